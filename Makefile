@@ -3,7 +3,8 @@
 # make test      that, and everything that a change could break in common use
 # make test-all  that and the rest: mutants, proofs, exotic compilers, emulators (test-rest: these by themselves)
 # make test-hdl  only the tests of the Verilog: simulation, mutants, proofs, lint, synthesis
-# make test-long a hundred thousand random swaps
+# make test-long what is seldom worth its time: more seeds and combinations, tables of docs, 100,000 random swaps
+# make durations where CPU time goes, by folder and by test, into build/durations.txt (OF=tests/emit: of these alone)
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
 # make instructions what the C takes on Cortex-M, into docs/instructions.md
 # make link      what an upload takes, into docs/upload.md
@@ -32,33 +33,46 @@ README_PACKAGES := ca-certificates git gpgv make python3 python3-venv
 # What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
 CHECK_TOOLS := gcc libc6-dev iverilog libpython
 COMMON_TOOLS := $(CHECK_TOOLS) make g++ ccache clang libclang-rt-dev cmake ninja-build ghdl srecord chromium groff man-db
-HDL_TOOLS := make g++ ccache iverilog libpython yosys z3
+HDL_TOOLS := make g++ ccache iverilog libpython yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
     arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm
 TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # A process that has nothing more to do takes tests from the end of the other's: neighbours stay together, so that what
 # they share is made once. OpenBLAS threads only spin beside the other processes. Half of what is compiled of each model
-# of Verilator is its library, the same for all.
-PYTEST := OPENBLAS_NUM_THREADS=1 OBJCACHE=ccache CCACHE_DIR=$(CURDIR)/build/ccache $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# of Verilator is its library, the same for all. Without bytecode every process compiles anew: the processes that run the
+# tests hundreds of files, each command of tablegen that a test starts its modules, which doubles what it takes. A make
+# that a test starts is no part of this one.
+PYTEST := MAKEFLAGS= MFLAGS= PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OBJCACHE=ccache CCACHE_DIR=$(CURDIR)/build/ccache $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench cost figures notebooks site man reference paper clean
+.PHONY: demo lint style types check run-quick test run-common test-rest test-all test-hdl test-long durations resources instructions link fuzz bench cost figures notebooks site man reference paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
 	$(BIN)/tablegen build examples/annexin_200nm.toml -o build/demo
 
-lint: $(VENV)/installed-test
+lint: style types
+
+style: $(VENV)/installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: $(VENV)/installed-test
 	$(BIN)/mypy
 
-check: lint
+# Types are checked in one process, beside the tests.
+check: style
 	@.ci/system-packages $(CHECK_TOOLS)
+	@$(MAKE) --no-print-directory --jobs=2 types run-quick
+
+test: style
+	@.ci/system-packages $(COMMON_TOOLS)
+	@$(MAKE) --no-print-directory --jobs=2 types run-common
+
+run-quick:
 	$(PYTEST) -m 'not (common or rest or long)'
 
-test: lint
-	@.ci/system-packages $(COMMON_TOOLS)
+run-common:
 	$(PYTEST) -m 'not (rest or long)'
 
 test-rest: $(VENV)/installed-test
@@ -74,11 +88,19 @@ test-hdl: $(VENV)/installed-test
 	$(PYTEST) hdl_tests
 
 test-long: $(VENV)/installed-test
-	@.ci/system-packages $(COMMON_TOOLS)
+	@.ci/system-packages $(TOOLS)
 	$(PYTEST) -m long
 
+# OF=FOLDER or FILE: of these tests alone; MARKS: of those of a set.
+OF ?=
+MARKS ?= not long
+durations: $(VENV)/installed-test
+	@.ci/system-packages $(TOOLS)
+	DURATIONS=$(CURDIR)/build/durations.txt PYTHONPATH=tests/helpers $(PYTEST) -p durations -m '$(MARKS)' $(OF)
+	@head -n 40 build/durations.txt
+
 resources: $(VENV)/installed-test
-	@.ci/system-packages $(HDL_TOOLS) nextpnr-ice40
+	@.ci/system-packages $(HDL_TOOLS)
 	$(BIN)/python benchmarks/resources.py --write
 
 instructions: $(VENV)/installed-test

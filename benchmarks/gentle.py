@@ -19,7 +19,7 @@ from scaling import SECTION_8
 from tablegen.base.input_errors import Unphysical
 from tablegen.certificate.optimum import least_acceleration
 from tablegen.compensation.line import LineShape
-from tablegen.waveform.minimum_acceleration import Straightness, gentlest, least_percent
+from tablegen.waveform.minimum_acceleration import Straightness, least_percent, minimum_acceleration_series
 from tablegen.waveform.window_fit import fit_window
 
 PAGE = Path(__file__).parent.parent / "docs" / "waveform.md"
@@ -41,11 +41,11 @@ def table() -> tuple[list[str], float]:
     worst = 0.0
     for name, straight in LINES.items():
         for harmonics in HARMONICS:
-            fitted = fit_window(straight.asked, harmonics, straight.window, straight.both)
+            fitted = fit_window(straight.target, harmonics, straight.window, straight.both)
             window = f"{fitted.peak_acceleration():.1f}, {straight.error_percent(fitted):.2g} %"
             for percent in PERCENT:
                 try:
-                    series = gentlest(straight, harmonics, percent)
+                    series = minimum_acceleration_series(straight, harmonics, percent)
                 except Unphysical:
                     least = least_percent(straight, harmonics)
                     rows.append(f"| {name} | {harmonics} | {percent:g} | {window} | from {least:.2g} % on | | |")

@@ -10,6 +10,7 @@ import os
 import re
 import tempfile
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -28,7 +29,7 @@ from tablegen.emit.render import render
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import MODES, TableShape
 from tablegen.html_report.table_charts import table_charts
-from tablegen.html_report.table_costs import CELLS, INSTRUCTIONS
+from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
 from tablegen.html_report.table_rows import axis_tables
 from tablegen.html_report.tables_text import tables_text
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -45,7 +46,9 @@ COSTS = HERE.parent / "tablegen" / "html_report" / "table_costs.py"
 CORES = ("cortex-m4", "cortex-m0plus")
 ERRORS = (2.0, 1.0, 0.75, 0.6, 0.55)
 SINES = ((16, 1000, 1.0), (16, 65536, 1.0), (18, 1000, 0.6), (18, 65536, 0.6))
-# Words of the tables that are counted: how many and how wide they are changes nothing.
+NARROW = MeasuredRun(16, 16, False)
+_WORDS = {16: "to 16 bits", 32: "above"}
+# Words of the tables that are counted: how many changes nothing.
 _LENGTHS: dict[Mode, int | None] = {"direct": None, "interpolated": 512, "cubic": 128}
 
 
@@ -93,12 +96,15 @@ def memory() -> str:
 
 def costs() -> str:
     """What the modes take, as a table of the page."""
-    head = f"| mode | {' | '.join(f'instructions, {core}' for core in CORES)} | cells, HX8K |"
+    head = "| mode | words | converter's word | " + " | ".join(f"instructions, {core}" for core in CORES)
     rows = [
-        f"| `{mode}` | {' | '.join(f'{INSTRUCTIONS[mode][core]:g}' for core in CORES)} | {CELLS[mode]} |"
+        f"| `{mode}` | {_WORDS[run.table_storage_bits]} | {_WORDS[run.output_storage_bits]}"
+        f"{', coded' if run.coded else ''} | {' | '.join(f'{COUNTS[run][mode][core]:g}' for core in CORES)} "
+        f"| {CELLS[mode]} |"
         for mode in MODES
+        for run in COUNTS
     ]
-    return "\n".join([head, f"|{'---|' * (len(CORES) + 2)}", *rows, ""])
+    return "\n".join([f"{head} | cells, HX8K |", f"|{'---|' * (len(CORES) + 4)}", *rows, ""])
 
 
 def output() -> str:
@@ -117,27 +123,35 @@ def figure() -> bytes:
     return picture(charts.charts, "svg", "", charts.columns)
 
 
-def instructions(core: str) -> dict[Mode, float]:
-    """An axis sample of ``fill`` by mode: of x alone, since y keeps lines between its words."""
-    found: dict[Mode, float] = {}
+def instructions(core: str, run: MeasuredRun = NARROW) -> dict[Mode, float]:
+    """Count an axis sample of ``fill`` by mode: of x alone, since y keeps lines between its words."""
+    counts: dict[Mode, float] = {}
     for mode in MODES:
         spline = mode == "cubic"  # the runtime plays it only if it is compiled for it
-        found[mode] = round(2.0 * _fill(core, mode, spline) - _fill(core, "interpolated", spline), 1)
-    return found
+        counts[mode] = round(2.0 * _fill(core, mode, spline, run) - _fill(core, "interpolated", spline, run), 1)
+    return counts
 
 
-def _fill(core: str, mode: Mode, spline: bool) -> float:
+@cache
+def _fill(core: str, mode: Mode, spline: bool, run: MeasuredRun) -> float:
     """Mean of a frame of the example, of samples of both axes."""
-    setup = load(EXAMPLE)
-    x = structs.replace(setup.scan.x, table=Table(mode=mode, length=_LENGTHS[mode], bits=16))
-    plan = make_plan(structs.replace(setup, scan=structs.replace(setup.scan, x=x)))
+    setup, wide = load(EXAMPLE), run.table_storage_bits > 16
+    x = structs.replace(setup.scan.x, table=Table(mode=mode, length=_LENGTHS[mode], bits=18 if wide else 16))
+    assert setup.scan.dac is not None
+    dac = structs.replace(setup.scan.dac, coding="twos-complement" if run.coded else "offset-binary")
+    plan = make_plan(structs.replace(setup, scan=structs.replace(setup.scan, x=x, dac=dac)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for file, content in render(plan, certify(plan), ["c"]).items():
             (folder / file).write_bytes(content)
         sources = [HERE / "table_count.c", firmware.MEMORY, folder / f"{plan.name}.c", folder / f"{plan.name}.h"]
         options = ("-std=c99", "-O2", f"-DDAC_SPLINE={int(spline)}")
-        machine = Processor(compile_bare(folder / "count.elf", [*c_runtime(), *sources], core, None, options), core)
+        widths = {
+            "DAC_TABLE_STORAGE_BITS": run.table_storage_bits,
+            "DAC_OUTPUT_STORAGE_BITS": run.output_storage_bits,
+        }
+        program = compile_bare(folder / "count.elf", [*c_runtime(), *sources], core, None, options, widths)
+        machine = Processor(program, core)
         machine.call("count_start")
         if int.from_bytes(machine.read("refused", 4), "little"):
             raise RuntimeError(f"the runtime refuses the program with a {mode} table")
@@ -163,19 +177,23 @@ def cells() -> dict[Mode, int | None]:
 
 def write_costs() -> None:
     """Measure what the modes take, and put it where the command reads it."""
-    by_core = {core: instructions(core) for core in CORES}
-    lines = ["INSTRUCTIONS: dict[Mode, dict[str, float]] = {"]
-    for mode in MODES:
-        counts = ", ".join(f'"{core}": {by_core[core][mode]}' for core in CORES)
-        lines.append(f'    "{mode}": {{{counts}}},')
-    lines += ["}", "# Cells of one axis in Verilog on an iCE40 HX8K, a sample a clock, of a cubic table one in 11."]
+    lines = ["COUNTS: dict[MeasuredRun, dict[Mode, dict[str, float]]] = {"]
+    for run in COUNTS:
+        by_core = {core: instructions(core, run) for core in CORES}
+        lines.append(f"    MeasuredRun({run.table_storage_bits}, {run.output_storage_bits}, {run.coded}): {{")
+        for mode in MODES:
+            counts = ", ".join(f'"{core}": {by_core[core][mode]}' for core in CORES)
+            lines.append(f'        "{mode}": {{{counts}}},')
+        lines.append("    },")
+    lines += ["}", "INSTRUCTIONS = COUNTS[MeasuredRun(16, 16, False)]"]
+    lines += ["# Cells of one axis in Verilog on an iCE40 HX8K, a sample a clock, of a cubic table one in 11."]
     lines += [
         "CELLS: dict[Mode, int] = {",
         *(f'    "{mode}": {count},' for mode, count in cells().items()),
         "}",
         "",
     ]
-    before = COSTS.read_text("utf-8").partition("INSTRUCTIONS")[0]
+    before = COSTS.read_text("utf-8").partition("COUNTS: ")[0]
     COSTS.write_text(before + "\n".join(lines), "utf-8")
 
 

@@ -203,6 +203,19 @@ def hexadecimal(digits: str) -> int:
         raise Wrong(f"undefined: {digits}") from None
 
 
+def check_word(
+    at: int, writes: Sequence[tuple[int, int, int]], writable: bool, write: bool, commit: bool, where: Sequence[str]
+) -> None:
+    """Hold a word of a boot against the one that is due."""
+    word = (-1, 0, 0) if commit else tuple(map(hexadecimal, where))
+    if write and commit:
+        raise Wrong("two things at once")
+    if not writable:
+        raise Wrong(f"refused word {at}")
+    if at == len(writes) or word != writes[at]:
+        raise Wrong(f"word {at}")
+
+
 def check(name: str, lines: Sequence[str]) -> int:
     """Hold what left against the law; returns how many boots came to their end."""
     writes, clocks = SETUPS[name].writes, stimulus(name)
@@ -221,13 +234,7 @@ def check(name: str, lines: Sequence[str]) -> int:
             if got != (asked.host_write, asked.host_commit, *asked.host):
                 raise Wrong("the host is not heard")
         elif write or commit:
-            region, address, data = (-1, 0, 0) if commit else map(hexadecimal, where)
-            if write and commit:
-                raise Wrong("two things at once")
-            if not asked.writable:
-                raise Wrong(f"refused word {at}")
-            if at == len(writes) or (region, address, data) != writes[at]:
-                raise Wrong(f"word {at}")
+            check_word(at, writes, asked.writable, bool(write), bool(commit), where)
             at += 1
             ended += at == len(writes)
         # A clock without a word is one that was held up, the first one, or after the commit, held up or not, the last.

@@ -38,7 +38,7 @@ class Proof:
     asserts_in_stubs: bool = True
 
 
-ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit")
+ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit", "dac_whole")
 PROOFS = {
     "slew": Proof("slew_properties", 1, 12, {"BITS": 4}),
     # These look back for as long as a sample is under way.
@@ -50,11 +50,13 @@ PROOFS = {
     "play_cubic": Proof("play_properties", 59, 67, {"CUBIC": 1}, ALL_STUBS, 90, asserts_in_stubs=False),
     "play_cubic_low_area": Proof("play_properties", 18, 26, {"CUBIC": 1, "LOW_AREA": 1}, ALL_STUBS, 30),
     "valid": Proof("valid_properties", 4, 20, covers=12),
-    "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit"), covers=40),
+    "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit", "dac_whole"), covers=40),
     "sequencer_of_look_up_tables": Proof(
-        "sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis", "dac_fit")
+        "sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis", "dac_fit", "dac_whole")
     ),
-    "sequencer_that_shapes": Proof("sequencer_properties", 27, 35, {"SHAPING": 3}, stubs=("dac_axis", "dac_fit")),
+    "sequencer_that_shapes": Proof(
+        "sequencer_properties", 27, 35, {"SHAPING": 3}, stubs=("dac_axis", "dac_fit", "dac_whole")
+    ),
     "first": Proof("shaper_properties", 1, 8, {"SHAPING": 1}, covers=8),
     "second": Proof("shaper_properties", 2, 12, {"SHAPING": 2}, covers=12),
 }
@@ -262,7 +264,11 @@ MUTANTS = {
     "park_leaves_it_armed": ("requests", "dac_scan", "if (park || reset) armed", "if (reset) armed"),
     "reset_ignored": ("requests", "dac_scan", "&& !park && !reset;", "&& !park;"),
     "trigger_without_arm": ("requests", "dac_scan", "trigger && (armed || arm)", "trigger"),
-    "trigger_without_program": ("requests", "dac_scan", "(loaded || (tick && committed))", "1"),
+    "trigger_without_program": ("requests", "dac_scan", "(loaded || committed)", "1"),
+    "trigger_before_the_first_tick_lost": ("requests", "dac_scan", "(loaded || committed)", "(loaded || take)"),
+    "withdrawn_and_started": ("requests", "dac_scan", " && !unloads && !still_running", " && !still_running"),
+    "withdrawn_and_running": ("requests", "dac_scan", " && last_frame) && !unloads;", " && last_frame);"),
+    "taken_and_withdrawn": ("requests", "dac_scan", "!loaded && !take;", "!loaded;"),
     "trigger_restarts_a_scan": ("requests", "dac_scan", " && !still_running;", ";"),
     "arm_alone_starts": ("requests", "dac_scan", "go = trigger && (armed || arm)", "go = (trigger && armed || arm)"),
     "armed_for_ever": ("requests", "dac_scan", "armed <= 1'b0;\n            frames_left", "frames_left"),

@@ -49,7 +49,7 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
     for at in np.flatnonzero(swapped & playing):
         before = starts[starts < at][-1]
         assert at - before in {program.schedule.ticks for program in pair}  # the line before was whole
-    follow_their_programs(capture, script.taken)
+    follow_their_programs(capture, script.swapped_programs)
 
 
 @pytest.mark.rest

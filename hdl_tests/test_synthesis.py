@@ -145,6 +145,7 @@ def test_a_change_of_the_verilog_changes_the_digest(tmp_path: Path, old: str) ->
 )
 def test_meets_the_requirements(name: str) -> None:
     """At the first seed: the cells are near those of the page, the rate is at least that of its slowest seed."""
+    tool("nextpnr-ice40")
     result = resources.measure(resources.CASES[name], resources.SEEDS[:1])
     row = resources.page_rows()[name]
     holds(name, result.cells, result.mhz, result.counts["multipliers"])

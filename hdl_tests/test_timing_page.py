@@ -20,6 +20,15 @@ SEEN = ("writable", "refused", "committed", "armed", "running", "strobe", "swapp
 Clock = dict[str, int]
 
 
+def program_writes() -> list[int]:
+    """The whole program, a word a write as the bench reads it: region, address and data."""
+    program = random_dual(np.random.default_rng(1), SequencerShape(16, 1, 3, 16, 1, 2, 16), (20, 20), tame=True)
+    words = [(0, at, word) for at, word in enumerate(program_words(program.schedule, program.x, program.y))]
+    for region, table in ((1, program.x.words), (2, program.y.words)):
+        words += [(region, at, int(word) & 0xFFFFFFFF) for at, word in enumerate(table)]
+    return [region << 48 | at << 32 | word for region, at, word in words]
+
+
 def taken() -> list[Clock]:
     """A program is committed, taken by the first tick, played from arm and trigger on, and parked."""
     asked: list[Clock] = [{} for _ in range(96)]
@@ -35,15 +44,16 @@ def taken() -> list[Clock]:
 
 def refused() -> list[Clock]:
     """A line of 429 ticks in 8 bits: its commit is refused until it is discarded and written again."""
-    asked: list[Clock] = [{} for _ in range(30)]
+    writes = program_writes()
+    asked: list[Clock] = [{} for _ in range(30 + len(writes))]
     asked[2] = {"write": 1, "data": 429}
     asked[4] = {"commit": 1}
     asked[9] = {"write": 1, "data": 20}
     asked[11] = {"commit": 1}
     asked[15] = {"withdraw": 1}
-    asked[18] = asked[19] = {"write": 1, "data": 20}
-    asked[20] = {"commit": 1}
-    asked[24] = {"tick": 1}
+    asked[18 : 18 + len(writes)] = [{"write": 1, "data": word} for word in writes]
+    asked[18 + len(writes)] = {"commit": 1}
+    asked[22 + len(writes)] = {"tick": 1}
     return asked
 
 
@@ -58,13 +68,10 @@ DIAGRAMS = (
 
 def simulate(asked: list[Clock], folder: Path) -> dict[str, str]:
     """Every signal on every clock, 0 and 1, after a whole program was written."""
-    program = random_dual(np.random.default_rng(1), SequencerShape(16, 1, 3, 16, 1, 2, 16), (20, 20), tame=True)
-    words = program_words(program.schedule, program.x, program.y)
-    written = [1 << 56 | at << 32 | word for at, word in enumerate(words)]
-    for region, table in ((1, program.x.words), (2, program.y.words)):
-        written += [1 << 56 | region << 48 | at << 32 | int(word) & 0xFFFFFFFF for at, word in enumerate(table)]
+    writes = program_writes()
+    written = [1 << 56 | word for word in writes]
     played = [
-        sum(clock.get(name, 0) << 56 + bit for bit, name in enumerate(ASKED)) | clock.get("data", words[0])
+        sum(clock.get(name, 0) << 56 + bit for bit, name in enumerate(ASKED)) | clock.get("data", writes[0])
         for clock in asked
     ]
     (folder / "stimulus.hex").write_text("".join(f"{word:x}\n" for word in [*written, *played]), "ascii")
@@ -103,7 +110,7 @@ def test_the_diagrams_show_what_they_say(tmp_path: Path) -> None:
     assert "1" in played["playing"]
     stopped = simulate(refused(), tmp_path)
     assert stopped["refused"][6] == "1"
-    assert stopped["committed"].index("1") == 22
+    assert stopped["committed"].index("1") == 20 + len(program_writes())
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.band_limit import band_limited
 from tablegen.planning.enough_harmonics import plain_line
 from tablegen.planning.line_plan import make_plan
-from tablegen.waveform.minimum_acceleration import Straightness, fewest_harmonics, gentlest
+from tablegen.waveform.minimum_acceleration import Straightness, fewest_harmonics, minimum_acceleration_series
 from tablegen.waveform.series import FourierSeries
 
 WINDOW = (0.1, 0.9)
@@ -120,7 +120,11 @@ def at_equal_bandwidth() -> list[list[str]]:
     rows = [of_series("bandwidth", what, method(HARMONICS)) for what, method in METHODS.items()]
     for percent in reversed(PERCENT):
         rows.append(
-            of_series("bandwidth", f"ours, least acceleration at {percent:g} %", gentlest(STRAIGHT, HARMONICS, percent))
+            of_series(
+                "bandwidth",
+                f"ours, least acceleration at {percent:g} %",
+                minimum_acceleration_series(STRAIGHT, HARMONICS, percent),
+            )
         )
     return rows
 
@@ -144,7 +148,7 @@ def at_equal_error() -> list[list[str]]:
         least = fewest_harmonics(STRAIGHT, percent, 1, TRIED[-1])
         assert least is not None
         for what, harmonics in (("fewest harmonics", least), *(("least acceleration", h) for h in (HARMONICS, 64))):
-            rows.append(of_series(compared, f"ours, {what}", gentlest(STRAIGHT, harmonics, percent)))
+            rows.append(of_series(compared, f"ours, {what}", minimum_acceleration_series(STRAIGHT, harmonics, percent)))
     return rows
 
 

@@ -8,14 +8,16 @@
 // At power-up it boots the scan of the build and holds its park codes, until it is triggered over the line. `permit` is
 // the interlock of the instrument: while it is low, no new scan becomes active and the old one continues. MEMORY_BYTES
 // is enough for scans as Fourier words; 16384 is enough for the tables of this scan. X_MAX_STEP and the parameters next
-// to it are limits that no scan may exceed: set those of your instrument.
+// to it are limits that no scan may exceed: set those of your instrument. It serves the scans that scanner.v does:
+// linked_scanner_serves, below, refuses the others.
 
 `default_nettype none
 
 module linked_scanner #(
     parameter CLOCKS_PER_TICK = 100,  // a 50 MHz clock, for the 500 kHz of the scan
     parameter CLOCKS_PER_BIT = 434,   // 115200 baud
-    parameter MEMORY_BYTES = 2048
+    parameter MEMORY_BYTES = 2048,
+    parameter SHAPING = 0             // the highest order of shaping that it plays, 0 to 3
 ) (
     input  wire clock,
     input  wire line_in,
@@ -37,6 +39,8 @@ module linked_scanner #(
 
     localparam HARMONICS = 127;
 
+    linked_scanner_serves #(.CLOCKS_PER_TICK(CLOCKS_PER_TICK), .SHAPING(SHAPING), .HARMONICS(HARMONICS)) this_scan ();
+
     reg [15:0] divider;
     reg tick;
     initial begin
@@ -53,7 +57,8 @@ module linked_scanner #(
     wire [15:0] host_address, address, arm_frames;
     wire [31:0] host_data, data;
     wire strobe, swapped, playing, parked, missed, missing, refused;
-    wire [15:0] x_code, y_code, x_word, y_word;
+    wire [ANNEXIN_200NM_X_DAC_BITS-1:0] x_code, y_code;
+    wire [ANNEXIN_200NM_X_DAC_WORD_BITS-1:0] x_word, y_word;
     wire [3:0] faults;
     wire [63:0] fault_counts;
 
@@ -62,7 +67,9 @@ module linked_scanner #(
         .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
         .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS), .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED),
         .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS),
-        .FOURIER(1), .HARMONICS(HARMONICS), .CONVERTER(ANNEXIN_200NM_X_DAC_WORD_BITS),
+        .FOURIER(1), .HARMONICS(HARMONICS), .SHAPING(SHAPING),
+        .CONVERTER(ANNEXIN_200NM_X_DAC_WORD_BITS + 64 * ANNEXIN_200NM_X_DAC_TWOS_COMPLEMENT +
+                   128 * ANNEXIN_200NM_X_DAC_LEFT_ALIGNED),
         .X_CODE_MIN(ANNEXIN_200NM_X_CODE_MIN), .X_CODE_MAX(ANNEXIN_200NM_X_CODE_MAX),
         .X_MAX_STEP(ANNEXIN_200NM_X_MAX_STEP),
         .Y_CODE_MIN(ANNEXIN_200NM_Y_CODE_MIN), .Y_CODE_MAX(ANNEXIN_200NM_Y_CODE_MAX),
@@ -96,7 +103,7 @@ module linked_scanner #(
         .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS),
         .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED), .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS),
         .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS),
-        .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE)
+        .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE), .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
         .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw || (booting && missing)),
@@ -117,12 +124,50 @@ module linked_scanner #(
         .TWOS_COMPLEMENT(ANNEXIN_200NM_Y_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(ANNEXIN_200NM_Y_DAC_LEFT_ALIGNED)
     ) y_coding (.code(y_code), .word(y_word));
 
-    dac_spi #(.WORD_BITS(16), .FRAME_BITS(16)) converters (
+    dac_spi #(.WORD_BITS(ANNEXIN_200NM_X_DAC_WORD_BITS), .FRAME_BITS(16)) converters (
         .clock(clock), .reset(1'b0), .strobe(strobe), .x_word(x_word), .y_word(y_word), .sclk(sclk), .cs_x_n(select_n),
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
     assign fault = faults != 4'd0 || missing || refused;
+endmodule
+
+
+// Which scans this device plays. The reason of a refusal is the name of a module that does not exist.
+module linked_scanner_serves #(
+    parameter CLOCKS_PER_TICK = 100,
+    parameter SHAPING = 3,
+    parameter HARMONICS = 127
+);
+    localparam ANNEXIN_200NM_SHAPING = 0;  // a shaped scan has its own, which hides this one
+
+    generate
+        if (1) begin : scan
+            `include "annexin_200nm.vh"
+
+            localparam CUBIC = ANNEXIN_200NM_X_INTERPOLATED == 3 || ANNEXIN_200NM_Y_INTERPOLATED == 3;
+            localparam CLOCKS = (CUBIC ? 90 : 41) + (SHAPING != 0 ? 2 : 0);
+
+            if (ANNEXIN_200NM_X_DAC_WORD_BITS != 16 || ANNEXIN_200NM_Y_DAC_WORD_BITS != 16) begin : guard_0
+                linked_scanner_serves_converters_with_words_of_16_bits stop ();
+            end
+            if (ANNEXIN_200NM_X_DAC_BITS != ANNEXIN_200NM_Y_DAC_BITS) begin : guard_1
+                linked_scanner_serves_converters_of_the_same_bits stop ();
+            end
+            if (ANNEXIN_200NM_X_INTERPOLATED == 0 || ANNEXIN_200NM_Y_INTERPOLATED == 0) begin : guard_2
+                linked_scanner_renders_no_direct_table stop ();
+            end
+            if (ANNEXIN_200NM_X_HARMONICS > HARMONICS || ANNEXIN_200NM_Y_HARMONICS > HARMONICS) begin : guard_3
+                linked_scanner_HARMONICS_is_less_than_those_of_the_scan stop ();
+            end
+            if (ANNEXIN_200NM_SHAPING > SHAPING) begin : guard_4
+                linked_scanner_SHAPING_is_less_than_that_of_the_scan stop ();
+            end
+            if (CLOCKS_PER_TICK < CLOCKS) begin : guard_5
+                linked_scanner_CLOCKS_PER_TICK_is_less_than_the_sequencer_takes stop ();
+            end
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -16,6 +16,8 @@ module play (
 );
     `include "annexin_200nm.vh"
 
+    play_serves this_scan ();
+
     play_axis #(
         .TABLE_FILE(ANNEXIN_200NM_X_TABLE_FILE),
         .LENGTH(ANNEXIN_200NM_X_TABLE_LENGTH),
@@ -33,6 +35,22 @@ module play (
         .CODE_MIN(ANNEXIN_200NM_X_CODE_MIN),
         .CODE_MAX(ANNEXIN_200NM_X_CODE_MAX)
     ) axis (.clock(clock), .reset(reset), .tick(tick), .code(code));
+endmodule
+
+
+// A shaped scan is none for it: the output of `play_axis` is rounded, and no remainder is fed back.
+module play_serves;
+    localparam ANNEXIN_200NM_SHAPING = 0;  // a shaped scan has its own, which hides this one
+
+    generate
+        if (1) begin : scan
+            `include "annexin_200nm.vh"
+
+            if (ANNEXIN_200NM_SHAPING != 0) begin : guard
+                play_plays_no_shaped_scan stop ();
+            end
+        end
+    endgenerate
 endmodule
 
 

@@ -139,7 +139,7 @@ static void forget(dac_axis *axis)
 #endif
 }
 
-/* Starts at line 0 of the active program. */
+/* Starts at line 0 of the active program. Without one swap() does, with the program that waits. */
 static void begin(dac_sequencer *s)
 {
     s->tick = 0;
@@ -152,15 +152,21 @@ static void begin(dac_sequencer *s)
     s->catching_up = true;
 }
 
+static bool has_program(const dac_sequencer *s)
+{
+    return s->now != NULL || s->waiting;
+}
+
 static void trigger(dac_sequencer *s)
 {
-    if (!s->armed || s->running || s->now == NULL)
+    if (!s->armed || s->running || !has_program(s))
         return;
     s->armed = false;
     s->endless = s->armed_frames == 0;
     s->frames_left = s->armed_frames;
     s->running = true;
-    begin(s);
+    if (s->now != NULL)
+        begin(s);
 }
 
 static void park(dac_sequencer *s)
@@ -178,6 +184,8 @@ static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
         break;
     case WITHDRAW:
         s->waiting = 0;
+        if (!has_program(s)) /* a scan of the first program was triggered, and never plays */
+            s->running = false;
         break;
     case ARM:
         s->armed = true;

@@ -11,7 +11,6 @@
  *     dac_sequencer_load(&sequencer, &scan);
  *     dac_sequencer_commit(&sequencer);
  *     ... start a timer, or a DMA channel, whose interrupt calls dac_sequencer_step() or dac_sequencer_fill()
- *     while (dac_sequencer_status(&sequencer).swaps == 0) {}    the first tick takes the program
  *     dac_sequencer_arm(&sequencer, 0);
  *     dac_sequencer_trigger(&sequencer);
  *
@@ -340,14 +339,15 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 bool dac_sequencer_commit(dac_sequencer *s);
 
 /* Withdraws a committed program, if it was not taken yet. Once dac_sequencer_writable() returns true, status.swaps tells whether
- * the program was taken before: it has then grown. */
+ * the program was taken before: it has then grown. A scan that was triggered for the first program does not start. */
 bool dac_sequencer_withdraw(dac_sequencer *s);
 
 /* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. Returns false for more. A running scan
  * keeps its own count. */
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames);
 
-/* Starts at line 0, if armed, not running, and a program is loaded. Otherwise does nothing. */
+/* Starts at line 0, if armed, not running, and with a program: one that was taken, or one that is committed by then, so that
+ * commit, arm and trigger may follow each other at once. Otherwise does nothing. */
 bool dac_sequencer_trigger(dac_sequencer *s);
 
 /* Disarms, stops, ramps to the park codes and holds them. */

@@ -4,7 +4,10 @@
 #   include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install piezo-tablegen or give TABLEGEN=PATH))
 #   $(eval $(call tablegen_build,scan.toml,build/scan))
 #
-#   firmware: main.o $(build/scan_SOURCES:.c=.o)
+#   CPPFLAGS += -Ibuild/scan $(build/scan_CPPFLAGS)
+#   OBJECTS := main.o $(build/scan_SOURCES:.c=.o)
+#   firmware: $(OBJECTS)
+#   $(OBJECTS): $(build/scan_OPTIONS)
 #
 # builds scan.toml into the directory build/scan before make looks at anything else, and gives
 #
@@ -13,6 +16,7 @@
 #   build/scan_CPPFLAGS    -DDAC_TABLE_STORAGE_BITS=.. -DDAC_OUTPUT_STORAGE_BITS=..: the widths that this scan needs, for all files;
 #                          and -DDAC_SPLINE=1 for cubic tables
 #                          and -DDAC_SHAPING=.. where its output is shaped
+#   build/scan_OPTIONS     a file that changes when build/scan_CPPFLAGS do: let all objects depend on it
 #   build/scan_VERILOG     dac_*.v
 #   build/scan_MEMORY      the .mem files
 #   build/scan_FILES       all files of the build, NAME.vh, manifest.json and those of other formats too
@@ -65,8 +69,17 @@ $(2)_FILES := $(2)/manifest.json $$(addprefix $(2)/,$$(call tablegen_listed,$(2)
 $(2)_SOURCES := $$(filter %.c,$$($(2)_FILES))
 $(2)_HEADERS := $$(filter %.h,$$($(2)_FILES))
 $(2)_CPPFLAGS := $$(foreach option,TABLE_STORAGE_BITS OUTPUT_STORAGE_BITS SHAPING SPLINE,$$(call tablegen_option,$$(option),$$(filter-out $(2)/dac_%,$$($(2)_HEADERS))))
+$(2)_OPTIONS := $(2)/tablegen-build.options
 $(2)_VERILOG := $$(filter %.v,$$($(2)_FILES))
 $(2)_MEMORY := $$(filter %.mem,$$($(2)_FILES))
+
+# Written as soon as the options are known, and only if they are others: its time is that of the last change.
+ifneq ($$(and $$(tablegen_goals),$$(wildcard $(2)/manifest.json)),)
+ifneq ($$(file <$$($(2)_OPTIONS)),$$($(2)_CPPFLAGS))
+$$(file >$$($(2)_OPTIONS),$$($(2)_CPPFLAGS))
+endif
+endif
+$$($(2)_OPTIONS): ;
 
 # A file that somebody has removed is made again.
 ifneq ($$(filter-out $$(wildcard $$($(2)_FILES)),$$($(2)_FILES)),)

@@ -22,6 +22,7 @@ module dac_scan #(
     input  wire                  trigger,
     input  wire                  park,
     input  wire                  committed,   // a program waits to be taken
+    input  wire                  withdraw,    // it does not after this clock
     input  wire                  loaded,      // there is a program to play
     output wire                  take,        // the tick of this clock takes the program
     output reg                   armed,
@@ -45,7 +46,7 @@ module dac_scan #(
     reg [LINE_BITS:0] idle_lines;
     initial idle_lines = 0;
     reg [TICK_BITS-1:0] next_to_last_tick;
-    initial next_to_last_tick = 0;
+    initial next_to_last_tick = 1;  // tick 0 of the first program, which is being loaded, is not the last but one
     reg [LINE_BITS-1:0] last_line_number;
     initial last_line_number = 0;
     wire [TICK_BITS:0] less_two = idle_ticks - 2;
@@ -95,8 +96,9 @@ module dac_scan #(
     wire plays = tick && running;
     wire fresh = starts || take;
     wire frame_ends = plays && last && bottom;  // a line that is fresh does not end with its first tick
-    wire still_running = running && !(frame_ends && last_frame);
-    wire go = trigger && (armed || arm) && (loaded || (tick && committed)) && !still_running;
+    wire unloads = withdraw && !loaded && !take;  // the first program is withdrawn: there is none to play
+    wire still_running = running && !(frame_ends && last_frame) && !unloads;
+    wire go = trigger && (armed || arm) && (loaded || committed) && !unloads && !still_running;
 
     initial begin
         armed = 1'b0;

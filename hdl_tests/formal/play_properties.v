@@ -11,7 +11,7 @@ module play_properties
 
     localparam LATENCY = CUBIC ? 57 : 24;  // clocks from a tick to its strobe, in the pipeline with multiplier blocks
 
-    reg before, was_stopped, was_running, was_armed, was_arm, was_trigger, was_tick, was_lost;
+    reg before, was_stopped, was_withdraw, was_running, was_armed, was_arm, was_trigger, was_tick, was_lost;
     reg [LATENCY-1:0] ticks, ran;  // the highest bit is of the tick whose strobe may come now
     reg works, ran_last;           // in low area, a tick at a time
     initial begin
@@ -23,6 +23,7 @@ module play_properties
     always @(posedge clock) begin
         before <= 1;
         was_stopped <= park || reset;
+        was_withdraw <= withdraw;
         was_running <= running;
         was_armed <= armed;
         was_arm <= arm;
@@ -37,7 +38,7 @@ module play_properties
     always @* if (before) begin
         if (was_stopped) assert (!running && !armed);
         if (running && !was_running) assert (was_trigger && (was_armed || was_arm) && !was_stopped);
-        if (was_running && !running) assert (was_stopped || was_tick);
+        if (was_running && !running) assert (was_stopped || was_tick || was_withdraw);
         if (armed && !was_armed) assert (was_arm);
         if (was_arm && !was_trigger && !was_stopped) assert (armed);
         if (was_lost) assert (faults[2]);

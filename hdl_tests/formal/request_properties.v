@@ -46,7 +46,8 @@ module request_properties
     wire frame_ends = line_ends && this_j + 1 == lines;
     wire ends = tick && plays && frame_ends && wanted != 0 && frames + 1 == wanted;
     wire goes_on = plays && !ends;
-    wire starts = trigger && (is_armed || arm) && !goes_on && (loaded || takes) && !park && !reset;
+    wire lost = withdraw && !loaded && !takes;  // the first program, before it is taken
+    wire starts = trigger && (is_armed || arm) && !goes_on && (loaded || committed) && !lost && !park && !reset;
     always @(posedge clock) begin
         written_ticks <= ticks_now;
         written_lines <= lines_now;
@@ -54,7 +55,7 @@ module request_properties
             ticks <= written_ticks;
             lines <= written_lines;
         end
-        plays <= (goes_on || starts) && !park && !reset;
+        plays <= (goes_on || starts) && !lost && !park && !reset;
         is_armed <= (is_armed || arm) && !starts && !park && !reset;
         if (arm) asked <= arm_frames;
         if (starts) begin
@@ -70,7 +71,8 @@ module request_properties
     end
 
     // The properties, of ports alone: what was asked on the clock before, and what is on this one.
-    reg before, was_stopped, was_running, was_armed, was_arm, was_trigger, was_loaded, was_tick, was_playing, was_ended;
+    reg before, was_stopped, was_running, was_armed, was_arm, was_trigger, was_loaded, was_tick, was_playing, was_ended,
+        was_lost;
     reg [TICK_BITS:0] was_k;
     reg [LINE_BITS:0] was_j;
     initial before = 0;
@@ -81,7 +83,8 @@ module request_properties
         was_armed <= armed;
         was_arm <= arm;
         was_trigger <= trigger;
-        was_loaded <= loaded || take;
+        was_loaded <= loaded || committed;
+        was_lost <= withdraw && !loaded && !take;
         was_tick <= tick;
         was_playing <= plays;
         was_ended <= ends;
@@ -92,13 +95,16 @@ module request_properties
         // After a park or a reset nothing plays on the next tick, and nothing is armed.
         if (was_stopped) assert (!running && !armed);
         // A scan begins by a trigger of an armed device with a program, and by nothing else.
-        if (running && !was_running) assert (was_trigger && (was_armed || was_arm) && was_loaded && !was_stopped);
+        if (running && !was_running) begin
+            assert (was_trigger && (was_armed || was_arm) && was_loaded && !was_stopped && !was_lost);
+            assert (loaded || committed);
+        end
         // A trigger is taken once.
         if (running && !was_running) assert (!armed);
         if (armed && !was_armed) assert (was_arm);
         // A counted scan is over with the last tick of its last frame, and not before.
         if (was_ended && !was_trigger) assert (!running);
-        if (was_running && !running) assert (was_stopped || was_ended);
+        if (was_running && !running) assert (was_stopped || was_ended || was_lost);
         assert (running == plays && armed == is_armed);
         // What a tick is.
         assert (tick_out == was_tick);
@@ -128,9 +134,10 @@ module request_properties
             assert ({1'b0, scan__next_to_last_tick} + 2 == ticks && ticks >= 8 && ticks <= (1 << TICK_BITS));
             assert ({1'b0, scan__last_line_number} + 1 == lines && lines >= 1 && lines <= (1 << LINE_BITS));
         end
+        if (!loaded) assert (scan__next_to_last_tick == 1 && ticks == 8 && lines == 1);
         if (is_armed) assert (scan__armed_frames == asked);
         if (plays) begin
-            assert (loaded);
+            assert (loaded || (committed && scan__starts));
             assert (k == {1'b0, scan__at_tick} && k < ticks);
             assert (j == {1'b0, scan__at_line} && j < lines);
             assert (scan__first == (k == 0));

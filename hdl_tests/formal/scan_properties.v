@@ -64,9 +64,11 @@ module scan_properties
         assert (scan__idle_ticks == written_ticks);
         if (committed) assert (written_ticks >= 8 && written_ticks <= (1 << TICK_BITS));
         if (loaded) assert ({1'b0, scan__next_to_last_tick} + 2 == line_ticks && line_ticks >= 8);
+        if (!loaded) assert (scan__next_to_last_tick == 1 && line_ticks == 8);
         if (loaded) assert (line_ticks <= (1 << TICK_BITS));
         if (running) begin
-            assert (loaded);
+            assert (loaded || committed);
+            if (!loaded) assert (number == 0);
             assert (number == {1'b0, scan__at_tick} && number < line_ticks);
             assert (scan__first == (number == 0));
             assert (scan__last == (number == line_ticks - 1));

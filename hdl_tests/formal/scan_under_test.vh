@@ -30,7 +30,7 @@
     dac_scan #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .FRAME_BITS(FRAME_BITS)) scan (
         .clock(clock), .reset(reset), .write(write && writable), .write_address(write_address), .write_data(write_data),
         .tick(tick), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .committed(committed),
-        .loaded(loaded), .take(take), .armed(armed), .running(running), .tick_out(tick_out), .load(load), .runs(runs),
+        .withdraw(withdraw), .loaded(loaded), .take(take), .armed(armed), .running(running), .tick_out(tick_out), .load(load), .runs(runs),
         .begins(begins), .line(line), .frame(frame), .y_advance(y_advance), .tick_number(tick_number),
         .line_number(line_number)
     );

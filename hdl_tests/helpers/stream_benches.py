@@ -25,5 +25,5 @@ def equal(bench: SequencerBench, script: Script) -> BenchRun:
     """Play a script; all has to be as the model has it, and every step inside the limit of the program that plays."""
     played = bench.play(script)
     assert played.equal, played
-    steps_are_limited(played.capture, script.taken)
+    steps_are_limited(played.capture, script.swapped_programs)
     return played

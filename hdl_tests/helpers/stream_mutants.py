@@ -447,7 +447,23 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "a trigger is not taken on the clock of its arm", "dac_scan", "trigger && (armed || arm)", "trigger && armed"
     )
-    yield Mutant("a trigger is taken with nothing to play", "dac_scan", "(loaded || (tick && committed)) && ", "")
+    yield Mutant("a trigger is taken with nothing to play", "dac_scan", "(loaded || committed) && ", "")
+    yield Mutant(
+        "a trigger is lost before the first program is taken",
+        "dac_scan",
+        "(loaded || committed)",
+        "(loaded || (tick && committed))",
+    )
+    yield Mutant(
+        "a trigger is taken though the first program is withdrawn",
+        "dac_scan",
+        " && !unloads && !still_running",
+        " && !still_running",
+    )
+    yield Mutant(
+        "the first program is withdrawn, and its scan runs", "dac_scan", "last_frame) && !unloads;", "last_frame);"
+    )
+    yield Mutant("a withdrawal stops the first program as it is taken", "dac_scan", "!loaded && !take;", "!loaded;")
     yield Mutant("a trigger is taken while a scan plays", "dac_scan", " && !still_running;", ";")
     yield Mutant(
         "a trigger does not disarm",

@@ -159,6 +159,39 @@ def random_renderings(
     script.wait_ticks(200)
 
 
+def first_program(script: Script, program: DualProgram, pace: int) -> None:
+    """Triggered before the first tick that could take it: withdrawn, withdrawn at once, and at last taken."""
+
+    def ticks(count: int) -> None:
+        script.tick_every(pace)
+        script.wait_ticks(count)
+        script.come_to_rest()
+
+    def commit() -> None:
+        script.request("commit", program=program)
+        script.wait(script.commit_clocks + 1)
+
+    script.come_to_rest()
+    script.request("park")
+    script.load(program)
+    commit()
+    script.request("arm", "trigger")
+    script.wait(2)
+    script.request("withdraw")
+    ticks(3)
+    commit()
+    script.request("arm", "trigger", "withdraw")  # it stays armed
+    ticks(3)
+    commit()
+    script.request("trigger")
+    script.wait(2)
+    script.tick_every(pace)
+    script.request("withdraw")  # too late: on the clock of the tick that takes it
+    script.wait_ticks(2 * program.schedule.ticks + 3)
+    script.request("park")
+    script.wait_ticks(3)
+
+
 def swaps_at_every_tick(script: Script, programs: tuple[DualProgram, DualProgram]) -> None:
     """While a program plays without end, commit the other one at each tick of its line in turn."""
     script.request("park")
@@ -310,6 +343,7 @@ def sweep(
     )
     script.request("arm", "trigger")  # with nothing to play
     script.wait(3)
+    first_program(script, smooth, pace)
     counted_frames(script, tame)
     swaps_at_every_tick(script, (smooth, tame))
     withdrawals(script, smooth, clamped(tame))

@@ -258,7 +258,7 @@ class Build(Result):
 
     @property
     def findings(self) -> list[Finding]:
-        """The same with weights and percentages of the scan, the worst first."""
+        """The same with weights, percentages of the scan, codes and axes, the worst first."""
         return scan_findings(self.plan, self.certificates)
 
     @cached_property

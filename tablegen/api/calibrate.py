@@ -9,11 +9,11 @@ import numpy as np
 
 from tablegen.api.image_input import (
     IMAGE_OPTIONS,
+    acquisition_of,
     check_names,
     read_trace_and_retrace,
     sample_image,
     sample_of,
-    taking_of,
 )
 from tablegen.api.known_scanner import KnownScanner
 from tablegen.api.measured import Measured, measured_list, table_of
@@ -56,6 +56,7 @@ from tablegen.charts.picture_file import PlottedCharts
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate, Fit
 from tablegen.images.files import ScanImage
+from tablegen.images.scan_angle import angle_remarks, require_fast_axis
 from tablegen.numerics.driver import Driver
 
 Axis = Literal["x", "y"]
@@ -145,7 +146,7 @@ def calibrate(
 
 def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], known: KnownScanner, how: dict[str, Any]) -> "Calibrated":
     """Sizes, or sizes at several offsets, of images of a sample of known constant."""
-    sample, taking = sample_of(how), taking_of(how)
+    sample, acquisition = sample_of(how), acquisition_of(how)
     rows = [row if kind == "offset" else (row[0], None, *row[1:]) for row in images]
     read = [sample_image(size, at, pair[0], pair[1] if pair[1:] else None, how) for size, at, *pair in rows]
     files = tuple(one for _, both in read for one in both)
@@ -153,7 +154,7 @@ def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], known: KnownScanne
     law = known.size_law("the calibration of offsets by images") if kind == "offset" else None
     fit: Fit
     try:
-        sizes = sizes_of([image for image, _ in read], driver, sample, taking)
+        sizes = sizes_of([image for image, _ in read], driver, sample, acquisition)
         if law is not None:
             apparent, errors = apparent_of(sizes, law, driver, sample)
             offset_v = np.array([row[1] for row in rows], dtype=np.float64)
@@ -165,7 +166,7 @@ def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], known: KnownScanne
             fit = replace(size, images=sizes.images, remarks=sizes.remarks + size.remarks)
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
-    return Calibrated(fit, known.axis, files)
+    return Calibrated(_with_angles(fit, files, known.axis), known.axis, files)
 
 
 def known_scanner(scanner: str | Path | None, axis: str, v_max: float | None, v_min: float) -> KnownScanner:
@@ -213,7 +214,8 @@ def calibrate_images(
     Raises
     ------
     Rejected
-        A file cannot be read, or an image has the wrong shape.
+        A file cannot be read, an image has the wrong shape, or a file states a scan angle at which ``axis`` is not the
+        fast axis.
     Unphysical
         No scanner makes such images, or they are not of one scan.
 
@@ -225,17 +227,24 @@ def calibrate_images(
     """
     check_names(how, _PAIR_OPTIONS)
     images = [read_trace_and_retrace(pair[1], pair[2] if len(pair) > 2 else None, how) for pair in pairs]
+    files = tuple(image for both in images for image in both)
+    require_fast_axis(files, axis)
     driver = known_scanner(scanner, axis, v_max, v_min).driver
     scans = [
         Pair(" and ".join(dict.fromkeys(one.source.name for one in both)), pair[0], *(one.heights for one in both))
         for pair, both in zip(pairs, images, strict=True)
     ]
-    files = tuple(image for both in images for image in both)
     try:
         fit = fit_images(scans, driver, **{name: how[name] for name in _IMAGE_FIT if name in how})
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
-    return Calibrated(fit, axis, files, points)
+    return Calibrated(_with_angles(fit, files, axis), axis, files, points)
+
+
+def _with_angles(fit: Fit, images: Sequence[ScanImage], axis: str) -> Fit:
+    """Return the fit with remarks on the scan angles of its images before its own."""
+    remarks = angle_remarks(images, axis)
+    return replace(fit, remarks=(*remarks, *fit.remarks)) if remarks else fit
 
 
 @dataclass(frozen=True, eq=False, repr=False)

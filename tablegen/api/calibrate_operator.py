@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tablegen.api.calibrate import Axis, known_scanner
-from tablegen.api.image_input import IMAGE_OPTIONS, check_names, sample_image, sample_of, taking_of
+from tablegen.api.image_input import IMAGE_OPTIONS, acquisition_of, check_names, sample_image, sample_of
 from tablegen.api.known_scanner import KnownScanner
 from tablegen.api.measured import Measured, measured_list, table_of
 from tablegen.api.result import Result
@@ -15,6 +15,7 @@ from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Unphysical
 from tablegen.base.reading import CONFIGURATION, read_text
+from tablegen.base.warnings import Finding, of_remarks, worst_first
 from tablegen.calibration.laws.image_sizes import SampleImage
 from tablegen.calibration.operator.advice import NextTrace, next_trace
 from tablegen.calibration.operator.delay import fit_delay
@@ -33,6 +34,7 @@ from tablegen.compensation.models.operator import OperatorModel
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage
+from tablegen.images.scan_angle import angle_remarks
 from tablegen.numerics.driver import Driver
 
 _MEASURES = "    rms   scaling  mismatch"
@@ -143,7 +145,7 @@ def _image_lines(
     lines = []
     for image, rate_hz in images:
         try:
-            lines.append(imaged_line(image, rate_hz, known.driver, sample_of(how), taking_of(how))[0])
+            lines.append(imaged_line(image, rate_hz, known.driver, sample_of(how), acquisition_of(how))[0])
         except Unphysical as reason:
             raise _NamedUnphysical(f"{image.name}: {reason}") from None
     return lines
@@ -173,7 +175,7 @@ class CalibratedOperator(Result):
     @property
     def left(self) -> tuple[LineErrors, ...]:
         """What the operator leaves of each trace: ``rms``, ``scaling``, ``mismatch`` in percent of the line."""
-        return self.fit.left
+        return self.fit.in_fit
 
     @property
     def left_out(self) -> tuple[LineErrors, ...]:
@@ -202,7 +204,7 @@ class CalibratedOperator(Result):
                     "size_percent": out.size,
                 },
             }
-            for line, left, out in zip(self.lines, self.fit.left, self.fit.left_out, strict=True)
+            for line, left, out in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True)
         ]
         error, further = self.delay.standard_error, self.next_trace
         return {
@@ -213,12 +215,17 @@ class CalibratedOperator(Result):
             "creep_loss_per_decade": self.fit.operator.creep.loss_per_decade,
             "delay_s": {"value": self.delay.value, "standard_error": error if isfinite(error) else None},
             "traces": traces,
+            "remarks": list(angle_remarks(self.measured, self.axis)),
             "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
             "sources": [{"file": one.source.name, "sha256": one.source.sha256} for one in self.measured],
         }
 
+    def findings(self) -> list[Finding]:
+        """Return what to know of the images before the operator is trusted, the worst first."""
+        return worst_first(of_remarks(angle_remarks(self.measured, self.axis)))
+
     def summary(self) -> str:
-        """Return what was found, what it leaves of every trace, and what to measure next."""
+        """Return the parameters, what is left of every trace, what to measure next, and what is odd."""
         creep = self.fit.operator.creep
         pure = {name: score for name, score in self.fit.candidates.items() if name == self.family or "," not in name}
         tried = ", ".join(f"{name} {score:.3g} %" for name, score in pure.items())
@@ -232,7 +239,7 @@ class CalibratedOperator(Result):
             f"{'':41}  {'in the fit':<23}   left out",
             f"size [V]  offset [V]  rate [Hz]  noise [%]{_MEASURES}  {_MEASURES}  size [%]  trace",
         ]
-        for line, left, without in zip(self.lines, self.fit.left, self.fit.left_out, strict=True):
+        for line, left, without in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True):
             noise = 100.0 * line.noise_nm / float(line.displacement_nm.max() - line.displacement_nm.min())
             out.append(
                 f"{line.stroke * self.driver.span:8.4g}  {self.driver.volts(line.centre):10.4g}  {line.rate_hz:9.4g}  "
@@ -240,7 +247,7 @@ class CalibratedOperator(Result):
                 f"{without.scaling:8.2f}  {without.mismatch:8.2f}  {without.size:+8.2f}  {line.name}"
             )
         out += ["percent of the line over x = 0.1..0.9; left out: predicted from the other traces", ""]
-        return "\n".join([*out, *self._advice()])
+        return "\n".join([*out, *self._advice(), *(finding.line for finding in self.findings())])
 
     def _advice(self) -> list[str]:
         further = self.next_trace
@@ -271,7 +278,7 @@ class CalibratedOperator(Result):
             drive = line.stroke * self.driver.span, self.driver.volts(line.centre), line.rate_hz
             return *drive, left.rms, left.scaling, left.mismatch, out.rms, out.scaling, out.mismatch, out.size
 
-        rows = zip(self.lines, self.fit.left, self.fit.left_out, strict=True)
+        rows = zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True)
         traces = [(line.name, figures(line, left, out)) for line, left, out in rows]
         advice = self._advice()[0].removeprefix("next trace: ")
         candidates = [*self.fit.candidates.items()]

@@ -10,7 +10,7 @@ import numpy as np
 from tablegen.api.read_image import Image
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
+from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage, channels_of, read_image, read_pair
 from tablegen.images.formats.channel import Direction, choose, partner
@@ -19,9 +19,9 @@ from tablegen.numerics.arrays import Floats
 
 ImageSource: TypeAlias = str | Path | Floats | Image
 _SAMPLE = ("lattice_nm", "lattice", "cell", "pitch_nm", "angle_deg")
-_TAKING = ("turn", "window", "retrace_mirrored", "delay_pixels", "aspect")
+_ACQUISITION = ("turn", "window", "retrace_mirrored", "delay_pixels", "aspect")
 _CHANNEL = ("channel", "retrace_channel", "frame")
-IMAGE_OPTIONS = (*_SAMPLE, *_TAKING, *_CHANNEL)
+IMAGE_OPTIONS = (*_SAMPLE, *_ACQUISITION, *_CHANNEL)
 
 
 def check_names(how: dict[str, Any], names: Sequence[str]) -> None:
@@ -114,9 +114,9 @@ def sample_of(how: dict[str, Any]) -> KnownSample:
     return known_sample(**_chosen(how, _SAMPLE))
 
 
-def taking_of(how: dict[str, Any]) -> Taking:
+def acquisition_of(how: dict[str, Any]) -> Acquisition:
     """How images were taken, by keywords of a function or of a command."""
-    return Taking(**_chosen(how, _TAKING))
+    return Acquisition(**_chosen(how, _ACQUISITION))
 
 
 def _chosen(how: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
@@ -130,7 +130,7 @@ def sample_image(
     images = read_trace_and_perhaps_retrace(trace, retrace, how)
     first, ratio = images[0], None
     if first.width_nm and first.height_nm:
-        low, high = taking_of(how).window
+        low, high = acquisition_of(how).window
         ratio = first.height_nm / (first.width_nm / (high - low))
     name = " and ".join(dict.fromkeys(one.file for one in images))
     heights = [one.heights for one in images]

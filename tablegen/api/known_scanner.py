@@ -91,7 +91,7 @@ class KnownScanner:
         problems = Problems()
         decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
         used = {(self.axis, name) for name in names}
-        wrong = [one for one in problems.found if tuple(one.key.split(".")[:2]) in used]
+        wrong = [one for one in problems.entries if tuple(one.key.split(".")[:2]) in used]
         if wrong:
             raise Rejected(wrong)
         return tables

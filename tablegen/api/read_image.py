@@ -15,6 +15,7 @@ from tablegen.images.files import read_image as read_one
 from tablegen.images.formats.channel import Channel, choose, partner
 from tablegen.numerics.arrays import Floats
 
+_ANGLE = "angle [deg]"
 _HEAD = ("", "channel", "direction", "pixels", "size [nm]", "unit", "lines [Hz]", "frames", "first row")
 
 
@@ -30,7 +31,8 @@ def channels(path: str | Path) -> "Channels":
     -------
     Channels
         A sequence. Each has ``number``, ``title``, ``direction``, ``shape`` (rows, columns), ``width_nm``,
-        ``height_nm``, ``unit``, ``line_rate_hz`` and ``frames``, None or empty where the file does not say.
+        ``height_nm``, ``unit``, ``line_rate_hz``, ``frames`` and ``angle_deg`` (of the scan), None or empty where the
+        file does not say.
 
     Raises
     ------
@@ -157,6 +159,7 @@ class Image(Result):
             "height_nm": one.height_nm,
             "unit": one.unit,
             "line_rate_hz": one.line_rate_hz,
+            "scan_angle_deg": one.angle_deg,
             "frame": one.frame,
             "retrace": None if self.retrace is None else self.retrace.record,
         }
@@ -224,7 +227,10 @@ class Channels(Result, Sequence[Channel]):
     def rows(self) -> list[str]:
         """Return the lines of the table: its head, then one line a channel."""
         rows = [_HEAD, *(_row(one) for one in self)]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(_HEAD))]
+        if any(one.angle_deg for one in self):
+            angles = ["" if one.angle_deg is None else f"{one.angle_deg:.4g}" for one in self]
+            rows = [(*row, cell) for row, cell in zip(rows, [_ANGLE, *angles], strict=True)]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
     def _lines(self) -> Sequence[str]:
@@ -261,6 +267,7 @@ def _record(channel: Channel) -> dict[str, Any]:
         "line_rate_hz": channel.line_rate_hz,
         "frames": channel.frames,
         "first_row": channel.first_row,
+        "scan_angle_deg": channel.angle_deg,
     }
 
 

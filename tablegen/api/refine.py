@@ -1,7 +1,7 @@
 """A trace or images of the running scan to a layer over the model, and into the scan file: a round of learning."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +19,7 @@ from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.emit.write import write_files
+from tablegen.images.scan_angle import running_scan_remarks
 from tablegen.refinement.comment import provenance
 from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.lattice_line import ImageOptions
@@ -123,9 +124,13 @@ def _of_images(
     heights = [(one.heights, other.heights) for one, other in pairs]
     stored = ImageOptions(bool(how.get("retrace_mirrored", False)), float(how.get("delay_pixels", 0.0)))
     sources = tuple(image.source for pair in pairs for image in pair)
+    found: Round
     if mismatch:
-        return refine_mismatch(setup, axis, heights, options, stored), sources
-    return refine_images(setup, axis, heights, options, stored, sample_of(how) if known else None), sources
+        found = refine_mismatch(setup, axis, heights, options, stored)
+    else:
+        found = refine_images(setup, axis, heights, options, stored, sample_of(how) if known else None)
+    remarks = running_scan_remarks(image for pair in pairs for image in pair)
+    return replace(found, remarks=(*remarks, *found.remarks)), sources
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,12 +160,12 @@ class RefinedScan(Result):
     @property
     def before_percent(self) -> float:
         """The measured residual, rms, in percent of the line."""
-        return self.round.lesson.before.rms_percent
+        return self.round.update.before.rms_percent
 
     @property
     def after_percent(self) -> float:
         """The one that is predicted for the next trace."""
-        return self.round.lesson.after.rms_percent
+        return self.round.update.after.rms_percent
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -194,7 +199,7 @@ class RefinedScan(Result):
             raise ValueError("the scan was given as a setup; give the path of its file to write into it")
         found = self.round
         best = None if force else found.best
-        if best is None and (found.refinement is None or not found.lesson.harmonics):
+        if best is None and (found.refinement is None or not found.update.harmonics):
             return b""
         plain = msgspec.json.decode(msgspec.json.encode(best or found.refinement))
         values = {key: value for key, value in plain.items() if value is not None}  # as a file has it

@@ -82,7 +82,7 @@ class ReportPage(Result):
     @property
     def broken(self) -> tuple[str, ...]:
         """Limits of the scan file that the certificate exceeds; empty for a build, which has none."""
-        return () if self.subject.planned is None else self.subject.planned.broken
+        return () if self.subject.planned is None else tuple(map(str, self.subject.planned.broken))
 
     @property
     def record(self) -> dict[str, Any]:
@@ -91,7 +91,7 @@ class ReportPage(Result):
         return {
             "name": manifest.name,
             "hash": manifest.hash,
-            "findings": [{"weight": one.weight, "text": one.text} for one in self.findings],
+            "findings": [{"weight": one.weight, **one.record()} for one in self.findings],
             "broken": list(self.broken),
             "figures": list(self.figures),
         }

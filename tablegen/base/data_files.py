@@ -15,14 +15,20 @@ _LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|\Z)")  # as Unix, Windows or old Maci
 
 @dataclass(frozen=True)
 class Source:
-    """Which bytes numbers came from: the file's name without its folder, and the first 16 digits of its SHA-256."""
+    """The origin of numbers: the file's name without its folder, and the first 16 digits of its SHA-256."""
 
     name: str
     sha256: str
 
 
 def file_content(path: Path, name: str, kind: Kind = MEASUREMENT) -> bytes:
-    """The bytes of a measurement. Raises ``Rejected``."""
+    """Read the bytes of a measurement.
+
+    Raises
+    ------
+    Rejected
+        If it is not a file, is too large or cannot be read.
+    """
     require_file(path, name)
     try:
         return read_bytes(path, kind)
@@ -42,7 +48,13 @@ def unreadable(name: str, error: OSError) -> Rejected:
 
 
 def file_text(content: bytes, name: str, line: int = 1) -> str:
-    """UTF-8 without its mark; ``line`` is the number of its first line. Raises ``Rejected``."""
+    """Decode UTF-8 without its byte order mark; ``line`` is the number of the first line.
+
+    Raises
+    ------
+    Rejected
+        If the bytes are not UTF-8, at the line.
+    """
     if line == 1 and content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise Rejected([Problem(name, 1, "", "is UTF-16; save it as UTF-8")])
     try:
@@ -54,9 +66,15 @@ def file_text(content: bytes, name: str, line: int = 1) -> str:
 
 
 def lines_of(text: str, name: str, first: int = 1) -> Iterator[tuple[int, str]]:
-    """The lines of a text, numbered from ``first``. Raises ``Rejected`` for one that is no line of any table."""
-    for number, found in enumerate(_LINE.finditer(text), first):
-        if found.end(1) - found.start() > _MAX_LINE:
-            why = f"a line of {found.end(1) - found.start()} characters; at most 2^20 are read"
+    """Yield the lines of a text, numbered from ``first``.
+
+    Raises
+    ------
+    Rejected
+        If a line is longer than 2^20 characters.
+    """
+    for number, match in enumerate(_LINE.finditer(text), first):
+        if match.end(1) - match.start() > _MAX_LINE:
+            why = f"a line of {match.end(1) - match.start()} characters; at most 2^20 are read"
             raise Rejected([Problem(name, number, "", why)])
-        yield number, found[1]
+        yield number, match[1]

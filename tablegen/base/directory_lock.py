@@ -1,4 +1,4 @@
-"""One writer of a directory at a time: a lock on the directory itself, that leaves no file and ends with its owner."""
+"""A lock that gives a directory one writer at a time: on the directory itself, released with its owner."""
 
 import errno
 import os
@@ -20,9 +20,14 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.EBADF, errno.EINVAL, errno.ENOSY
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Be the only writer of a directory; wait while another one is. Raises ``OSError`` after a minute.
+    """Lock a directory for writing; wait while another writer has it.
 
-    ``make -j`` may start two builds into one directory: the second writes after the first, and what it finds is whole.
+    ``make -j`` may start two builds into one directory: the second writes after the first, and sees complete files.
+
+    Raises
+    ------
+    OSError
+        If the other writer takes longer than a minute.
     """
     handle = _locked(folder)
     try:
@@ -38,17 +43,17 @@ def _locked(folder: Path) -> int | None:
     until = time.monotonic() + _PATIENCE_S
     while True:
         handle = os.open(folder, os.O_RDONLY)
-        kept = False
+        acquired = False
         try:
-            kept = _lock(handle) and _is_still(folder, handle)
-            if kept:
+            acquired = _lock(handle) and _is_still(folder, handle)
+            if acquired:
                 return handle
         except OSError as error:
             if error.errno in _NO_LOCKS:
                 return None
             raise
         finally:
-            if not kept:
+            if not acquired:
                 os.close(handle)
         if time.monotonic() >= until:
             why = f"another program has been writing there for {_PATIENCE_S:g} s; end it, or take another directory"

@@ -1,16 +1,16 @@
-"""Figures and paths in messages: figures are rounded to the side on which what they promise still holds."""
+"""Figures and paths in messages: figures are rounded to the side on which their promise still holds."""
 
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from pathlib import Path
 
 
 def at_most(value: float, digits: int = 4) -> str:
-    """A value in so many significant digits, never above it."""
+    """Return a value in that many significant digits, rounded down."""
     return _rounded(value, digits, ROUND_FLOOR)
 
 
 def at_least(value: float, digits: int = 4) -> str:
-    """A value in so many significant digits, never below it."""
+    """Return a value in that many significant digits, rounded up."""
     return _rounded(value, digits, ROUND_CEILING)
 
 
@@ -19,7 +19,7 @@ def _rounded(value: float, digits: int, rounding: str) -> str:
 
 
 def shown_path(path: Path) -> str:
-    """A path on one line, and not the whole of a very long one."""
+    """Return a path on one line, shortened if it is very long."""
     shown = str(path)
     shown = shown if shown.isprintable() else ascii(shown)
     return shown if len(shown) <= 200 else f"{shown[:100]}...{shown[-97:]}"

@@ -1,8 +1,8 @@
-"""Files that were compiled, kept in the user's cache by what they were made of: the same is not compiled twice.
+"""Compiled files in the user's cache, by a digest of their inputs: nothing is compiled twice.
 
-The name of a file has two digests: its key, which stands for everything that it was made of, and one of the key and
-its bytes, so that a file that was cut short, or stands in another's place, is not taken. What cannot be kept is not: a
-full disk costs time, no result.
+The name of a file has two digests: its key, which stands for everything that it was made from, and one of the key and
+its bytes, so that a truncated or misplaced file is not used. What cannot be stored is not: a full disk costs time, but
+changes no result.
 """
 
 import os
@@ -20,25 +20,25 @@ _BY_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
 
 @dataclass(frozen=True)
-class KeptFiles:
-    """A folder of the cache, with at most so many files; those that were not used for longest go."""
+class CachedFiles:
+    """A folder of the cache, with at most ``most`` files; those that were not used for longest are removed."""
 
     folder: str
     most: int
 
     def take(self, key: str, target: Path) -> bool:
-        """Copy the file of this key to ``target``; whether there is one, as it was written.
+        """Copy the file of this key to ``target``; return True if there is one, unchanged since it was stored.
 
-        It is the copy that is held against its name: whatever happens to the file then, that is what was kept.
+        The copy is compared with the digest in the name, so that a later change of the cached file does not matter.
         """
         folder = private_folder(self.folder)
         with suppress(OSError):
             for name in os.listdir(folder) if folder is not None else ():
-                if folder is not None and name.startswith(f"{key}-") and _taken(key, folder / name, target):
+                if folder is not None and name.startswith(f"{key}-") and _copied_out(key, folder / name, target):
                     return True
         return False
 
-    def keep(self, key: str, made: Path) -> None:
+    def keep(self, key: str, source: Path) -> None:
         """Copy a file into the cache."""
         folder = private_folder(self.folder)
         if folder is None:
@@ -49,7 +49,7 @@ class KeptFiles:
             with NamedTemporaryFile(dir=folder, prefix="part-", delete=False) as part:
                 path = Path(part.name)
             try:
-                shutil.copy(made, path)
+                shutil.copy(source, path)
                 path.chmod(stat.S_IMODE(path.stat().st_mode) & ~_BY_OTHERS)  # a compiler leaves it to the umask
                 path.rename(folder / _name(key, path))
             finally:
@@ -57,8 +57,8 @@ class KeptFiles:
             keep_newest(folder, self.most)
 
 
-def _taken(key: str, path: Path, target: Path) -> bool:
-    """Whether a file of the cache could be copied and is what its name says; one that is not is taken out."""
+def _copied_out(key: str, path: Path, target: Path) -> bool:
+    """Copy a file of the cache; return True if it is what its name states. Remove it otherwise."""
     status = path.lstat()
     if stat.S_ISREG(status.st_mode) and is_private(status):
         shutil.copy(path, target)

@@ -1,4 +1,4 @@
-"""What is wrong with an input, where it stands, and how all of it is reported at once."""
+"""Input errors: what is wrong, at which file, line and key, all reported in one run."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 from msgspec import Struct, field
 
+from tablegen.base.warnings import Axis, FindingCode, axis_name
+
 MOST_PROBLEMS = 50  # of one run; more are no help, and a file may have a million
 _MOST_KEY, _MOST_WHY = 200, 1000  # characters
 
 
 def shortened(text: str, most: int = 200) -> str:
-    """A text on one line, and of a long one its beginning and its end."""
+    """Return a text on one line; of a long one its beginning and its end."""
     text = text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in _cut(text, most))
     return _cut(text, most)
 
@@ -25,12 +27,21 @@ class Unphysical(ValueError):
 
 
 class Problem(NamedTuple):
-    """One fault of the input, printed as ``scan.toml:14: x.table.bits: 30 is above 24``."""
+    """One fault of the input, printed as ``scan.toml:14: x.table.bits: 30 is above 24``.
+
+    ``code`` and ``axis`` are those of a finding of the certificate, for programs: "" for every other fault.
+    """
 
     file: str
     line: int
     key: str
     why: str
+    code: FindingCode = ""
+    axis: Axis = ""
+
+    def coded(self, code: FindingCode, axis: str) -> "Problem":
+        """Return the problem with the code of its finding and the axis ("x", "y" or "")."""
+        return self._replace(code=code, axis=axis_name(axis))
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
@@ -39,7 +50,7 @@ class Problem(NamedTuple):
 
 
 class Rejected(Exception):
-    """The input was refused; ``problems`` holds the faults found, in the order of the files: at most 50, and a word."""
+    """The input was refused; ``problems`` has its faults in the order of the files, at most 50 and a note."""
 
     def __init__(self, problems: list[Problem]) -> None:
         self.problems = sorted(dict.fromkeys(problems), key=lambda p: (p.file, p.line))
@@ -56,18 +67,18 @@ class Rejected(Exception):
 class Document(Struct, frozen=True):
     """A TOML file as the user named it, and the line on which each of its keys stands.
 
-    ``lines`` is None for values that stand in no file. ``said`` has the keys that follow from others: the key that was
-    written in place of each, and the factor from the one's value to the other's; ``inherited`` the keys that an axis
-    takes from another one, each with the key that is written.
+    ``lines`` is None for values that stand in no file. ``written_keys`` has the keys that follow from others: the key
+    that was written in place of each, and the factor from the one's value to the other's; ``inherited`` the keys that
+    an axis takes from another one, each with the key that is written.
     """
 
     name: str
     lines: dict[str, int] | None = field(default_factory=dict)
-    said: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    written_keys: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     inherited: Mapping[str, str] = field(default_factory=dict)
 
     def line_of(self, key: str) -> int:
-        """The line of a key such as ``x.hysteresis.branches[0].turn``; of what encloses it if it is not written."""
+        """Return the line of a key such as ``x.hysteresis.branches[0].turn``; else of its table."""
         if self.lines is None:
             return 0
         while key:
@@ -78,35 +89,35 @@ class Document(Struct, frozen=True):
         return 1
 
     def problem(self, key: str, why: str) -> Problem:
-        """A problem of this document's key, told at the key that was written in its place."""
-        asked, (key, _) = key, self.as_said(key)
-        if asked[1:2] == "." and key[1:2] != ".":  # a key for both axes
-            why = f"{asked[0]}: {why}"
+        """Return a problem of this document's key, reported at the key that was written in its place."""
+        requested, (key, _) = key, self.written_key(key)
+        if requested[1:2] == "." and key[1:2] != ".":  # a key for both axes
+            why = f"{requested[0]}: {why}"
         other = self.inherited.get(key)
         if other is not None:
             why = f"{why}; {key.split('.')[0]} has it from {other} by like"
         return Problem(self.name, self.line_of(other or key), key, why)
 
-    def as_said(self, key: str) -> tuple[str, float]:
-        """The key that was written in place of this one, and the factor to its value; itself where it was written."""
-        return self.said.get(key, (key, 1.0))
+    def written_key(self, key: str) -> tuple[str, float]:
+        """Return the key that was written in place of this one, and the factor to its value; itself if written."""
+        return self.written_keys.get(key, (key, 1.0))
 
 
 class Problems:
-    """Collects problems, so that one run reports them all; beyond ``MOST_PROBLEMS`` it raises ``Rejected``."""
+    """A collector of problems, so that one run reports them all; beyond ``MOST_PROBLEMS`` it raises ``Rejected``."""
 
     def __init__(self) -> None:
-        self.found: list[Problem] = []
+        self.entries: list[Problem] = []
 
     def add(self, document: Document, key: str, why: str) -> None:
-        """Note one problem and go on."""
+        """Add a problem of a key, and go on."""
         self.note(document.problem(key, why))
 
     def note(self, problem: Problem) -> None:
-        """The same, of a problem that was made elsewhere."""
-        self.found.append(problem)
-        if len(self.found) > MOST_PROBLEMS:
-            raise Rejected(self.found)
+        """Add a problem that was made elsewhere."""
+        self.entries.append(problem)
+        if len(self.entries) > MOST_PROBLEMS:
+            raise Rejected(self.entries)
 
     @contextmanager
     def at(self, document: Document, key: str) -> Iterator[None]:
@@ -117,6 +128,6 @@ class Problems:
             self.add(document, key, str(reason))
 
     def stop_if_any(self) -> None:
-        """Raise ``Rejected`` if anything was found so far."""
-        if self.found:
-            raise Rejected(self.found)
+        """Raise ``Rejected`` if there are problems."""
+        if self.entries:
+            raise Rejected(self.entries)

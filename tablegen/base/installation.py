@@ -1,4 +1,4 @@
-"""What of the installed distribution the package itself has to know: its name, for advice and for its record.
+"""The name of the installed distribution, for advice and for its record.
 
 The distribution is not called like the package: on PyPI ``tablegen`` is another program, which would replace this one.
 """
@@ -13,9 +13,9 @@ _COMMAND = ("tablegen", "tablegen.cli:main")
 
 
 def distribution_name() -> str:
-    """The name under which this package is installed: that of the distribution with its command and its version.
+    """Return the name under which this package is installed: that of the distribution with its command and its version.
 
-    Any other may be an older one that was left behind, or another program of the same name. An editable installation
+    Any other may be an older installation, or another program of the same name. An editable installation
     has the same name as an ordinary one.
     """
     from importlib.metadata import entry_points  # takes as long as everything else that `tablegen --version` loads
@@ -27,13 +27,13 @@ def distribution_name() -> str:
 
 
 def install_advice(extra: str) -> str:
-    """The command that installs what an extra needs."""
+    """Return the command that installs what an extra needs."""
     return f"pip install '{distribution_name()}[{extra}]'"
 
 
 def records(packages: Path) -> list[Path]:
-    """The record of this distribution in a folder of packages; none beside an editable one, whose files are elsewhere.
+    """Return the record of this distribution in a folder of packages; empty for an editable one.
 
-    Found by its name, since an importlib.metadata that is loaded for this alone would slow every build.
+    It is found by its name, since importing importlib.metadata for this alone would slow every build.
     """
     return sorted(packages.glob(f"{re.sub('[-_.]+', '_', PROJECT).lower()}-*.dist-info/RECORD"))

@@ -1,4 +1,4 @@
-"""Interruptions that wait where they would leave something half done, or a process that nobody knows."""
+"""Signals that are deferred where they would leave half-written files, or an orphaned process."""
 
 import signal
 import threading
@@ -7,15 +7,15 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-# What ends a program in an orderly way: Ctrl-C, `kill` and every supervisor, and the terminal that was closed.
+# The signals of an orderly end: Ctrl-C, `kill` and every supervisor, and a closed terminal.
 ENDINGS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 @contextmanager
 def endings_interrupt() -> Iterator[None]:
-    """Inside, all of ``ENDINGS`` raise ``KeyboardInterrupt``, so that whatever is being done is put in order first.
+    """Make all of ``ENDINGS`` raise ``KeyboardInterrupt`` inside, so that open work is put in order first.
 
-    One that is ignored stays ignored, as ``nohup`` asks for, and one that somebody handles stays theirs.
+    A signal that is ignored stays ignored, as with ``nohup``, and one that has a handler keeps it.
     """
     before: list[signal.Signals] = []
     if threading.current_thread() is threading.main_thread():
@@ -34,31 +34,31 @@ def endings_interrupt() -> Iterator[None]:
 
 
 @contextmanager
-def held(*numbers: signal.Signals) -> Iterator[list[int]]:
-    """Signals that come inside wait, and stand in the list that this yields; a second one of a kind does not wait.
+def defer_signals(*numbers: signal.Signals) -> Iterator[list[int]]:
+    """Defer signals that arrive inside, and yield the list of them; a second one of a kind is not deferred.
 
-    Only what a Python function would have handled is held, and only in the main thread: elsewhere nothing can be
-    interrupted. What is to become of them afterwards is the caller's affair; see ``deliver``.
+    Only signals with a Python handler are deferred, and only in the main thread: elsewhere nothing can be
+    interrupted. The caller decides what becomes of them afterwards; see ``deliver``.
     """
-    came: list[int] = []
+    received: list[int] = []
     before: dict[signal.Signals, Any] = {}
     if threading.current_thread() is threading.main_thread():
         before = {number: signal.getsignal(number) for number in numbers if callable(signal.getsignal(number))}
 
     def hold(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
+        received.append(number)
         signal.signal(number, before[signal.Signals(number)])
 
     for number in before:
         signal.signal(number, hold)
     try:
-        yield came
+        yield received
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-def deliver(came: list[int]) -> None:
-    """Let the signals that were held happen now."""
-    for number in came:
+def deliver(received: list[int]) -> None:
+    """Raise the signals that were deferred."""
+    for number in received:
         signal.raise_signal(number)

@@ -34,8 +34,8 @@ def cause(error: BaseException) -> str:
 def guarded(name: str, of: str, what: str, *passed: type[BaseException]) -> Iterator[None]:
     """Turn whatever the plug-in ``name`` of the distribution ``of`` raises inside into ``PluginFailed``.
 
-    Exceptions of the types ``passed`` go through; ``what`` says what failed, as in "cannot be loaded". ``SystemExit``
-    would end the command with the plug-in's status; an interruption stays one, and says where it came.
+    Exceptions of the types ``passed`` go through; ``what`` names the failure, as in "cannot be loaded". ``SystemExit``
+    would end the command with the plug-in's status; an interruption stays one, and names its place.
     """
     try:
         yield

@@ -1,7 +1,7 @@
-"""The one way in which files that others wrote are read: regular files only, and no more of them than their kind has.
+"""Bounded reading of files from outside: regular files only, and no more bytes than their kind may have.
 
 A pipe would be waited for, a device may never end, and a file may be of any size: none of these stops or fills a
-machine. What cannot be read is an ``OSError`` whose ``strerror`` says why.
+machine. A file that cannot be read is an ``OSError`` whose ``strerror`` gives the reason.
 """
 
 import errno
@@ -20,7 +20,7 @@ _OPENING = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in ("O_NONBLOCK", "O_
 
 
 class Kind(NamedTuple):
-    """A kind of file: what messages call it, and the most bytes that are read of one."""
+    """A kind of file: its name in messages, and the most bytes that are read of one."""
 
     what: str
     most_bytes: int
@@ -47,7 +47,7 @@ _OTHERS = (
 
 
 def other_than_file(path: str | os.PathLike[str]) -> str | None:
-    """What stands at a path, such as "a pipe", if that is no regular file; None for a file, and for nothing."""
+    """Return what stands at a path, such as "a pipe", if that is no regular file; None for a file, and for nothing."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
@@ -56,22 +56,40 @@ def other_than_file(path: str | os.PathLike[str]) -> str | None:
 
 
 def read_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
-    """The whole of a file. Raises ``OSError`` where it cannot be read, is no regular file, or too large."""
+    """Read a whole file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, is no regular file, or is too large.
+    """
     return b"".join(chunks_of(path, kind))
 
 
 def read_private_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
-    """The whole of a file of the user's own that nobody else can write. Raises ``OSError`` for every other one too."""
+    """Read a whole file of the user's own that nobody else can write.
+
+    Raises
+    ------
+    OSError
+        As ``read_bytes``, and if others own or can write it.
+    """
     return b"".join(chunks_of(path, kind, private=True))
 
 
 def read_text(path: str | os.PathLike[str], kind: Kind, encoding: str = "utf-8", errors: str = "strict") -> str:
-    """The same as text."""
+    """Read a whole file as text.
+
+    Raises
+    ------
+    OSError
+        As ``read_bytes``.
+    """
     return read_bytes(path, kind).decode(encoding, errors)
 
 
 def file_sha256(path: str | os.PathLike[str], kind: Kind = BUILD_FILE) -> str:
-    """The digest of a file, in hexadecimal digits, of which no more than a part is held at a time."""
+    """Return the digest of a file, in hexadecimal digits, read in parts."""
     digest = sha256()
     for chunk in chunks_of(path, kind):
         digest.update(chunk)
@@ -79,7 +97,7 @@ def file_sha256(path: str | os.PathLike[str], kind: Kind = BUILD_FILE) -> str:
 
 
 def holds(path: Path, content: bytes) -> bool:
-    """Whether a regular file has just this content; False for everything else, and for what cannot be read."""
+    """Return True if a regular file has exactly this content; False also for what cannot be read."""
     try:
         return read_bytes(path, Kind("", len(content))) == content
     except (OSError, ValueError):
@@ -87,12 +105,12 @@ def holds(path: Path, content: bytes) -> bool:
 
 
 def size_shown(count: int) -> str:
-    """A limit as documents and messages have it."""
+    """Return a limit as documents and messages show it."""
     return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
 
 
 def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -> Iterator[bytes]:
-    """The bytes of a file, a part at a time; what ``read_bytes`` refuses is refused before the first part of it."""
+    """Yield the bytes of a file in parts; what ``read_bytes`` refuses is refused before the first part."""
     count = 0
     with _opened(path) as (handle, status):
         if private and not is_private(status):
@@ -110,7 +128,7 @@ def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -
 @contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[int, os.stat_result]]:
     try:
-        _require_file(os.stat(path).st_mode)  # first of all: to open some devices is to do something
+        _require_file(os.stat(path).st_mode)  # before opening, since opening some devices has an effect
         handle = os.open(os.fspath(path), _OPENING)
     except ValueError:
         raise OSError(errno.EINVAL, "no file can have such a name") from None

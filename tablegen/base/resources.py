@@ -11,27 +11,27 @@ _C_LINK = "dac_link"
 
 
 def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
-    """Where the example files, or the templates and the runtime, are installed."""
+    """Return the folder where the example files, or the templates and the runtime, are installed."""
     return Path(str(import_module(f"tablegen.{name}").__file__)).parent
 
 
 def verilog_runtime() -> list[Path]:
-    """The Verilog sequencer and its link, one module a file, in order of name; every build copies them."""
+    """Return the Verilog sequencer and its link, one module a file, in order of name; every build copies them."""
     return list(_runtime("verilog", ".v"))
 
 
 def c_runtime() -> list[Path]:
-    """The C sequencer, headers and sources, in order of name; every build copies it."""
+    """Return the C sequencer, headers and sources, in order of name; every build copies it."""
     return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith(_C_LINK)]
 
 
 def c_link() -> list[Path]:
-    """The device's end of the serial link in C, which needs the sequencer; every build copies it too."""
+    """Return the device's end of the serial link in C, which needs the sequencer; every build copies it too."""
     return [path for path in _runtime("c", ".c", ".h") if path.name.startswith(_C_LINK)]
 
 
 def own_runtime_folders() -> tuple[Path, ...]:
-    """Where all of these files stand."""
+    """Return the folders of all of these files."""
     return tuple(resource_folder("firmware_templates") / language for language in ("c", "verilog"))
 
 

@@ -1,7 +1,7 @@
-"""TOML text to plain values, and the line of every key.
+"""Parse TOML text to plain values, and locate the line of every key.
 
-The standard library parses and validates; it does not say where things stand, so a second, lenient walk over
-the (by then known to be valid) text notes the line of each key.
+The standard library parses and validates, but gives no lines, so a second, lenient walk over the text, which is
+known to be valid by then, notes the line of each key.
 """
 
 import re
@@ -21,9 +21,12 @@ _MAXIMUM_DIGITS = 4300  # digits of a decimal number that Python converts
 
 
 def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
-    """Return the values of a file and the places of its keys.
+    """Return the values of a file and the places of its keys; ``name`` is that of the file in messages.
 
-    ``name`` is what messages call the file. Raises ``Rejected`` where it cannot be read or is not TOML.
+    Raises
+    ------
+    Rejected
+        If it cannot be read or is not TOML.
     """
     try:
         text = read_text(path, CONFIGURATION)
@@ -39,7 +42,13 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
 
 
 def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
-    """What ``read_toml`` does once it has the text."""
+    """Return the values of TOML text and the places of its keys.
+
+    Raises
+    ------
+    Rejected
+        If it is not TOML.
+    """
     text = text.replace("\r\n", "\n")
     _refuse_long_keys(text, name)
     try:
@@ -84,8 +93,8 @@ def _refuse_long_keys(text: str, name: str) -> None:
 
 
 def _syntax_problem(name: str, text: str, message: str) -> Problem:
-    head, found, place = message.rpartition(" (at ")
-    if not found:
+    head, has_place, place = message.rpartition(" (at ")
+    if not has_place:
         return Problem(name, 0, "", f"not TOML: {message}")
     if place.startswith("line "):
         line = int(place[5:].split(",")[0])
@@ -97,16 +106,16 @@ def _syntax_problem(name: str, text: str, message: str) -> Problem:
 
 
 def _long_number(text: str) -> tuple[int, int]:
-    """Line and digits of the first decimal number that is too long to convert; all that stands before it is valid."""
+    """Return line and digits of the first decimal number that is too long to convert; the text before it is valid."""
     try:
         _KeyLines(text).locate()
-    except _LongNumber as found:
-        return found.line, found.digits
+    except _LongNumber as number:
+        return number.line, number.digits
     raise AssertionError("no other value is refused by its size")  # pragma: no cover
 
 
 def join_key(prefix: str, key: str) -> str:
-    """``x`` and ``table`` give ``x.table``; a key that is not bare is quoted."""
+    """Return ``x.table`` for ``x`` and ``table``; a key that is not bare is quoted."""
     shown = key
     if not key or not _BARE_KEY.issuperset(key):
         shown = '"' + key.encode("unicode_escape").decode().replace('"', '\\"') + '"'

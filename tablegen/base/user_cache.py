@@ -1,7 +1,8 @@
-"""Folders of the user's cache: what was made once, and is run again instead of made again.
+"""Folders of the user's cache for files that are expensive to make.
 
-They stand in ``$XDG_CACHE_HOME/tablegen``, in ``~/.cache/tablegen`` by default. What stands there is run, so it counts
-only where nobody else can have written it. A cache that is missing, cut short or not private costs time, no result.
+They stand in ``$XDG_CACHE_HOME/tablegen``, in ``~/.cache/tablegen`` by default. Cached programs are run, so a folder
+is used only where nobody else can have written it. A cache that is missing, truncated or not private costs time, but
+changes no result.
 """
 
 import os
@@ -12,7 +13,7 @@ _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def private_folder(name: str) -> Path | None:
-    """The folder of that name in the cache, which is made if it is missing; None where it cannot be private.
+    """Return the folder of that name in the cache, made if it is missing; None where it cannot be private.
 
     It has to be a directory of the user's own, and no link, that nobody else can write into. Windows has no such marks;
     there the profile that the folder stands in is the user's own.
@@ -28,12 +29,18 @@ def private_folder(name: str) -> Path | None:
 
 
 def is_private(status: os.stat_result) -> bool:
-    """Whether a file or directory is the user's own, and nobody else can write it."""
+    """Return True if a file or directory is the user's own, and nobody else can write it."""
     return not hasattr(os, "geteuid") or (status.st_uid == os.geteuid() and not status.st_mode & _BY_OTHERS)
 
 
 def keep_newest(folder: Path, most: int) -> None:
-    """Take the files out of a folder that were not used for longest. Raises ``OSError``."""
+    """Remove the files of a folder that were not used for longest, so that ``most`` remain.
+
+    Raises
+    ------
+    OSError
+        If one cannot be removed.
+    """
     by_age = sorted(folder.iterdir(), key=lambda one: one.stat().st_mtime)
     for old in by_age[:-most]:
         old.unlink(missing_ok=True)

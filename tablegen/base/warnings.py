@@ -1,7 +1,7 @@
-"""What a user has to know of an image, with its weight: what spoils the image first, small print last.
+"""Warnings of an image with a weight, by which they are ranked: what spoils the image first, notes last.
 
-A weight is by what becomes of the image; within it, percentages of the scan count: by how much of the line a place, or
-the size, is wrong. Where no percentage is known it is 0.
+A weight follows from the effect on the image; within it findings are ranked by the percentage of the line by which a
+place, or the size, is wrong. Where no percentage is known it is 0.
 """
 
 from collections.abc import Iterable
@@ -10,6 +10,30 @@ from typing import Literal
 from msgspec import Struct
 
 Weight = Literal["limit", "spoils", "expect", "note"]
+FindingCode = Literal[
+    "",
+    "changed-file",
+    "converter-error",
+    "damaged-build",
+    "expected-scaling-error",
+    "expected-size-error",
+    "failed-check",
+    "image-offset",
+    "imaged-pixels",
+    "model-mismatch",
+    "offset-drift",
+    "operator-distance",
+    "other-verify-record",
+    "resonance",
+    "rounded-pixels",
+    "scaling-error",
+    "size-error",
+    "standard-errors",
+    "step-guard",
+    "uncompared-inputs",
+    "uncompensated-hysteresis",
+]
+Axis = Literal["", "x", "y"]
 Tone = Literal["", "good", "warn", "bad", "quiet"]
 _ORDER: tuple[Weight, ...] = ("limit", "spoils", "expect", "note")
 _TONES: dict[Weight, Tone] = {"limit": "bad", "spoils": "warn", "expect": "", "note": "quiet"}
@@ -22,9 +46,10 @@ _SIGNS: dict[Weight, str] = {
 
 
 class Finding(Struct, frozen=True):
-    """A sentence, how much it weighs, and by what percentage of the scan within that.
+    """A sentence, its weight, and the percentage of the scan that ranks it within that.
 
-    ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal.
+    ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal. ``code`` names the
+    kind of finding for programs, which go by it and by ``axis``, never by the sentence; "" where it has none.
     """
 
     weight: Weight
@@ -32,54 +57,66 @@ class Finding(Struct, frozen=True):
     text: str
     called: str = ""
     label: str = "note"
+    code: FindingCode = ""
+    axis: Axis = ""
+
+    def record(self) -> dict[str, str]:
+        """Return the finding as JSON outputs have it."""
+        return {"code": self.code, "axis": self.axis, "text": self.text}
 
     @property
     def tone(self) -> Tone:
-        """Its colour."""
+        """The colour of its weight."""
         return _TONES[self.weight]
 
     @property
     def sign(self) -> str:
-        """Its weight in words, for eyes that see no colour."""
+        """The weight in words, for output without colours."""
         return self.called or _SIGNS[self.weight]
 
     @property
     def line(self) -> str:
-        """As a line of a terminal."""
+        """The finding as a line of a terminal."""
         return f"{self.label}: {self.text}"
 
 
 class Remark(str):
-    """A sentence of a fit, which is a text with a weight and a percentage of the scan."""
+    """A warning of a fit: a text with a weight and a percentage of the scan."""
 
     weight: Weight
     percent: float
 
     def __new__(cls, text: str, weight: Weight = "note", percent: float = 0.0) -> "Remark":
-        made = super().__new__(cls, text)
-        made.weight, made.percent = weight, percent
-        return made
+        """Make a remark of a text, its weight and its percentage of the scan."""
+        remark = super().__new__(cls, text)
+        remark.weight, remark.percent = weight, percent
+        return remark
 
     def under(self, name: str) -> "Remark":
-        """The same, said of something; of nothing if that has no name."""
+        """Return the remark with the name of its subject before it; unchanged if that is empty."""
         return Remark(f"{name}: {self}", self.weight, self.percent) if name else self
 
 
 def spoils(text: str, percent: float = 0.0) -> Remark:
-    """A remark on what makes the image worse, by so much of the scan where that is known."""
+    """Return a remark on what makes the image worse, with the percentage of the scan where that is known."""
     return Remark(text, "spoils", percent)
 
 
+def axis_name(axis: str) -> Axis:
+    """Return the name of an axis as findings have it: "x" or "y", and "" for anything else."""
+    return "x" if axis == "x" else "y" if axis == "y" else ""
+
+
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
-    """In order; those of one weight and, as it is printed, one percentage stay as they are."""
+    """Return findings by weight and percentage; those of equal weight and printed percentage keep their order."""
     return sorted(findings, key=lambda one: (_ORDER.index(one.weight), -as_printed(one.percent)))
 
 
 def as_printed(percent: float) -> float:
-    """In three digits: what reads the same is the same."""
+    """Return a percentage in three digits, so that equal texts compare equal."""
     return float(f"{percent:.3g}")
 
 
 def of_remarks(remarks: Iterable[Remark]) -> list[Finding]:
-    """As findings, in their own order."""
+    """Return remarks as findings, in their own order."""
     return [Finding(one.weight, one.percent, str(one)) for one in remarks]

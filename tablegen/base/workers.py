@@ -1,4 +1,4 @@
-"""One function on many arguments, in processes of their own, results as they come; nothing is kept.
+"""Run one function on many arguments in worker processes, and yield results as they come.
 
 A worker is a new interpreter that takes pickled tasks from its stdin: no fork of a program with threads, and no module
 of the caller that is imported again. It runs in a session of its own, so that Ctrl-C reaches this program alone, which
@@ -24,11 +24,11 @@ _START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from tablegen
 
 
 class WorkerDied(Exception):
-    """A process ended in the middle of its task: it was killed, or there was no memory."""
+    """A process ended in the middle of its task: it was killed, or memory was exhausted."""
 
 
 def default_jobs() -> int:
-    """Nine tenths of the cores that this process may use, and at least one."""
+    """Return nine tenths of the cores that this process may use, at least one."""
     try:
         cores = len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
@@ -39,10 +39,10 @@ def default_jobs() -> int:
 def results(
     function: Callable[..., Result], tasks: Iterable[tuple[Any, ...]], jobs: int
 ) -> Iterator[tuple[int, "Result | Exception"]]:
-    """The number of each task and what the function gave for it, or raised, in the order in which they end.
+    """Yield the number of each task and its result or exception, in the order in which they end.
 
-    ``function`` is one of a module; arguments and results travel as pickles. Tasks are taken as workers become free.
-    With one job everything runs here. Where the caller stops, the workers are ended and waited for.
+    ``function`` is one of a module; arguments and results are pickled. Tasks are assigned as workers become free.
+    With one job everything runs here. If the caller stops, the workers are ended and waited for.
     """
     if jobs <= 1:
         for number, task in enumerate(tasks):
@@ -71,7 +71,7 @@ def _attempt(function: Callable[..., Result], task: tuple[Any, ...]) -> "Result 
 
 
 class _Pool:
-    """Workers with a thread each that talks to one of them, and what they are given and give back."""
+    """Workers, a thread for each that exchanges messages with it, and the queues of tasks and results."""
 
     def __init__(self, function: Callable[..., Any], jobs: int) -> None:
         self._function, self._jobs = function, jobs
@@ -83,14 +83,14 @@ class _Pool:
         self._ended = False
 
     def give(self, number: int, task: tuple[Any, ...]) -> None:
-        """Queue a task, with a worker more while there may be."""
+        """Queue a task, and start another worker if there may be one."""
         self._tasks.put((number, task))
         if len(self._threads) < self._jobs:
             self._threads.append(threading.Thread(target=self._work, daemon=True))
             self._threads[-1].start()
 
     def take(self) -> tuple[int, Any]:
-        """The next result."""
+        """Return the next result, and wait for it."""
         return self._done.get()
 
     def end(self) -> None:
@@ -105,22 +105,22 @@ class _Pool:
             thread.join()
 
     def _work(self) -> None:
-        """Talk to a worker until the pool ends; start another one where it dies."""
+        """Serve a worker until the pool ends; start another one where it dies."""
         worker: subprocess.Popen[bytes] | None = None
         while (item := self._tasks.get()) is not None and not self._ended:
             number, task = item
             try:
                 message = pickle.dumps((self._function, task))
                 worker = worker or self._started()
-                found = _exchanged(worker, message)
+                result = _exchanged(worker, message)
             except (EOFError, OSError) as error:
                 status = self._gone(worker) if worker is not None else None
                 worker = None
                 why = f"the process of this task ended with status {status}" if status is not None else str(error)
-                found = WorkerDied(why)
+                result = WorkerDied(why)
             except Exception as error:  # what cannot be pickled
-                found = error
-            self._done.put((number, found))
+                result = error
+            self._done.put((number, result))
         if worker is not None:
             self._gone(worker)
 
@@ -136,7 +136,7 @@ class _Pool:
         return worker
 
     def _gone(self, worker: "subprocess.Popen[bytes]") -> int:
-        """Close what leads to a worker, which ends it, and wait."""
+        """Close the pipes of a worker, which ends it, and wait; return its status."""
         assert worker.stdin is not None
         assert worker.stdout is not None
         for pipe in (worker.stdin, worker.stdout):
@@ -157,19 +157,19 @@ def _exchanged(worker: "subprocess.Popen[bytes]", message: bytes) -> Any:
 
 
 def serve() -> None:
-    """A worker: tasks from stdin, results to stdout, until the input ends or a signal comes."""
+    """Run a worker: tasks from stdin, results to stdout, until the input ends or a signal comes."""
     source: IO[bytes] = sys.stdin.buffer
     sink = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a format of somebody else prints is no result
+    os.dup2(2, 1)  # the output of a third-party format is no result
     try:
         with endings_interrupt():
             while True:
                 function, task = pickle.load(source)
-                found = _attempt(function, task)
+                result = _attempt(function, task)
                 try:
-                    answer = pickle.dumps(found)
-                except Exception as error:  # an exception of somebody else, that holds what cannot travel
-                    answer = pickle.dumps(RuntimeError(f"{type(found).__name__}: {found} ({error})"))
+                    answer = pickle.dumps(result)
+                except Exception as error:  # a third-party exception that cannot be pickled
+                    answer = pickle.dumps(RuntimeError(f"{type(result).__name__}: {result} ({error})"))
                 sink.write(answer)
                 sink.flush()
     except (EOFError, KeyboardInterrupt, BrokenPipeError):

@@ -27,26 +27,26 @@ _LAW_ERRORS, _LAW_SHARE = 10.0, 0.25  # a law that misses by so many errors, and
 
 
 def doubts(fit: Fit, points: bool = False) -> tuple[str, ...]:
-    """What makes a fit meaningless, in sentences with what to do; empty for one that can be written.
+    """List what makes a fit meaningless, with what to do; empty for a fit that can be written.
 
     With ``points`` measured values are written in place of a law, so that a law that misses them does not count.
     """
     match fit:
         case HysteresisFit():
-            found = _hysteresis(fit, points)
+            doubtful = _hysteresis(fit, points)
         case OffsetFit():
-            found = _offset(fit)
+            doubtful = _offset(fit)
         case OffsetSizesFit():
-            found = (f"images of {one.size_v:g} V: {doubt}" for one in fit.sizes for doubt in _offset(one))
+            doubtful = (f"images of {one.size_v:g} V: {doubt}" for one in fit.sizes for doubt in _offset(one))
         case SizeFit():
-            found = _size(fit)
+            doubtful = _size(fit)
         case FrequencyFit():
-            found = _frequency(fit)
+            doubtful = _frequency(fit)
         case ResonanceFit():
-            found = iter(()) if points else _resonance(fit)
+            doubtful = iter(()) if points else _resonance(fit)
         case _:
             raise NotImplementedError(type(fit))
-    return tuple(found)
+    return tuple(doubtful)
 
 
 def _hysteresis(fit: HysteresisFit, points: bool) -> Iterator[str]:

@@ -10,8 +10,8 @@ from tablegen.fitting.estimate import Fit
 def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[Finding]:
     """``places`` are files and lines of the outliers, ``points`` what would be written."""
     part = "image" if fit.images else "row"
-    found = [Finding("limit", 0.0, text, "\u2717 means nothing", "warning") for text in doubts(fit, points)]
-    found += [
+    findings = [Finding("limit", 0.0, text, "\u2717 means nothing", "warning") for text in doubts(fit, points)]
+    findings += [
         Finding(
             "spoils",
             abs(float(fit.residual_percent[row])) if row < len(fit.residual_percent) else 0.0,
@@ -21,4 +21,4 @@ def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[
         )
         for row, place in zip(fit.outliers, places, strict=True)
     ]
-    return worst_first([*found, *of_remarks(fit.remarks)])
+    return worst_first([*findings, *of_remarks(fit.remarks)])

@@ -43,7 +43,7 @@ class Change:
 
 
 def new_file(name: str, driver: Driver | float) -> str:
-    """A scanner file with nothing calibrated yet."""
+    """Return the text of a scanner file with nothing calibrated yet."""
     document = tomlkit.document()
     document["name"] = name
     driver = Driver.of(driver)
@@ -56,9 +56,12 @@ def new_file(name: str, driver: Driver | float) -> str:
 
 
 def updated(text: str, name: str, axis: str, change: Change) -> str:
-    """The text with a calibration put in; ``name`` is what messages call it.
+    """Put a calibration into the text of a scanner file; messages call the file ``name``.
 
-    Raises ``Rejected`` where the text is no TOML or where a value that was put in is outside what the file can hold.
+    Raises
+    ------
+    Rejected
+        If the text is no TOML, or a new value is outside what the file can hold.
     """
     before, _ = parse_toml(text, name)
     windows = "\r\n" in text
@@ -68,10 +71,10 @@ def updated(text: str, name: str, axis: str, change: Change) -> str:
     expected = document.unwrap()
     try:
         changed = _spaced(_with_provenance(tomlkit.dumps(document), name, axis, change), text)
-        kept = tomllib.loads(changed) == expected
+        faithful = tomllib.loads(changed) == expected
     except (Rejected, ValueError):  # what came out is no TOML
-        changed, kept = text, False
-    if not kept:
+        changed, faithful = text, False
+    if not faithful:
         why = "its layout is too unusual to be edited in place; write the values by hand, or one table below the other"
         raise Rejected([Problem(name, 0, axis, why)])
     _check(text, changed, name)
@@ -153,7 +156,7 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _rows_of_tables(rows: Sequence[Mapping[str, Any]]) -> Any:
-    """A row a line."""
+    """Format a table with one row a line."""
     array = tomlkit.array()
     for row in rows:
         table = tomlkit.inline_table()
@@ -175,7 +178,7 @@ def _set(table: Any, key: str, value: Any) -> None:
 
 
 def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
-    """The text with comments above the tables, in place of those of an earlier calibration."""
+    """Replace the comments above the tables, those of an earlier calibration, by the new ones."""
     for index, lines in enumerate(change.provenance):
         key, turn = f"{axis}.{change.kind}", None
         if change.branches:
@@ -192,7 +195,7 @@ def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
 
 
 def _spaced(text: str, before: str) -> str:
-    """A blank line above the tables that are new, as between the others."""
+    """Put a blank line above the tables that are new, as between the others."""
     known = set(pairwise(before.split("\n")))
     rows: list[str] = []
     for row in text.split("\n"):
@@ -210,10 +213,10 @@ def _old(rows: list[str], at: int, kind: str, turn: float | None) -> tuple[int, 
         first = end
         while first > 0 and _FILE_MARK.match(rows[first - 1].strip()):
             first -= 1
-        found = _FIRST_MARK.match(rows[first - 1].strip()) if first > 0 else None
-        if not found:
+        mark = _FIRST_MARK.match(rows[first - 1].strip()) if first > 0 else None
+        if not mark:
             break
-        if found[1] == kind and (turn is None or (found[2] and abs(float(found[2]) - turn) < TURN_TOLERANCE)):
+        if mark[1] == kind and (turn is None or (mark[2] and abs(float(mark[2]) - turn) < TURN_TOLERANCE)):
             return first - 1, end
         end = first - 1
     return at, at
@@ -229,14 +232,14 @@ def _entry(text: str, key: str, turn: float) -> str:
 
 def _check(old: str, new: str, name: str) -> None:
     """Refuse what the new text has wrong and the old one had not; a file may be incomplete while it is calibrated."""
-    found = []
+    problem_lists = []
     for text in (old, new):
         problems = Problems()
         values, document = parse_toml(text, name)
         decode(Scanner, values, document, problems, lambda *_: None)
-        found.append(problems.found)
-    known = {(problem.key, problem.why) for problem in found[0]}
-    added = [p for p in found[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
+        problem_lists.append(problems.entries)
+    known = {(problem.key, problem.why) for problem in problem_lists[0]}
+    added = [p for p in problem_lists[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
     if added:  # at lines that are not in the file
         raise Rejected([Problem(name, 0, p.key, f"{p.why}; nothing was written") for p in added])
 

@@ -82,7 +82,7 @@ def _branch_parameters(branch: TurnFit) -> list[tuple[str, Estimate, str]]:
 def change(
     fit: Fit, sources: Sequence[Source], points: bool = False, response: str = "", forced: bool = False
 ) -> Change:
-    """What the fit writes into the scanner file, and the comment that says where it came from.
+    """Return the change that the fit makes in the scanner file, and the comment with its origin.
 
     With ``points`` hysteresis is written as it was measured at each amplitude, in place of (22). With ``response``, the
     name of a file, the measured response takes the place of the resonance. ``forced`` is said in the comment.
@@ -153,11 +153,11 @@ def _branch_errors(branch: TurnFit, points: bool) -> list[tuple[str, Estimate]]:
     ]
 
 
-def _errors(found: Sequence[tuple[str, Estimate]]) -> list[str]:
+def _errors(estimates: Sequence[tuple[str, Estimate]]) -> list[str]:
     """Lines of the comment: each value with its standard error, where that is known. `tablegen compare` reads them."""
     known = [
         f"{key} {one.rounded:.9g} +- {one.standard_error:.2g}"
-        for key, one in found
+        for key, one in estimates
         if isfinite(one.standard_error) and one.standard_error > 0.0
     ]
     lines: list[str] = []

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from math import floor, log10, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
 
 from tablegen.base.input_errors import Document, Problem
+from tablegen.base.warnings import FindingCode
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
@@ -22,6 +24,9 @@ from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
 
+if TYPE_CHECKING:
+    from tablegen.certificate.position_errors import ArrivingErrors
+
 
 class Certificate(Struct, frozen=True):
     """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
@@ -32,7 +37,7 @@ class Certificate(Struct, frozen=True):
     ``peak_acceleration`` is that of the target, of the line a period squared, where the waveform was made for the
     least; ``optimum`` the least of any, where ``certificate.optimum`` has worked it out.
     Errors of an axis with a ``shaped`` part are those of the position, and its codes and largest step are bounds: no
-    two of its periods are the same.
+    two of its periods are the same. ``position`` has those of an unshaped axis whose scanner has a response.
     """
 
     ticks: int
@@ -53,6 +58,7 @@ class Certificate(Struct, frozen=True):
     peak_acceleration: float | None = None
     optimum: float | None = None
     shaped: ShapedErrors | None = None
+    position: "ArrivingErrors | None" = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -90,7 +96,7 @@ def broken_limits(
     advise: Callable[[str], str] = lambda _: "",
     hardware_problem: Callable[[str, str, str], Problem] | None = None,
 ) -> list[Problem]:
-    """The limits of the configuration that a certificate exceeds, each with a remedy.
+    """List the limits of the configuration that a certificate exceeds, each with a remedy.
 
     ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it. ``hardware_problem`` places
     one of a key of an axis' amplifier; without it that stands in ``file``.
@@ -102,13 +108,14 @@ def broken_limits(
                 f"the {axis} axis steps by {certificate.largest_step} codes, above its guard of {certificate.max_step}"
             )
             key = "amplifier.max_slew_v_per_s"
-            problems.append(file.problem(key, why) if hardware_problem is None else hardware_problem(axis, key, why))
+            problem = file.problem(key, why) if hardware_problem is None else hardware_problem(axis, key, why)
+            problems.append(problem.coded("step-guard", axis))
         limit = plan.limits.max_error_lsb
         if limit is not None and certificate.max_error_lsb > limit:
             why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "
             remedy = _finer_table(plan.x if axis == "x" else plan.y)
             remedy = remedy if limit > 0.5 else "a code alone is rounded by up to 0.5"
-            problems.append(file.problem("limits.max_error_lsb", why + remedy))
+            problems.append(file.problem("limits.max_error_lsb", why + remedy).coded("converter-error", axis))
         limit = plan.limits.max_scaling_error_percent
         if limit is None:
             continue
@@ -118,23 +125,25 @@ def broken_limits(
             parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
             remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
             why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
-            problems.append(file.problem("limits.max_scaling_error_percent", why))
-        elif foreseen := _foreseen(certificate, limit):
-            why = f"on the scanner the {axis} axis is expected to have a {foreseen}"
+            code: FindingCode = "scaling-error" if worst > limit else "size-error"
+            problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
+        elif expected := _expected_excess(certificate, limit):
+            code, excess = expected
+            why = f"on the scanner the {axis} axis is expected to have a {excess}"
             why = "; ".join(filter(None, (why, advise(axis))))
-            problems.append(file.problem("limits.max_scaling_error_percent", why))
+            problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
     return problems
 
 
-def _foreseen(certificate: Certificate, limit: float) -> str:
-    """What the waveform and what a model expects of the scanner exceed together, and which part is whose; or nothing.
+def _expected_excess(certificate: Certificate, limit: float) -> tuple[FindingCode, str] | None:
+    """Return how the errors of the waveform and of the scanner together exceed a limit; None where they do not.
 
     The uncertainty is not counted: no change of the scan makes it smaller.
     """
     both, expected = certificate.scaling_on_scanner, certificate.expected
     if both is not None and both[1] + both[2] > limit:
         side, on_scanner, own = both
-        return (
+        return "expected-scaling-error", (
             f"scaling error of {on_scanner + own:.4g} % {side}, above {limit:g} %: {on_scanner:.3g} % since these "
             f"harmonics do not make the waveform that its operator needs over the window, {own:.3g} % of the emitted "
             "waveform"
@@ -142,17 +151,17 @@ def _foreseen(certificate: Certificate, limit: float) -> str:
     if expected is not None and expected.size is not None:
         on_scanner, own = expected.size.value, certificate.size_error_percent
         if abs(on_scanner + own) > limit:
-            return (
+            return "expected-size-error", (
                 f"size error of {on_scanner + own:+.4g} %, above {limit:g} %: {on_scanner:+.3g} % by its operator, "
                 f"{own:+.3g} % of the emitted waveform"
             )
-    return ""
+    return None
 
 
 def _finer_table(line: LinePlan, written: str = "lengthen or widen {}") -> str:
     """How a table is made to err less: one that is written, and one that the build chooses."""
     table = f"{line.axis}.table"
-    return written.format(table) if line.asked_table is None else f"a lower {table}.max_error_lsb"
+    return written.format(table) if line.table_request is None else f"a lower {table}.max_error_lsb"
 
 
 def _remedy(line: LinePlan, parts: ScalingError) -> str:
@@ -201,11 +210,31 @@ def _certify(line: LinePlan) -> Certificate:
         expected=certified_expectation(line, played),
         peak_acceleration=None if line.kept_percent is None else line.target.peak_acceleration(),
         shaped=shaped_errors(line, played, _directions(line)),
+        position=_position(line, played),
     )
 
 
+def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":
+    """Compute the errors of the position behind the response of the axis; None without a response."""
+    if line.drive.response is None:
+        return None
+    from tablegen.certificate.position_errors import position_errors  # few scanners have one
+
+    return position_errors(line, played, _directions(line))
+
+
+def position_scaling(line: LinePlan) -> float:
+    """Return the larger scaling error of both directions behind the response of an axis, in percent; 0 without one."""
+    played = EmittedPeriod(line)
+    position = _position(line, played)
+    scaling = (
+        {side: one.total for side, one in _scaling(line, played).items()} if position is None else position.scaling
+    )
+    return max(scaling.values(), default=0.0)
+
+
 def scaling_errors(line: LinePlan) -> dict[str, ScalingError]:
-    """The scaling errors of an axis alone, by the directions that image."""
+    """Compute the scaling errors of an axis, by the directions that image."""
     return _scaling(line, EmittedPeriod(line))
 
 
@@ -214,7 +243,7 @@ def _scaling(line: LinePlan, played: EmittedPeriod) -> dict[str, ScalingError]:
 
 
 def _directions(line: LinePlan) -> dict[str, Sweep]:
-    """The branches that image; none of an axis at rest."""
+    """Return the branches that image; none of an axis at rest."""
     shape = line.drive.shape
     if line.drive.resting:
         return {}

@@ -27,7 +27,7 @@ class ConverterErrors(Struct, frozen=True):
 
 
 def converter_errors(line: LinePlan, played: EmittedPeriod) -> ConverterErrors:
-    """The errors of the integers of the directions that image, in a position, through the axis' dynamics."""
+    """Compute the position errors of the directions that image from those of the codes, through the axis' dynamics."""
     shape = line.drive.shape
     sides: dict[str, Sweep] = {"forward": shape.forward}
     if line.band_limit.directions == "both":

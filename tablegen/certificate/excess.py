@@ -5,6 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from tablegen.base.warnings import FindingCode
 from tablegen.certificate.line_errors import ScalingError
 
 LARGEST_PERCENT = 1.0  # the error that nobody is told of
@@ -27,6 +28,11 @@ class Excess(Struct, frozen=True):
     parts: ScalingError
 
     @property
+    def code(self) -> FindingCode:
+        """The code of the finding."""
+        return "scaling-error" if self.what == "scaling error" else "size-error"
+
+    @property
     def times(self) -> float:
         """By which factor the error is above what it may be."""
         return abs(self.percent) / self.limit
@@ -34,15 +40,15 @@ class Excess(Struct, frozen=True):
     @property
     def cause(self) -> Cause:
         """The largest part."""
-        found: list[tuple[float, Cause]] = [
+        parts: list[tuple[float, Cause]] = [
             (self.parts.quantisation, "quantisation"),
             (self.parts.band_limit, "band limit"),
             (self.parts.model, "model"),
         ]
-        return max(found, key=lambda part: part[0])[1]
+        return max(parts, key=lambda part: part[0])[1]
 
     def text(self, axis: str) -> str:
-        """The error, what it is above, and its parts, in words."""
+        """Return the error, what it is above, and its parts, in words."""
         parts, above = self.parts, []
         if self.what == "scaling error":
             figure = f"{self.percent:.3g} %"
@@ -61,22 +67,22 @@ class Excess(Struct, frozen=True):
 
 
 def excess(scaling: Mapping[str, ScalingError], most: float | None = None) -> Excess | None:
-    """What should be said of the errors of one axis, by direction; None where nothing should.
+    """Return the worst error of one axis that is to be reported; None where there is none.
 
     An uncompensated line is one to compare with only where the scanner file has a hysteresis to compensate. With
     ``most``, a limit of the scan file in percent, that alone counts.
     """
-    found = []
+    candidates = []
     for side, parts in scaling.items():
         error = max(parts.total, parts.band_limit)
         limit = size_limit = LARGEST_PERCENT if most is None else most
         if most is None and parts.uncompensated >= _NOTHING_PERCENT:
             limit = min(limit, parts.uncompensated)
         if error > limit:
-            found.append(Excess("scaling error", side, error, limit, parts))
+            candidates.append(Excess("scaling error", side, error, limit, parts))
         if abs(parts.size) > size_limit:
-            found.append(Excess("size error", side, parts.size, size_limit, parts))
-    return max(found, key=lambda one: one.times, default=None)
+            candidates.append(Excess("size error", side, parts.size, size_limit, parts))
+    return max(candidates, key=lambda one: one.times, default=None)
 
 
 def _figure(percent: float) -> str:

@@ -1,4 +1,4 @@
-"""Where what is expected on the scanner should be doubted, or is worse than the waveform's own errors say."""
+"""Where what arrives on the scanner should be doubted, or is worse than the errors of the codes say."""
 
 from typing import Literal
 
@@ -7,27 +7,30 @@ from msgspec import Struct
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import LARGEST_PERCENT
+from tablegen.certificate.shaped_periods import Passage
 from tablegen.planning.line_plan import LinePlan
 
 FAR_PERCENT = 10.0  # of v_max, from the nearest measured line; the traces of `calibrate operator` are closer than twice
+# Behind a resonance: still above 1 % if its quality is half of what the scanner file says, which nobody knows better.
+RESONANCE_PERCENT = 2.0
 _GRID = 32  # points per period of the highest harmonic
 
 
 class Doubt(Struct, frozen=True):
-    """A sentence about one axis: a figure in percent, above ``limit``; ``kind`` says which figure it is."""
+    """A sentence about one axis: a figure in percent, above ``limit``; ``code`` says which figure it is."""
 
-    kind: Literal["scaling error", "distance"]
+    code: Literal["expected-scaling-error", "operator-distance", "resonance"]
     text: str
     percent: float
     limit: float
 
 
 def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
-    """What should be said of the expectation of an axis.
+    """List the doubts about the expectation of an axis.
 
     The uncertainty is not counted: it stands beside the figure, and no change of the scan makes it smaller.
     """
-    found, axis, expected = [], line.axis, certificate.expected
+    doubt_list, axis, expected = [], line.axis, certificate.expected
     figures = {} if expected is None else expected.scaling
     side = max(figures, key=lambda one: figures[one].value, default="")
     if side and figures[side].value > LARGEST_PERCENT:
@@ -36,7 +39,16 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"{side}, above {LARGEST_PERCENT:g} %, since these harmonics do not make the waveform that its operator "
             "needs over the window"
         )
-        found.append(Doubt("scaling error", text, figures[side].value, LARGEST_PERCENT))
+        doubt_list.append(Doubt("expected-scaling-error", text, figures[side].value, LARGEST_PERCENT))
+    position = certificate.position
+    if position is not None and max(position.scaling.values(), default=0.0) > RESONANCE_PERCENT:
+        side, percent = position.worst
+        text = (
+            f"the steps of the {axis} codes drive the resonance at {_hz(position.passage)}: behind it the scaling "
+            f"error is {percent:.3g} % {side}, above {RESONANCE_PERCENT:g} %; of the codes alone it is "
+            f"{certificate.scaling[side].total:.3g} %"
+        )
+        doubt_list.append(Doubt("resonance", text, percent, RESONANCE_PERCENT))
     if expected is not None and expected.distance is not None and expected.distance > FAR_PERCENT:
         w = line.drive_series.on_grid(_GRID * line.drive_series.harmonics)
         stroke = line.drive.v_amplitude * float(np.max(w) - np.min(w))
@@ -46,5 +58,10 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"trace of its operator, so that little is known there; record a trace of {here}, and give it to "
             "`tablegen calibrate operator` with the others"
         )
-        found.append(Doubt("distance", text, expected.distance, FAR_PERCENT))
-    return found
+        doubt_list.append(Doubt("operator-distance", text, expected.distance, FAR_PERCENT))
+    return doubt_list
+
+
+def _hz(passage: Passage) -> str:
+    response = passage.response
+    return f"{passage.frequency_hz if response is None else response.resonance_hz:.6g} Hz"

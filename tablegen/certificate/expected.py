@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from tablegen.certificate.converter_errors import converter_errors
 from tablegen.certificate.line_errors import EmittedPeriod
-from tablegen.compensation.expectation import Expectation, Figure
+from tablegen.compensation.expectation import Expectation, Figure, PlayedStroke
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Expansion, on_grid
@@ -21,7 +21,7 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 def expected_of(line: LinePlan) -> Expectation | None:
-    """What a line should do on the scanner; None where nothing is known.
+    """Compute what a line should do on the scanner; None where nothing is known.
 
     A layer of ``tablegen refine`` was learnt on the scanner, and knows more than the model.
     """
@@ -31,12 +31,12 @@ def expected_of(line: LinePlan) -> Expectation | None:
     known = line.drive.shape.expectation
     if known is not None:
         return known if both else known.forward_only
-    mismatch = rounding_mismatch(line) if both else None
-    return None if mismatch is None else Expectation("laws", mismatch=Figure(mismatch))
+    rounding = _rounding(line) if both else None
+    return None if rounding is None else Expectation("laws", mismatch=Figure(rounding[0]), stroke=rounding[1])
 
 
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
-    """The same of the emitted integers: what the converter's steps leave is uncertain too.
+    """Compute the expectation of the emitted integers: what the converter's steps leave is uncertain too.
 
     It is added to the uncertainties: nobody knows how steps and departures of the piezo fall together.
     """
@@ -57,10 +57,15 @@ def _less_certain(figure: Figure, by: float) -> Figure:
 
 
 def rounding_mismatch(line: LinePlan) -> float | None:
-    """The largest distance of trace and retrace inside the window, in percent of the line, by the laws.
+    """Compute the largest distance of trace and retrace inside the window, in percent of the line, by the laws.
 
     None where a model has no branches for the stroke that is played.
     """
+    rounding = _rounding(line)
+    return None if rounding is None else rounding[0]
+
+
+def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
     drive = line.drive
     if drive.shape.waveform is not None or not drive.hysteresis.compensates:
         return None
@@ -74,9 +79,10 @@ def rounding_mismatch(line: LinePlan) -> float | None:
     there, back = (_share(line, target, side, x, low, high) for side in ("forward", "backward"))
     apart = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
     extent = drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) / drive.size_nm
-    return 100.0 * extent * float(np.max(np.abs(apart)))
+    forward, backward = ((one.beta, one.u_peak) for one in played.peaks)
+    return 100.0 * extent * float(np.max(np.abs(apart))), PlayedStroke(forward, backward, extent)
 
 
 def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:
-    """The drive where the line is at ``x``, from 0 to 1 between its turns."""
+    """Return the drive where the line is at ``x``, from 0 to 1 between its turns."""
     return (target.at(line.drive.shape.times(side, x), 0)[0] - low) / (high - low)

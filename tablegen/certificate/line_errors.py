@@ -100,13 +100,13 @@ class EmittedPeriod:
             self.shaped = ShapedPeriods(line, self._asked(ticks))
 
     def _extremes(self) -> Ints:
-        """The ticks before and behind each extreme of the float waveform."""
+        """Return the ticks before and behind each extreme of the float waveform."""
         series, slopes = self._line.series, self.expansion(self._line.series)
         grid = on_grid(series, extreme_points(series))
         return extreme_ticks(grid, lambda t: slopes.at(t, 1, 2), self._line.program.ticks)
 
     def expansion(self, series: FourierSeries) -> Expansion:
-        """A series of the line, to be asked at any times; it is worked out once."""
+        """Expand a series of the line once, for values at any times."""
         if id(series) not in self._expansions:
             self._expansions[id(series)] = series, Expansion(series)  # the series is kept, so that no other has its id
         return self._expansions[id(series)][1]
@@ -120,7 +120,7 @@ class EmittedPeriod:
         return codes
 
     def errors(self, k: Ints) -> Floats:
-        """Emitted code less the code asked for, unrounded, at ticks k."""
+        """Compute the emitted code less the unrounded target code at ticks k."""
         return self._by_tick[k] if self.runs.by_tick else self.runs.at(k) - self._asked(k)
 
     @property
@@ -129,7 +129,7 @@ class EmittedPeriod:
         return self.runs.by_tick
 
     def arriving(self) -> "list[EmittedPeriod | TickErrors]":
-        """What is judged of the errors: the codes' own, or of shaped ones those of the position, period by period.
+        """List the errors that are judged: those of the codes, or of shaped codes those of the position, a period each.
 
         Of a shaped period that is too long for that, it is what rounding alone would leave.
         """
@@ -138,7 +138,7 @@ class EmittedPeriod:
         return [TickErrors(errors) for errors in self.shaped.position_errors]
 
     def largest_error(self) -> float:
-        """max |error| over every tick; of shaped codes of the position."""
+        """Return max |error| over every tick; of shaped codes, that of the position."""
         if self.shaped is not None:
             return float(np.max(np.abs(self.shaped.position_errors)))
         return self._figures[0]
@@ -169,7 +169,7 @@ class EmittedPeriod:
         return pairwise([first, *edges.tolist(), stop])
 
     def _chunks(self) -> Iterator[slice]:
-        """The runs in parts that are worked out together, in the cache."""
+        """Yield parts of the runs that fit into the cache together."""
         return (slice(at, at + _CHUNK_RUNS) for at in range(0, len(self.runs.starts), _CHUNK_RUNS))
 
     @cached_property
@@ -186,7 +186,7 @@ class EmittedPeriod:
         return largest, float(mean), float(square)
 
     def _moments(self, which: slice, n: Ints, first: Floats, last: Floats) -> tuple[float, float]:
-        """Sums of the error and of its square over the ticks of some runs, with the errors of their ends."""
+        """Sum the error and its square over the ticks of some runs, with the errors of their ends."""
         starts = self.runs.starts[which]
         if self.runs.by_tick:
             return float(np.sum(first)), float(np.sum(first * first))
@@ -212,6 +212,24 @@ class EmittedPeriod:
 
 
 def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
+    """Compute the scaling error of one direction and its parts, in percent, peak to peak over the window.
+
+    Parameters
+    ----------
+    line
+        The planned axis.
+    played
+        Its emitted period.
+    side
+        "forward" or "backward".
+    branch
+        The branch u(x) of this direction.
+
+    Returns
+    -------
+    ScalingError
+        The total and its parts: band limit, quantisation, model; the size error with its sign.
+    """
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     deviation, speed, wanted_speed = _followed(line, played, side, position)
@@ -250,12 +268,12 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
             series, value, slope = series.less(line.layer), value - layer_value, slope - layer_slope
         return shape.followed(side, position, series, value, slope)
 
-    wanted = follow(line.target)
-    return *(wanted if reached is line.target else follow(reached)), wanted[1]
+    ideal = follow(line.target)
+    return *(ideal if reached is line.target else follow(reached)), ideal[1]
 
 
 def refined(line: LinePlan, side: str, branch: Sweep) -> Refined:
-    """What the layer does, to first order: it moves the modelled piezo by r / u'."""
+    """Compute what the layer does, to first order: it moves the modelled piezo by r / u'."""
     assert line.layer is not None
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
@@ -269,7 +287,7 @@ def _peak_to_peak(values: Floats) -> float:
 
 
 def _reached(line: LinePlan) -> FourierSeries:
-    """The drive as the piezo sees it: the target, less what the boost limit held back."""
+    """Return the drive at the piezo: the target less what the boost limit held back."""
     if not line.held_harmonics or line.drive.response is None:
         return line.target
     n = np.arange(1.0, line.target.harmonics + 1.0)
@@ -282,7 +300,7 @@ def _reached(line: LinePlan) -> FourierSeries:
 
 
 def tick_scaling(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep, errors: TickErrors) -> float:
-    """The total in percent, peak to peak, where these are the errors of a period."""
+    """Compute the total scaling error in percent, peak to peak, of a period with these errors."""
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     deviation, _, _ = _followed(line, played, side, position)
@@ -298,7 +316,7 @@ def _chords(
     deviation: Floats,
     steepness: Floats,
 ) -> tuple[Floats, Floats]:
-    """The least and the largest slope error (1 is 100 %) of chords inside the window: of the integers, of quantisation.
+    """Return the least and the largest slope error (1 is 100 %) of chords inside the window: of codes, of quantisation.
 
     Of all chords those count that begin or end where a run does: between those the error of a chord is a straight
     line. ``deviation`` and ``steepness`` of the waveform stand at ``position``. A code stands for the middle of its

@@ -9,18 +9,18 @@ _MAX_PIXELS_APART = 0.25  # of a pixel; more is a warning
 
 
 def apart_percent(plan: Plan) -> float:
-    """The largest distance of a pixel's two places, in percent of the line; 0 where one direction images."""
+    """Return the largest distance of a pixel's two places, in percent of the line; 0 where one direction images."""
     return 100.0 * retrace_mismatch(plan.schedule, plan.x.drive.turn)
 
 
 def apart_note(plan: Plan) -> str:
-    """A sentence where there is a distance, with the lines that have none."""
+    """Return a sentence on the distance, with the lines that have none; "" where there is no distance."""
     apart = apart_percent(plan)
     if not apart:
         return ""
     schedule, (low, high) = plan.schedule, plan.x.band_limit.window
-    asked = exact(plan.x.drive.turn), exact(low), exact(high)
-    lines = matching_lines(*asked, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
+    requested = exact(plan.x.drive.turn), exact(low), exact(high)
+    lines = matching_lines(*requested, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
     remedy = f"; a timing.ticks_per_line of {' or '.join(map(str, lines))} makes them match" if lines else ""
     return (
         f"the same pixel of trace and retrace shows places up to {apart:.2g} % of the line apart, since pixels begin "
@@ -29,7 +29,7 @@ def apart_note(plan: Plan) -> str:
 
 
 def apart_warning(plan: Plan) -> str:
-    """The same sentence where the distance is more than a quarter of a pixel."""
+    """Return the sentence of ``apart_note`` where the distance is more than a quarter of a pixel; "" otherwise."""
     low, high = plan.x.band_limit.window
     pixel = 100.0 * (high - low) / plan.schedule.pixels
     return apart_note(plan) if apart_percent(plan) > _MAX_PIXELS_APART * pixel * (1.0 + 1e-9) else ""

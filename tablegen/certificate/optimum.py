@@ -20,7 +20,7 @@ _PER_WAVE = 16  # of the highest harmonic: accelerations outside the windows, an
 
 
 def with_optimum(line: LinePlan, certificate: Certificate) -> Certificate:
-    """A certificate with the peak acceleration and its optimum at the error that the axis keeps, or has.
+    """Add the peak acceleration, and its optimum at the error that the axis keeps or has, to a certificate.
 
     The optimum is None where the waveform is the operator's own, which leaves no error to trade for acceleration. It
     needs scipy.
@@ -32,7 +32,7 @@ def with_optimum(line: LinePlan, certificate: Certificate) -> Certificate:
 
 
 def least_acceleration(straight: Straightness, harmonics: int, percent: float) -> float | None:
-    """max |w''| per period squared, of the line; None where no waveform of so many harmonics keeps the error."""
+    """Return max |w''| per period squared of the line; None where no waveform of so many harmonics keeps the error."""
     from scipy.optimize import linprog
 
     shape, turn, (low, high) = straight.shape, straight.shape.turn, straight.window
@@ -49,19 +49,19 @@ def least_acceleration(straight: Straightness, harmonics: int, percent: float) -
 
     count = _SLOPES_PER_HARMONIC * harmonics + _MORE_SLOPES
     t = np.concatenate(straight.times(0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))))
-    slopes, wanted = rows(t, 1) / shape.slope(t)[:, None], straight.asked.slope(t) / shape.slope(t)
+    slopes, target = rows(t, 1) / shape.slope(t)[:, None], straight.target.slope(t) / shape.slope(t)
     grid = np.arange(ceil(_PER_WAVE * harmonics)) / ceil(_PER_WAVE * harmonics)
     place = np.where(grid <= turn, grid / turn, (1.0 - grid) / (1.0 - turn))
     free = (place <= low) | (place >= high) | ((grid > turn) & (not straight.both))
     bends, values = rows(grid[free], 2), rows(grid, 0)
     half = percent / 200.0
-    blocks = [(bends, 1.0, 0.0, 0.0), (slopes, 0.0, wanted, half), (values, 0.0, 0.5, 0.5)]
-    left, right = [], []
+    blocks = [(bends, 1.0, 0.0, 0.0), (slopes, 0.0, target, half), (values, 0.0, 0.5, 0.5)]
+    coefficients, bounds = [], []
     for block, share, middle, width in blocks:
         for sign in (1.0, -1.0):
-            left.append(np.hstack([sign * block, np.full((len(block), 1), -share)]))
-            right.append(np.broadcast_to(width + sign * np.asarray(middle), len(block)))
+            coefficients.append(np.hstack([sign * block, np.full((len(block), 1), -share)]))
+            bounds.append(np.broadcast_to(width + sign * np.asarray(middle), len(block)))
     objective = np.zeros(2 * harmonics + 2)
     objective[-1] = 1.0
-    found = linprog(objective, np.vstack(left), np.concatenate(right), bounds=(None, None), method="highs")
-    return float(found.fun) if found.status == 0 else None
+    solution = linprog(objective, np.vstack(coefficients), np.concatenate(bounds), bounds=(None, None), method="highs")
+    return float(solution.fun) if solution.status == 0 else None

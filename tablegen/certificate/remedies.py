@@ -7,6 +7,7 @@ trials, so that the search ends soon where nothing helps.
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from math import ceil, copysign, log2
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from msgspec.structs import replace
 
 from tablegen.base.figures import at_least, at_most, shown_path
 from tablegen.base.input_errors import Rejected
-from tablegen.certificate.certificate import scaling_errors
+from tablegen.certificate.certificate import position_scaling, scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
 from tablegen.certificate.expected import expected_of
 from tablegen.certificate.line_errors import EmittedPeriod
@@ -60,17 +61,19 @@ class Remedy:
         return f"{self.text} leaves {self.percent:.3g} %{also}"
 
 
-def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> list[Remedy]:
-    """The remedies of one axis that were planned and measured, a key each: the first value that is enough, or the best.
+def tried(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, most: float | None = None) -> list[Remedy]:
+    """Plan and measure the remedies of one axis, a key each: the first value that is enough, or the best.
 
-    ``found`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan alone is enough, no other
+    ``exceeded`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan is enough, no other
     is looked for; of the hardware, both converter and amplifier are. A change that no plan can be made of is left out.
     """
-    return _tried(_WAYS[found.cause](setup, plan, line, found), lambda change: _trial(setup, plan, line, change, most))
+    return _tried(
+        _WAYS[exceeded.cause](setup, plan, line, exceeded), lambda change: _trial(setup, plan, line, change, most)
+    )
 
 
 def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own: bool) -> list[Remedy]:
-    """The same for the scaling error that the operator of an axis expects of its waveform: at most ``most`` percent.
+    """Plan and measure remedies for the scaling error that an operator expects: at most ``most`` percent.
 
     With ``own`` the errors of the emitted waveform count as well.
     """
@@ -88,6 +91,29 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
         return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
 
     return _tried(_other_bands(setup, plan, line), trial)
+
+
+def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
+    """Plan and measure remedies for a resonance that the steps of the codes drive: shaping, or more codes."""
+    hardware = [setup.hardware(one.axis) for one in plan.lines]
+    shaping = _keys(setup.hardware(line.axis).where("dac.shaping"))
+    dac = setup.hardware(line.axis).dac
+    finest = min(_MOST_BITS, *(one.dac.word_bits or _MOST_BITS for one in hardware))
+    bits = _keys(place for one in hardware for place in one.where("dac.bits"))
+    ways: list[Iterator[Change]] = [
+        (dict.fromkeys(shaping, order) for order in ("scanner", "second", "first")),
+        (dict.fromkeys(bits, n) for n in range(dac.bits + 1, min(dac.bits + 5, finest + 1))),
+        islice(_slower(setup, plan), 2),  # where not the rounding but the ticks are coarse
+    ]
+
+    def trial(change: Change) -> Remedy | None:
+        other = _planned(setup, change)
+        if other is None:
+            return None
+        left = position_scaling(other.x if line.axis == "x" else other.y)
+        return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
+
+    return _tried(ways, trial)
 
 
 def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | None]) -> list[Remedy]:
@@ -108,7 +134,7 @@ def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | 
 
 
 def changed(setup: Setup, change: Change) -> Setup:
-    """The setup with other values at dotted keys of its files; the values are not checked."""
+    """Return the setup with other values at dotted keys of its files; the values are not checked."""
 
     def put(struct: Any, path: list[str], value: Any) -> Any:
         name, *rest = path
@@ -141,11 +167,11 @@ def _planned(setup: Setup, change: Change) -> Plan | None:
 
 
 def _text(setup: Setup, change: Change) -> str:
-    """The change as its keys and values would be written in the files."""
+    """Write the change as keys and values of the files."""
 
     def part(key: str, value: Any) -> str:
         name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
-        written, factor = setup.scan_file.as_said(key)
+        written, factor = setup.scan_file.written_key(key)
         shown = _value(value if factor == 1.0 else factor * value)
         return f"{written.removeprefix(_SCANNER)} = {shown}{name}"
 
@@ -167,19 +193,19 @@ def _value(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else f"{value:.9g}"
 
 
-def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess) -> Iterator[Iterator[Change]]:
     axis, table = line.axis, line.program
-    if line.asked_table is not None:
-        asked, least = line.asked_table.max_error_lsb, 0.0 if line.asked_table.shaped else _ROUNDED_LSB
-        yield ({f"{axis}.table.max_error_lsb": asked / share} for share in (2.0, 4.0) if asked / share > least)
-    bits = ceil(log2(_MARGIN) + log2(abs(found.percent)) - log2(found.limit))  # their quotient may be no float
+    if line.table_request is not None:
+        requested, least = line.table_request.max_error_lsb, 0.0 if line.table_request.shaped else _ROUNDED_LSB
+        yield ({f"{axis}.table.max_error_lsb": requested / share} for share in (2.0, 4.0) if requested / share > least)
+    bits = ceil(log2(_MARGIN) + log2(abs(exceeded.percent)) - log2(exceeded.limit))  # their quotient may be no float
     words_per_code = 2.0**table.bits / (abs(line.codes_per_unit) * line.scale)
-    if words_per_code < 2.0 and line.asked_table is None:
+    if words_per_code < 2.0 and line.table_request is None:
         yield ({f"{axis}.table.bits": b} for b in range(table.bits + bits, _MOST_BITS + 1))
     length = len(table.words)
-    if line.asked_table is None and table.mode != "direct" and length < 64 * line.series.harmonics:
+    if line.table_request is None and table.mode != "direct" and length < 64 * line.series.harmonics:
         yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= MOST_LENGTH[table.mode])
-    yield _amplifiers(setup, plan, line, found)
+    yield _amplifiers(setup, plan, line, exceeded)
     hardware = [setup.hardware(one.axis) for one in plan.lines]
     dac = setup.hardware(axis).dac
     most = min(_MOST_BITS, *(one.dac.word_bits or _MOST_BITS for one in hardware))
@@ -192,8 +218,8 @@ def _keys(places: Iterable[Place]) -> list[str]:
     return list(dict.fromkeys(f"{_SCANNER if place.in_scanner else ''}{place.key}" for place in places))
 
 
-def _amplifiers(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Change]:
-    """A gain that is as much lower as is needed, or as the drives on this amplifier allow, about the middle of them."""
+def _amplifiers(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess) -> Iterator[Change]:
+    """Yield a gain that is as much lower as is needed, or as the drives on this amplifier allow, about their middle."""
     hardware = setup.hardware(line.axis)
     dac, gain = hardware.dac, hardware.amplifier.gain
     gains, biases = _keys(hardware.where("amplifier.gain")), _keys(hardware.where("amplifier.bias_v"))
@@ -209,15 +235,15 @@ def _amplifiers(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iter
         ends.append(one.drive.v_offset if park_v is None else park_v)
     bottom, top = min(ends), max(ends)
     tightest = float(at_least(1.01 * (top - bottom) / (dac.highest_v - dac.v_min), 4))
-    wanted = float(at_most(abs(gain) / (_MARGIN * found.times), 2))
-    for size in dict.fromkeys((max(wanted, tightest), max(0.7 * wanted, tightest))):
+    lower = float(at_most(abs(gain) / (_MARGIN * exceeded.times), 2))
+    for size in dict.fromkeys((max(lower, tightest), max(0.7 * lower, tightest))):
         if size < 0.99 * abs(gain):
             one_gain = float(f"{copysign(size, gain):.4g}")
             bias_v = 0.5 * (bottom + top) - one_gain * 0.5 * (dac.v_min + dac.highest_v)
             yield dict.fromkeys(gains, one_gain) | dict.fromkeys(biases, float(f"{bias_v:.4g}"))
 
 
-def _against_band_limit(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+def _against_band_limit(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess) -> Iterator[Iterator[Change]]:
     if line.band_limit.method != "window":
         yield iter([{f"{line.axis}.band_limit.method": "window"}])
     yield from _other_bands(setup, plan, line)
@@ -251,7 +277,7 @@ def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[
         yield narrower
 
 
-def _against_model(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+def _against_model(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess) -> Iterator[Iterator[Change]]:
     axis = line.axis
     limit = getattr(setup.scan, axis).band_limit
     free = (line.held_harmonics[0] if line.held_harmonics else line.series.harmonics) - 1

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from tablegen.base.warnings import Finding, worst_first
+from tablegen.base.warnings import Finding, axis_name, worst_first
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.matching import apart_note, apart_percent
 from tablegen.planning.line_plan import Plan
@@ -12,30 +12,30 @@ _TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to
 
 
 def scan_findings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[Finding]:
-    """The worst first; warnings, which the certificate tells of, are not among them."""
-    found = note_findings(plan)
+    """List the findings of a scan, the worst first; warnings, which the certificate has, are not among them."""
+    findings = note_findings(plan)
     for line in plan.lines:
         expected = certificates[line.axis].expected
         if expected is not None and expected.mismatch is not None:
             figure = expected.mismatch
-            found.append(expected_mismatch(line.axis, expected.basis, figure.value, figure.uncertainty))
-    return worst_first(found)
+            findings.append(expected_mismatch(line.axis, expected.basis, figure.value, figure.uncertainty))
+    return worst_first(findings)
 
 
 def expected_mismatch(axis: str, basis: str, percent: float, uncertainty: float | None) -> Finding:
-    """What the model of an axis is expected to leave between trace and retrace."""
+    """Return the finding of what the model of an axis is expected to leave between trace and retrace."""
     by = "" if uncertainty is None else f" \u00b1 {uncertainty:.2g}"
     what = "the operator expects" if basis == "traces" else "the laws expect"
     why = ", since turnarounds are rounded" if basis == "laws" else ""
     text = (
         f"the model leaves {percent:.3g}{by} % of the line: trace and retrace of {axis} are so far apart, {what}{why}"
     )
-    return Finding("expect", percent, text)
+    return Finding("expect", percent, text, code="model-mismatch", axis=axis_name(axis))
 
 
 def note_findings(plan: Plan) -> list[Finding]:
-    """What the plan alone tells, the worst first."""
-    schedule, found, resting = plan.schedule, [], plan.y.drive.resting
+    """List the findings that follow from the plan alone, the worst first."""
+    schedule, findings, resting = plan.schedule, [], plan.y.drive.resting
     per_pixel = schedule.pixel_ticks
     if per_pixel.denominator != 1:
         whole = [n for n in (int(per_pixel), int(per_pixel) + 1) if n > 0]
@@ -44,15 +44,15 @@ def note_findings(plan: Plan) -> list[Finding]:
             f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
             f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
         )
-        found.append(Finding("note", 50.0 / schedule.ticks, text))
+        findings.append(Finding("note", 50.0 / schedule.ticks, text, code="rounded-pixels", axis="x"))
     if apart := apart_note(plan):
-        found.append(Finding("note", apart_percent(plan), apart))
+        findings.append(Finding("note", apart_percent(plan), apart, code="image-offset", axis="x"))
     pixels = (
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")
         + (" pixels: y rests" if resting else f" pixels: the lines inside the window of y, of {schedule.lines} a frame")
     )
-    found.append(Finding("note", 0.0, pixels))
+    findings.append(Finding("note", 0.0, pixels, code="imaged-pixels"))
     for line in plan.lines:
         settles = settling(line.axis, line.drive, schedule)
         if settles is not None and settles.lines > schedule.settle_lines:
@@ -60,8 +60,10 @@ def note_findings(plan: Plan) -> list[Finding]:
                 f"{line.axis} drifts by more than {settles.bound_nm:.3g} nm a frame after the {schedule.settle_lines} "
                 f"settle_lines that follow a change of offset of {settles.offset_v:.4g} V or a smaller scan"
             )
-            found.append(Finding("expect", 100.0 * settles.bound_nm / line.drive.size_nm, text))
+            percent = 100.0 * settles.bound_nm / line.drive.size_nm
+            findings.append(Finding("expect", percent, text, code="offset-drift", axis=axis_name(line.axis)))
         if not line.drive.hysteresis.compensates and not line.drive.resting:
             text = f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it"
-            found.append(Finding("spoils", _TYPICAL_PERCENT, text))
-    return worst_first(found)
+            axis = axis_name(line.axis)
+            findings.append(Finding("spoils", _TYPICAL_PERCENT, text, code="uncompensated-hysteresis", axis=axis))
+    return worst_first(findings)

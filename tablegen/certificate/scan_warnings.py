@@ -17,17 +17,20 @@ if TYPE_CHECKING:
 
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
-    """What exceeds 1 % or the uncompensated line, and what is to be doubted, without remedies: it costs nothing."""
-    found = [Finding("spoils", abs(one.percent), one.text(line.axis)) for line, one in _found(plan, certificates)]
-    found += [
+    """List the errors above 1 % or above the uncompensated line, and the doubts, without remedies, which take time."""
+    findings = [
+        Finding("spoils", abs(one.percent), f"{one.text(line.axis)}{_behind_resonance(one, certificates[line.axis])}")
+        for line, one in _exceeded(plan, certificates)
+    ]
+    findings += [
         Finding("spoils", doubt_percent(doubt, certificates[line.axis]), doubt.text)
         for line, doubt in _doubts(plan, certificates)
     ]
-    return [one.text for one in worst_first(found)]
+    return [one.text for one in worst_first(findings)]
 
 
 def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[Problem]:
-    """The same with remedies, each at the key that the cause stands at; see ``weighed_warnings``."""
+    """List the warnings with remedies, each at the key of its cause; see ``weighed_warnings``."""
     return [problem for _, problem in weighed_warnings(setup, plan, certificates)]
 
 
@@ -39,30 +42,36 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
     first.
     """
     warnings = []
-    for line, found in _found(plan, certificates):
-        share = _share(line, found, certificates[line.axis])
-        why = f"{found.text(line.axis)}; {share}{_advice(setup, plan, line, found)}"
-        warnings.append((abs(found.percent), setup.scan_file.problem(_key(setup, line, found), why)))
+    for line, exceeded in _exceeded(plan, certificates):
+        share = _share(line, exceeded, certificates[line.axis])
+        text = f"{exceeded.text(line.axis)}{_behind_resonance(exceeded, certificates[line.axis])}"
+        why = f"{text}; {share}{_advice(setup, plan, line, exceeded)}"
+        problem = setup.scan_file.problem(_key(setup, line, exceeded), why)
+        warnings.append((abs(exceeded.percent), problem.coded(exceeded.code, line.axis)))
     for line, doubt in _doubts(plan, certificates):
         key, advice = _size_key(setup, line), ""
-        if doubt.kind == "scaling error":
+        if doubt.code == "expected-scaling-error":
             from tablegen.certificate.remedies import tried_on_operator
 
             tried = tried_on_operator(setup, plan, line, doubt.limit, own=False)
             key, advice = _band_key(setup, line), "; " + _in_words(tried, doubt.percent)
+        elif doubt.code == "resonance":
+            from tablegen.certificate.remedies import tried_against_resonance
+
+            advice = "; " + _in_words(tried_against_resonance(setup, plan, line, doubt.limit), doubt.percent)
         percent = doubt_percent(doubt, certificates[line.axis])
-        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice)))
+        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice).coded(doubt.code, line.axis)))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
         key = f"timing.{'ticks_per_line' if given else 'line_rate_hz'}"
-        warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart)))
+        warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart).coded("image-offset", "x")))
     return sorted(warnings, key=lambda one: -as_printed(one[0]))
 
 
 def doubt_percent(doubt: Doubt, certificate: Certificate) -> float:
     """Of the scan: a distance is one of volts, and tells what the operator may be wrong by."""
     expected = certificate.expected
-    if doubt.kind != "distance" or expected is None:
+    if doubt.code != "operator-distance" or expected is None:
         return doubt.percent
     return max((figure.value + (figure.uncertainty or 0.0) for figure in expected.rms.values()), default=0.0)
 
@@ -71,9 +80,9 @@ def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificat
     """Remedies that were tried for an axis above ``limits.max_scaling_error_percent``, in words."""
     line = plan.x if axis == "x" else plan.y
     most = plan.limits.max_scaling_error_percent
-    found = excess(certificates[axis].scaling, most)
-    if found is not None:
-        return _advice(setup, plan, line, found, most)
+    exceeded = excess(certificates[axis].scaling, most)
+    if exceeded is not None:
+        return _advice(setup, plan, line, exceeded, most)
     both = certificates[axis].scaling_on_scanner
     if both is None or most is None or both[1] + both[2] <= most:
         return ""
@@ -82,10 +91,10 @@ def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificat
     return _in_words(tried_on_operator(setup, plan, line, most, own=True), both[1] + both[2])
 
 
-def _advice(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> str:
+def _advice(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, most: float | None = None) -> str:
     from tablegen.certificate.remedies import tried  # only a scan that needs them pays for them
 
-    return _in_words(tried(setup, plan, line, found, most), abs(found.percent))
+    return _in_words(tried(setup, plan, line, exceeded, most), abs(exceeded.percent))
 
 
 def _in_words(remedies: "list[Remedy]", percent: float) -> str:
@@ -98,31 +107,43 @@ def _in_words(remedies: "list[Remedy]", percent: float) -> str:
     return "no remedy that was tried helps"
 
 
-def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Excess]]:
+def _exceeded(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Excess]]:
     every = [(line, excess(certificates[line.axis].scaling)) for line in plan.lines]
-    return [(line, found) for line, found in every if found is not None]
+    return [(line, exceeded) for line, exceeded in every if exceeded is not None]
 
 
 def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
-    return [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
+    """List the doubts of both axes; one on a resonance is left out where the scaling error already names it."""
+    explained = {line.axis for line, exceeded in _exceeded(plan, certificates) if exceeded.what == "scaling error"}
+    every = [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
+    return [(line, doubt) for line, doubt in every if doubt.code != "resonance" or line.axis not in explained]
 
 
-def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:
-    """What of the converter, of the table or of the band the scan uses."""
-    if found.cause == "quantisation":
+def _behind_resonance(exceeded: Excess, certificate: Certificate) -> str:
+    """Return a scaling error that the resonance makes larger, in words; "" where it does not."""
+    position = certificate.position
+    if position is None or exceeded.what != "scaling error":
+        return ""
+    side, percent = position.worst
+    return f"; with the resonance that steps drive it is {percent:.3g} % {side}" if percent > exceeded.percent else ""
+
+
+def _share(line: LinePlan, exceeded: Excess, certificate: Certificate) -> str:
+    """Return how much of the converter, of the table or of the band the scan uses."""
+    if exceeded.cause == "quantisation":
         codes, full = certificate.highest_code - certificate.lowest_code + 1, 1 << line.converter.bits
         word = abs(line.codes_per_unit) * line.scale / 2.0**line.program.bits
         coarse = f", and a word of the table {word:.3g} codes" if word > 0.5 else ""
         return f"the scan spans {codes} of the converter's {full} codes{coarse}; "
-    if found.cause == "model":
+    if exceeded.cause == "model":
         return f"max_boost_db holds back {len(line.held_harmonics)} of {line.series.harmonics} harmonics; "
     return ""
 
 
-def _key(setup: Setup, line: LinePlan, found: Excess) -> str:
-    if found.cause == "quantisation":
+def _key(setup: Setup, line: LinePlan, exceeded: Excess) -> str:
+    if exceeded.cause == "quantisation":
         return _size_key(setup, line)
-    if line.band_limit.method != "window" and found.cause == "band limit":
+    if line.band_limit.method != "window" and exceeded.cause == "band limit":
         return f"{line.axis}.band_limit.method"
     return _band_key(setup, line)
 

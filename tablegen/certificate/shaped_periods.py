@@ -34,7 +34,7 @@ class Passage(Struct, frozen=True):
 
     @classmethod
     def of(cls, line: LinePlan) -> "Passage":
-        """That of an axis."""
+        """Return the passage of an axis."""
         match line.drive.response:
             case None:
                 return cls(band_hz=line.series.harmonics * float(line.rate))
@@ -122,7 +122,7 @@ class ShapedPeriods:
 
 
 def passed(line: LinePlan, errors: Floats) -> Floats:
-    """What the position makes of errors that begin from rest, one a tick, shape (n,)."""
+    """Compute the position errors of code errors that begin from rest, one a tick, shape (n,)."""
     size = 1 << (2 * len(errors) - 1).bit_length()
     f: Floats = np.arange(size // 2 + 1, dtype=np.float64) * (float(line.rate) * line.program.ticks / size)
     spectrum = np.fft.rfft(errors, size)
@@ -134,10 +134,10 @@ def passed(line: LinePlan, errors: Floats) -> Floats:
         real, imaginary = response.inverse(f[known])
         spectrum[known] /= real + 1j * imaginary
         spectrum[~known] = 0.0
-    found: Floats = np.fft.irfft(spectrum, size)[: len(errors)]
-    return found
+    position: Floats = np.fft.irfft(spectrum, size)[: len(errors)]
+    return position
 
 
 def largest_and_rms(errors: Floats) -> tuple[float, float]:
-    """The largest magnitude, and the root of the mean square."""
+    """Return the largest magnitude, and the root of the mean square."""
     return float(np.max(np.abs(errors))), sqrt(float(np.mean(errors * errors)))

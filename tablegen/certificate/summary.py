@@ -20,7 +20,7 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
-    """What is applied to an axis, factor by factor: label and value."""
+    """List what is applied to an axis, factor by factor: label and value."""
     drive, output = line.drive, line.program.output
     if drive.resting:
         return [
@@ -74,14 +74,14 @@ def _method(line: LinePlan) -> str:
 
 
 def _needs_of_table(line: LinePlan) -> list[tuple[str, str]]:
-    """What a device has to have for it: a build knows neither its options nor its clock, and cannot refuse."""
+    """List what a device must have: a build knows neither its options nor its clock, and cannot refuse."""
     if line.program.mode != "cubic":
         return []
     return [("", "needs DAC_SPLINE=1 in C; in Verilog 11 clocks a tick, 90 in low area")]
 
 
 def _chosen(line: LinePlan) -> str:
-    return "" if line.asked_table is None else f", {line.asked_table}"
+    return "" if line.table_request is None else f", {line.table_request}"
 
 
 def _asked(line: LinePlan) -> str:
@@ -94,7 +94,7 @@ def _hz(value: float) -> str:
 
 
 def rate(value: Fraction) -> str:
-    """A rate as a number, and as the exact fraction where the number is not exact."""
+    """Format a rate as a number, with the exact fraction where the number is not exact."""
     shown = _hz(float(value))
     if Fraction(f"{float(value):.6g}") == value:
         return shown
@@ -102,7 +102,7 @@ def rate(value: Fraction) -> str:
 
 
 def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
-    """A certificate: label and value."""
+    """List the figures of a certificate: label and value."""
     c = certificate
     error = f"max {_lsb(c.max_error_lsb)} LSB, rms {_lsb(c.rms_error_lsb)} LSB"
     if c.shaped is None:
@@ -115,6 +115,11 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
         )
         rows.append(("scaling " + side, f"{_percent(e.total)} % peak to peak ({parts})"))
         rows.append(("", f"uncompensated {_percent(e.uncompensated)} %; window's size off by {e.size:+.4f} %"))
+    if c.position is not None:
+        sides = ", ".join(f"scaling {side} {_percent(value)} %" for side, value in c.position.scaling.items())
+        rows.append(("position", f"{sides}, with the steps of the codes"))
+        errors = f"max {_lsb(c.position.max_error_lsb)} LSB, rms {_lsb(c.position.rms_error_lsb)} LSB"
+        rows.append(("", f"{errors}, {behind(c.position.passage)}"))
     for side, r in (c.refinement or {}).items():
         moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
         rows.append(("refined " + side, moves))
@@ -148,7 +153,7 @@ def behind(passage: Passage) -> str:
 
 
 def shaped_lines(shaped: ShapedErrors) -> list[tuple[str, str]]:
-    """What shaping does beside rounding alone, and what it costs: label and value."""
+    """List what shaping does beside rounding alone, and what it costs: label and value."""
     was, order = shaped.rounded, shaping_text(shaped.shaping)
     scaling = "".join(f", scaling {side} {_percent(value)} %" for side, value in was.scaling.items())
     largest, rms = shaped.code_error_lsb
@@ -166,7 +171,7 @@ def shaped_lines(shaped: ShapedErrors) -> list[tuple[str, str]]:
 
 
 def shaping_text(shaping: Shaping) -> str:
-    """The order of a shaping, and where its zeros are."""
+    """Return the order of a shaping, and where its zeros are."""
     if shaping.order == 3:
         return f"third order, zeros at 0 Hz and at 2 cos = {shaping.zero}/64"
     return {0: "off", 1: "first order", 2: "second order"}[shaping.order]
@@ -183,7 +188,7 @@ def _optimum(c: Certificate) -> str:
 
 
 def expected_lines(expectation: Expectation) -> list[str]:
-    """What to expect on the scanner; no figure without its uncertainty, or a word that there is none."""
+    """List what to expect on the scanner; each figure has its uncertainty, or a word that there is none."""
     if expectation.basis == "laws":
         assert expectation.mismatch is not None
         apart = _percent(expectation.mismatch.value)
@@ -238,7 +243,7 @@ def _volts(line: LinePlan) -> str:
 
 
 def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
-    """The whole block, a list of lines of text."""
+    """List the lines of text of the whole summary."""
     schedule = plan.schedule
     lines = [
         f"{schedule.ticks} ticks a line, {schedule.lines} lines a frame, "
@@ -257,7 +262,7 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
             lines.append(f"  {'' if i else 'settles':<18}{text}")
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
-        found = excess(certificates[line.axis].scaling)
-        for i, text in enumerate([] if found is None else found.text(line.axis).split("; ")):
+        exceeded = excess(certificates[line.axis].scaling)
+        for i, text in enumerate([] if exceeded is None else exceeded.text(line.axis).split("; ")):
             lines.append(f"  {'' if i else 'warning':<18}{text}")
     return lines

@@ -120,16 +120,16 @@ class Chart:
     @property
     def needed_legend(self) -> list[DrawnCurve]:
         """The same, but none of a single curve that has no direction: the title says what it is."""
-        found = self.legend
-        return found if len(found) > 1 or any(curve.role in ("forward", "backward") for curve in found) else []
+        entries = self.legend
+        return entries if len(entries) > 1 or any(curve.role in ("forward", "backward") for curve in entries) else []
 
 
 def _range(values: list[Floats], more: list[float], room: float) -> tuple[float, float]:
-    found = np.concatenate([*values, np.array(more)])
-    found = found[np.isfinite(found)]
-    if not len(found):
+    values_in_range = np.concatenate([*values, np.array(more)])
+    values_in_range = values_in_range[np.isfinite(values_in_range)]
+    if not len(values_in_range):
         return 0.0, 1.0
-    low, high = float(np.min(found)), float(np.max(found))
+    low, high = float(np.min(values_in_range)), float(np.max(values_in_range))
     span = high - low
     if span <= 1e-9 * max(abs(low), abs(high)):
         span = max(abs(low), 1.0) * 0.1
@@ -138,7 +138,7 @@ def _range(values: list[Floats], more: list[float], room: float) -> tuple[float,
 
 
 def runs(curve: DrawnCurve) -> Iterator[tuple[Floats, Floats]]:
-    """The stretches of a curve without NaN, thinned to what can be seen; extremes stay."""
+    """Yield the stretches of a curve without NaN, thinned to what can be seen; extremes stay."""
     good = np.isfinite(curve.x) & np.isfinite(curve.y)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -150,10 +150,10 @@ def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     if count <= 2 * _BINS:
         return x, y
     edges = np.linspace(0, count, _BINS + 1).astype(np.int64)
-    kept = {0, count - 1}
+    indices = {0, count - 1}
     for first, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        kept |= {first + int(np.argmin(y[first:stop])), first + int(np.argmax(y[first:stop]))}
-    at = np.array(sorted(kept))
+        indices |= {first + int(np.argmin(y[first:stop])), first + int(np.argmax(y[first:stop]))}
+    at = np.array(sorted(indices))
     return x[at], y[at]
 
 

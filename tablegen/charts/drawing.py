@@ -142,7 +142,7 @@ def height_of(chart: Chart) -> int:
 
 
 def drawing(chart: Chart) -> tuple[Part, ...]:
-    """The chart without its title and legend: axes, and what is in them. WIDTH by ``height_of`` pixels."""
+    """Draw the chart without its title and legend: axes, and what is in them. WIDTH by ``height_of`` pixels."""
     frame = _Frame(chart, height_of(chart))
     inner: list[Part] = []
     if chart.raster is not None:
@@ -186,7 +186,7 @@ def _line(mark: Mark, frame: _Frame) -> tuple[float, float, float, float]:
 
 
 def _mark_words(chart: Chart, frame: _Frame) -> Iterator[Part]:
-    """The words of marks, each a row lower where the one before it is near."""
+    """Draw the words of marks, each a row lower where the one before it is near."""
     row, last = 0, -1e9
     for mark in sorted((mark for mark in chart.marks if mark.of == "x"), key=lambda one: one.at):
         x = float(frame.x(mark.at))
@@ -213,7 +213,7 @@ def _image(raster: Raster, frame: _Frame) -> Shades:
 
 
 def _scale(raster: Raster, frame: _Frame) -> Iterator[Part]:
-    """The shades with their values, on the right."""
+    """Draw the shades with their values, on the right."""
     left = _LEFT + frame.width + 14
     column = np.arange(254, -1, -1, dtype=np.uint8)[:, None]
     yield Shades(column, palette(raster.shades), left, _TOP, _SCALE_WIDTH, frame.height)
@@ -239,7 +239,7 @@ def _arrows(chart: Chart, frame: _Frame) -> Iterator[tuple[float, float, float, 
 
 
 def legend_rows(chart: Chart) -> list[list[tuple[float, DrawnCurve | Band]]]:
-    """The entries of a legend in rows, each with its place from the left."""
+    """Arrange the entries of a legend in rows, each with its place from the left."""
     rows: list[list[tuple[float, DrawnCurve | Band]]] = []
     bands = {band.name: band for band in chart.bands if band.name}
     x = float(WIDTH)
@@ -255,12 +255,12 @@ def legend_rows(chart: Chart) -> list[list[tuple[float, DrawnCurve | Band]]]:
 
 
 def _title_rows(chart: Chart) -> list[str]:
-    """The title in as many rows as it takes."""
+    """Wrap the title into as many rows as it takes."""
     return wrap(chart.title, _TITLE_LETTERS) or [""]
 
 
 def _with_title(chart: Chart, titles: int, rows: int) -> tuple[Part, ...]:
-    """A chart below its title and a legend, which have room for some rows."""
+    """Draw a chart below its title and a legend, which have room for some rows."""
     parts: list[Part] = [Words("title", _LEFT, 20 + _ROW * at, text) for at, text in enumerate(_title_rows(chart))]
     for number, entries in enumerate(legend_rows(chart)):
         y = 20.0 + _ROW * (titles + number)
@@ -271,7 +271,7 @@ def _with_title(chart: Chart, titles: int, rows: int) -> tuple[Part, ...]:
 
 
 def _swatch(one: DrawnCurve | Band, left: float, y: float) -> Part:
-    """A piece of what a legend names."""
+    """Draw a piece of what a legend names."""
     if isinstance(one, Band):
         return Box("band", left, y - 7, 30, 14)
     across = np.array([left + 15.0] if one.kind == "points" else [left, left + 30.0])

@@ -19,7 +19,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 
 def drawn(charts: Sequence[Chart], kind: Literal["png", "pdf"], heading: str = "", columns: int = 2) -> bytes:
-    """The file. Without a date, so that the same charts give the same bytes."""
+    """Render the file. Without a date, so that the same charts give the same bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -28,7 +28,7 @@ class PlottedCharts:
 
 
 def picture(charts: Sequence[Chart], kind: str, heading: str = "", columns: int = 2) -> bytes:
-    """A file of one of ``KINDS``; PNG and PDF need matplotlib. The same charts give the same bytes: no date."""
+    """Render a file of one of ``KINDS``; PNG and PDF need matplotlib. The same charts give the same bytes: no date."""
     if kind == "svg":
         from tablegen.charts.svg import standalone
 

@@ -31,7 +31,7 @@ def _png(shades: np.typing.NDArray[np.uint8], colours: int, *more: tuple[bytes, 
 
 
 def data_address(png: bytes) -> str:
-    """The picture as an address within a page."""
+    """Return the picture as an address within a page."""
     return f"data:image/png;base64,{b64encode(png).decode('ascii')}"
 
 
@@ -40,7 +40,7 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 
 def _stored(raw: bytes) -> bytes:
-    """A zlib stream of stored blocks."""
+    """Write a zlib stream of stored blocks."""
     parts = [b"\x78\x01"]
     for first in range(0, len(raw), _MOST):
         block = raw[first : first + _MOST]

@@ -34,7 +34,7 @@ _Attributes = Callable[[Part], Markup]
 
 
 def svg(chart: Chart) -> Markup:
-    """The chart for the page: without its title and legend, which stand beside it as text that wraps."""
+    """Render the chart for the page: without its title and legend, which stand beside it as text that wraps."""
     return Markup(
         '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}" tabindex="0" data-x="{!r} {!r}" '
         'data-y="{!r} {!r}" data-log="{}">{}</svg>'
@@ -56,7 +56,7 @@ def standalone(charts: Sequence[Chart], heading: str = "", columns: int = 2) -> 
 
 
 def embedded(charts: Sequence[Chart], columns: int = 2) -> str:
-    """The same as a part of an HTML page of somebody else, such as a notebook."""
+    """Render the charts as a part of an HTML page of another program, such as a notebook."""
     return str(_alone(charts, "", columns, Markup("")))
 
 
@@ -69,7 +69,7 @@ def _alone(charts: Sequence[Chart], heading: str, columns: int, space: Markup) -
 
 
 def swatch(curve: DrawnCurve) -> Markup:
-    """A piece of a curve, for a legend of the page."""
+    """Draw a piece of a curve, for a legend of the page."""
     return Markup(
         '<svg class="swatch" viewBox="0 0 30 10" width="30" height="10" aria-hidden="true"><path{} d="{}"/></svg>'
     ).format(_classes(Trail(curve, ())), "M15 5h0" if curve.kind == "points" else "M0 5h30")
@@ -190,12 +190,12 @@ def _looks(part: Part) -> Markup:
 
 
 def _stroke(look: Look, area: Look | None = None) -> Markup:
-    found = Markup(' fill="none"')
+    attributes = Markup(' fill="none"')
     if area is not None:
-        found = Markup(' fill="{}" fill-opacity="{}"').format(area.fill, area.opacity)
-    found += Markup(' stroke="{}" stroke-width="{}" vector-effect="non-scaling-stroke"').format(
+        attributes = Markup(' fill="{}" fill-opacity="{}"').format(area.fill, area.opacity)
+    attributes += Markup(' stroke="{}" stroke-width="{}" vector-effect="non-scaling-stroke"').format(
         look.stroke, _number(look.width, 1)
     )
     if look.dashes:
-        found += Markup(' stroke-dasharray="{}"').format(" ".join(f"{one:g}" for one in look.dashes))
-    return found + Markup(' stroke-linejoin="round"')
+        attributes += Markup(' stroke-dasharray="{}"').format(" ".join(f"{one:g}" for one in look.dashes))
+    return attributes + Markup(' stroke-linejoin="round"')

@@ -50,17 +50,17 @@ class _TextPlot:
         chart, blank = self.chart, " " * self.margin
         at_row = {self._row(value): text for value, text in self.y_ticks}
         edge, tick = ("\u2502", "\u2524") if self.unicode else ("|", "+")
-        found: list[list[Span]] = [[(_cut(chart.title, self.total), "title")]]
-        found += self._legend()
-        found.append([(f"{blank}{chart.y_label}", "")])
+        rows: list[list[Span]] = [[(_cut(chart.title, self.total), "title")]]
+        rows += self._legend()
+        rows.append([(f"{blank}{chart.y_label}", "")])
         for row in range(self.height):
             label = at_row.get(row, "")
             start = f"{label:>{self.margin - 1}} {tick if label else edge}"
-            found.append([(start, ""), *_spans(self.cells[row], self.styles[row])])
-        found.append([(blank, ""), *self._axis()])
-        found.append([(blank + " " + self._x_texts(), "")])
-        found.append([(blank + " " + chart.x_label.center(self.width).rstrip(), "")])
-        return found
+            rows.append([(start, ""), *_spans(self.cells[row], self.styles[row])])
+        rows.append([(blank, ""), *self._axis()])
+        rows.append([(blank + " " + self._x_texts(), "")])
+        rows.append([(blank + " " + chart.x_label.center(self.width).rstrip(), "")])
+        return rows
 
     def _draw(self) -> None:
         if self.chart.raster is not None:
@@ -85,13 +85,13 @@ class _TextPlot:
         low, high, at = self.x0, self.x1, np.asarray(values, dtype=np.float64)
         if self.chart.log_x:
             low, high, at = np.log10(low), np.log10(high), np.log10(np.maximum(at, 1e-300))
-        found: Floats = (at - low) / (high - low)
-        return found
+        fraction: Floats = (at - low) / (high - low)
+        return fraction
 
     def _y(self, values: Floats | float) -> Floats:
         """0 to 1 from above."""
-        found: Floats = (self.y1 - np.asarray(values, dtype=np.float64)) / (self.y1 - self.y0)
-        return found
+        fraction: Floats = (self.y1 - np.asarray(values, dtype=np.float64)) / (self.y1 - self.y0)
+        return fraction
 
     def _row(self, value: float) -> int:
         return min(max(int(float(self._y(value)) * self.height), 0), self.height - 1)
@@ -118,7 +118,7 @@ class _TextPlot:
                     self._put(row, column, text, "")
 
     def _rule(self, mark: Mark) -> None:
-        """A thin line at a value."""
+        """Draw a thin line at a value."""
         if mark.of == "y" and min(self.y0, self.y1) <= mark.at <= max(self.y0, self.y1):
             for column in range(self.width):
                 self._put(self._row(mark.at), column, "\u2504" if self.unicode else "-", "faint")
@@ -127,7 +127,7 @@ class _TextPlot:
                 self._put(row, self._column(mark.at), "\u250a" if self.unicode else ":", "faint")
 
     def _name(self, mark: Mark) -> None:
-        """The word of a line: at its right end, or beside it in the first row that is free there."""
+        """Write the word of a line: at its right end, or beside it in the first row that is free there."""
         if mark.of == "y":
             self._word(self._row(mark.at), self.width - len(mark.name), mark.name)
             return
@@ -170,8 +170,8 @@ class _TextPlot:
         for row, column in self._cells_of(curve, (4, 2)):
             if 0 <= row < 4 * self.height and 0 <= column < 2 * self.width:
                 old = ord(self.cells[row // 4][column // 2])
-                kept = old if 0x2800 < old < 0x2900 else 0x2800
-                self._put(row // 4, column // 2, chr(kept | _BRAILLE[row % 4][column % 2]), _style(curve))
+                dots = old if 0x2800 < old < 0x2900 else 0x2800
+                self._put(row // 4, column // 2, chr(dots | _BRAILLE[row % 4][column % 2]), _style(curve))
 
     def _marks(self, curve: DrawnCurve, first: int) -> None:
         """Without dots at every place of a line, with them at some."""
@@ -180,8 +180,8 @@ class _TextPlot:
             return
         every = _EVERY if self.unicode else 1
         for row, column in seen[first if self.unicode else 0 :: every]:
-            taken = not self.unicode and 0 <= row < self.height and 0 <= column < self.width
-            if taken and self.cells[row][column] not in " -:" and column % 2:
+            occupied = not self.unicode and 0 <= row < self.height and 0 <= column < self.width
+            if occupied and self.cells[row][column] not in " -:" and column % 2:
                 continue  # where two curves are one, both are seen
             self._put(row, column, mark_of(curve), _style(curve))
 
@@ -193,7 +193,7 @@ class _TextPlot:
                     self._put(row, column, mark_of(curve), _style(curve))
 
     def _legend(self) -> list[list[Span]]:
-        """Marks with their names, in as many lines as they take; also of bands, and of shades."""
+        """List marks with their names, in as many lines as they take; also of bands, and of shades."""
         entries: list[Span] = []
         entries += [(f"{mark_of(curve)} {curve.name}", _style(curve)) for curve in self.chart.needed_legend]
         entries += [
@@ -223,7 +223,7 @@ class _TextPlot:
         return "\u2550" if self.unicode else "="
 
     def _axis(self) -> list[Span]:
-        """The horizontal axis with its ticks; what bands span is doubled."""
+        """Draw the horizontal axis with its ticks; what bands span is doubled."""
         line, corner, tick = ("\u2500", "\u2514", "\u252c") if self.unicode else ("-", "+", "+")
         cells = [line] * self.width
         for band in self.chart.bands:
@@ -249,7 +249,7 @@ class _TextPlot:
 
 
 def mark_of(curve: DrawnCurve) -> str:
-    """The character that stands for a curve."""
+    """Return the character that stands for a curve."""
     if curve.kind == "points":
         return _POINTS[curve.role]
     return (_FAINT_MARKS if curve.faint else _MARKS)[curve.role]
@@ -266,10 +266,10 @@ def _cut(text: str, most: int) -> str:
 def _spans(cells: Sequence[str], styles: Sequence[str]) -> list[Span]:
     """Characters of one style together; without blanks at the end."""
     last = max((i for i, cell in enumerate(cells) if cell != " "), default=-1)
-    found: list[Span] = []
+    spans: list[Span] = []
     for cell, style in zip(cells[: last + 1], styles, strict=False):
-        if found and found[-1][1] == style:
-            found[-1] = (found[-1][0] + cell, style)
+        if spans and spans[-1][1] == style:
+            spans[-1] = (spans[-1][0] + cell, style)
         else:
-            found.append((cell, style))
-    return found
+            spans.append((cell, style))
+    return spans

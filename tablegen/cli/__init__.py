@@ -3,9 +3,11 @@
 Commands import what they need when they run, so that ``--version`` and ``--help`` answer at once.
 """
 
+import errno
 import gc
 import sys
 from importlib import import_module
+from typing import IO
 
 import click
 
@@ -60,6 +62,19 @@ class _Commands(click.Group):
         module, command = _COMMANDS[name]
         found: click.Command = getattr(import_module(f"tablegen.cli.{module}"), command)
         return found
+
+    def invoke(self, context: click.Context) -> object:
+        """Run a command. Click takes every broken pipe for that of stdout, and ends without a word."""
+        try:
+            return super().invoke(context)
+        except OSError as error:
+            if error.errno == errno.EPIPE and not _of_stdout(error):
+                raise _OtherPipe from error
+            raise
+
+
+class _OtherPipe(Exception):
+    """A broken pipe that is not stdout: of a process that a command started."""
 
 
 @click.group(
@@ -121,46 +136,59 @@ def _run() -> int:
         if sys.stdout is not None:  # it is None where the caller closed it
             sys.stdout.flush()
         return int(result or 0)
-    except Failure as failure:
-        failure.show()
-        return failure.status
-    except click.ClickException as error:
+    except BaseException as error:
+        return _ended(error, stdout)
+
+
+def _ended(error: BaseException, stdout: IO[str] | None) -> int:
+    """Explain what ended a command, and return its status; ``stdout`` is the stream from before it ran."""
+    if isinstance(error, click.ClickException):
         error.show()
-        return error.exit_code
-    except (click.Abort, KeyboardInterrupt) as interruption:
-        if isinstance(interruption.__cause__, EOFError):  # click takes it for the end of an answer; nothing asks here
-            return _unexpected(interruption.__cause__)
-        where = str(interruption.__cause__ or "") or str(interruption)  # that of a plug-in says so
-        click.echo(f"interrupted {where}".rstrip(), err=True)
-        return ExitStatus.INTERRUPTED
-    except BrokenPipeError:
-        return _reader_left()
-    except SystemExit as end:
-        # Click ends so after a broken pipe, having replaced stdout, and after completing for a shell.
-        if sys.stdout is not stdout:
+        return error.status if isinstance(error, Failure) else error.exit_code
+    if isinstance(error, click.Abort | KeyboardInterrupt):
+        return _interrupted(error)
+    if isinstance(error, _OtherPipe) and error.__cause__ is not None:
+        return _unexpected(error.__cause__)
+    if isinstance(error, SystemExit):
+        return _exited(error, stdout)
+    if isinstance(error, OSError) and _of_stdout(error):
+        if isinstance(error, BrokenPipeError):
             return _reader_left()
-        if isinstance(end.code, int) and _raised_in(end, "click"):
-            return end.code
-        return _unexpected(end)
-    except OSError as error:
-        if error.filename is not None or not _raised_in(
-            error, "click.utils", "tablegen.cli", "tablegen.cli.shared.terminal"
-        ):
-            return _unexpected(error)
         sys.stdout = None
         click.echo(f"cannot write to stdout: {error.strerror or error}", err=True)
         return ExitStatus.CANNOT_WRITE
-    except BaseException as error:
-        return _unexpected(error)
+    return _unexpected(error)
 
 
-def _raised_in(error: BaseException, *modules: str) -> bool:
-    """True if the innermost frame of an exception is of one of these modules, or of a package of that name."""
+def _interrupted(error: BaseException) -> int:
+    if isinstance(error.__cause__, EOFError):  # click takes it for the end of an answer; nothing asks here
+        return _unexpected(error.__cause__)
+    where = str(error.__cause__ or "") or str(error)  # that of a plug-in says so
+    click.echo(f"interrupted {where}".rstrip(), err=True)
+    return ExitStatus.INTERRUPTED
+
+
+def _exited(end: SystemExit, stdout: IO[str] | None) -> int:
+    """Click ends so after a broken pipe, having replaced stdout, and after completing for a shell."""
+    if sys.stdout is not stdout:
+        return _reader_left()
+    if isinstance(end.code, int) and _raised_in(end, "click"):
+        return end.code
+    return _unexpected(end)
+
+
+def _of_stdout(error: OSError) -> bool:
+    """True if it was text for stdout or stderr that could not be written, and not a file or another pipe."""
+    return error.filename is None and _raised_in(error, "click", "tablegen.cli")
+
+
+def _raised_in(error: BaseException, *packages: str) -> bool:
+    """True if the innermost frame of an exception is of a module of one of these packages."""
     trace, name = error.__traceback__, ""
     while trace is not None:
         name = str(trace.tb_frame.f_globals.get("__name__", ""))
         trace = trace.tb_next
-    return name in modules or name.partition(".")[0] in modules
+    return any(name == package or name.startswith(f"{package}.") for package in packages)
 
 
 def _unexpected(error: BaseException) -> int:

@@ -91,12 +91,7 @@ def build(
     `tablegen paths` prints the include files that run this command from make or CMake. Compiled templates are kept in
     ~/.cache/tablegen; the output does not depend on them.
     """
-    if depfile is None and depfile_target is not None:
-        raise click.UsageError("--depfile-target needs --depfile FILE")
-    if depfile is not None and only_check:
-        raise click.UsageError("--check cannot be used with --depfile")
-    if plot is not None and only_check:
-        raise click.UsageError("--check cannot be used with --plot")
+    _check_usage(only_check, depfile, depfile_target, plot)
     check_plot(plot)
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     try:
@@ -106,17 +101,11 @@ def build(
         where = f" {interruption}".rstrip()  # that of a plug-in says so
         fail([f"interrupted{where}; {output} was left as it was"], ExitStatus.INTERRUPTED)
     if only_check:
-        from tablegen.cli.shared.directory_difference import differences
-
-        found = differences(output, files)
-        outdated, leftovers = built.outdated(output), built.leftovers(output)
-        found += [f"{output / name}: left over from an earlier build" for name in outdated]
-        found += [_leftover(output / name) for name in leftovers]
-        if not found:
-            return ExitStatus.OK
-        click.echo("\n".join(found))
-        again = "".join(f" -f {name}" for name in formats)
-        fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
+        if found := _stale(built, files, output):
+            click.echo("\n".join(found))
+            again = "".join(f" -f {name}" for name in formats)
+            fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
+        return ExitStatus.OK
     if rule is not None:
         rule.note(built.setup, built.formats)
     removed: list[str] = []
@@ -132,16 +121,7 @@ def build(
     for name in kept:
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
-        from tablegen.cli.certificate_text import certificate_table
-
-        click.echo("\n".join(certificate_table(built.plan, built.certificates)))
-        for finding in built.findings:
-            if finding.weight == "spoils":  # `show` prints the small print too
-                click.echo(finding.line)
-        if built.choices:
-            click.echo()
-        for choice in built.choices:
-            click.echo(f"chosen: {choice}")
+        _print_certificate(built)
         click.echo(f"\n{output}: {_state(built, changed)}")
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
@@ -151,6 +131,39 @@ def build(
         brief = in_terminal(plot)
         put_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
     return ExitStatus.OK
+
+
+def _check_usage(only_check: bool, depfile: Path | None, depfile_target: str | None, plot: Path | None) -> None:
+    """Refuse options that cannot be used together."""
+    if depfile is None and depfile_target is not None:
+        raise click.UsageError("--depfile-target needs --depfile FILE")
+    if depfile is not None and only_check:
+        raise click.UsageError("--check cannot be used with --depfile")
+    if plot is not None and only_check:
+        raise click.UsageError("--check cannot be used with --plot")
+
+
+def _stale(built: "Build", files: dict[str, bytes], output: Path) -> list[str]:
+    """Return what differs in the directory from what this build makes, a line each."""
+    from tablegen.cli.shared.directory_difference import differences
+
+    lines = differences(output, files)
+    lines += [f"{output / name}: left over from an earlier build" for name in built.outdated(output)]
+    return lines + [_leftover(output / name) for name in built.leftovers(output)]
+
+
+def _print_certificate(built: "Build") -> None:
+    """Print the certificate, what spoils it, and what the build chose."""
+    from tablegen.cli.certificate_text import certificate_table
+
+    click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+    for finding in built.findings:
+        if finding.weight == "spoils":  # `show` prints the small print too
+            click.echo(finding.line)
+    if built.choices:
+        click.echo()
+    for choice in built.choices:
+        click.echo(f"chosen: {choice}")
 
 
 def _few(names: list[str]) -> str:

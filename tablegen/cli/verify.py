@@ -118,7 +118,7 @@ def verify(
 
     Every code, marker and fault must equal the integer model. Every code must be as close to the ideal waveform as the
     words of the manifest make it, and every code and step within its limits. A check that had no occasion to fail is
-    "not exercised".
+    "not exercised". "not played:" names the files and options that nothing has played.
 
     \b
     verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and the

@@ -7,7 +7,7 @@ HEAD = ("A", "B", "B less A", "change")
 
 
 def cells(pair: ComparedPair) -> tuple[str, str, str, str]:
-    """A, B, the difference with its unit, and its percentage or what the standard errors say."""
+    """Return A, B, the difference with its unit, and its percentage or how it compares with the standard errors."""
     difference, change = "", ""
     if not pair.same and pair.difference is not None:
         difference = f"{pair.difference:+.5g}{_unit(pair)}"

@@ -26,11 +26,11 @@ def comparison_charts(both: SideBySide) -> list[Chart]:
     """Every chart of two sides; those that only one of them could have are left out."""
     if both.a.subject is not None and both.b.subject is not None:
         return [*_scans(both.a.subject, both.b.subject)]
-    found = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
+    charts = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
     for name in both.a.operators:
         if name in both.b.operators:
-            found += _loops(name, both.a.operators[name], both.b.operators[name])
-    return found
+            charts += _loops(name, both.a.operators[name], both.b.operators[name])
+    return charts
 
 
 def differing_charts(charts: Sequence[Chart]) -> list[Chart]:
@@ -65,7 +65,7 @@ def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
 
 
 def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
-    """A line of x or a frame of y, each over its own time."""
+    """Draw a line of x or a frame of y, each over its own time."""
     t = np.linspace(0.0, 1.0, _POINTS)
     periods = [entry.line.rate_exact[1] / entry.line.rate_exact[0] for entry in (a, b)]
     times, unit = (1e3, "ms") if max(periods) < 1.0 else (1.0, "s")
@@ -75,7 +75,7 @@ def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
 
 
 def _apart(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
-    """What an overlay of two drives that are alike cannot show."""
+    """Draw the difference of two drives that an overlay cannot show."""
     t = np.linspace(0.0, 1.0, _POINTS)
     return overlaid(
         f"apart-{axis}",

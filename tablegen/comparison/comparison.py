@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.warnings import Finding
 from tablegen.comparison.difference import SURE, ComparedPair, pairs
 from tablegen.comparison.operators import operator_quantities
 from tablegen.comparison.side import WORDS, ComparedSide, folder_of, kind_of, read_side, together
@@ -24,9 +25,9 @@ class SideBySide:
         """Every quantity of both."""
         both = [list(side.quantities) for side in (self.a, self.b)]
         for name in dict.fromkeys([*self.a.operators, *self.b.operators]):
-            found = [side.operators.get(name) for side in (self.a, self.b)]
-            places = sorted({place for one in found if one is not None for place in one.places})
-            for one, quantities in zip(found, both, strict=True):
+            operators = [side.operators.get(name) for side in (self.a, self.b)]
+            places = sorted({place for one in operators if one is not None for place in one.places})
+            for one, quantities in zip(operators, both, strict=True):
                 if one is not None:
                     quantities += operator_quantities(one, places, f"{name} " if name else "")
         return pairs(both[0], both[1], of_scan="build" not in (self.a.kind, self.b.kind))
@@ -48,25 +49,31 @@ class SideBySide:
         return not self.differing and not any(side.damaged for side in (self.a, self.b))
 
     @property
-    def notes(self) -> list[str]:
-        """What to know of the numbers, in sentences."""
-        found = [*self.a.notes, *(note for note in self.b.notes if note not in self.a.notes)]
+    def findings(self) -> list[Finding]:
+        """What to know of the numbers: a sentence each, with its code and axis."""
+        findings = [*self.a.findings, *(one for one in self.b.findings if one not in self.a.findings)]
         if "build" in (self.a.kind, self.b.kind):
-            found.append(
+            text = (
                 "a build has neither the keys and limits of the scan file nor the scanner file: these are not compared"
             )
+            findings.append(Finding("note", 0.0, text, code="uncompared-inputs"))
         known = [pair for pair in self.pairs if pair.errors is not None]
         if known:
             more = sum(pair.errors is not None and pair.errors > SURE for pair in known)
-            found.append(
+            text = (
                 f"{more} of {len(known)} quantities with known standard errors differ by more than {SURE:g} of them; "
                 f"by chance alone one of twenty does"
             )
+            findings.append(Finding("note", 0.0, text, code="standard-errors"))
         elif self.a.kind == "scanner":
-            found.append(
-                "no standard errors are known of both: `tablegen calibrate --write` puts them into the scanner file"
-            )
-        return found
+            text = "no standard errors are known of both: `tablegen calibrate --write` puts them into the scanner file"
+            findings.append(Finding("note", 0.0, text, code="standard-errors"))
+        return findings
+
+    @property
+    def notes(self) -> list[str]:
+        """The sentences of the findings."""
+        return [one.text for one in self.findings]
 
     @property
     def verdict(self) -> str:
@@ -80,7 +87,15 @@ class SideBySide:
         """As plain data: what differs, or everything."""
         sides = {name: {"path": str(side.path), "kind": side.kind} for name, side in (("a", self.a), ("b", self.b))}
         rows = [pair.record() for pair in (self.pairs if everything else self.differing)]
-        return {**sides, "same": self.same, "compared": len(self.pairs), "notes": self.notes, "quantities": rows}
+        findings = [one.record() for one in self.findings]
+        return {
+            **sides,
+            "same": self.same,
+            "compared": len(self.pairs),
+            "notes": self.notes,
+            "findings": findings,
+            "quantities": rows,
+        }
 
 
 def compared(a: Path, b: Path, tell: Callable[[str], object] = lambda _: None) -> SideBySide:

@@ -80,13 +80,13 @@ def pairs(a: Sequence[ComparedQuantity], b: Sequence[ComparedQuantity], of_scan:
     """
     sides = [{(one.section, one.name): one for one in side if of_scan or not one.of_scan} for side in (a, b)]
     sections = _merged([key[0] for key in sides[0]], [key[0] for key in sides[1]])
-    found = []
+    compared_pairs = []
     for section in sections:
         for name in _merged(*([key[1] for key in side if key[0] == section] for side in sides)):
             first, second = (side.get((section, name)) for side in sides)
             unit = next(one.unit for one in (first, second) if one is not None)
-            found.append(ComparedPair(section, name, unit, first, second))
-    return found
+            compared_pairs.append(ComparedPair(section, name, unit, first, second))
+    return compared_pairs
 
 
 def _merged(a: Sequence[str], b: Sequence[str]) -> list[str]:

@@ -101,7 +101,7 @@ def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
 
 
 def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape | None:
-    """The line of a model that works with branches; an operator's table has them too, for its laws."""
+    """Return the line of a model that works with branches; an operator's table has them too, for its laws."""
     from tablegen.compensation.models.harmonic import HarmonicModel
     from tablegen.compensation.models.operator import OperatorModel
 
@@ -127,8 +127,8 @@ def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape 
         rate_gain=None,
         folder=Path(),
     )
-    made = None if table is None else table.line(request, ModelProblems.without_files(axis, problems))
-    return None if problems.found else made
+    line = None if table is None else table.line(request, ModelProblems.without_files(axis, problems))
+    return None if problems.entries else line
 
 
 def _bent(shape: LineShape, side: str) -> Pair:

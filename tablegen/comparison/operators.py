@@ -31,7 +31,7 @@ class ComparedOperator:
 
     @classmethod
     def read(cls, path: Path) -> "ComparedOperator":
-        """Raises ``Rejected``."""
+        """Read an operator file. Raises ``Rejected``."""
         return cls(*read_operator(path, str(path)))
 
     @property
@@ -51,7 +51,7 @@ class ComparedOperator:
         return place[0] / self.driver.span, self.driver.share(place[1])
 
     def loop(self, place: Place) -> Loop | None:
-        """The settled loop there; None where the operator has none."""
+        """Compute the settled loop there; None where the operator has none."""
         stroke, centre = self.shares(place)
         low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
         if low < -1e-9 or high > 1.0 + 1e-9:
@@ -63,16 +63,16 @@ class ComparedOperator:
 
 
 def operator_quantities(one: ComparedOperator, places: Sequence[Place], section: str = "") -> list[ComparedQuantity]:
-    """The numbers of the file but for its traces, and size, residual and mismatch of the line at each place.
+    """List the numbers of the file but for its traces, and size, residual and mismatch of the line at each place.
 
     Errors are standard errors by the traces that were left out, which hold within 90 % of lines.
     """
     plain = msgspec.to_builtins(one.file)
     tables = {key: value for key, value in plain.items() if key not in ("lines", "axis", "version")}
-    found = [*keys_of(f"{section}operator", "", {**tables, "traces": len(one.file.lines)}, of_scan=False)]
+    quantities = [*keys_of(f"{section}operator", "", {**tables, "traces": len(one.file.lines)}, of_scan=False)]
     for place in places:
-        found += _line(one, place, section)
-    return found
+        quantities += _line(one, place, section)
+    return quantities
 
 
 def _line(one: ComparedOperator, place: Place, section: str) -> Iterator[ComparedQuantity]:
@@ -88,8 +88,8 @@ def _line(one: ComparedOperator, place: Place, section: str) -> Iterator[Compare
     inside = (x >= _WINDOW[0]) & (x <= _WINDOW[1])
     for side, residual in zip(SIDES, both, strict=True):
         straight = np.polynomial.polynomial.polyfit(x[inside], residual[inside], 1)
-        left = residual[inside] - np.polynomial.polynomial.polyval(x[inside], straight)
-        yield ComparedQuantity(name, f"rms residual {side}", float(np.sqrt(np.mean(left * left))), "%", rms)
+        residue = residual[inside] - np.polynomial.polynomial.polyval(x[inside], straight)
+        yield ComparedQuantity(name, f"rms residual {side}", float(np.sqrt(np.mean(residue * residue))), "%", rms)
         yield ComparedQuantity(name, f"largest residual {side}", float(residual[np.argmax(np.abs(residual))]), "%")
     apart = float(np.max(np.abs(both[0] - both[1])[inside]))
     yield ComparedQuantity(name, "forward to backward", apart, "%", mismatch)

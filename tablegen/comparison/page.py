@@ -10,31 +10,29 @@ from tablegen.comparison.difference import ComparedPair
 from tablegen.comparison.side import WORDS
 from tablegen.html_report.blocks import Grid, Section, TableCell, row
 from tablegen.html_report.document import document
-from tablegen.html_report.ranking import Finding
 from tablegen.version import __version__
 
 
 def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
-    """What differs, the charts, and folded up everything that was compared."""
+    """Render what differs, the charts, and folded up everything that was compared."""
     sides = tuple(
         row(name, f"{side.title}: {WORDS[side.kind]}", side.path.name or str(side.path))
         for name, side in (("A", both.a), ("B", both.b))
     )
-    found = [
+    sections = [
         Section("sides", "A and B", (Grid("", ("", "what", "file"), sides),)),
         Section("differences", "What differs", tuple(_grids(both.differing))),
         *([chart_section(charts)] if charts else []),
         Section("all", "Everything that was compared", tuple(_grids(both.pairs, folded=True))),
     ]
     verdict = TableCell(f"{both.verdict}.", "good" if both.same else "quiet")
-    findings = [Finding("note", 0.0, note) for note in both.notes]
     title = "{} and {}".format(*both.titles)
     foot = f"Made by tablegen {__version__}. All is worked out from the files; nothing is measured."
-    return document(title, verdict, findings, found, "", foot)
+    return document(title, verdict, both.findings, sections, "", foot)
 
 
 def _grids(pairs: Sequence[ComparedPair], folded: bool = False) -> list[Grid]:
-    """A table a section."""
+    """Make a table for each section."""
     return [
         Grid(
             section,

@@ -36,7 +36,7 @@ class ComparedQuantity:
 
 
 def unit_of(key: str) -> str:
-    """The unit that is part of a key's name; empty where there is none, or for v_max and the like."""
+    """Return the unit that is part of a key's name; empty where there is none, or for v_max and the like."""
     name = key.rpartition(".")[2].partition("[")[0]
     return next((unit for end, unit in _UNITS.items() if name.endswith(f"_{end}") or _begins(name, end)), "")
 
@@ -46,7 +46,7 @@ def _begins(name: str, end: str) -> bool:
 
 
 def keys_of(section: str, key: str, value: Any, of_scan: bool = True) -> Iterator[ComparedQuantity]:
-    """A table of a file, flattened: of long lists of numbers how many there are and a digest. None is left out."""
+    """Yield all keys of a table, nested ones flattened: of long lists of numbers their length and a digest."""
     if isinstance(value, dict):
         for name, inner in value.items():
             yield from keys_of(section, f"{key}.{name}" if key else name, inner, of_scan)
@@ -63,5 +63,5 @@ def keys_of(section: str, key: str, value: Any, of_scan: bool = True) -> Iterato
 
 
 def digest(value: object) -> str:
-    """The beginning of the SHA-256 of a value as Python writes it."""
+    """Return the beginning of the SHA-256 of a value as Python writes it."""
     return sha256(repr(value).encode()).hexdigest()[:8]

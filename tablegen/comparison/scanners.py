@@ -25,15 +25,15 @@ def scanner_quantities(file: Document, scanner: Scanner) -> list[ComparedQuantit
     error is not known.
     """
     errors, plain = dict(_errors(file)), msgspec.to_builtins(scanner)
-    found = [*keys_of("scanner", "", {key: value for key, value in plain.items() if key not in ("x", "y")})]
+    quantities = [*keys_of("scanner", "", {key: value for key, value in plain.items() if key not in ("x", "y")})]
     for axis in ("x", "y"):
         for table, value in plain[axis].items():
             section, key = (f"scanner, {axis} {table}", "") if isinstance(value, dict) else (f"scanner, {axis}", table)
             for one in keys_of(section, key, value):
                 measured, error = errors.get(f"{axis}.{table}.{one.name}", (0.0, 0.0))
                 same = not isinstance(one.value, str) and isclose(one.value, measured, rel_tol=1e-8)
-                found.append(replace(one, error=error) if error > 0.0 and same else one)
-    return found
+                quantities.append(replace(one, error=error) if error > 0.0 and same else one)
+    return quantities
 
 
 def _errors(file: Document) -> Iterator[tuple[str, tuple[float, float]]]:

@@ -22,22 +22,22 @@ _PARTS = (
 
 def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
     """Every quantity of a scan or a build, in the order in which they are told."""
-    found = [*_asked(subject.planned)] if subject.planned is not None else []
-    found += _rates(subject.manifest.sequence)
+    quantities = [*_asked(subject.planned)] if subject.planned is not None else []
+    quantities += _rates(subject.manifest.sequence)
     axes = (("x", subject.manifest.axes.x), ("y", subject.manifest.axes.y))
     for axis, entry in axes:
-        found.append(ComparedQuantity(f"{axis} drive", "motion", "rests" if entry.resting else "moves"))
+        quantities.append(ComparedQuantity(f"{axis} drive", "motion", "rests" if entry.resting else "moves"))
         if entry.resting:
-            found.append(ComparedQuantity(f"{axis} drive", "offset", entry.drive.v_offset, "V"))
+            quantities.append(ComparedQuantity(f"{axis} drive", "offset", entry.drive.v_offset, "V"))
             continue
-        found += _corrections(axis, entry)
-        found += _waveform(axis, entry)
-        found += _certificate(axis, entry)
-        found += _expected(axis, entry)
-        found += _output(axis, entry)
+        quantities += _corrections(axis, entry)
+        quantities += _waveform(axis, entry)
+        quantities += _certificate(axis, entry)
+        quantities += _expected(axis, entry)
+        quantities += _output(axis, entry)
     manifest = subject.manifest
-    found += _memory(subject)
-    found += [
+    quantities += _memory(subject)
+    quantities += [
         ComparedQuantity("build", "name", manifest.name),
         ComparedQuantity("build", "formats", ", ".join(manifest.formats) or "c, verilog"),
         ComparedQuantity("build", "tablegen", manifest.tablegen),
@@ -45,14 +45,14 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
         ComparedQuantity("build", "files", f"{len(manifest.files)}: {digest(sorted(manifest.files.items()))}"),
     ]
     if subject.planned is not None:
-        found += scanner_quantities(subject.planned.setup.scanner_file, subject.planned.setup.scanner)
-    return found
+        quantities += scanner_quantities(subject.planned.setup.scanner_file, subject.planned.setup.scanner)
+    return quantities
 
 
 def _asked(planned: PlannedScan) -> Iterator[ComparedQuantity]:
-    """The scan file but for the path of the scanner file, whose values are compared."""
-    asked = msgspec.to_builtins(planned.setup.scan)
-    yield from keys_of("asked for", "", {key: value for key, value in asked.items() if key not in ("name", "scanner")})
+    """Yield the keys of the scan file but for the path of the scanner file, whose values are compared."""
+    values = msgspec.to_builtins(planned.setup.scan)
+    yield from keys_of("asked for", "", {key: value for key, value in values.items() if key not in ("name", "scanner")})
 
 
 def _rates(sequence: ManifestSequence) -> Iterator[ComparedQuantity]:
@@ -121,37 +121,43 @@ def _waveform(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
 
 
 def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    section, found = f"{axis} certificate", entry.certificate
-    for side, errors in (found.scaling_error_percent or {}).items():
+    section, certificate = f"{axis} certificate", entry.certificate
+    for side, errors in (certificate.scaling_error_percent or {}).items():
         for part, name in _PARTS:
             if part in errors:
                 yield ComparedQuantity(section, name.format(side), errors[part], "%")
-    for side, moved in (found.refinement_percent or {}).items():
+    for side, moved in (certificate.refinement_percent or {}).items():
         for part, value in moved.items():
             yield ComparedQuantity(section, f"refinement {side}, {part}", value, "%")
-    of = "a code" if found.shaped is None else "the position"
+    if certificate.position is not None:
+        for side, value in certificate.position.scaling_error_percent.items():
+            yield ComparedQuantity(section, f"scaling error {side}, with the resonance", value, "%")
+        yield ComparedQuantity(section, "largest error behind the resonance", certificate.position.max_error_lsb, "LSB")
+        yield ComparedQuantity(section, "rms error behind the resonance", certificate.position.rms_error_lsb, "LSB")
+        yield ComparedQuantity(section, "response", digest(certificate.position.passage))
+    of = "a code" if certificate.shaped is None else "the position"
     numbers = (
-        (f"largest error of {of}", found.max_error_lsb, "LSB"),
-        (f"rms error of {of}", found.rms_error_lsb, "LSB"),
-        ("lowest code", found.lowest_code, ""),
-        ("highest code", found.highest_code, ""),
-        ("room below", found.headroom_low, "codes"),
-        ("room above", found.headroom_high, "codes"),
-        ("largest step", found.largest_step, "codes"),
-        ("steepest slope", found.peak_slew_v_per_s, "V/s"),
-        ("power beyond the cutoff", found.beyond_cutoff_db, "dB"),
-        ("power at the resonance", found.at_resonance_db, "dB"),
+        (f"largest error of {of}", certificate.max_error_lsb, "LSB"),
+        (f"rms error of {of}", certificate.rms_error_lsb, "LSB"),
+        ("lowest code", certificate.lowest_code, ""),
+        ("highest code", certificate.highest_code, ""),
+        ("room below", certificate.headroom_low, "codes"),
+        ("room above", certificate.headroom_high, "codes"),
+        ("largest step", certificate.largest_step, "codes"),
+        ("steepest slope", certificate.peak_slew_v_per_s, "V/s"),
+        ("power beyond the cutoff", certificate.beyond_cutoff_db, "dB"),
+        ("power at the resonance", certificate.at_resonance_db, "dB"),
     )
     for name, number, unit in numbers:
         if number is not None:
             yield ComparedQuantity(section, name, number, unit)
-    if found.shaped is not None:
-        yield ComparedQuantity(section, "rms error of a code", found.shaped.rms_code_error_lsb, "LSB")
-        yield ComparedQuantity(section, "ticks on which the code changes", found.shaped.changes.percent, "%")
+    if certificate.shaped is not None:
+        yield ComparedQuantity(section, "rms error of a code", certificate.shaped.rms_code_error_lsb, "LSB")
+        yield ComparedQuantity(section, "ticks on which the code changes", certificate.shaped.changes.percent, "%")
 
 
 def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """What the model expects on the scanner; what that is uncertain by holds for 90 % of scans."""
+    """Yield what the model expects on the scanner; the uncertainty holds for 90 % of scans."""
     expected = entry.certificate.expected
     if expected is None:
         return
@@ -168,12 +174,14 @@ def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
             yield ComparedQuantity(section, name, figure.value, "%")
             if figure.uncertainty is not None:
                 yield ComparedQuantity(section, f"{name}, uncertain by", figure.uncertainty, "%")
+    if expected.stroke is not None:
+        yield ComparedQuantity(section, "branches at the stroke that is played", digest(expected.stroke))
     if expected.distance_percent is not None:
         yield ComparedQuantity(section, "distance to the nearest trace", expected.distance_percent, "% of v_max")
 
 
 def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
-    """What a device stores. In C the words of all tables have one type, and a table has one word more than it plays."""
+    """Yield what a device stores. Tables in C have one type for both axes, and one word more than they play."""
     axes = subject.manifest.axes.x, subject.manifest.axes.y
     tables = [entry.table for entry in axes]
     bits = storage_bits(max(table.bits for table in tables))
@@ -191,7 +199,7 @@ def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
 
 
 def _output(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """The converter and the limits that the device keeps."""
+    """Yield the converter and the limits that the device keeps."""
     section, output = f"{axis} limits", entry.output
     numbers = (
         ("lowest code allowed", output.code_min, ""),

@@ -7,6 +7,7 @@ from typing import Literal
 
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.toml import read_toml
+from tablegen.base.warnings import Finding
 from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
@@ -39,7 +40,7 @@ class ComparedSide:
     path: Path
     kind: Kind
     quantities: list[ComparedQuantity]
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     subject: Subject | None = None
     scanner: Scanner | None = None
     operators: dict[str, ComparedOperator] = field(default_factory=dict)
@@ -58,7 +59,7 @@ class ComparedSide:
 
 
 def kind_of(path: Path) -> Kind:
-    """What a path is, by its content. Raises ``Rejected``."""
+    """Return the kind of a path, by its content. Raises ``Rejected``."""
     if path.is_dir():
         return "build"
     values, file = read_toml(path, str(path))
@@ -73,7 +74,7 @@ def kind_of(path: Path) -> Kind:
 
 
 def folder_of(path: Path) -> Path:
-    """A manifest stands for its directory."""
+    """Return the directory of a build, for which its manifest stands too."""
     return path.parent if path.name == MANIFEST else path
 
 
@@ -88,12 +89,17 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
         subject = of_directory(path)
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
-        notes = (f"{path.name or path}: not as its manifest says: {names}",) if wrong else ()
-        return ComparedSide(path, kind, scan_quantities(subject), notes, subject)
+        text = f"{path.name or path}: not as its manifest says: {names}"
+        damage = (Finding("note", 0.0, text, code="damaged-build"),) if wrong else ()
+        return ComparedSide(path, kind, scan_quantities(subject), damage, subject)
     if kind == "scan":
         subject = planned_scan(path, progress=tell, remedies=False)
         assert subject.planned is not None
-        return ComparedSide(path, kind, scan_quantities(subject), subject.planned.broken, subject)
+        findings = tuple(
+            Finding("note", 0.0, str(problem), code=problem.code, axis=problem.axis)
+            for problem in subject.planned.broken
+        )
+        return ComparedSide(path, kind, scan_quantities(subject), findings, subject)
     if kind == "operator":
         return ComparedSide(path, kind, [], operators={"": ComparedOperator.read(path)})
     scanner, file = load_scanner(path)

@@ -41,7 +41,7 @@ class Branch(Parameters, frozen=True):
 
     @classmethod
     def contradictions(cls, written: Mapping[str, Any]) -> list[tuple[str, str]]:
-        """One of the two ways has to be there, and no more."""
+        """Return the faults of a branch that has neither of the two ways of calibration, or both."""
         if "points" in written:
             return [(name, "points is given as well; keep one of the two") for name in LAW if name in written]
         if "beta_max" not in written:
@@ -50,17 +50,17 @@ class Branch(Parameters, frozen=True):
 
     @property
     def without_peak(self) -> list[str]:
-        """Keys of the peaks that it does not say."""
+        """The keys of the peaks that are not given."""
         if self.points:
             return [f"points[{j}].u_peak" for j, point in enumerate(self.points) if point.u_peak is None]
         return ["u_peak"] if self.u_peak is None else []
 
 
 class ResidualLaw(Struct, frozen=True):
-    """beta and u_peak against the normalised scan voltage v.
+    """The residual beta and its place u_peak against the normalised scan voltage v.
 
-    With ``points``, (v, beta, u_peak) ascending in v, they lie between these; with ``offsets``, between those of two
-    offsets. Without, beta is (22) of beta_max and rho, u_peak one number.
+    With ``points``, (v, beta, u_peak) ascending in v, they are interpolated between these; with ``offsets``, between
+    those of two offsets. Without, beta is (22) of beta_max and rho, u_peak one number.
     """
 
     beta_max: float = 0.0
@@ -71,7 +71,7 @@ class ResidualLaw(Struct, frozen=True):
 
     @classmethod
     def of(cls, branch: Branch, driver: Driver | float) -> "ResidualLaw":
-        """As the scanner file has it."""
+        """Return the law of a branch of the scanner file."""
         if branch.points is not None and branch.points[0].offset_v is not None:
             return cls(offsets=OffsetRows.of(branch.points, driver))
         if branch.points is not None:
@@ -81,13 +81,16 @@ class ResidualLaw(Struct, frozen=True):
 
     @property
     def measured(self) -> bool:
-        """Whether it is that of points."""
+        """True if the law is that of measured points."""
         return bool(self.points) or self.offsets is not None
 
     def at(self, v: float, driver: Driver | float, v_offset: float | None = None) -> tuple[float, float]:
-        """beta and u_peak at a normalised scan voltage, and at an offset in V (default: the middle of the range).
+        """Return beta and u_peak at a normalised scan voltage and an offset in V (default: the middle of the range).
 
-        Raises ``Unphysical`` for a scan that is larger than what was measured, or far from its offsets.
+        Raises
+        ------
+        Unphysical
+            If the scan is larger than what was measured, or far from its offsets.
         """
         driver = Driver.of(driver)
         if self.offsets is not None:
@@ -100,7 +103,7 @@ class ResidualLaw(Struct, frozen=True):
 def residual_between(
     one: Branch, other: Branch, share: float, v: float, driver: Driver | float, v_offset: float
 ) -> tuple[float, float, float | None]:
-    """beta and u_peak between two turns, and the beta_max that they come from where (22) gives both."""
+    """Return beta and u_peak between two turns, and the beta_max that they come from where (22) gives both."""
     left, right = ResidualLaw.of(one, driver), ResidualLaw.of(other, driver)
     if not left.measured and not right.measured:
         beta_max, rho = _between(left.beta_max, right.beta_max, share), _between(left.rho, right.rho, share)

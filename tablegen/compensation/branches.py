@@ -13,7 +13,7 @@ from tablegen.compensation.branch import Branch, residual_between
 from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape, Sweep
 from tablegen.compensation.model import Hysteresis, Parameters
 from tablegen.compensation.model_problems import ModelProblems
-from tablegen.compensation.points import beyond_driver, twice
+from tablegen.compensation.points import beyond_driver, repeated_points
 
 # A calibration serves turning points this far beyond the calibrated ones: the paper sees no major difference
 # between 0.5 and 0.7 except at large sizes, and 10 % to 25 % between 0.7 and 0.9.
@@ -34,7 +34,7 @@ class Branches(Parameters, frozen=True):
 
 
 class WithBranches(Hysteresis, frozen=True):
-    """A model whose table may hold calibrated branches, whether it uses them or not: models change with one word."""
+    """A model whose table may hold calibrated branches, used or not, so that one key changes the model."""
 
     branches: Annotated[
         list[Branches], Meta(max_length=64, description="one entry per calibrated turn; interpolated between them")
@@ -42,14 +42,14 @@ class WithBranches(Hysteresis, frozen=True):
 
     @property
     def calibrated(self) -> bool:
-        """Whether there are branches."""
+        """True if there are branches."""
         return bool(self.branches)
 
     @classmethod
     def like(cls, other: Hysteresis) -> Self | None:
-        """This model on the branches of another one; None where those lack what it needs."""
-        made = cls(branches=other.branches) if isinstance(other, WithBranches) else cls()
-        return None if made.faults() else made
+        """Return this model on the branches of another one; None where those lack what it needs."""
+        model = cls(branches=other.branches) if isinstance(other, WithBranches) else cls()
+        return None if model.faults() else model
 
 
 class ByBranches(WithBranches, frozen=True):
@@ -58,38 +58,44 @@ class ByBranches(WithBranches, frozen=True):
     @classmethod
     @abstractmethod
     def sweep(cls, beta: float, u_peak: float) -> Sweep:
-        """The source equation. Raises ``Unphysical``."""
+        """Return the sweep by the model's equation.
+
+        Raises
+        ------
+        Unphysical
+            If there is no sweep of this residual and peak.
+        """
 
     @classmethod
     @abstractmethod
     def peak_at(cls, beta: float, u_peak: float) -> float:
-        """Where the residual is largest, of what the table says."""
+        """Return the place of the largest residual, from the numbers of the table."""
 
     @classmethod
     def wrong_key(cls, beta: float, u_peak: float) -> str | None:
-        """The key that is wrong where there is no sweep; None if it is the residual."""
+        """Return the key that is wrong where there is no sweep; None if it is the residual."""
         return None
 
     def lacking(self, branch: Branch) -> list[str]:
-        """Keys of a branch that this model needs and that are not given."""
+        """Return the keys of a branch that this model needs and that are not given."""
         return []
 
     def faults(self) -> list[tuple[str, str]]:
-        """Branches that lack, or that are there twice."""
+        """Return the branches that lack keys, or that are repeated, with the reason."""
         if not self.branches:
             return [("branches", f"missing; the {self.model()} model needs a calibrated branch")]
-        found = []
+        faults = []
         for i, entry in enumerate(self.branches):
             if any(entry.turn == earlier.turn for earlier in self.branches[:i]):
-                found.append((f"branches[{i}].turn", f"{entry.turn:g} is calibrated twice"))
+                faults.append((f"branches[{i}].turn", f"{entry.turn:g} is calibrated twice"))
             for side, branch in entry.sides:
-                wrong = twice(branch.points or [])
+                wrong = repeated_points(branch.points or [])
                 wrong += [(key, f"missing; the {self.model()} model needs it") for key in self.lacking(branch)]
-                found += [(f"branches[{i}].{side}.{key}", why) for key, why in wrong]
-        return found
+                faults += [(f"branches[{i}].{side}.{key}", why) for key, why in wrong]
+        return faults
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
-        """Both branches at this turn and scan size."""
+        """Return the line of both branches at this turn and scan size."""
         self._check_amplitudes(request, problems)
         turn, entries = request.turn, sorted(enumerate(self.branches), key=lambda entry: entry[1].turn)
         turns = [entry.turn for _, entry in entries]
@@ -105,12 +111,12 @@ class ByBranches(WithBranches, frozen=True):
             one: Branch = getattr(entries[left][1], side)
             other: Branch = getattr(entries[right][1], side)
             key = f"branches[{entries[left if share < 0.5 else right][0]}].{side}"
-            found = None
+            residual = None
             with problems.at(f"{key}.points"):
-                found = residual_between(one, other, share, request.v, request.driver, request.v_offset)
-            if found is None:
+                residual = residual_between(one, other, share, request.v, request.driver, request.v_offset)
+            if residual is None:
                 continue
-            beta, u_peak, beta_max = found
+            beta, u_peak, beta_max = residual
             name = "points" if beta_max is None else self.wrong_key(beta, u_peak) or "beta_max"
             with problems.at(f"{key}.{name}"):
                 shapes.append(self._shape(beta, beta_max, u_peak))
@@ -126,12 +132,12 @@ class ByBranches(WithBranches, frozen=True):
                     problems.add(f"branches[{i}].{side}.{key}", why)
 
     def _shape(self, beta: float, beta_max: float | None, u_peak: float) -> Sweep:
-        """The sweep; where there is none, ``Unphysical`` with the residual that would fit."""
+        """Return the sweep; raise ``Unphysical`` with the residual that fits where there is none."""
         try:
             return self.sweep(beta, u_peak)
         except Unphysical as reason:
-            text, found = str(reason).partition("; lower it")[:2]
-            fits = _largest(lambda share: self.sweep(share * beta, u_peak)) if found else 0.0
+            text, has_remedy = str(reason).partition("; lower it")[:2]
+            fits = _largest(lambda share: self.sweep(share * beta, u_peak)) if has_remedy else 0.0
             if not fits:
                 raise
             what, value = ("beta", beta) if beta_max is None else ("beta_max", beta_max)
@@ -139,7 +145,7 @@ class ByBranches(WithBranches, frozen=True):
 
 
 def _largest(build: Callable[[float], object]) -> float:
-    """The largest share, below 1, that can be built."""
+    """Return the largest share, below 1, that can be built."""
     fits, fails = 0.0, 1.0
     for _ in range(40):
         middle = 0.5 * (fits + fails)

@@ -16,11 +16,11 @@ class Response(Protocol):
     """A frequency response, normalised to 1 at 0 Hz."""
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part of 1 / H(f)."""
+        """Return real and imaginary part of 1 / H(f) at frequencies in Hz, each of the shape of ``f_hz``."""
 
     @property
     def resonance_hz(self) -> float:
-        """Where the response is largest."""
+        """The frequency at which the response is largest."""
 
     @property
     def half_width_hz(self) -> float:
@@ -28,18 +28,18 @@ class Response(Protocol):
 
     @property
     def highest_hz(self) -> float:
-        """Up to which it is known; ``inverse`` refuses what is above."""
+        """The frequency up to which the response is known; ``inverse`` refuses higher ones."""
 
 
 class SecondOrder(Struct, frozen=True):
-    """H = exp(-i 2 pi f delay) / (1 - r^2 + i r / Q), r = f / frequency."""
+    """A resonance H = exp(-i 2 pi f delay) / (1 - r^2 + i r / Q), r = f / frequency."""
 
     frequency_hz: float
     quality: float
     delay_s: float = 0.0
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part of 1 / H(f)."""
+        """Return real and imaginary part of 1 / H(f) at frequencies in Hz, each of the shape of ``f_hz``."""
         r = f_hz / self.frequency_hz
         real, imaginary = 1.0 - r * r, r / self.quality
         s, c = sine_and_cosine(f_hz * self.delay_s)
@@ -57,7 +57,7 @@ class SecondOrder(Struct, frozen=True):
 
     @property
     def highest_hz(self) -> float:
-        """All frequencies."""
+        """The frequency up to which the response is known: there is no limit."""
         return inf
 
 
@@ -69,10 +69,15 @@ class Measured(Struct, frozen=True):
     phase_turns: Floats
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part of 1 / H(f); gain and phase linear between the points.
+        """Return real and imaginary part of 1 / H(f) at frequencies in Hz; gain and phase are interpolated linearly.
 
-        Below the first the gain is that of it, and the phase goes straight to 0 at 0 Hz, as that of a dead time, or to
-        the half turn that is nearest where the response is inverted.
+        Below the first point the gain is that of it, and the phase is linear to 0 at 0 Hz, as that of a dead time, or
+        to the nearest half turn where the response is inverted.
+
+        Raises
+        ------
+        Unphysical
+            If a frequency is above the last point.
         """
         f = np.maximum(f_hz, self.f_hz[0])
         if f.size and float(np.max(f)) > self.f_hz[-1]:
@@ -102,20 +107,33 @@ class Measured(Struct, frozen=True):
 
     @property
     def highest_hz(self) -> float:
-        """That of the last point."""
+        """The frequency of the last point."""
         return float(self.f_hz[-1])
 
 
 def capped_inverse(response: Response, f_hz: Floats, max_boost_db: float) -> tuple[Floats, Floats, Bools]:
-    """1 / H at each frequency, its size limited to the boost and its phase kept; and where the limit held it back."""
+    """Return 1 / H at each frequency, with its size limited to the boost and its phase unchanged.
+
+    Parameters
+    ----------
+    f_hz
+        Frequencies in Hz, shape (n,).
+    max_boost_db
+        The largest size of the inverse, in dB.
+
+    Returns
+    -------
+    real, imaginary, limited
+        Both parts, and True where the limit acts; each (n,).
+    """
     real, imaginary = response.inverse(f_hz)
     size = np.sqrt(real * real + imaginary * imaginary)
     ceiling = decibels(max_boost_db)
-    held = size > ceiling
-    factor = np.where(held, ceiling / np.where(held, size, 1.0), 1.0)
-    return real * factor, imaginary * factor, held
+    limited = size > ceiling
+    factor = np.where(limited, ceiling / np.where(limited, size, 1.0), 1.0)
+    return real * factor, imaginary * factor, limited
 
 
 def decibels(value_db: float) -> float:
-    """The amplitude ratio of a value in dB, from basic operations: 10^(dB / 20)."""
+    """Return the amplitude ratio 10^(dB / 20) of a value in dB, from basic operations."""
     return exp(value_db * 0.11512925464970228)  # ln(10) / 20

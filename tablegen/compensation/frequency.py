@@ -8,7 +8,13 @@ _MIN_RESPONSE = 0.5
 
 
 def frequency_gain(rate_hz: float, alpha: float, reference_hz: float) -> float:
-    """g = 1 / (1 - alpha log10(f / f_DH)): what restores the amplitude of (23), R normalised to its value at f_DH."""
+    """Return g = 1 / (1 - alpha log10(f / f_DH)), which restores the amplitude of (23); R is 1 at f_DH.
+
+    Raises
+    ------
+    Unphysical
+        If (23) leaves less than half of the amplitude.
+    """
     response = 1.0 - alpha * log10(rate_hz / reference_hz)
     if response < _MIN_RESPONSE:
         highest = reference_hz * 10.0 ** min(_MIN_RESPONSE / alpha, 300.0)

@@ -1,6 +1,6 @@
-"""The converter's zero-order hold, and its inverse for each harmonic of the scan.
+"""Half-sample compensation of the converter's zero-order hold, for each harmonic of the scan.
 
-A code holds from its tick to the next. What the piezo sees of samples w(k / N) is harmonic n times
+A code is held from its tick to the next. What the piezo sees of samples w(k / N) is harmonic n times
 ``exp(-i pi n / N) sinc(n / N)``: half a tick late, and a little smaller. Docs/waveform.md has the convention of time.
 """
 
@@ -13,10 +13,15 @@ from tablegen.numerics.turns import sine_and_cosine
 
 
 def hold_inverse(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Floats]:
-    """Real and imaginary part of what undoes the hold of harmonics 1..``harmonics``, with ``advances`` codes a period.
+    """Return the inverse of the hold for harmonics 1..``harmonics``, with ``advances`` codes a period.
 
-    An axis that ``steps`` once a line is imaged at its codes, and not in between: the phase alone is undone. The gain
-    is below pi / 2 (3.9 dB), since ``harmonics`` stay below half of ``advances``.
+    An axis that ``steps`` once a line is imaged at its codes, and not in between: only the phase is compensated. The
+    gain is below pi / 2 (3.9 dB), since ``harmonics`` stay below half of ``advances``.
+
+    Returns
+    -------
+    real, imaginary
+        Both parts of the factors, shape (harmonics,).
     """
     share = np.arange(1, harmonics + 1) / advances
     s, c = sine_and_cosine(0.5 * share)

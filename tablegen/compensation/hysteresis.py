@@ -18,7 +18,7 @@ HIGHEST_PEAK = 1.0 - LOWEST_PEAK
 
 
 class BranchShape(Sweep):
-    """u(tau) = lambda tau + xi sin(pi tau) + xi_gamma (cos(pi tau) - 1) with lambda = 1 + 2 xi_gamma, (17), (18).
+    """A branch u(tau) = lambda tau + xi sin(pi tau) + xi_gamma (cos(pi tau) - 1), lambda = 1 + 2 xi_gamma, (17), (18).
 
     tau in [0, 1] runs with the sweep, for both directions; the backward branch of (17) is 1 - u(1 - tau).
     The sinusoidal model (15) has xi_gamma = 0, the triangle xi = 0 as well. Dimensionless.
@@ -33,27 +33,38 @@ class BranchShape(Sweep):
 
     @property
     def linear(self) -> float:
-        """lambda, equation (18)."""
+        """The slope lambda of equation (18)."""
         return 1.0 + 2.0 * self.xi_gamma
 
     @property
     def lag(self) -> float:
-        """How far the sweep lags behind the drive in its first mode: xi.
+        """The lag xi of the sweep behind the drive in its first mode.
 
-        Its sign is sure where few data leave the skew, and with it the sign of the peak, open.
+        Its sign is certain even where few data leave the skew, and with it the sign of the peak, open.
         """
         return self.xi
 
     @classmethod
     def sinusoidal(cls, beta: float) -> "BranchShape":
-        """Equation (15)."""
+        """Return the branch of equation (15).
+
+        Raises
+        ------
+        Unphysical
+            If the branch would run backwards.
+        """
         return cls(xi=beta)._checked(f"beta = {beta:.4g}")
 
     @classmethod
     def harmonic(cls, beta: float, u_peak: float) -> "BranchShape":
-        """Equations (17)-(21): the residual u - tau peaks at beta, where u = u_peak.
+        """Return the branch of equations (17)-(21): the residual u - tau peaks at beta, where u = u_peak.
 
         (19) and (20) are multiplied out: gamma itself is infinite at its poles, while xi and xi gamma are not.
+
+        Raises
+        ------
+        Unphysical
+            If the peak is outside the poles of (20), or the branch would run backwards.
         """
         u0 = u_peak - beta  # (21)
         if not LOWEST_PEAK < u0 < HIGHEST_PEAK:
@@ -75,24 +86,25 @@ class BranchShape(Sweep):
 
     @classmethod
     def at(cls, coordinates: Floats) -> "BranchShape":
-        """The branch at a point of ``basis``, (2,), whether it runs forward or not."""
+        """Return the branch at a point of ``basis``, (2,), whether it is monotonic or not."""
         return cls(float(coordinates[0]), float(coordinates[1]))
 
     @property
     def coordinates(self) -> Floats:
-        """(2,): of the branch in ``basis``."""
+        """The coordinates of the branch in ``basis``, (2,)."""
         return np.array([self.xi, self.xi_gamma])
 
     @staticmethod
     def basis(tau: Floats) -> tuple[Floats, Floats]:
-        """d u(tau) by each coordinate: the branch is tau and a sum of these, so that fits are linear and have no poles.
+        """Return the derivatives of u(tau) by each coordinate, of the shape of ``tau``.
 
-        For calibration: numpy's sines, whose last bits differ between processors.
+        The branch is tau and a sum of these, so that fits are linear and have no poles. For calibration: numpy's sines,
+        whose last bits differ between processors.
         """
         return np.sin(pi * tau), 2.0 * tau + np.cos(pi * tau) - 1.0
 
     def peak(self) -> tuple[float, float]:
-        """beta and u_peak: u - tau turns once between the poles of (20)."""
+        """Return beta and u_peak: u - tau has one extreme between the poles of (20)."""
         tau = np.linspace(LOWEST_PEAK, HIGHEST_PEAK, 257)
         slope = pi * self.xi * np.cos(pi * tau) + self.xi_gamma * (2.0 - pi * np.sin(pi * tau))
         turning = np.flatnonzero(np.sign(slope[1:]) != np.sign(slope[:-1]))
@@ -109,22 +121,22 @@ class BranchShape(Sweep):
         return float(beta), float(low + beta)
 
     def value(self, tau: FloatsLike) -> Floats:
-        """u(tau), equation (17)."""
+        """Return u(tau), equation (17), of the shape of ``tau``."""
         return self.value_and_slope(tau)[0]
 
     def slope(self, tau: FloatsLike) -> Floats:
-        """du/dtau."""
+        """Return du/dtau, of the shape of ``tau``."""
         return self.value_and_slope(tau)[1]
 
     def value_and_slope(self, tau: FloatsLike) -> tuple[Floats, Floats]:
-        """u(tau) and du/dtau, of the same sines."""
+        """Return u(tau) and du/dtau, from the same sines."""
         tau = np.asarray(tau, dtype=np.float64)
         s, c = sine_and_cosine(0.5 * tau)
         value = self.linear * tau + self.xi * s + self.xi_gamma * (c - 1.0)
         return value, self.linear + pi * (self.xi * c - self.xi_gamma * s)
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
-        """int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, in closed form."""
+        """Return int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, in closed form; of the shape of ``y``."""
         ramp, plain = ramp_moment(y), plain_moment(y)
         below, above = plain_moment(y - 0.5), plain_moment(y + 0.5)  # of exp(+- i pi s) times the kernel
         sine = 0.5 * (below[1] - above[1]), 0.5 * (above[0] - below[0])
@@ -136,7 +148,7 @@ class BranchShape(Sweep):
         )
 
     def least_slope(self) -> float:
-        """The least du/dtau over [0, 1]: at an end, or where xi cos + ... turns, that is tan(pi tau) = -xi_gamma/xi."""
+        """Return the least du/dtau over [0, 1]: at an end, or at the extreme, where tan(pi tau) = -xi_gamma/xi."""
         candidates = [0.0, 1.0]
         if self.xi or self.xi_gamma:
             turning = (atan(-self.xi_gamma / self.xi) / pi) % 1.0 if self.xi else 0.5
@@ -146,5 +158,5 @@ class BranchShape(Sweep):
 
 
 def beta_at(v_scan_normalised: float, beta_max: float, rho: float) -> float:
-    """Growth of the residual with the scan size, equation (22); rho is dimensionless."""
+    """Return the residual at a normalised scan voltage by equation (22); rho is dimensionless."""
     return beta_max * (1.0 - exp(-rho * v_scan_normalised)) / (1.0 - exp(-rho))

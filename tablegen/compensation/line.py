@@ -1,6 +1,6 @@
 """The line that a model makes: a sweep each way, what the drive is to follow, and how the piezo follows a drive.
 
-Most models give the shape of two sweeps (``LineShape``), and the band limit is fitted to it. A model that works out the
+Most models give the shape of two sweeps (``LineShape``), and the band limit is fitted to it. A model that makes the
 whole periodic waveform itself gives a ``WholeLine``.
 """
 
@@ -34,18 +34,18 @@ class Sweep(ABC):
 
     @abstractmethod
     def value(self, tau: FloatsLike) -> Floats:
-        """u(tau); of the shape of ``tau``."""
+        """Return u(tau), of the shape of ``tau``."""
 
     @abstractmethod
     def slope(self, tau: FloatsLike) -> Floats:
-        """du/dtau, above 0."""
+        """Return du/dtau, above 0, of the shape of ``tau``."""
 
     def value_and_slope(self, tau: FloatsLike) -> tuple[Floats, Floats]:
-        """Both at the same places; a subclass may have a way that is shorter than the two."""
+        """Return value and slope at the same places; a subclass may compute them together."""
         return self.value(tau), self.slope(tau)
 
     def inverse(self, u: FloatsLike) -> Floats:
-        """tau(u): where the modelled piezo is when the normalised drive is u. Clipped to u in [0, 1]."""
+        """Return tau(u): where the modelled piezo is when the normalised drive is u. Clipped to u in [0, 1]."""
         u = np.clip(np.asarray(u, dtype=np.float64), 0.0, 1.0)
         grid = np.linspace(0.0, 1.0, _GRID)
         tau = np.interp(u, self.value(grid), grid)
@@ -55,9 +55,12 @@ class Sweep(ABC):
         return tau
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
-        """int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part: what a Fourier series in closed form needs.
+        """Return int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, for a Fourier series in closed form.
 
-        Raises ``Unphysical`` where a model has no closed form.
+        Raises
+        ------
+        Unphysical
+            If the model has no closed form.
         """
         raise Unphysical("this model of the piezo has no Fourier series in closed form; use method = 'window'")
 
@@ -70,7 +73,7 @@ class AppliedBranch(Struct, frozen=True):
 
     @classmethod
     def of(cls, sweep: Sweep) -> "AppliedBranch":
-        """The largest residual u - tau of any sweep, on a grid."""
+        """Return the largest residual u - tau of any sweep, on a grid."""
         tau = np.linspace(0.0, 1.0, _GRID)
         u = sweep.value(tau)
         at = int(np.argmax(np.abs(u - tau)))
@@ -80,7 +83,7 @@ class AppliedBranch(Struct, frozen=True):
 class LineShape(Struct, frozen=True):
     """The periodic normalised waveform of one line: forward for 0 < t <= turn, backward after, (14) and (17).
 
-    ``applied`` is what the manifest and ``tablegen show`` say of the sweeps; without it, it is read off them.
+    ``applied`` is the residual in the manifest and in ``tablegen show``; without it, it is computed from the sweeps.
     """
 
     turn: float
@@ -105,30 +108,30 @@ class LineShape(Struct, frozen=True):
 
     @property
     def learnt_line(self) -> "LineShape":
-        """The line that the piezo follows straight, where ``waveform`` keeps an error beside that."""
+        """The line that the piezo follows straight, where ``waveform`` has an allowed error against it."""
         return self
 
     @property
     def beside_learnt_percent(self) -> float | None:
-        """The scaling error of ``waveform`` beside ``learnt_line``."""
+        """The scaling error of ``waveform`` against ``learnt_line``."""
         return None
 
     @property
     def transients(self) -> tuple[Transient, Transient] | None:
-        """What follows a change of offset and one of size, where the model knows."""
+        """The transients after a change of offset and after one of size, where the model knows them."""
         return None
 
     @property
     def expectation(self) -> Expectation | None:
-        """What the model expects of the line on the scanner, where it knows more than its branches."""
+        """The expected errors of the line on the scanner, where the model knows more than its branches."""
         return None
 
     def value(self, t: FloatsLike) -> Floats:
-        """w(t) with t in periods."""
+        """Return w(t) with t in periods, of the shape of ``t``."""
         return self._by_sweep(t, self.forward.value, lambda tau: 1.0 - self.backward.value(tau))
 
     def slope(self, t: FloatsLike) -> Floats:
-        """dw/dt per period."""
+        """Return dw/dt per period, of the shape of ``t``."""
         return self._by_sweep(
             t,
             lambda tau: self.forward.slope(tau) / self.turn,
@@ -138,11 +141,20 @@ class LineShape(Struct, frozen=True):
     def followed(
         self, side: str, position: Floats, drive: FourierSeries, value: Floats, slope: Floats
     ) -> tuple[Floats, Floats]:
-        """How the piezo follows a drive where the line is at ``position`` in one direction, (n,) each.
+        """Return how the piezo follows a drive where the line is at ``position`` in one direction.
 
-        Its place less ``position``, as a fraction of the line, and its speed over the line's. ``value`` and ``slope``
-        are those of ``drive`` at these times. To first order in a deviation of at most some percent: x - tau =
-        (w - u) / u'. A model that knows more of the drive than its values there overrides this.
+        To first order in a deviation of at most some percent: x - tau = (w - u) / u'. A model that knows more of the
+        drive than its values there overrides this.
+
+        Parameters
+        ----------
+        position, value, slope
+            The line's positions, and ``drive`` and its slope at these times; each (n,).
+
+        Returns
+        -------
+        error, speed
+            The place less ``position``, as a fraction of the line, and the speed over the line's; each (n,).
         """
         times = self.times(side, position)
         sweep = self.forward if side == "forward" else self.backward
@@ -150,27 +162,27 @@ class LineShape(Struct, frozen=True):
         return (value - self.value(times)) / steepness, slope / self.slope(times)
 
     def times(self, side: str, position: Floats) -> Floats:
-        """When the sweep of one direction passes a normalised position, in periods."""
+        """Return when the sweep of one direction passes a normalised position, in periods."""
         return self.turn * position if side == "forward" else self.turn + (1.0 - self.turn) * (1.0 - position)
 
     def _by_sweep(
         self, t: FloatsLike, forward: Callable[[Floats], Floats], backward: Callable[[Floats], Floats]
     ) -> Floats:
-        """What either sweep gives at its own times, of the shape of ``t``."""
+        """Return the values of either sweep at its own times, of the shape of ``t``."""
         t = np.asarray(t, dtype=np.float64)
         t = t - np.floor(t)
         going = t <= self.turn
         returning = ~going
-        found = np.empty(t.shape)
+        values = np.empty(t.shape)
         if going.any():
-            found[going] = forward(t[going] / self.turn)
+            values[going] = forward(t[going] / self.turn)
         if returning.any():
-            found[returning] = backward((t[returning] - self.turn) / (1.0 - self.turn))
-        return found
+            values[returning] = backward((t[returning] - self.turn) / (1.0 - self.turn))
+        return values
 
 
 class SweptSeries(Sweep):
-    """One sweep of a waveform that rises once and falls once; only where it does can it be inverted."""
+    """One sweep of a waveform that rises once and falls once; it can be inverted only where it does."""
 
     __slots__ = ("forward", "series", "turn")
 
@@ -178,12 +190,12 @@ class SweptSeries(Sweep):
         self.series, self.turn, self.forward = series, turn, forward
 
     def value(self, tau: FloatsLike) -> Floats:
-        """u(tau)."""
+        """Return u(tau), of the shape of ``tau``."""
         w = self.series.value(self._times(tau))
         return w if self.forward else 1.0 - w
 
     def slope(self, tau: FloatsLike) -> Floats:
-        """du/dtau."""
+        """Return du/dtau, of the shape of ``tau``."""
         rise = self.series.value(self._times(tau), 1)
         return self.turn * rise if self.forward else (self.turn - 1.0) * rise
 
@@ -193,31 +205,31 @@ class SweptSeries(Sweep):
 
 
 class WholeLine(LineShape, frozen=True, kw_only=True):
-    """A line whose waveform the model itself has worked out, in the harmonics that are played."""
+    """A line whose waveform the model itself makes, in the harmonics that are played."""
 
     series: FourierSeries
 
     @classmethod
     def of(cls, series: FourierSeries, turn: float, **more: Any) -> "Self":
-        """The line of a waveform w(t), straight on the scanner as far as the model knows; ``more`` of a subclass."""
+        """Return the line of a waveform w(t), straight on the scanner by the model; ``more`` is for subclasses."""
         return cls(turn, SweptSeries(series, turn, True), SweptSeries(series, turn, False), series=series, **more)
 
     @property
     def waveform(self) -> FourierSeries | None:
-        """What was worked out."""
+        """The waveform of the model."""
         return self.series
 
     def value(self, t: FloatsLike) -> Floats:
-        """w(t) with t in periods."""
+        """Return w(t) with t in periods, of the shape of ``t``."""
         return self.series.value(t)
 
     def slope(self, t: FloatsLike) -> Floats:
-        """dw/dt per period."""
+        """Return dw/dt per period, of the shape of ``t``."""
         return self.series.value(t, 1)
 
 
 class LineRequest(Struct, frozen=True):
-    """What a scan asks the model of one axis for.
+    """The request of a scan to the model of one axis.
 
     ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1], V_max the whole range of the
     ``driver``; ``v_amplitude`` = m g V_scan, volts peak to peak at
@@ -227,7 +239,7 @@ class LineRequest(Struct, frozen=True):
     where it is not calibrated. ``allowed`` is the scaling error in the window that may be left for the sake of
     less acceleration: a model that makes the whole waveform itself keeps it, where it is not None. ``v`` and
     ``v_amplitude`` are 0 where the size law refuses the size, and ``size_nm`` is where nothing gives one; the model is
-    asked all the same, so that its own faults are reported in the same run.
+    called all the same, so that its own faults are reported in the same run.
     """
 
     axis: str

@@ -1,7 +1,7 @@
-"""A model of what a piezo does with a drive: the table of the scanner file, and the line that it makes of it.
+"""The interface of a hysteresis model: the table of the scanner file, and the line that the model makes of it.
 
 Each is one file in ``tablegen/compensation/models/``, or an entry point. Everything else (the decoder, the JSON
-Schema, the page of keys, the build, the certificate, ``tablegen show`` and ``simulate``) goes through all alike.
+Schema, the page of keys, the build, the certificate, ``tablegen show`` and ``simulate``) treats all alike.
 """
 
 from collections.abc import Mapping
@@ -25,11 +25,11 @@ class Parameters(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def contradictions(cls, written: Mapping[str, Any]) -> list[tuple[str, str]]:
-        """Keys of the table, as it is written, that contradict each other or lack, and why."""
+        """Return the keys of the written table that contradict each other or are missing, each with the reason."""
         return []
 
     def faults(self) -> list[tuple[str, str]]:
-        """Keys whose values contradict each other, and why."""
+        """Return the keys whose values contradict each other, each with the reason."""
         return []
 
 
@@ -37,33 +37,33 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
     """Hysteresis of the line, (13)-(22)."""
 
     purpose: ClassVar[str] = ""
-    """What it is, in a few words or equations, for the list of models."""
+    """The model in a few words or equations, for the list of models."""
     calibration: ClassVar[str] = ""
-    """What measures its parameters, in Markdown."""
+    """The commands that measure its parameters, in Markdown."""
     order: ClassVar[int] = 9
     """Its place among models that are compared: the simplest is 0."""
     compensates: ClassVar[bool] = True
-    """Whether it corrects anything."""
+    """True if the model corrects anything."""
     counts_turns: ClassVar[bool] = False
-    """Whether its line counts with the turns that the waveform really has, and not with those of a triangle."""
+    """True if its line depends on the real turns of the waveform, not on those of a triangle."""
 
     @classmethod
     def model(cls) -> str:
-        """Its name: the tag of the class."""
+        """Return the name of the model: the tag of the class."""
         return str(cls.__struct_config__.tag)
 
     @classmethod
     def like(cls, other: "Hysteresis") -> "Self | None":
-        """This model with what another one's table holds; None where that does not serve."""
+        """Return this model with the table of another one; None where that does not serve."""
         return other if isinstance(other, cls) else None
 
     @property
     def calibrated(self) -> bool:
-        """Whether the table holds a calibration."""
+        """True if the table holds a calibration."""
         return True
 
     def files(self) -> tuple[str, ...]:
-        """Files that the table names, relative to the scanner file: builds depend on them."""
+        """Return the files that the table names, relative to the scanner file: builds depend on them."""
         return ()
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
@@ -73,7 +73,7 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
     def loop(
         self, request: LineRequest, low: float, high: float, problems: ModelProblems
     ) -> "tuple[Loop, LogarithmicCreep] | None":
-        """What a settled drive between two shares of v_max does, and the creep behind it; its mean is the offset.
+        """Return the loop of a settled drive between two shares of v_max, and its creep; its mean is the offset.
 
         The loop is ``request.size_nm`` long. None where ``problems`` grew. By default it is that of the line's
         sweeps, without creep.
@@ -89,10 +89,10 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
         return Loop(low, high, rising, falling, request.size_nm), NO_CREEP
 
     def described(self, line: LineShape) -> str:
-        """What is applied, in a line of text."""
+        """Return the applied hysteresis in a line of text."""
         sides = zip(("forward", "backward"), line.peaks, strict=True)
         return f"{self.model()}; " + ", ".join(f"{side} beta {b.beta:.5f} u_peak {b.u_peak:.4g}" for side, b in sides)
 
     def contents(self, folder: Path) -> list[str]:
-        """Digests of those files: a refinement belongs to one model with one content."""
+        """Return the digests of those files: a refinement belongs to one model with one content."""
         return [file_sha256(folder / name) for name in self.files()]

@@ -1,4 +1,4 @@
-"""Where a model of the piezo reports what it cannot serve: at keys of its table, or of the scan file."""
+"""The problems of a hysteresis model: at keys of its table, or of the scan file."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -7,7 +7,7 @@ from tablegen.base.input_errors import Document, Problem, Problems
 
 
 class ModelProblems:
-    """The problems of one axis' model, each at its key; ``count`` tells a model whether there are new ones."""
+    """The problems of one axis' model, each at its key; ``count`` shows a model whether there are new ones."""
 
     __slots__ = ("_axis", "_problems", "scan_file", "scanner_file")
 
@@ -19,13 +19,13 @@ class ModelProblems:
 
     @classmethod
     def without_files(cls, axis: str, problems: Problems) -> "ModelProblems":
-        """Return one whose problems nobody reads: a model is asked whether it serves at all."""
+        """Return an instance whose problems are discarded, to test whether a model serves at all."""
         return cls(axis, Document("scan"), Document("scanner"), problems)
 
     @property
     def count(self) -> int:
-        """How many problems there are so far."""
-        return len(self._problems.found)
+        """The number of problems so far."""
+        return len(self._problems.entries)
 
     @contextmanager
     def at(self, key: str) -> Iterator[None]:

@@ -14,7 +14,7 @@ _SIMPSON_PANELS = 1024  # panels of Simpson's rule; the integrand is smooth and 
 
 
 class OffsetLaw(Struct, frozen=True):
-    """m(p) = 1 + alpha p + beta p^2, equation (1), with p in [-1, 1]; all dimensionless."""
+    """The law m(p) = 1 + alpha p + beta p^2, equation (1), with p in [-1, 1]; all dimensionless."""
 
     alpha: float = 0.0
     beta: float = 0.0
@@ -29,21 +29,32 @@ class OffsetLaw(Struct, frozen=True):
 
     @classmethod
     def from_ends(cls, m_minus: float, m_plus: float) -> "OffsetLaw":
-        """From the factors at p = -1 and p = +1, equations (3) and (4)."""
+        """Return the law of the factors at p = -1 and p = +1, equations (3) and (4)."""
         return cls(0.5 * (m_plus - m_minus), 0.5 * (m_plus + m_minus) - 1.0)
 
     @classmethod
     def fit(cls, p: list[float], apparent: list[float]) -> "OffsetLaw":
-        """From apparent sizes of one object (any unit) at three or more p: least squares, exact for three.
+        """Fit the law to apparent sizes of one object (any unit) at three or more p: least squares, exact for three.
 
-        The p of each point is taken as it is, since the paper advises points away from the edges. The apparent
-        size is proportional to m; the size at the centre comes out of the fit.
+        The p of each point is used as given, since the paper advises points away from the edges. The apparent
+        size is proportional to m; the size at the centre is a result of the fit.
+
+        Raises
+        ------
+        Unphysical
+            If the offsets do not determine a parabola, or m is not above 0 in the driver's range.
         """
         return cls.fitted(p, apparent)[0]
 
     @classmethod
     def fitted(cls, p: list[float], apparent: list[float]) -> "tuple[OffsetLaw, float]":
-        """The law of ``fit``, and the apparent size at the centre."""
+        """Return the law of ``fit``, and the apparent size at the centre.
+
+        Raises
+        ------
+        Unphysical
+            As ``fit``.
+        """
         if len(set(p)) < 3:
             raise Unphysical(f"{len(set(p))} different offsets do not determine a parabola; at least 3 are needed")
         if max(p) - min(p) < _MIN_SPAN:
@@ -71,11 +82,11 @@ class OffsetLaw(Struct, frozen=True):
         return cls(linear / centre, quadratic / centre), centre
 
     def factor(self, p: float) -> float:
-        """m(p), equation (1)."""
+        """Return m(p), equation (1)."""
         return 1.0 + self.alpha * p + self.beta * p * p
 
     def position_nm(self, v_offset: float, driver: Driver | float, k_nm_per_v: float) -> float:
-        """Position in nm above that at 0 V: the integral of the local slope k / m over the offset voltage."""
+        """Return the position in nm above that at 0 V: the integral of the slope k / m over the offset voltage."""
         if v_offset == 0.0:
             return 0.0
         p = Driver.of(driver).p(v_offset * (np.arange(_SIMPSON_PANELS + 1) / _SIMPSON_PANELS))
@@ -86,14 +97,20 @@ class OffsetLaw(Struct, frozen=True):
         return k_nm_per_v * v_offset * float(tree_sum(weights * slope)) / (3.0 * _SIMPSON_PANELS)
 
     def voltage_at(self, position_nm: float, driver: Driver | float, k_nm_per_v: float) -> float:
-        """The offset voltage that gives a position; the inverse of ``position_nm``."""
+        """Return the offset voltage of a position; the inverse of ``position_nm``.
+
+        Raises
+        ------
+        Unphysical
+            If the position is outside the driver's range.
+        """
         driver = Driver.of(driver)
         low, high = (self.position_nm(end, driver, k_nm_per_v) for end in (driver.v_min, driver.v_max))
         if not low <= position_nm <= high:
             reach = f"{at_least(low, 6)}..{at_most(high, 6)} nm that {driver} reach"
             raise Unphysical(f"{position_nm:g} nm is outside the {reach}")
         v = driver.v_min + driver.span * (position_nm - low) / (high - low)
-        for _ in range(60):  # Newton on a smooth, increasing function; a bound, not a hope
+        for _ in range(60):  # Newton on a smooth, increasing function converges in a few rounds
             error = self.position_nm(v, driver, k_nm_per_v) - position_nm
             step = error * self.factor(driver.p(v)) / k_nm_per_v
             v = min(max(v - step, driver.v_min), driver.v_max)
@@ -103,5 +120,5 @@ class OffsetLaw(Struct, frozen=True):
 
 
 def normalised_offset(v_offset: float, driver: Driver | float) -> float:
-    """p = 2 V_offset / V_max - 1, equation (2); with V_offset from v_min on, and V_max for the whole range."""
+    """Return p = 2 V_offset / V_max - 1, equation (2); with V_offset from v_min on, and V_max for the whole range."""
     return Driver.of(driver).p(v_offset)

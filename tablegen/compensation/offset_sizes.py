@@ -1,4 +1,4 @@
-"""m of (1) where it depends on the scan size too: (1)-(4) as measured at several scan voltages."""
+"""The factor m of (1) where it depends on the scan size too: (1)-(4) as measured at several scan voltages."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -14,7 +14,7 @@ _ROUNDS = 40  # of a contraction that leaves a third of an error
 
 
 class OffsetSurface(Struct, frozen=True):
-    """m(p, v) = 1 + alpha(v) p + beta(v) p^2 with v = V_scan / V_max in [0, 1].
+    """The factor m(p, v) = 1 + alpha(v) p + beta(v) p^2 with v = V_scan / V_max in [0, 1].
 
     ``laws`` are (1) as measured at scan voltages, shares of v_max, ascending. Between two of them alpha and beta are
     linear in v; below the first and above the last they stay. With one law m does not depend on the size.
@@ -24,16 +24,16 @@ class OffsetSurface(Struct, frozen=True):
 
     @classmethod
     def everywhere(cls, law: OffsetLaw) -> "OffsetSurface":
-        """One law for all sizes."""
+        """Return the surface of one law for all sizes."""
         return cls(((0.0, law),))
 
     @property
     def small(self) -> OffsetLaw:
-        """At small scans: the law of the smallest size."""
+        """The law of the smallest size, for small scans."""
         return self.laws[0][1]
 
     def at(self, v: float) -> OffsetLaw:
-        """(1) at a normalised scan voltage."""
+        """Return the law (1) at a normalised scan voltage."""
         if v <= self.laws[0][0]:
             return self.laws[0][1]
         for (low, left), (high, right) in pairwise(self.laws):
@@ -45,9 +45,19 @@ class OffsetSurface(Struct, frozen=True):
 
 
 def law_of_sizes(p: list[float], apparent: list[float], size: SizeLaw, v: float) -> OffsetLaw:
-    """(1) from apparent sizes (any unit) of one object in images of a scan voltage ``v`` (of v_max) at three or more p.
+    """Return (1) from apparent sizes (any unit) of one object in images of one scan voltage at three or more p.
 
-    Of a scan that was not changed they are in proportion to R(V) / R(V / m), R of (6) and (10). Raises ``Unphysical``.
+    The apparent sizes are in proportion to R(V) / R(V / m), R of (6) and (10), since the scan was not changed.
+
+    Parameters
+    ----------
+    v
+        Scan voltage of the images, of v_max.
+
+    Raises
+    ------
+    Unphysical
+        If the sizes do not determine the law.
     """
     centre, scan_nm = 1.0, size.size_nm(v)
     law, middle = OffsetLaw.fitted(p, apparent)
@@ -58,9 +68,14 @@ def law_of_sizes(p: list[float], apparent: list[float], size: SizeLaw, v: float)
 
 
 def surface_of(points: Sequence[tuple[float, float, float]], size: SizeLaw, driver: Driver | float) -> OffsetSurface:
-    """The surface of (offset in V, apparent size in any unit, scan voltage of the image in V).
+    """Return the surface of points (offset in V, apparent size in any unit, scan voltage of the image in V).
 
-    The images of one scan voltage have to show one object. Raises ``Unphysical``.
+    The images of one scan voltage have to show one object.
+
+    Raises
+    ------
+    Unphysical
+        If the points of one scan voltage do not determine its law.
     """
     driver, laws = Driver.of(driver), []
     for volts in sorted({size_v for _, _, size_v in points}):

@@ -37,19 +37,19 @@ class HysteresisPoint(Parameters, frozen=True):
 
 
 def rows_of(points: Sequence[HysteresisPoint], v_max: float) -> Rows:
-    """The points by ascending voltage."""
-    found = [(p.size_v / v_max, p.beta, 0.5 if p.u_peak is None else p.u_peak) for p in points]
-    return tuple(sorted(found))
+    """Return the points by ascending voltage."""
+    rows = [(p.size_v / v_max, p.beta, 0.5 if p.u_peak is None else p.u_peak) for p in points]
+    return tuple(sorted(rows))
 
 
 class OffsetRows(Struct, frozen=True):
-    """Points of several offsets: the rows of each, by ascending offset as a share of v_max."""
+    """Points at several offsets: the rows of each, by ascending offset as a share of v_max."""
 
     offsets: tuple[tuple[float, Rows], ...]
 
     @classmethod
     def of(cls, points: Sequence[HysteresisPoint], driver: Driver | float) -> "OffsetRows":
-        """Points that all have an offset."""
+        """Return the rows of points that all have an offset."""
         driver = Driver.of(driver)
         groups: dict[float, list[HysteresisPoint]] = {}
         for point in points:
@@ -57,10 +57,14 @@ class OffsetRows(Struct, frozen=True):
         return cls(tuple((at, rows_of(groups[at], driver.span)) for at in sorted(groups)))
 
     def at(self, v: float, offset: float, driver: Driver | float) -> tuple[float, float]:
-        """beta and u_peak at a normalised scan voltage and an offset, both shares of the driver's range.
+        """Return beta and u_peak at a normalised scan voltage and an offset, both shares of the driver's range.
 
-        Linear in the offset between two offsets that were measured, constant beyond the outermost. Raises
-        ``Unphysical`` where the scan is too large, or too far off.
+        Linear in the offset between two offsets that were measured, constant beyond the outermost.
+
+        Raises
+        ------
+        Unphysical
+            If the scan is larger than the largest that was measured, or far from all offsets.
         """
         driver = Driver.of(driver)
         span, first, last = driver.span, self.offsets[0][0], self.offsets[-1][0]
@@ -82,7 +86,7 @@ class OffsetRows(Struct, frozen=True):
 
 
 def _between_offsets(left: Rows, right: Rows, share: float, v: float, v_max: float) -> tuple[float, float]:
-    """Between two offsets, of which the outer one has the smaller scans: beyond its largest it grows as the other."""
+    """Interpolate between two offsets; beyond the largest scan of one, its residual grows as that of the other."""
     check_size(left[-1][0] + share * (right[-1][0] - left[-1][0]), v, v_max)
     common = min(left[-1][0], right[-1][0])
     sides = []
@@ -99,16 +103,19 @@ def _between_offsets(left: Rows, right: Rows, share: float, v: float, v_max: flo
 
 
 def between_points(rows: Rows, v: float, v_max: float) -> tuple[float, float]:
-    """beta and u_peak at a normalised scan voltage, as ``interpolated``.
+    """Return beta and u_peak at a normalised scan voltage, as ``interpolated``.
 
-    Raises ``Unphysical`` for a scan that is larger than what was measured.
+    Raises
+    ------
+    Unphysical
+        If the scan is larger than what was measured.
     """
     check_size(rows[-1][0], v, v_max)
     return interpolated(rows, v)
 
 
 def check_size(largest: float, v: float, v_max: float) -> None:
-    """Refuse a scan that is larger than the largest that was measured, both of v_max, by more than ``SIZE_REACH``."""
+    """Raise ``Unphysical`` for a scan larger than the largest measured, both of v_max, by more than ``SIZE_REACH``."""
     if v > largest + SIZE_REACH + 1e-9:
         served = at_most((largest + SIZE_REACH) * v_max, 6)
         raise Unphysical(
@@ -118,8 +125,9 @@ def check_size(largest: float, v: float, v_max: float) -> None:
 
 
 def interpolated(rows: Rows, v: float) -> tuple[float, float]:
-    """beta and u_peak: linear between points; below the first beta falls to 0 at v = 0 and u_peak stays, beyond the
-    last both stay.
+    """Return beta and u_peak at a normalised scan voltage, linear between points.
+
+    Below the first point beta falls to 0 at v = 0 and u_peak stays, beyond the last both stay.
     """
     before = (0.0, 0.0, rows[0][2])
     for point in rows:
@@ -130,27 +138,27 @@ def interpolated(rows: Rows, v: float) -> tuple[float, float]:
     return before[1], before[2]
 
 
-def twice(points: Sequence[HysteresisPoint]) -> list[tuple[str, str]]:
-    """Points at one voltage and offset, and those without an offset among others; and what is wrong with them."""
-    found = [
+def repeated_points(points: Sequence[HysteresisPoint]) -> list[tuple[str, str]]:
+    """Return the keys of points at one voltage and offset, and of those that lack an offset, with the reason."""
+    faults = [
         (f"points[{j}].size_v", f"{point.size_v:g} V is measured twice")
         for j, point in enumerate(points)
         if any((point.size_v, point.offset_v) == (earlier.size_v, earlier.offset_v) for earlier in points[:j])
     ]
     if any(point.offset_v is not None for point in points):
         lacking = [j for j, point in enumerate(points) if point.offset_v is None]
-        found += [(f"points[{j}].offset_v", "missing beside those of other points") for j in lacking]
-    return found
+        faults += [(f"points[{j}].offset_v", "missing beside those of other points") for j in lacking]
+    return faults
 
 
 def beyond_driver(points: Sequence[HysteresisPoint], driver: Driver) -> list[tuple[str, str]]:
-    """No hysteresis can have been measured at more than the driver's range, but for the error of a voltage."""
-    found = [
+    """Return the keys of points outside the driver's range, but for the error of a voltage, with the reason."""
+    faults = [
         (f"points[{j}].size_v", f"{point.size_v:g} V is above {driver.full_scale}")
         for j, point in enumerate(points)
         if point.size_v > (1.0 + FULL_SCALE_TOLERANCE) * driver.span
     ]
-    return found + [
+    return faults + [
         (f"points[{j}].offset_v", f"{point.offset_v:g} V is outside the driver's {driver}")
         for j, point in enumerate(points)
         if point.offset_v is not None and driver.beyond(point.offset_v, point.offset_v) > 0.0

@@ -13,9 +13,12 @@ from tablegen.compensation.dynamics import Measured
 
 
 def read_response(path: Path) -> Measured:
-    """A CSV file with a header ``hz, gain, phase_deg``; the gain is taken relative to that of the first row.
+    """Read a CSV file with a header ``hz, gain, phase_deg``; the gain is relative to that of the first row.
 
-    Raises ``Unphysical``, with the file and the line.
+    Raises
+    ------
+    Unphysical
+        With the file and the line, if it is not such a table or does not ascend in hz.
     """
     name = shown_path(path)
     if not os.path.isfile(path):  # a pipe would be waited for
@@ -42,7 +45,7 @@ def read_response(path: Path) -> Measured:
             raise Unphysical(f"{name}:{n}: {line.strip()[:60]!r} is not three numbers") from None
         if not (isfinite(f) and 1e-6 <= gain <= 1e6 and abs(phase) <= 1e6):
             raise Unphysical(
-                f"{name}:{n}: {line.strip()[:60]!r} is outside what is taken: "
+                f"{name}:{n}: {line.strip()[:60]!r} is outside the accepted range: "
                 f"finite hz, a gain of 1e-6 to 1e6, phase_deg of -1e6 to 1e6"
             )
         before = values[-1][0] if values else 0.0

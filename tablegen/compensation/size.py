@@ -9,7 +9,7 @@ from tablegen.base.input_errors import Unphysical
 
 
 class SizeLaw(Struct, frozen=True):
-    """R = alpha V (1 + beta V) up to the threshold, (6), its tangent beyond, (10); V = V_scan / V_max.
+    """The size R = alpha V (1 + beta V) up to the threshold, (6), and its tangent beyond, (10); V = V_scan / V_max.
 
     ``alpha_nm`` is in nm per full scale. beta = 0 is the linear scanner.
     """
@@ -20,10 +20,15 @@ class SizeLaw(Struct, frozen=True):
 
     @classmethod
     def calibrated(cls, k_nm_per_v: float, v_max: float, beta: float, base_nm: float, v_threshold: float) -> "SizeLaw":
-        """The law that reaches ``base_nm`` at the voltage base_nm / k, equation (8).
+        """Return the law that reaches ``base_nm`` at the voltage base_nm / k, equation (8).
 
         In (8) k_scan is nm per full scale, that is k in nm/V times V_max. Where the base size lies beyond the
         threshold, alpha follows from (10) in place of (6), so that the calibration is met there too.
+
+        Raises
+        ------
+        Unphysical
+            If the base size needs more than v_max.
         """
         v_base = base_nm / (k_nm_per_v * v_max)
         if v_base > 1.0:
@@ -33,14 +38,20 @@ class SizeLaw(Struct, frozen=True):
         return cls(base_nm / unit.size_nm(v_base), beta, v_threshold)
 
     def size_nm(self, v: float) -> float:
-        """Scan size in nm at the normalised voltage v in [0, 1], equations (6) and (10)."""
+        """Return the scan size in nm at the normalised voltage v in [0, 1], equations (6) and (10)."""
         if v <= self.v_threshold:
             return self.alpha_nm * v * (1.0 + self.beta * v)
         threshold = self.v_threshold
         return self.alpha_nm * ((1.0 + 2.0 * self.beta * threshold) * v - self.beta * threshold * threshold)
 
     def voltage(self, size_nm: float) -> float:
-        """Normalised voltage for a scan size in nm, equations (9) and (12)."""
+        """Return the normalised voltage of a scan size in nm, equations (9) and (12).
+
+        Raises
+        ------
+        Unphysical
+            If the size needs more than v_max.
+        """
         threshold = self.v_threshold
         if size_nm <= self.size_nm(threshold):
             ratio = size_nm / self.alpha_nm

@@ -1,4 +1,4 @@
-"""How a line drifts after a change of offset or of size, line after line."""
+"""The drift of a line after a change of offset or of size, line after line."""
 
 import numpy as np
 from msgspec import Struct
@@ -10,10 +10,10 @@ OFFSET_CHANGE = 0.1  # of v_max: the change of offset that drift is stated for, 
 SIZE_CHANGE = 0.5  # of the size: the smaller scan before
 
 
-class Late(Struct, frozen=True):
+class CreepTerm(Struct, frozen=True):
     """A term of creep: ``nm`` are still to come at the change, ``after_nm`` at the end of the first sweep.
 
-    Either falls by exp(-t / ``tau_s``); in the second is what the memory of hysteresis has brought meanwhile.
+    Either falls by exp(-t / ``tau_s``); the second includes what the memory of hysteresis has added meanwhile.
     """
 
     nm: float
@@ -22,13 +22,13 @@ class Late(Struct, frozen=True):
 
 
 class Transient(Struct, frozen=True, eq=False):
-    """What is late after a change, and how far hysteresis is from its settled loop in the first sweep forward.
+    """The creep after a change, and the distance of hysteresis from its settled loop in the first sweep forward.
 
-    ``memory_nm`` has the first sweep less settled ones, at ``memory_s`` after its beginning, both (n,). Creep with time
-    constants above ``measured_s`` was not measured but goes on as before.
+    ``memory_nm`` is the first sweep less settled ones, at ``memory_s`` after its beginning, both (n,). Creep with time
+    constants above ``measured_s`` is extrapolated.
     """
 
-    late: tuple[Late, ...]
+    late: tuple[CreepTerm, ...]
     measured_s: float
     memory_s: Floats
     memory_nm: Floats
@@ -42,21 +42,24 @@ class Transient(Struct, frozen=True, eq=False):
         return float(np.max(np.abs(self.memory_nm)))
 
     def drift_nm(self, line_s: float, first: int, count: int, slower_than_s: float = 0.0) -> float:
-        """How far the mean position of a line moves from line ``first`` after the change on, over ``count`` lines.
+        """Return how far the mean position moves from line ``first`` after the change on, over ``count`` lines, in nm.
 
-        With ``slower_than_s`` only what terms of creep with longer time constants bring.
+        With ``slower_than_s`` only terms of creep with longer time constants count.
         """
         off = self._off_nm(line_s, first + count + 1, slower_than_s)
         return float(abs(off[first + count] - off[first]))
 
     def lines(self, line_s: float, count: int, bound_nm: float, most: int) -> int:
-        """After how many lines no ``count`` lines drift by more than a bound; ``most`` + 1 where that is later."""
+        """Return after how many lines no ``count`` lines drift by more than a bound; at most ``most`` + 1."""
         off = self._off_nm(line_s, most + 1 + count, 0.0)
         beyond = np.flatnonzero(np.abs(off[count:] - off[: most + 1]) > bound_nm)
         return int(beyond[-1]) + 1 if len(beyond) else 0
 
     def _off_nm(self, line_s: float, lines: int, slower_than_s: float) -> Floats:
-        """How far the mean of each of the first lines is from the settled one; of short memory only without a limit."""
+        """Return how far the mean of each of the first lines is from the settled one.
+
+        Hysteresis counts only without ``slower_than_s``.
+        """
         sweep_s = float(self.memory_s[-1])
         within = min(-int(-sweep_s // line_s), lines)  # lines that begin before the first sweep ends
         off = np.zeros(lines)
@@ -72,7 +75,7 @@ class Transient(Struct, frozen=True, eq=False):
         return off if slower_than_s > 0.0 else off + self._memory(line_s, lines)
 
     def _memory(self, line_s: float, lines: int) -> Floats:
-        """The mean over each line of what the first sweep is off."""
+        """Return the mean over each line of the distance of the first sweep from settled ones."""
         steps = np.diff(self.memory_s)
         whole = np.concatenate([[0.0], np.add.accumulate(0.5 * steps * (self.memory_nm[1:] + self.memory_nm[:-1]))])
         at = np.minimum(np.arange(lines + 1.0) * line_s, self.memory_s[-1])

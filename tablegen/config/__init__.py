@@ -1,1 +1,1 @@
-"""Two TOML files in, frozen dataclass-like structs in SI-named units out; every fault at its file, line and key."""
+"""The two TOML files as frozen structs with units in their names; every fault at its file, line and key."""

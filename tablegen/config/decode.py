@@ -1,4 +1,4 @@
-"""Plain TOML values to the frozen types of the schema, with every fault found on the way."""
+"""Decode plain TOML values into the frozen types of the schema, and collect every fault."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from tablegen.compensation.model import Hysteresis
 
 T = TypeVar("T", bound=Struct)
 
-# Called for every table with its type, its key, what was written in it, and what was built of it or None.
+# Called for every table with its type, its key, its written values, and the decoded struct or None.
 Check: TypeAlias = Callable[[type, str, dict[str, Any], Any], None]
 
 _ALREADY_REPORTED = object()  # the value of a key that was reported already
@@ -25,9 +25,9 @@ _UNITS = ("_nm", "_v", "_hz", "_s", "_nm_per_v", "_v_per_s", "_db", "_lsb", "_pe
 
 
 def decode(kind: type[T], values: dict[str, Any], document: Document, problems: Problems, check: Check) -> T | None:
-    """Build ``kind`` from a table of TOML values; None, and at least one problem, where that cannot be.
+    """Build ``kind`` from a table of TOML values; None, and at least one problem, where that is not possible.
 
-    ``check`` adds what keys of the same table say about each other.
+    ``check`` is called for each table and adds contradictions between its keys.
     """
     built = _Decoder(document, problems, check).struct(kind, values, "")
     return built if isinstance(built, kind) else None
@@ -47,18 +47,8 @@ class _Decoder:
         match kind:
             case types.Metadata():
                 return self._any(kind.type, value, key)
-            case types.UnionType():  # in the schema "something or None", and TOML has no null; or a number or a word
-                some = [t for t in kind.types if not isinstance(t, types.NoneType)]
-                arrays = [t for t in some if isinstance(_bare(t), types.ListType)]
-                if arrays and len(some) > 1:  # a number, or an array of them
-                    return self._any(next(t for t in some if (t in arrays) == isinstance(value, list)), value, key)
-                words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
-                if len(some) > 1 and isinstance(value, str):
-                    wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
-                    return value if value in words else self._wrong(key, wrong)
-                return self._any(
-                    next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key
-                )
+            case types.UnionType():
+                return self._union(kind, value, key)
             case types.StructType():
                 return self.struct(kind.cls, value, key)
             case types.ListType():
@@ -80,10 +70,22 @@ class _Decoder:
                 return value if isinstance(value, bool) else self._wrong(key, f"{_shown(value)} is not true or false")
         raise NotImplementedError(kind)  # pragma: no cover - a type that the schema does not use
 
+    def _union(self, kind: types.UnionType, value: Any, key: str) -> Any:
+        """Decode "something or None", since TOML has no null; or a number or a word."""
+        some = [t for t in kind.types if not isinstance(t, types.NoneType)]
+        arrays = [t for t in some if isinstance(_bare(t), types.ListType)]
+        if arrays and len(some) > 1:  # a number, or an array of them
+            return self._any(next(t for t in some if (t in arrays) == isinstance(value, list)), value, key)
+        words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
+        if len(some) > 1 and isinstance(value, str):
+            wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
+            return value if value in words else self._wrong(key, wrong)
+        return self._any(next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key)
+
     def struct(self, kind: type[Struct], value: Any, key: str) -> Any:
         if not isinstance(value, dict):
             return self._wrong(key, f"{_shown(value)} is not a table")
-        good, built = True, {}
+        valid, built = True, {}
         if kind is Hysteresis:
             known_model = self._model(value, key)
             if known_model is None:  # nobody knows its keys
@@ -94,7 +96,7 @@ class _Decoder:
         tag = () if tag_field is None else (tag_field,)
         unknown = [name for name in value if name not in known and name not in tag]
         for name in unknown:
-            good = False
+            valid = False
             self._wrong(join_key(key, name), f"unknown key; {_suggestion(name, [*tag, *known], value)}")
         for name, field in known.items():
             if name in value:
@@ -103,18 +105,18 @@ class _Decoder:
                     built[name] = self.struct(field.type, value[name], inner)
                 else:
                     built[name] = self._any(_described(kind, name), value[name], inner)
-                good = good and built[name] is not _ALREADY_REPORTED
+                valid = valid and built[name] is not _ALREADY_REPORTED
             elif field.required:
-                good = False
+                valid = False
                 if not any(name in meant(other, known) for other in unknown):
                     kind_of = "table" if types.is_struct_type(field.type) else "key"
                     self._wrong(join_key(key, name), f"missing; this {kind_of} is required")
-        made = kind(**built) if good else None
-        self._check(kind, key, value, made)
-        return made if good else _ALREADY_REPORTED
+        struct = kind(**built) if valid else None
+        self._check(kind, key, value, struct)
+        return struct if valid else _ALREADY_REPORTED
 
     def _model(self, value: dict[str, Any], key: str) -> type[Struct] | None:
-        """The type of a hysteresis table by the name in it; None where there is no such model."""
+        """Return the type of a hysteresis table by the name in it; None where there is no such model."""
         name = value.get("model", models.DEFAULT)
         try:
             if not isinstance(name, str):
@@ -186,13 +188,13 @@ class _Decoder:
 
 @cache
 def _fields(kind: type[Struct]) -> dict[str, FieldInfo]:
-    """The fields of a type by their keys; a scan has several tables of one type."""
+    """Return the fields of a type by their keys, cached since a scan has several tables of one type."""
     return {field.encode_name: field for field in fields(kind)}
 
 
 @cache
 def _described(kind: type[Struct], name: str) -> types.Type:
-    """A field of a type with its range. Of each one that is written, since of all it takes some percent of a build."""
+    """Return a field of a type with its range, only for written keys: all of them take some percent of a build."""
     return types.type_info(_fields(kind)[name].type)
 
 
@@ -201,7 +203,7 @@ def _bare(kind: types.Type) -> types.Type:
 
 
 def meant(name: str, known: Any) -> list[str]:
-    """The known keys that an unknown one was probably meant to be: with its unit, or without a typing error."""
+    """Return the known keys that an unknown one was probably meant to be: with its unit, or without a typing error."""
     with_unit = [k for k in known if any(k == name + unit for unit in _UNITS)]
     stem = name.rsplit("_", 1)[0]
     other_unit = [k for k in known if any(k == stem + unit for unit in _UNITS)] if "_" in name else []
@@ -212,11 +214,11 @@ def meant(name: str, known: Any) -> list[str]:
     return get_close_matches(name, list(known), n=1, cutoff=0.6)
 
 
-def _suggestion(name: str, known: list[str], given: dict[str, Any]) -> str:
+def _suggestion(name: str, known: list[str], written: dict[str, Any]) -> str:
     likely = meant(name, known)
     if not likely:
         return f"known here: {', '.join(sorted(known))}"
-    if present := [key for key in likely if key in given]:
+    if present := [key for key in likely if key in written]:
         return f"{present[0]} is given as well"
     unit = " (units are part of the name)" if any(m == name + unit for m in likely for unit in _UNITS) else ""
     return f"did you mean {' or '.join(likely)}?{unit}"

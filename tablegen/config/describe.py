@@ -1,4 +1,4 @@
-"""The keys of the input files, described: the table of hysteresis is that of all models together."""
+"""Descriptions of the keys of the input files: the table of hysteresis is that of all models together."""
 
 from typing import Any
 
@@ -18,29 +18,29 @@ _ONE_OF = {WrittenTiming.__name__: (("lines", "image_lines"), RATES)}
 
 
 def purposes() -> str:
-    """What each model is, in a line."""
+    """Return the purpose of each model, in a line."""
     return "; ".join(f"{kind.model()}: {kind.purpose}" for kind in models.own())
 
 
 def model_fields() -> list[tuple[types.Field, str]]:
-    """Keys of the hysteresis tables of all models, each once; and for which models where not for all of them."""
+    """Return the keys of the hysteresis tables of all models, each once, and its models where not all have it."""
     fields: dict[str, types.Field] = {}
-    takers: dict[str, list[str]] = {}
+    owners: dict[str, list[str]] = {}
     for kind in models.own():
         described = types.type_info(kind)
         assert isinstance(described, types.StructType)
         for field in described.fields:
             fields.setdefault(field.encode_name, field)
-            takers.setdefault(field.encode_name, []).append(kind.model())
-    everybody = len(models.own())
+            owners.setdefault(field.encode_name, []).append(kind.model())
+    model_count = len(models.own())
     return [
-        (field, "" if len(takers[name]) == everybody else f"model {' or '.join(takers[name])}: ")
+        (field, "" if len(owners[name]) == model_count else f"model {' or '.join(owners[name])}: ")
         for name, field in fields.items()
     ]
 
 
 def json_schema(kind: type[Struct]) -> dict[str, Any]:
-    """JSON Schema (2020-12) of a file; a hysteresis table has the keys of all models."""
+    """Return the JSON Schema (2020-12) of a file; a hysteresis table has the keys of all models."""
     (root,), components = schema_components([kind], ref_template="#/$defs/{name}")
     if Hysteresis.__name__ in components:
         _, of_models = schema_components(models.own(), ref_template="#/$defs/{name}")

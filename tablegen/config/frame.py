@@ -1,4 +1,4 @@
-"""The frame as people say it, and the line periods, turn and window of y that make it. Exact fractions, no floats.
+"""The frame in the user's terms, and its line periods and the turn and window of y. Exact fractions, no floats.
 
 An image of N lines takes more line periods than N: y has to turn round outside its window, and to fly back. With U
 line periods on the way up, of which a lie before the window and a behind it, the turn is U / lines and the window
@@ -24,7 +24,7 @@ _PARTS = 10**9  # windows are given to so many parts, turns to a thousand times 
 
 
 class ImageFrame(Struct, frozen=True):
-    """Line periods of a frame, where y turns, its window, and the line periods at which it images."""
+    """Line periods of a frame, the turn of y, its window, and the line periods at which it images."""
 
     lines: int
     turn: float
@@ -33,24 +33,24 @@ class ImageFrame(Struct, frozen=True):
 
     @property
     def up(self) -> tuple[int, int]:
-        """First line of the image on the way up, and how many."""
+        """The first line of the image on the way up, and the number of lines."""
         return lines_inside(self.turn, self.window, self.both, self.lines)[0]
 
     @property
     def down(self) -> tuple[int, int]:
-        """The same of the way down; none where it does not image."""
+        """The first line of the image on the way down, and the number of lines; 0 where it does not image."""
         return lines_inside(self.turn, self.window, self.both, self.lines)[1]
 
 
 def exact(value: float) -> Fraction:
-    """The decimal fraction that a float of a configuration was written as."""
+    """Return the decimal fraction that a float of a configuration was written as."""
     return Fraction(repr(value))
 
 
 def lines_inside(
     turn: float, window: tuple[float, float], both: bool, lines: int
 ) -> tuple[tuple[int, int], tuple[int, int]]:
-    """First and count of the lines that lie inside the window of y, going up and coming back.
+    """Return first and count of the lines inside the window of y, on the way up and on the way back.
 
     A line lasts from its number to the next. Without ``both`` none images on the way back.
     """
@@ -70,15 +70,18 @@ def lines_inside(
 
 
 def frame_of_image(mode: FrameMode, image_lines: int, window: tuple[float, float] | None) -> ImageFrame:
-    """The frame whose window holds so many lines, up, and down where that images; the shortest for a given window.
+    """Return the shortest frame whose window holds that many lines, on the way up, and down where that images.
 
-    Raises ``Unphysical`` where no frame does.
+    Raises
+    ------
+    Unphysical
+        If no frame does.
     """
     if window is not None:
         if mode == "up-down":
             return lines_of_image(image_lines, 0.5, window, both=True)
-        return _searched(
-            image_lines, Fraction(_FLYBACK, _FLYBACK + 1), window, lambda count: _flying(count, window), up=True
+        return _shortest_frame(
+            image_lines, Fraction(_FLYBACK, _FLYBACK + 1), window, lambda count: _flyback_frames(count, window), up=True
         )
     margin = max(1, round(Fraction(image_lines, _MARGIN)))
     up = image_lines + 2 * margin
@@ -93,7 +96,13 @@ def frame_of_image(mode: FrameMode, image_lines: int, window: tuple[float, float
 
 
 def frame_of_lines(mode: FrameMode, lines: int, window: tuple[float, float] | None) -> ImageFrame:
-    """The frame of so many line periods. Raises ``Unphysical`` where no line of it images."""
+    """Return the frame of that many line periods.
+
+    Raises
+    ------
+    Unphysical
+        If no line of it images.
+    """
     frame = _split(mode, lines, window)
     if frame.up[1] < 1 or (frame.both and frame.down[1] < 1):
         raise Unphysical(f"{lines} line periods hold no image line with frame = '{mode}'; take more, or image_lines")
@@ -101,21 +110,24 @@ def frame_of_lines(mode: FrameMode, lines: int, window: tuple[float, float] | No
 
 
 def lines_of_image(image_lines: int, turn: float, window: tuple[float, float], both: bool) -> ImageFrame:
-    """The shortest frame with so many lines in the window on the way up, and down too where both ways are as long.
+    """Return the shortest frame with that many lines in the window on the way up, and down if both ways are as long.
 
-    Raises ``Unphysical`` where there is none.
+    Raises
+    ------
+    Unphysical
+        If there is none.
     """
-    return _searched(image_lines, exact(turn), window, lambda lines: [ImageFrame(lines, turn, window, both)])
+    return _shortest_frame(image_lines, exact(turn), window, lambda lines: [ImageFrame(lines, turn, window, both)])
 
 
-def _searched(
+def _shortest_frame(
     image_lines: int,
     way: Fraction,
     window: tuple[float, float],
     make: Callable[[int], list[ImageFrame]],
     up: bool = False,
 ) -> ImageFrame:
-    """The first frame that holds the image, by its lines or by those ``up``; y goes up in about ``way`` of them."""
+    """Return the first frame that holds the image, by its lines or by those ``up``; ``way`` is the share going up."""
     low, high = window
     share = (exact(high) - exact(low)) * way
     near = image_lines / share
@@ -145,8 +157,8 @@ def _split(mode: FrameMode, lines: int, window: tuple[float, float] | None) -> I
     return ImageFrame(lines, turn, window or _margins(margin, up, lines, turn), False)
 
 
-def _flying(up: int, window: tuple[float, float]) -> list[ImageFrame]:
-    """Frames of so many lines up; with two flybacks, since a turn of another last digit may hold another line."""
+def _flyback_frames(up: int, window: tuple[float, float]) -> list[ImageFrame]:
+    """Return frames of that many lines up, with two flybacks: a turn of another last digit may hold another line."""
     lines = [up + _flyback(up) + more for more in (0, 1)]
     return [ImageFrame(count, _turn("flyback", up, count), window, False) for count in lines]
 
@@ -156,13 +168,13 @@ def _flyback(up: int) -> int:
 
 
 def _turn(mode: FrameMode, up: int, lines: int) -> float:
-    """Rounded down, so that the first line that flies back is number ``up``, and not the one after it."""
+    """Return the turn, rounded down, so that the first line that flies back is number ``up``, not the one after it."""
     digits = 1000 * _PARTS
     return 0.5 if mode == "up-down" else floor(Fraction(up * digits, lines)) / digits
 
 
 def _margins(margin: int, up: int, lines: int, turn: float) -> tuple[float, float]:
-    """A window that is rounded outwards, and more than the turn is, so that it holds every line between the margins."""
+    """Return a window rounded outwards by more than the turn is, so that it holds every line between the margins."""
     low = floor(Fraction(margin * _PARTS, up))
     if exact(turn) * lines != up and low * up == margin * _PARTS:
         low -= 1

@@ -1,7 +1,7 @@
-"""The converter and the amplifier of each axis, put together from the keys of the scanner file and of the scan file.
+"""The converter and the amplifier of each axis, combined from the keys of the scanner file and of the scan file.
 
 The hardware belongs to the instrument: in the scanner file ``[x.dac]`` goes before ``[dac]``, which serves both axes.
-``[dac]`` of the scan file serves both axes too; what both files say has to be the same.
+``[dac]`` of the scan file serves both axes too; keys that both files have must be equal.
 """
 
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ _Tables: TypeAlias = Mapping[Place, Dac | Amplifier]
 class AxisDac(Struct, frozen=True):
     """The converter of one axis; fields as the keys of ``Dac``, ``word_bits`` None where it is that of ``bits``.
 
-    ``output`` is None on both axes where neither says it.
+    ``output`` is None on both axes where neither gives it.
     """
 
     bits: int
@@ -61,9 +61,9 @@ class AxisAmplifier(Struct, frozen=True):
 
 
 class AxisHardware(Struct, frozen=True):
-    """Converter and amplifier of one axis; ``places`` says where keys such as "dac.bits" stand: once, or in both files.
+    """Converter and amplifier of one axis; ``places`` has the files and keys of keys such as "dac.bits".
 
-    Both files then say the same.
+    A key that stands in both files has two places and one value.
     """
 
     dac: AxisDac
@@ -71,7 +71,7 @@ class AxisHardware(Struct, frozen=True):
     places: Mapping[str, tuple[Place, ...]]
 
     def where(self, key: str) -> tuple[Place, ...]:
-        """Where "amplifier.bias_v" stands, or would stand: beside the required keys of its table."""
+        """Return the places of a key such as "amplifier.bias_v", or those beside the required keys of its table."""
         if key in self.places:
             return self.places[key]
         part, name = key.split(".")
@@ -80,32 +80,34 @@ class AxisHardware(Struct, frozen=True):
 
 
 def hardware_of(scan: WrittenScan, scanner: Scanner, axis: str) -> AxisHardware:
-    """The hardware of one axis ("x" or "y") of files that were checked."""
+    """Return the hardware of one axis ("x" or "y") of validated files."""
     tables: dict[Place, Dac | Amplifier] = {}
     for part in _KINDS:
         tables[Place(False, part)] = getattr(scan, part)
         tables[Place(True, part)] = getattr(scanner, part)
         tables[Place(True, f"{axis}.{part}")] = getattr(getattr(scanner, axis), part)
-    return _put_together(tables, axis)
+    return _combined(tables, axis)
 
 
-def _put_together(tables: _Tables, axis: str) -> AxisHardware:
+def _combined(tables: _Tables, axis: str) -> AxisHardware:
     values: dict[str, dict[str, Any]] = {part: {} for part in _KINDS}
     places: dict[str, tuple[Place, ...]] = {}
     for part, kind in _KINDS.items():
         for name in kind.__struct_fields__:
-            found = _places(tables, axis, part, name)
-            if found:
-                values[part][name] = getattr(tables[found[0]], name)
-                places[f"{part}.{name}"] = tuple(Place(table.in_scanner, f"{table.key}.{name}") for table in found)
+            tables_of_key = _places(tables, axis, part, name)
+            if tables_of_key:
+                values[part][name] = getattr(tables[tables_of_key[0]], name)
+                places[f"{part}.{name}"] = tuple(
+                    Place(table.in_scanner, f"{table.key}.{name}") for table in tables_of_key
+                )
     return AxisHardware(AxisDac(**values["dac"]), AxisAmplifier(**values["amplifier"]), places)
 
 
 def _places(tables: _Tables, axis: str, part: str, name: str) -> list[Place]:
-    """The tables that say a key of one axis: of the scan file, and the first one of the scanner file."""
+    """Return the tables with a key of one axis: that of the scan file, and the first one of the scanner file."""
     scans, own, common = Place(False, part), Place(True, f"{axis}.{part}"), Place(True, part)
-    given = [place for place in (scans, own, common) if getattr(tables[place], name) is not None]
-    return given[:2] if given[:1] == [scans] else given[:1]
+    defined = [place for place in (scans, own, common) if getattr(tables[place], name) is not None]
+    return defined[:2] if defined[:1] == [scans] else defined[:1]
 
 
 def check_hardware(
@@ -115,7 +117,33 @@ def check_hardware(
     scanner_file: Document,
     problems: Problems,
 ) -> None:
-    """Note what the values of both files say of the hardware together; faults of single keys were noted before."""
+    """Report contradictions of the hardware in both files; faults of single keys were reported before."""
+    written = _written(scan, scanner)
+    if not all(isinstance(table, dict) for table in written.values()):
+        return
+    files = {False: scan_file, True: scanner_file}
+    missing = _missing(written)
+    for place, why in missing:
+        problems.add(files[place.in_scanner], place.key, why)
+    tables = _decoded(written, files)
+    if missing or len(tables) < len(written):
+        return
+    if contradictions := _contradictions(tables, scanner_file):
+        for key, why in contradictions:
+            problems.add(scan_file, key, why)
+        return
+    both = {axis: _combined(tables, axis) for axis in _AXES}
+    for hardware in both.values():
+        for key, why in _faults(hardware):
+            place = hardware.where(key)[0]
+            problems.add(files[place.in_scanner], place.key, why)
+    for key, why in _differences(both["x"], both["y"], files):
+        place = both["y"].where(key)[0]
+        problems.add(files[place.in_scanner], place.key, why)
+
+
+def _written(scan: Mapping[str, Any], scanner: Mapping[str, Any]) -> dict[Place, Any]:
+    """Return the tables of the hardware as both files have them, empty where they have none."""
     written: dict[Place, Any] = {}
     for part in _KINDS:
         written[Place(False, part)] = scan.get(part, {})
@@ -123,46 +151,32 @@ def check_hardware(
         for axis in _AXES:
             its = scanner.get(axis)
             written[Place(True, f"{axis}.{part}")] = its.get(part, {}) if isinstance(its, dict) else {}
-    if not all(isinstance(table, dict) for table in written.values()):
-        return
-    files = {False: scan_file, True: scanner_file}
-    missing = _missing(written)
-    for place, why in missing:
-        problems.add(files[place.in_scanner], place.key, why)
+    return written
+
+
+def _decoded(written: Mapping[Place, Any], files: Mapping[bool, Document]) -> "dict[Place, Dac | Amplifier]":
+    """Decode the tables, but for those with faults of single keys."""
     tables: dict[Place, Dac | Amplifier] = {}
     for place, table in written.items():
         kind = _KINDS[place.key.rsplit(".", 1)[-1]]
         decoded = decode(kind, table, files[place.in_scanner], Problems(), lambda *_: None)
         if decoded is not None:
             tables[place] = decoded
-    if missing or len(tables) < len(written):
-        return
-    if contradictions := _contradictions(tables, scanner_file):
-        for key, why in contradictions:
-            problems.add(scan_file, key, why)
-        return
-    both = {axis: _put_together(tables, axis) for axis in _AXES}
-    for hardware in both.values():
-        for key, why in _faults(hardware):
-            place = hardware.where(key)[0]
-            problems.add(files[place.in_scanner], place.key, why)
-    for key, why in _apart(both["x"], both["y"], files):
-        place = both["y"].where(key)[0]
-        problems.add(files[place.in_scanner], place.key, why)
+    return tables
 
 
 def _missing(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, str]]:
-    """Required keys that no file has, for one axis or for both; not those that an unknown key was meant to be."""
-    found: list[tuple[Place, str]] = []
+    """Return required keys that no file has, for one axis or for both; unless an unknown key was meant to be one."""
+    faults: list[tuple[Place, str]] = []
     for part, kind in _KINDS.items():
         scans, common = written[Place(False, part)], written[Place(True, part)]
         own = {axis: written[Place(True, f"{axis}.{part}")] for axis in _AXES}
         if not any((scans, common, *own.values())):
-            found.append((Place(False, part), "missing; this table is required, here or in the scanner file"))
+            faults.append((Place(False, part), "missing; this table is required, here or in the scanner file"))
             continue
         known = [*kind.__struct_fields__]
         for name in _REQUIRED[part]:
-            lacking = [
+            axes_without = [
                 axis
                 for axis in _AXES
                 if not any(
@@ -171,19 +185,21 @@ def _missing(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, st
                     for key in table
                 )
             ]
-            if lacking and scans and len(lacking) == len(_AXES):
-                found.append((Place(False, f"{part}.{name}"), "missing; this key is required"))
-            elif lacking and len(lacking) == len(_AXES) and common:
-                found.append((Place(True, f"{part}.{name}"), "missing; this key is required, here or in the scan file"))
+            if axes_without and scans and len(axes_without) == len(_AXES):
+                faults.append((Place(False, f"{part}.{name}"), "missing; this key is required"))
+            elif axes_without and len(axes_without) == len(_AXES) and common:
+                faults.append(
+                    (Place(True, f"{part}.{name}"), "missing; this key is required, here or in the scan file")
+                )
             else:
                 why = f"missing; this key is required, here or in [{part}]"
-                found += [(Place(True, f"{axis}.{part}.{name}"), why) for axis in lacking]
-    return found
+                faults += [(Place(True, f"{axis}.{part}.{name}"), why) for axis in axes_without]
+    return faults
 
 
 def _contradictions(tables: _Tables, scanner_file: Document) -> list[tuple[str, str]]:
-    """Keys of the scan file that the scanner file says in another way."""
-    found = {}
+    """Return the keys of the scan file whose values differ from those of the scanner file."""
+    differences = {}
     for part, kind in _KINDS.items():
         for name in kind.__struct_fields__:
             for axis in _AXES:
@@ -193,34 +209,34 @@ def _contradictions(tables: _Tables, scanner_file: Document) -> list[tuple[str, 
                     theirs = f"{places[1].key}.{name}"
                     line = scanner_file.line_of(theirs)
                     at = f"{scanner_file.name}:{line}" if line else scanner_file.name
-                    found[f"{part}.{name}", theirs] = (
+                    differences[f"{part}.{name}", theirs] = (
                         f"{_shown(values[0])}, and {theirs} is {_shown(values[1])} at {at}; the scanner file's is that "
                         "of the instrument: remove this key, or correct the other"
                     )
-    return [(key, why) for (key, _), why in found.items()]
+    return [(key, why) for (key, _), why in differences.items()]
 
 
 def _faults(hardware: AxisHardware) -> list[tuple[str, str]]:
-    """Keys of one axis that contradict each other, and why."""
-    dac, gain, found = hardware.dac, hardware.amplifier.gain, []
+    """Return the keys of one axis that contradict each other, with the reason."""
+    dac, gain, faults = hardware.dac, hardware.amplifier.gain, []
     if dac.v_max <= dac.v_min:
-        found.append(("dac.v_max", f"{dac.v_max:.12g} V is not above v_min = {dac.v_min:.12g} V"))
+        faults.append(("dac.v_max", f"{dac.v_max:.12g} V is not above v_min = {dac.v_min:.12g} V"))
     elif dac.v_max - dac.v_min < 1e-3:
         why = f"{dac.v_max - dac.v_min:.3g} V above v_min is no range; at least 0.001 V is needed"
-        found.append(("dac.v_max", why))
+        faults.append(("dac.v_max", why))
     if dac.word_bits is not None and dac.word_bits < dac.bits:
-        found.append(("dac.word_bits", f"{dac.word_bits} is below bits = {dac.bits}; the code would not fit"))
+        faults.append(("dac.word_bits", f"{dac.word_bits} is below bits = {dac.bits}; the code would not fit"))
     if abs(gain) < 1e-4:
-        found.append(("amplifier.gain", f"{gain:g} is no gain; at least 1e-4 in size is needed"))
-    return found
+        faults.append(("amplifier.gain", f"{gain:g} is no gain; at least 1e-4 in size is needed"))
+    return faults
 
 
-def _apart(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> list[tuple[str, str]]:
-    """Keys of y in which both axes have to be alike, and are not."""
-    found = []
+def _differences(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> list[tuple[str, str]]:
+    """Return the keys of y that have to equal those of x and differ."""
+    differences = []
     if x.dac.bits != y.dac.bits:
         few, many = sorted((x.dac.bits, y.dac.bits))
-        found.append(
+        differences.append(
             (
                 "dac.bits",
                 f"{y.dac.bits} of y, and {_place_text(x, 'dac.bits', files)} is {x.dac.bits} of x; the device computes "
@@ -229,7 +245,7 @@ def _apart(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> 
             )
         )
     if x.dac.update_rate_hz != y.dac.update_rate_hz:
-        found.append(
+        differences.append(
             (
                 "dac.update_rate_hz",
                 f"{y.dac.update_rate_hz:.12g} of y, and {_place_text(x, 'dac.update_rate_hz', files)} is "
@@ -238,9 +254,9 @@ def _apart(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> 
         )
     outputs = (x.dac.output, y.dac.output)
     if outputs not in ((None, None), ("A", "B"), ("B", "A")):
-        said = " and ".join(f"{axis} is on {one or 'none'}" for axis, one in zip("xy", outputs, strict=True))
-        found.append(("dac.output", f"{said}; give one axis 'A' and the other 'B', or none of them"))
-    return found
+        outputs_text = " and ".join(f"{axis} is on {one or 'none'}" for axis, one in zip("xy", outputs, strict=True))
+        differences.append(("dac.output", f"{outputs_text}; give one axis 'A' and the other 'B', or none of them"))
+    return differences
 
 
 def _place_text(hardware: AxisHardware, key: str, files: Mapping[bool, Document]) -> str:

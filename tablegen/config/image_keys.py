@@ -1,4 +1,4 @@
-"""What was said of an image, solved for what a plan takes: sizes of the axes, line periods, turn of y and line rate."""
+"""Solve the keys of an image for what a plan needs: sizes of the axes, line periods, turn of y and line rate."""
 
 from collections.abc import Mapping
 from fractions import Fraction
@@ -20,82 +20,117 @@ _FREEDOM = Fraction(1, 20)  # by which the window of x may be wider or narrower,
 _HARMONICS = 64  # of y, with the margins of a chosen window
 
 
-class Solved(Struct, frozen=True):
-    """A scan as it is planned, the keys it stands at, and what was chosen for what was said, in sentences."""
+class SolvedScan(Struct, frozen=True):
+    """A scan as it is planned, the written keys of its values, and the choices of the solution, in sentences.
+
+    ``written_keys`` maps a key of ``scan`` to the key that was written in its place, and the factor to its value.
+    """
 
     scan: Scan
-    said: Mapping[str, tuple[str, float]]
+    written_keys: Mapping[str, tuple[str, float]]
     choices: tuple[str, ...]
 
 
-def check_words(values: Mapping[str, Any], file: Document, problems: Problems) -> None:
-    """Words of different tables that say the same thing, or contradict each other; ``values`` as they were written."""
+def check_image_keys(values: Mapping[str, Any], file: Document, problems: Problems) -> None:
+    """Report keys of different tables that set the same quantity, or contradict each other.
 
-    def table(name: str) -> Mapping[str, Any]:
-        found = values.get(name)
-        return found if isinstance(found, dict) else {}
-
-    def refuse(key: str, other: str, why: str) -> None:
-        line = file.line_of(other) if file.lines is not None else 0
-        at = f" on line {line}" if line else ""
-        problems.add(file, key, f"{other}{at} {why}")
-
-    timing, y = table("timing"), table("y")
-    off = y.get("motion") == "off"
-    own = [key for key in y if f"y.{key}" not in file.inherited]
-    if off:
-        for key in ("turn", "band_limit", "table", "refinement", *SIZES, "size_of"):
-            if key in own:
-                refuse(f"y.{key}", "y.motion", "keeps y where it is; leave this out, or motion = 'off'")
-        if "frame" in timing:
-            refuse("timing.frame", "y.motion", "keeps y where it is; leave out one of the two")
-    image = next((key for key in IMAGES if key in values), None)
-    if off and image is not None and isinstance(values[image], list):
-        refuse(image, "y.motion", "keeps y where it is; give one number, the length of the line scan")
-    for axis in ("x", "y"):
-        for key in (*SIZES, "size_of"):
-            rests = off and axis == "y"  # which is told already
-            if image is None or rests or key not in table(axis) or f"{axis}.{key}" in file.inherited:
-                continue
-            why = "sets the size of both axes already, as that of the imaging windows"
-            refuse(f"{axis}.{key}", image, f"{why}; leave out one of the two")
-    frame = timing.get("frame")
-    if frame is not None and "turn" in own:
-        refuse("y.turn", "timing.frame", "sets where y turns; leave out one of the two")
-    limit = table("y").get("band_limit")
-    named = isinstance(limit, dict) and "directions" in limit and "y.band_limit.directions" not in file.inherited
-    if frame is not None and named:
-        refuse("y.band_limit.directions", "timing.frame", "sets the directions of y; leave out one of the two")
-    speed = next((key for key in RATES[2:] if key in timing), None)
-    if speed is not None and "size_v" in table("x"):
-        refuse(f"timing.{speed}", "x.size_v", "gives no length, which a speed needs; give a size in nm, or a line rate")
-    ticks = next((key for key in ("ticks_per_line", "ticks_per_pixel") if key in timing), None)
-    rate = next((key for key in RATES[1:] if key in timing), None)
-    if ticks is not None and rate is not None:
-        refuse(f"timing.{rate}", f"timing.{ticks}", "sets the length of the line already; leave out one of the two")
-
-
-def solved(
-    written: WrittenScan, update_rate_hz: float, values: Mapping[str, Any], file: Document, problems: Problems
-) -> Solved | None:
-    """The scan for what was said, at an update rate; ``values`` are the tables as they were written.
-
-    None where ``problems`` grew.
+    ``values`` are those of the scan file as written.
     """
-    return _Words(written, update_rate_hz, values, file, problems).solved()
+    _Contradictions(values, file, problems).check()
 
 
-class _Words:
+class _Contradictions:
+    """The keys of the scan file ``values`` that set the same quantity twice."""
+
+    def __init__(self, values: Mapping[str, Any], file: Document, problems: Problems) -> None:
+        self._values, self._file, self._problems = values, file, problems
+        self._timing, self._y = self._table("timing"), self._table("y")
+        self._off = self._y.get("motion") == "off"
+        self._own = [key for key in self._y if f"y.{key}" not in file.inherited]
+        self._image = next((key for key in IMAGES if key in values), None)
+
+    def check(self) -> None:
+        """Report all of them."""
+        if self._off:
+            self._check_rest()
+        if self._image is not None:
+            self._check_sizes(self._image)
+        if self._timing.get("frame") is not None:
+            self._check_frame()
+        self._check_rates()
+
+    def _table(self, name: str) -> Mapping[str, Any]:
+        table = self._values.get(name)
+        return table if isinstance(table, dict) else {}
+
+    def _refuse(self, key: str, other: str, why: str) -> None:
+        line = self._file.line_of(other) if self._file.lines is not None else 0
+        at = f" on line {line}" if line else ""
+        self._problems.add(self._file, key, f"{other}{at} {why}")
+
+    def _check_rest(self) -> None:
+        """Refuse keys that an axis at rest does not have."""
+        for key in ("turn", "band_limit", "table", "refinement", *SIZES, "size_of"):
+            if key in self._own:
+                self._refuse(f"y.{key}", "y.motion", "keeps y where it is; leave this out, or motion = 'off'")
+        if "frame" in self._timing:
+            self._refuse("timing.frame", "y.motion", "keeps y where it is; leave out one of the two")
+        if self._image is not None and isinstance(self._values[self._image], list):
+            self._refuse(self._image, "y.motion", "keeps y where it is; give one number, the length of the line scan")
+
+    def _check_sizes(self, image: str) -> None:
+        """Refuse sizes of axes beside that of the image; those of an axis at rest are reported already."""
+        for axis in ("x",) if self._off else ("x", "y"):
+            for key in (*SIZES, "size_of"):
+                if key in self._table(axis) and f"{axis}.{key}" not in self._file.inherited:
+                    why = "sets the size of both axes already, as that of the imaging windows"
+                    self._refuse(f"{axis}.{key}", image, f"{why}; leave out one of the two")
+
+    def _check_frame(self) -> None:
+        """Refuse keys that the kind of frame sets."""
+        if "turn" in self._own:
+            self._refuse("y.turn", "timing.frame", "sets where y turns; leave out one of the two")
+        limit = self._y.get("band_limit")
+        if isinstance(limit, dict) and "directions" in limit:
+            key = "y.band_limit.directions"
+            if key not in self._file.inherited:
+                self._refuse(key, "timing.frame", "sets the directions of y; leave out one of the two")
+
+    def _check_rates(self) -> None:
+        """Refuse a speed without a length, and a line whose length is given twice."""
+        timing = self._timing
+        speed = next((key for key in RATES[2:] if key in timing), None)
+        if speed is not None and "size_v" in self._table("x"):
+            why = "gives no length, which a speed needs; give a size in nm, or a line rate"
+            self._refuse(f"timing.{speed}", "x.size_v", why)
+        ticks = next((key for key in ("ticks_per_line", "ticks_per_pixel") if key in timing), None)
+        rate = next((key for key in RATES[1:] if key in timing), None)
+        if ticks is not None and rate is not None:
+            why = "sets the length of the line already; leave out one of the two"
+            self._refuse(f"timing.{rate}", f"timing.{ticks}", why)
+
+
+def solve_scan(
+    written: WrittenScan, update_rate_hz: float, values: Mapping[str, Any], file: Document, problems: Problems
+) -> SolvedScan | None:
+    """Solve a written scan at an update rate in Hz; ``values`` are the tables as they were written.
+
+    Returns None where ``problems`` grew.
+    """
+    return _ScanSolver(written, update_rate_hz, values, file, problems).solve()
+
+
+class _ScanSolver:
     def __init__(
         self, written: WrittenScan, update_rate_hz: float, values: Mapping[str, Any], file: Document, problems: Problems
     ) -> None:
         self._written, self._update_rate_hz = written, update_rate_hz
         self._values, self._file, self._problems = values, file, problems
-        self._said: dict[str, tuple[str, float]] = {}
+        self._written_as: dict[str, tuple[str, float]] = {}
         self._choices: list[str] = []
 
-    def solved(self) -> Solved | None:
-        before = len(self._problems.found)
+    def solve(self) -> SolvedScan | None:
+        before = len(self._problems.entries)
         written = self._written
         x, y = self._sized("x", written.x), self._sized("y", written.y)
         frame = self._frame(y)
@@ -103,7 +138,7 @@ class _Words:
             return None
         y = self._framed(y, frame)
         line_rate = self._line_rate(x, frame)
-        if len(self._problems.found) > before:
+        if len(self._problems.entries) > before:
             return None
         x = self._whole_pixels(x, line_rate)
         if self._image is not None:
@@ -121,37 +156,37 @@ class _Words:
             }
         )
         rest = {**_fields(written), "image_nm": None, "image_um": None, "timing": timing, "x": x, "y": y}
-        return Solved(Scan(**rest), self._said, tuple(self._choices))
+        return SolvedScan(Scan(**rest), self._written_as, tuple(self._choices))
 
     @property
     def _image(self) -> str | None:
         return next((key for key in IMAGES if getattr(self._written, key) is not None), None)
 
     def _sized(self, axis: str, scan: Any) -> Any:
-        """An axis with its size and offset in nm, whatever they were given in, and with what tables have by default."""
+        """Return an axis with size and offset in nm, whatever their unit was, and the defaults of its table."""
         changes: dict[str, Any] = {"size_um": None, "offset_um": None, "table": _table(scan.table)}
         image = self._image
         if image is not None and not (axis == "y" and self._written.y.off):
-            given = getattr(self._written, image)
-            size = given[0 if axis == "x" else 1] if isinstance(given, list) else given
+            image_size = getattr(self._written, image)
+            size = image_size[0 if axis == "x" else 1] if isinstance(image_size, list) else image_size
             changes |= {"size_nm": size if image == "image_nm" else _nm(size), "size_of": "window"}
-            self._said[f"{axis}.size_nm"] = (image, 1.0 if image == "image_nm" else 1e-3)
+            self._written_as[f"{axis}.size_nm"] = (image, 1.0 if image == "image_nm" else 1e-3)
         for key in ("size", "offset"):
             um = getattr(scan, f"{key}_um")
             if um is not None:
                 changes[f"{key}_nm"] = _nm(um)
-                self._said[f"{axis}.{key}_nm"] = (f"{axis}.{key}_um", 1e-3)
+                self._written_as[f"{axis}.{key}_nm"] = (f"{axis}.{key}_um", 1e-3)
         return structs.replace(scan, **changes)
 
     def _frame(self, y: SlowAxis) -> ImageFrame | None:
-        """Line periods, turn and window of y. None after a problem."""
+        """Return line periods, turn and window of y; None after a problem."""
         timing = self._written.timing
         if y.off:
             lines = timing.lines or timing.image_lines or 1
             self._choices.append(f"a line scan: y rests, and all {lines} lines of a frame are imaged")
             return ImageFrame(lines, RESTING_TURN, (0.0, 1.0), False)
         limit, mode = y.band_limit, timing.frame
-        given = limit.window if "window" in self._written_keys("band_limit") else None
+        window = limit.window if "window" in self._written_keys("band_limit") else None
         both = limit.directions == "both"
         plain = "turn" not in self._written_keys() and "directions" not in self._written_keys("band_limit")
         frame = None
@@ -160,22 +195,22 @@ class _Words:
             if mode is None:
                 return ImageFrame(timing.lines, y.turn, limit.window, both)
             with self._problems.at(self._file, "timing.lines"):
-                frame = frame_of_lines(mode, timing.lines, given)
+                frame = frame_of_lines(mode, timing.lines, window)
         else:
-            self._said["timing.lines"] = ("timing.image_lines", 1.0)
+            self._written_as["timing.lines"] = ("timing.image_lines", 1.0)
             with self._problems.at(self._file, "timing.image_lines"):
                 if mode is None and not plain:
                     frame = lines_of_image(timing.image_lines, y.turn, limit.window, both)
                 else:
-                    frame = frame_of_image(mode or "up-down", timing.image_lines, given)
+                    frame = frame_of_image(mode or "up-down", timing.image_lines, window)
         if frame is not None:
             if mode is not None:
-                self._said |= dict.fromkeys(("y.turn", "y.band_limit.directions"), ("timing.frame", 1.0))
+                self._written_as |= dict.fromkeys(("y.turn", "y.band_limit.directions"), ("timing.frame", 1.0))
             self._choices.append(_frame_text(frame))
         return frame
 
     def _framed(self, y: SlowAxis, frame: ImageFrame) -> SlowAxis:
-        """y with the turn and the window of its frame; short turnarounds take more harmonics."""
+        """Return y with the turn and the window of its frame; short turnarounds take more harmonics."""
         limit = y.band_limit
         if y.off:
             limit = structs.replace(limit, harmonics=1)
@@ -189,12 +224,12 @@ class _Words:
         return structs.replace(y, turn=frame.turn, band_limit=limit)
 
     def _line_rate(self, x: FastAxis, frame: ImageFrame) -> float:
-        """Lines a second, of whatever was given."""
+        """Return the lines a second, from the rate or speed that was given."""
         timing = self._written.timing
         if timing.line_rate_hz is not None:
             return timing.line_rate_hz
         if timing.frame_rate_hz is not None:
-            self._said["timing.line_rate_hz"] = ("timing.frame_rate_hz", 1.0 / frame.lines)
+            self._written_as["timing.line_rate_hz"] = ("timing.frame_rate_hz", 1.0 / frame.lines)
             rate = float(exact(timing.frame_rate_hz) * frame.lines)
             shown = f"{timing.frame_rate_hz:g} Hz frames of {frame.lines} line periods"
             self._choices.append(f"{shown}: {rate:.6g} Hz lines")
@@ -205,20 +240,20 @@ class _Words:
         nm_per_s = speed * (1e3 if key == "speed_um_per_s" else 1e6)
         line_nm = x.size_nm / _width(x) if x.size_of == "window" else x.size_nm
         rate = nm_per_s * x.turn / line_nm
-        self._said["timing.line_rate_hz"] = (f"timing.{key}", speed / rate)
+        self._written_as["timing.line_rate_hz"] = (f"timing.{key}", speed / rate)
         unit = "um/s" if key == "speed_um_per_s" else "mm/s"
         self._choices.append(f"{speed:g} {unit} along lines of {line_nm:.6g} nm: {rate:.6g} Hz lines")
         return rate
 
     def _whole_pixels(self, x: FastAxis, line_rate: float) -> FastAxis:
-        """x with a window, near the default one, in which a pixel is a whole number of ticks; or as it is.
+        """Return x with a window, near the default one, in which a pixel is a whole number of ticks; or unchanged.
 
-        Only where the size is that of the image: whatever the window is, it spans that.
+        Only where the size is that of the image, which the window spans whatever it is.
         """
         timing, free = self._written.timing, "window" not in self._written_keys("band_limit", axis="x")
-        given = timing.ticks_per_line or timing.ticks_per_pixel
+        ticks_written = timing.ticks_per_line or timing.ticks_per_pixel
         speed = timing.speed_um_per_s or timing.speed_mm_per_s
-        if self._image is None or not free or given or speed or not 0.0 < line_rate < 1e9:
+        if self._image is None or not free or ticks_written or speed or not 0.0 < line_rate < 1e9:
             return x
         ticks = floor(exact(self._update_rate_hz) / exact(line_rate) + Fraction(1, 2))
         way = exact(x.turn) * ticks
@@ -233,7 +268,7 @@ class _Words:
         return structs.replace(x, band_limit=structs.replace(x.band_limit, window=window))
 
     def _written_keys(self, *path: str, axis: str = "y") -> set[str]:
-        """The keys that were written in a table of an axis."""
+        """Return the keys that were written in a table of an axis."""
         table: Any = self._values.get(axis, {})
         for name in path:
             table = table.get(name, {})
@@ -251,7 +286,7 @@ def _frame_text(frame: ImageFrame) -> str:
 
 
 def _carried(y: SlowAxis, lines: int) -> int:
-    """As many harmonics as short turnarounds need, if steps and table carry them."""
+    """Return as many harmonics as short turnarounds need, if steps and table carry them."""
     carried = [_HARMONICS]
     if y.motion == "step":
         carried.append((lines - 1) // 2)
@@ -261,7 +296,7 @@ def _carried(y: SlowAxis, lines: int) -> int:
 
 
 def _table(table: Table) -> Table:
-    """A table with its defaults, but for one that the build chooses."""
+    """Return a table with its defaults, except one that the build chooses."""
     if table.chosen_by_build:
         return structs.replace(table, mode=table.mode or "auto")
     return structs.replace(table, mode=table.mode or "interpolated", bits=table.bits or DEFAULT_BITS)
@@ -273,7 +308,7 @@ def _width(axis: FastAxis) -> float:
 
 
 def _nm(um: float) -> float:
-    """Exactly what the micrometres say in decimals."""
+    """Return the exact nm of a decimal value in micrometres."""
     return float(exact(um) * 1000)
 
 

@@ -1,4 +1,4 @@
-"""From the path of a scan file to everything that the rest of the build needs to know."""
+"""Read a scan file and its scanner file into the setup that the rest of the build needs."""
 
 import os
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ from tablegen.base.toml import read_toml
 from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
 from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardware_of
-from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES, check_words, solved
-from tablegen.config.like import inherited, told_once
+from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES, check_image_keys, solve_scan
+from tablegen.config.like import inherited, warn_inherited_once
 from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
 from tablegen.config.schema import (
@@ -39,7 +39,7 @@ _LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each 
 class Setup(Struct, frozen=True, dict=True):
     """A scan, the scanner it runs on, and where each of their keys stands.
 
-    ``choices`` says in sentences what was chosen for what the scan file says of the image.
+    ``choices`` has, in sentences, what was chosen for the keys of the image in the scan file.
     """
 
     scan: Scan
@@ -53,7 +53,7 @@ class Setup(Struct, frozen=True, dict=True):
         return f"<tablegen setup {self.scan.name!r} on {self.scanner.name!r}, from {self.scan_file.name}>"
 
     def hardware(self, axis: str) -> AxisHardware:
-        """Converter and amplifier of one axis ("x" or "y"), and where their keys stand."""
+        """Return converter and amplifier of one axis ("x" or "y"), and where their keys stand."""
         return self._hardware[axis]
 
     @cached_property
@@ -61,29 +61,29 @@ class Setup(Struct, frozen=True, dict=True):
         return {axis: hardware_of(self.scan, self.scanner, axis) for axis in ("x", "y")}
 
     def hardware_problem(self, axis: str, key: str, why: str) -> Problem:
-        """A problem of a key of the hardware such as "amplifier.gain", at the place where that of the axis stands."""
+        """Return a problem of a key of the hardware such as "amplifier.gain", at the place where the axis has it."""
         place = self.hardware(axis).where(key)[0]
         return (self.scanner_file if place.in_scanner else self.scan_file).problem(place.key, why)
 
     def named(self, axis: str, key: str) -> str:
-        """How a message calls a key of the hardware such as "dac.bits": with the scanner file if it stands there."""
+        """Return the name of a hardware key such as "dac.bits" in messages, with the scanner file if that has it."""
         return self.placed(self.hardware(axis).where(key)[0])
 
     def placed(self, place: Place) -> str:
-        """A key with its file, where that is not the scan file."""
+        """Return a key with its file, where that is not the scan file."""
         name = shown_path(Path(Path(self.scanner_file.name).name))
         return f"{place.key} of {name}" if place.in_scanner else place.key
 
     @property
     def files(self) -> list[Path]:
-        """Every file that decides this scan, each once: the scan, the scanner, and the files that it names."""
+        """The files that decide this scan, each once: the scan, the scanner, and the files that it names."""
         return list(dict.fromkeys(path for path, _, _ in self.named_files))
 
     @property
     def named_files(self) -> list[tuple[Path, Document, str]]:
         """The same files with the key that names each, and the document of the key; "" for the scan file itself.
 
-        One that several keys name stands there several times.
+        A file that several keys name stands there several times.
         """
         files = [(self.scan_file, self.scan_file, ""), (self.scanner_file, self.scan_file, "scanner")]
         named = [(Path(file.name), document, key) for file, document, key in files if file.lines is not None]
@@ -100,17 +100,26 @@ class Setup(Struct, frozen=True, dict=True):
 def load(path: str | Path) -> Setup:
     """Read a scan file and the scanner file that it names.
 
-    Raises ``Rejected`` with every fault of both files.
+    Raises
+    ------
+    Rejected
+        With every fault of both files.
     """
     path = Path(path)
     values, scan_file = read_scan_file(path)
     if "scans" in values:
         raise Rejected([scan_file.problem("scans", _LIBRARY)])
-    return assembled(path, values, scan_file)
+    return assemble_setup(path, values, scan_file)
 
 
 def read_scan_file(path: Path) -> tuple[dict[str, Any], Document]:
-    """The values of a scan file, and where its keys stand. Raises ``Rejected`` where it is none."""
+    """Read the values of a scan file, and where its keys stand.
+
+    Raises
+    ------
+    Rejected
+        If it is not a scan file.
+    """
     values, scan_file = read_toml(path, str(path))
     if "v_max" in values and not _is_scan(values):  # else every key of it is a fault, and none says this
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
@@ -119,14 +128,23 @@ def read_scan_file(path: Path) -> tuple[dict[str, Any], Document]:
 
 
 Scanners = dict[Path, tuple[Mapping[str, Any], Scanner, Document]]
-"""The values, the types and the places of scanner files that were read already, and found right."""
+"""The values, the types and the places of scanner files that were read already, and are valid."""
 
 
-def assembled(path: Path, values: Mapping[str, Any], scan_file: Document, scanners: Scanners | None = None) -> Setup:
-    """The setup of the values of a scan file at a path, with the scanner that it names.
+def assemble_setup(
+    path: Path, values: Mapping[str, Any], scan_file: Document, scanners: Scanners | None = None
+) -> Setup:
+    """Build the setup of the values of a scan file at a path, with the scanner that it names.
 
-    ``scanners`` are taken as they are, and what is read is kept there: for many scans of one scanner. Raises
-    ``Rejected`` with every fault of both files.
+    Parameters
+    ----------
+    scanners
+        Cache of valid scanner files, for many scans of one scanner.
+
+    Raises
+    ------
+    Rejected
+        With every fault of both files.
     """
     problems = Problems()
     values, scan_file = inherited(values, scan_file)
@@ -137,7 +155,7 @@ def assembled(path: Path, values: Mapping[str, Any], scan_file: Document, scanne
 
     named = values.get("scanner")
     if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
-        raise Rejected(problems.found)
+        raise Rejected(problems.entries)
     scanner_path = path.parent / named
     if scanners is not None and scanner_path in scanners:
         known_values, known, scanner_file = scanners[scanner_path]
@@ -147,19 +165,19 @@ def assembled(path: Path, values: Mapping[str, Any], scan_file: Document, scanne
         problems.add(
             scan_file, "scanner", f"{shown_path(scanner_path)} is not a file; the path is relative to this file"
         )
-        raise Rejected(problems.found)
+        raise Rejected(problems.entries)
     try:
         scanner_values, scanner_file = read_toml(scanner_path, str(scanner_path))
     except Rejected as rejected:
-        raise Rejected(problems.found + rejected.problems) from None
+        raise Rejected(problems.entries + rejected.problems) from None
     if _is_scan(scanner_values):
         problems.add(scan_file, "scanner", f"{shown_path(scanner_path)} is a scan file, not a scanner file")
-        raise Rejected(problems.found)
+        raise Rejected(problems.entries)
     scanner_values, scanner_file = inherited(scanner_values, scanner_file)
     check = partial(_check, scanner_values, scanner_file, problems)
-    before = len(problems.found)
+    before = len(problems.entries)
     scanner = decode(Scanner, scanner_values, scanner_file, problems, check)
-    if scanners is not None and scanner is not None and len(problems.found) == before:
+    if scanners is not None and scanner is not None and len(problems.entries) == before:
         scanners[scanner_path] = scanner_values, scanner, scanner_file
     check_hardware(values, scanner_values, scan_file, scanner_file, problems)
     return _setup(scan, scanner, values, scan_file, scanner_file, scanner_path.parent, problems)
@@ -174,29 +192,42 @@ def _setup(
     folder: Path,
     problems: Problems,
 ) -> Setup:
-    """The setup of what was decoded. Raises ``Rejected`` where there are ``problems``."""
+    """Build the setup of decoded files; raise ``Rejected`` where there are ``problems``."""
     for file in (scan_file, scanner_file):
-        told_once(problems, file)
+        warn_inherited_once(problems, file)
     problems.stop_if_any()
     assert written is not None
     assert scanner is not None
     update_rate_hz = hardware_of(written, scanner, "x").dac.update_rate_hz
-    found = solved(written, update_rate_hz, values, scan_file, problems)
+    solution = solve_scan(written, update_rate_hz, values, scan_file, problems)
     problems.stop_if_any()
-    assert found is not None
+    assert solution is not None
     assert scanner is not None
-    return Setup(found.scan, scanner, replace(scan_file, said=found.said), scanner_file, folder, found.choices)
+    return Setup(
+        solution.scan,
+        scanner,
+        replace(scan_file, written_keys=solution.written_keys),
+        scanner_file,
+        folder,
+        solution.choices,
+    )
 
 
 def load_scanner(path: str | Path) -> tuple[Scanner, Document]:
-    """A scanner file alone, and where its keys stand. Raises ``Rejected`` with every fault."""
+    """Read a scanner file alone, and where its keys stand.
+
+    Raises
+    ------
+    Rejected
+        With every fault.
+    """
     values, file = read_toml(Path(path), str(path))
     if _is_scan(values):
         raise Rejected([file.problem("", "this is a scan file; give the scanner file that it names")])
     problems = Problems()
     values, file = inherited(values, file)
     scanner = decode(Scanner, values, file, problems, partial(_check, values, file, problems))
-    told_once(problems, file)
+    warn_inherited_once(problems, file)
     problems.stop_if_any()
     assert scanner is not None
     return scanner, file
@@ -207,10 +238,15 @@ def _is_scan(values: Mapping[str, Any]) -> bool:
 
 
 def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str | Path = ".") -> Setup:
-    """A setup of values by the keys of the two files, without any file: numbers, strings, sequences and mappings.
+    """Build a setup of values by the keys of the two files, without any file: numbers, strings, sequences and mappings.
 
-    ``name`` is "scan" unless given, ``scanner`` of the scan is not needed. A response that the scanner names is looked
-    for in ``folder``. Raises ``Rejected`` as ``load`` does, with "scan" and "scanner" for the names of files.
+    ``name`` is "scan" unless given, ``scanner`` of the scan is not needed. A response that the scanner names is read
+    from ``folder``.
+
+    Raises
+    ------
+    Rejected
+        As ``load``, with "scan" and "scanner" for the names of files.
     """
     values, scan_file = inherited({"name": "scan", "scanner": "values", **_plain(scan)}, Document("scan", None))
     if "scans" in values:
@@ -221,13 +257,13 @@ def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str
     if isinstance(values["name"], str) and (why := why_not_a_name(values["name"])):
         problems.add(scan_file, "name", why)
     check = partial(_check, scanner_values, scanner_file, problems)
-    its = decode(Scanner, scanner_values, scanner_file, problems, check)
+    scanner_struct = decode(Scanner, scanner_values, scanner_file, problems, check)
     check_hardware(values, scanner_values, scan_file, scanner_file, problems)
-    return _setup(built, its, values, scan_file, scanner_file, Path(folder), problems)
+    return _setup(built, scanner_struct, values, scan_file, scanner_file, Path(folder), problems)
 
 
 def _plain(value: Any) -> Any:
-    """Values as a TOML file would have them: dicts, lists, and the numbers of Python for those of numpy."""
+    """Return values as a TOML file would have them: dicts, lists, and the numbers of Python for those of numpy."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):
@@ -244,23 +280,19 @@ def _check(
     written: Mapping[str, Any],
     built: Any,
 ) -> None:
-    """What the types and ranges of single keys cannot say: of a table as written, and as built where that went well.
+    """Report what types and ranges of single keys cannot express: of a table as written, and as decoded.
 
-    ``values`` is the whole file.
+    ``built`` is None where decoding failed, ``values`` the whole file.
     """
     if kind is WrittenScan:
         _at_most_one(IMAGES, key, written, file, problems)
-        check_words(written, file, problems)
+        check_image_keys(written, file, problems)
     elif issubclass(kind, FastAxis):
         _check_axis(kind, key, any(name in values for name in IMAGES), written, file, problems)
     elif kind is BandLimit:
         _at_most_one(("harmonics", "cutoff_hz"), key, written, file, problems)
     elif kind is WrittenTiming:
-        _at_most_one(("ticks_per_line", "ticks_per_pixel"), key, written, file, problems)
-        for names in (("lines", "image_lines"), RATES):
-            _at_most_one(names, key, written, file, problems)
-            if not _any_of(names, written, kind):
-                problems.add(file, f"{key}.{names[0]}", f"missing; give {' or '.join(names)}")
+        _check_timing(kind, key, written, file, problems)
     elif kind is Offset:
         _check_ways(key, written, file, problems)
     elif kind is Resonance:
@@ -273,10 +305,19 @@ def _check(
             problems.add(file, f"{key}.{name}", why)
 
 
+def _check_timing(kind: type, key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
+    """Check that lines and a rate are each given once."""
+    _at_most_one(("ticks_per_line", "ticks_per_pixel"), key, written, file, problems)
+    for names in (("lines", "image_lines"), RATES):
+        _at_most_one(names, key, written, file, problems)
+        if not _any_of(names, written, kind):
+            problems.add(file, f"{key}.{names[0]}", f"missing; give {' or '.join(names)}")
+
+
 def _check_axis(
     kind: type, key: str, image: bool, written: Mapping[str, Any], file: Document, problems: Problems
 ) -> None:
-    """A size and an offset, each said once; the size of an ``image``, which stands elsewhere, does for one."""
+    """Check that a size and an offset are each given once; the size of an ``image`` counts as one."""
     resting = written.get("motion") == "off"  # which needs no size
     for names in (OFFSETS,) if resting else (SIZES, OFFSETS):
         _at_most_one(names, key, written, file, problems)
@@ -286,7 +327,7 @@ def _check_axis(
 
 
 def _any_of(names: tuple[str, ...], written: Mapping[str, Any], kind: type) -> bool:
-    """Whether one of them is there; an unknown key that was meant to be one of them is reported as such."""
+    """Return True if one of the keys is there; an unknown key that was meant to be one of them counts."""
     known = [*kind.__struct_fields__]  # type: ignore[attr-defined]
     return any(name in names or {*names} & {*_unknown(name, known)} for name in written)
 
@@ -330,31 +371,14 @@ def _check_response(key: str, written: Mapping[str, Any], file: Document, proble
 
 
 def _faults(built: Struct) -> list[tuple[str, str]]:
-    """Keys of a table that contradict each other, and why."""
+    """Return the keys of a table that contradict each other, with the reason."""
     match built:
         case FastAxis() if built.size_v is not None and built.size_of == "window":
             return [("size_of", "only a size in nm can be that of the window; size_v is the drive's")]
         case BandLimit():
-            low, high = built.window
-            if high <= low:
-                return [("window", f"[{low:g}, {high:g}] does not ascend")]
-            if high - low < 0.01:
-                return [("window", f"[{low:.12g}, {high:.12g}] is narrower than 0.01 of the line")]
-            if built.method != "window":
-                keys = {
-                    "max_scaling_error_percent": built.max_scaling_error_percent is not None,
-                    "harmonics": built.harmonics == "fewest",
-                }
-                why = f"method = '{built.method}' keeps no scaling error; take method = 'window'"
-                return [(key, why) for key, given in keys.items() if given]
-        case Table() if built.mode == "cubic" and (built.bits or 0) > MAXIMUM_SPLINE_BITS:
-            return [("bits", f"{built.bits} is above the {MAXIMUM_SPLINE_BITS} of mode = 'cubic'")]
-        case Table() if built.mode == "cubic" and (built.length or 0) > MAXIMUM_SPLINE_LENGTH:
-            return [("length", f"{built.length} is above the {MAXIMUM_SPLINE_LENGTH} of mode = 'cubic'")]
-        case Table() if built.mode != "direct" and built.length is not None:
-            lower = 1 << (built.length.bit_length() - 1)
-            if built.length != lower:
-                return [("length", f"{built.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
+            return _band_limit_faults(built)
+        case Table():
+            return _table_faults(built)
         case Refinement() if len(built.a) != len(built.b):
             return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
         case Offset():
@@ -366,10 +390,38 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
     return []
 
 
+def _band_limit_faults(limit: BandLimit) -> list[tuple[str, str]]:
+    low, high = limit.window
+    if high <= low:
+        return [("window", f"[{low:g}, {high:g}] does not ascend")]
+    if high - low < 0.01:
+        return [("window", f"[{low:.12g}, {high:.12g}] is narrower than 0.01 of the line")]
+    if limit.method == "window":
+        return []
+    keys = {
+        "max_scaling_error_percent": limit.max_scaling_error_percent is not None,
+        "harmonics": limit.harmonics == "fewest",
+    }
+    why = f"method = '{limit.method}' keeps no scaling error; take method = 'window'"
+    return [(key, why) for key, given in keys.items() if given]
+
+
+def _table_faults(table: Table) -> list[tuple[str, str]]:
+    if table.mode == "cubic" and (table.bits or 0) > MAXIMUM_SPLINE_BITS:
+        return [("bits", f"{table.bits} is above the {MAXIMUM_SPLINE_BITS} of mode = 'cubic'")]
+    if table.mode == "cubic" and (table.length or 0) > MAXIMUM_SPLINE_LENGTH:
+        return [("length", f"{table.length} is above the {MAXIMUM_SPLINE_LENGTH} of mode = 'cubic'")]
+    if table.mode != "direct" and table.length is not None:
+        lower = 1 << (table.length.bit_length() - 1)
+        if table.length != lower:
+            return [("length", f"{table.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
+    return []
+
+
 def _offset_faults(offset: Offset) -> list[tuple[str, str]]:
     points, sizes = offset.points or [], [entry.size_v for entry in offset.sizes or []]
-    found = [(f"sizes[{i}].size_v", f"{v:g} V is given twice") for i, v in enumerate(sizes) if v in sizes[:i]]
+    faults = [(f"sizes[{i}].size_v", f"{v:g} V is given twice") for i, v in enumerate(sizes) if v in sizes[:i]]
     if any(point.size_v is not None for point in points):
-        lacking = [i for i, point in enumerate(points) if point.size_v is None]
-        found += [(f"points[{i}].size_v", "missing beside those of other points") for i in lacking]
-    return found
+        without_size = [i for i, point in enumerate(points) if point.size_v is None]
+        faults += [(f"points[{i}].size_v", "missing beside those of other points") for i in without_size]
+    return faults

@@ -1,4 +1,4 @@
-"""Names that are identifiers in C, C++, Verilog, SystemVerilog and VHDL at once."""
+"""Validity of names as identifiers in C, C++, Verilog, SystemVerilog and VHDL at once."""
 
 import re
 
@@ -52,7 +52,7 @@ _TAKEN_FILES = frozenset(
 
 
 def why_not_a_name(name: str) -> str | None:
-    """What makes a name unusable as an identifier of some target language, or None."""
+    """Return what makes a name unusable as an identifier of some target language, or None."""
     accepted = "a letter, then letters, digits and single underscores"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         return f"{name!r} is no identifier; accepted is {accepted}"
@@ -68,5 +68,5 @@ def why_not_a_name(name: str) -> str | None:
 
 
 def of_the_runtime(name: str) -> bool:
-    """Whether a file or identifier of this name is one of the sequencer, whatever the case of its letters."""
+    """Return True if a file or identifier of this name is one of the sequencer, whatever the case of its letters."""
     return name.lower().startswith((f"{_RUNTIME}_", "program_loader"))

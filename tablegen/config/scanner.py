@@ -1,6 +1,6 @@
 """The scanner file as frozen types: a scanner is calibrated once and shared by its scans.
 
-What ``[x.hysteresis]`` takes stands with the models, in ``compensation/models/``.
+The keys of ``[x.hysteresis]`` are defined by the models, in ``compensation/models/``.
 """
 
 from typing import Annotated, Literal
@@ -143,5 +143,5 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def driver(self) -> Driver:
-        """Its range."""
+        """The output range of the piezo driver."""
         return Driver(self.v_max, self.v_min)

@@ -1,6 +1,7 @@
-"""The scan file as frozen types: it changes daily. ``config/scanner.py`` has those of the scanner file.
+"""The scan file as frozen types. ``config/scanner.py`` has those of the scanner file.
 
-Units are part of every name. The ranges stand here once: the decoder checks them, ``tablegen schema`` prints them.
+Units are part of every name. The ranges are defined here only: the decoder checks them, ``tablegen schema`` prints
+them.
 """
 
 from typing import Annotated, Literal
@@ -9,7 +10,7 @@ from msgspec import Meta, Struct
 
 from tablegen.base.quantities import FileName, Hertz, Micrometres, Nanometres, Normalised, PositiveVolts, Volts
 
-# Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
+# Leaves room for the suffixes of emitted names; reserved words are refused as well, see ``why_not_a_name``.
 MAXIMUM_NAME = 48
 Identifier = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_NAME, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
 Percent = Annotated[float, Meta(gt=0.0, le=1000.0)]
@@ -67,7 +68,7 @@ class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def chosen_by_build(self) -> bool:
-        """Whether the build finds what is not given."""
+        """True if the build chooses the keys that are not given."""
         return self.mode == "auto" or self.max_error_lsb is not None
 
 
@@ -211,7 +212,7 @@ class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def off(self) -> bool:
-        """Whether it rests."""
+        """True if the axis is static."""
         return self.motion == "off"
 
 

@@ -1,4 +1,4 @@
-"""Values of a key that a sweep goes through, from the text of ``--set``: ranges, lists, texts."""
+"""The values of swept keys, from the text of ``--set``: ranges, lists, texts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _OPENING, _CLOSING = "[{", "]}"
 
 @dataclass(frozen=True)
 class Setting:
-    """A key of the scan file, such as ``x.size_nm``, the values it goes through, and what messages call it."""
+    """A key of the scan file, such as ``x.size_nm``, its values in a sweep, and its origin in messages."""
 
     key: str
     values: tuple[Any, ...]
@@ -22,14 +22,19 @@ class Setting:
 
     @property
     def parts(self) -> list[str]:
-        """The key, table by table."""
+        """The parts of the key, table by table."""
         return self.key.split(".")
 
 
 def parse_setting(text: str) -> Setting:
-    """A setting from ``KEY=VALUE,VALUE..``; a value is a number, a range START:STOP:STEP, a word or a TOML value.
+    """Parse ``KEY=VALUE,VALUE..``; a value is a number, a range START:STOP:STEP, a word or a TOML value.
 
-    A range ends at STOP where a whole number of steps reaches it, and before it where none does. Raises ``Rejected``.
+    A range ends at STOP where a whole number of steps reaches it, and before it where none does.
+
+    Raises
+    ------
+    Rejected
+        If the text is not a setting.
     """
     origin = f"--set {shortened(text)}"
     key, equals, written = text.partition("=")
@@ -49,7 +54,7 @@ def parse_setting(text: str) -> Setting:
     return Setting(key, tuple(values), origin)
 
 
-def given(settings: "Sequence[Setting]") -> None:
+def check_repeated_keys(settings: "Sequence[Setting]") -> None:
     """Refuse a key that is given twice, or beside a table that holds it."""
     for at, setting in enumerate(settings):
         for other in settings[:at]:
@@ -65,7 +70,7 @@ def _refused(origin: str, why: str) -> Rejected:
 
 
 def _items(text: str, origin: str) -> list[str]:
-    """The text at its commas, but those in brackets and quotes."""
+    """Return the text split at its commas, except those in brackets and quotes."""
     items, depth, quote = [""], 0, ""
     for character in text:
         if quote:
@@ -107,7 +112,7 @@ def _number(text: str) -> Decimal | None:
 
 
 def _range(numbers: list[Decimal], item: str, origin: str) -> list[int | float]:
-    """Every STEP from START to STOP, in decimal: 0.1:0.5:0.1 has 0.3 in it, and 0.5."""
+    """Return every STEP from START to STOP, in decimal: 0.1:0.5:0.1 includes 0.3 and 0.5."""
     if len(numbers) != 3:
         raise _refused(origin, f"{item!r} has no step; a range is START:STOP:STEP, as in 50:1000:50")
     start, stop, step = numbers
@@ -119,8 +124,8 @@ def _range(numbers: list[Decimal], item: str, origin: str) -> list[int | float]:
     if count > MOST_VALUES:
         raise _refused(origin, f"{item!r} has {count} values; at most {MOST_VALUES} are taken")
     whole = all(number == number.to_integral_value() and _exponent(number) >= 0 for number in numbers)
-    found = [start + step * at for at in range(count)]
-    return [int(value) for value in found] if whole else [float(value) for value in found]
+    numbers_in_range = [start + step * at for at in range(count)]
+    return [int(value) for value in numbers_in_range] if whole else [float(value) for value in numbers_in_range]
 
 
 def _exponent(number: Decimal) -> int:

@@ -1,4 +1,4 @@
-"""Many scans of one scan file: its ``[[scans]]``, and every combination of the values that keys are set to."""
+"""Many scans of one scan file: its ``[[scans]]``, and every combination of the values of swept keys."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -11,34 +11,34 @@ import msgspec
 
 from tablegen.base.input_errors import Document, Problem, Rejected
 from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES
-from tablegen.config.load import Scanners, Setup, assembled, read_scan_file
+from tablegen.config.load import Scanners, Setup, assemble_setup, read_scan_file
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import MAXIMUM_NAME
-from tablegen.config.settings import MOST_VALUES, Setting, given
+from tablegen.config.settings import MOST_VALUES, Setting, check_repeated_keys
 
 
 class VariedDocument(Document, frozen=True):
-    """A scan file of which some keys were set elsewhere: ``set_by`` says where, by key."""
+    """A scan file of which some keys were set elsewhere: ``set_by`` has the origin by key."""
 
     set_by: Mapping[str, str] = msgspec.field(default_factory=dict)
 
     def problem(self, key: str, why: str) -> Problem:
-        """A problem of a key, at the option that set it or in the file."""
-        told = super().problem(key, why)
-        written = self.inherited.get(told.key, told.key)
+        """Return a problem of a key, at the option that set it or in the file."""
+        problem = super().problem(key, why)
+        written = self.inherited.get(problem.key, problem.key)
         for known, origin in self.set_by.items():
             if written == known or written.startswith((f"{known}.", f"{known}[")):
-                return told._replace(file=origin, line=0)
-        return told
+                return problem._replace(file=origin, line=0)
+        return problem
 
 
 @dataclass(frozen=True, repr=False)
 class Variant:
-    """One scan of many: its name, what differs, and the values of the whole scan file."""
+    """One scan of many: its name, its differences, and the values of the whole scan file."""
 
     name: str
     settings: dict[str, Any]
-    """What differs from the file, by key: the keys of its ``[[scans]]`` and those that were set."""
+    """The differences from the file, by key: the keys of its ``[[scans]]`` and those that were set."""
     path: Path
     values: dict[str, Any]
     file: VariedDocument
@@ -46,25 +46,36 @@ class Variant:
 
     @property
     def setup(self) -> Setup:
-        """What can be planned and built. Raises ``Rejected`` with every fault of this scan."""
-        return assembled(self.path, self.values, self.file, self.scanners)
+        """The setup that can be planned and built.
+
+        Raises
+        ------
+        Rejected
+            With every fault of this scan.
+        """
+        return assemble_setup(self.path, self.values, self.file, self.scanners)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{key} = {value}" for key, value in self.settings.items())
-        return f"<tablegen variant {self.name!r}: {told or 'as the file has it'}>"
+        shown = ", ".join(f"{key} = {value}" for key, value in self.settings.items())
+        return f"<tablegen variant {self.name!r}: {shown or 'as the file has it'}>"
 
 
 def variants(
     path: str | Path, settings: "Mapping[str, Iterable[Any]] | Sequence[Setting]" = ()
 ) -> "tuple[str, list[Variant]]":
-    """The name of the library, and every scan of it: those of ``[[scans]]`` with each combination of the settings.
+    """Return the name of the library, and its scans: those of ``[[scans]]`` with each combination of the settings.
 
     The last setting runs fastest. A name is that of the entry and the values that were set, or a number where that is
-    too long. Raises ``Rejected`` for a file that cannot be read, and for names that are wrong or meet.
+    too long.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read, or names are invalid or equal.
     """
     path = Path(path)
     chosen = _chosen(settings)
-    given(chosen)
+    check_repeated_keys(chosen)
     if names := [setting for setting in chosen if setting.parts[0] in ("name", "scans")]:
         why = f"{names[0].key} is not set: names follow from what is, or stand in [[scans]]"
         raise Rejected([Problem(names[0].origin, 0, "", why)])
@@ -79,22 +90,24 @@ def variants(
         total *= len(setting.values)
     if total > MOST_VALUES:
         raise Rejected([file.problem("", f"{total} scans; one sweep takes at most {MOST_VALUES}")])
-    found: list[Variant] = []
+    scans: list[Variant] = []
     labels, scanners = _labels(chosen), Scanners()
     set_by = {setting.key: setting.origin for setting in chosen}
     for entry, base, lines, differs in _bases(entries, values, file):
         for combination in product(*(setting.values for setting in chosen)):
             given_here: dict[str, Any] = {}
-            told = dict(differs)
+            settings_of_scan = dict(differs)
             for setting, value in zip(chosen, combination, strict=True):
                 given_here = _merged(given_here, _nested(setting.parts, value))
-                told[setting.key] = value
+                settings_of_scan[setting.key] = value
             own = _over(base, given_here)
-            name = _name(entry or library, list(zip(labels, combination, strict=True)), len(found), total)
+            name = _name(entry or library, list(zip(labels, combination, strict=True)), len(scans), total)
             own = {**own, "name": name}
-            found.append(Variant(name, told, path, own, VariedDocument(file.name, lines, set_by=set_by), scanners))
-    _refuse_clashes(found, library)
-    return library, found
+            scans.append(
+                Variant(name, settings_of_scan, path, own, VariedDocument(file.name, lines, set_by=set_by), scanners)
+            )
+    _refuse_clashes(scans, library)
+    return library, scans
 
 
 def _chosen(settings: "Mapping[str, Iterable[Any]] | Sequence[Setting]") -> list[Setting]:
@@ -109,7 +122,7 @@ def _chosen(settings: "Mapping[str, Iterable[Any]] | Sequence[Setting]") -> list
 
 
 def _entries(scans: Any, file: Document) -> list[dict[str, Any]]:
-    """The tables of ``[[scans]]``; none where there are none."""
+    """Return the tables of ``[[scans]]``; an empty list where there are none."""
     if scans is None:
         return []
     if not isinstance(scans, list) or not scans or not all(isinstance(entry, dict) for entry in scans):
@@ -128,7 +141,7 @@ def _entries(scans: Any, file: Document) -> list[dict[str, Any]]:
 def _bases(
     entries: Sequence[dict[str, Any]], values: dict[str, Any], file: Document
 ) -> "Iterator[tuple[str | None, dict[str, Any], dict[str, int], dict[str, Any]]]":
-    """Each scan of the file before anything is set: its name, its values, the lines of its keys, and what differs."""
+    """Yield each scan of the file before anything is set: name, values, the lines of its keys, and differences."""
     lines = dict(file.lines or {})
     if not entries:
         yield None, values, lines, {}
@@ -140,26 +153,26 @@ def _bases(
 
 
 def _alternatives() -> dict[str, list[str]]:
-    """Keys by the key that says the same otherwise: setting the one takes the others out of the file."""
+    """Return the alternatives of each key: setting the one removes the others from the file."""
     sizes = {axis: [f"{axis}.{name}" for name in SIZES] for axis in ("x", "y")}
     groups = [sizes["x"], sizes["y"], list(IMAGES)]
     groups += [[f"{axis}.{name}" for name in OFFSETS] for axis in ("x", "y")]
     groups += [[f"{axis}.band_limit.{name}" for name in ("harmonics", "cutoff_hz")] for axis in ("x", "y")]
     groups += [[f"timing.{name}" for name in names] for names in (RATES, ("lines", "image_lines"))]
     groups += [["timing.ticks_per_line", "timing.ticks_per_pixel"]]
-    found = {key: [other for other in group if other != key] for group in groups for key in group}
+    others_of = {key: [other for other in group if other != key] for group in groups for key in group}
     for image in IMAGES:
-        found[image] += [*sizes["x"], *sizes["y"]]
+        others_of[image] += [*sizes["x"], *sizes["y"]]
     for size in [*sizes["x"], *sizes["y"]]:
-        found[size] += IMAGES
-    return found
+        others_of[size] += IMAGES
+    return others_of
 
 
 _ALTERNATIVES = _alternatives()
 
 
 def _over(values: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Values with others over them; what these say otherwise is no longer among them."""
+    """Return values with others over them, without the alternatives of these."""
     set_keys = {key for key, _ in _flat(more)}
     for key in set_keys:
         for other in _ALTERNATIVES.get(key, ()):
@@ -180,12 +193,12 @@ def _without(values: Mapping[str, Any], parts: Sequence[str]) -> Mapping[str, An
 
 
 def _merged(values: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Values with others over them, table by table; nothing that was given is changed."""
-    found = dict(values)
+    """Return values with others over them, table by table; the arguments are not changed."""
+    merged = dict(values)
     for key, value in more.items():
-        before = found.get(key)
-        found[key] = _merged(before, value) if isinstance(before, Mapping) and isinstance(value, Mapping) else value
-    return found
+        before = merged.get(key)
+        merged[key] = _merged(before, value) if isinstance(before, Mapping) and isinstance(value, Mapping) else value
+    return merged
 
 
 def _nested(parts: Sequence[str], value: Any) -> dict[str, Any]:
@@ -204,16 +217,16 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> "Iterator[tuple[str, A
 
 
 def _labels(settings: Sequence[Setting]) -> list[str]:
-    """How a name says each key: by its last part, or by all parts where two keys end alike."""
+    """Return the label of each key in names: its last part, or all parts where two keys end alike."""
     last = [setting.parts[-1] for setting in settings]
     return [
         setting.parts[-1] if last.count(setting.parts[-1]) == 1 else "_".join(setting.parts) for setting in settings
     ]
 
 
-def _name(base: str, told: "Sequence[tuple[str, Any]]", number: int, total: int) -> str:
+def _name(base: str, labelled: "Sequence[tuple[str, Any]]", number: int, total: int) -> str:
     parts = [base]
-    for label, value in told:
+    for label, value in labelled:
         parts += [label, _spelt(value)]
     name = re.sub(r"_+", "_", "_".join(part.strip("_") for part in parts if part.strip("_")))
     if len(name) <= MAXIMUM_NAME:
@@ -223,7 +236,7 @@ def _name(base: str, told: "Sequence[tuple[str, Any]]", number: int, total: int)
 
 
 def _spelt(value: Any) -> str:
-    """A value as a part of an identifier: 1.5 is 1p5, -2 is m2, texts keep their letters and digits."""
+    """Return a value as a part of an identifier: 1.5 is 1p5, -2 is m2, texts keep their letters and digits."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):
@@ -232,11 +245,11 @@ def _spelt(value: Any) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", str(value))
 
 
-def _refuse_clashes(found: Sequence[Variant], library: str) -> None:
+def _refuse_clashes(scans: Sequence[Variant], library: str) -> None:
     """Refuse names that files or identifiers cannot have, or that two scans share on some disk."""
     problems = []
     seen: dict[str, str] = {}
-    for variant in found:
+    for variant in scans:
         if why := why_not_a_name(variant.name):
             problems.append(variant.file.problem("name", why))
         if variant.name.lower() == f"{library}_library".lower():

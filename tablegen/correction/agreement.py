@@ -61,7 +61,10 @@ def _mean_of_columns(values: Floats) -> Floats:
 
 
 def difference(one: Floats, other: Floats) -> float:
-    """The rms of the difference of two images over that of both, each line less its mean; where both are no NaN."""
+    """Compute the rms of the difference of two images over that of both, each line less its mean.
+
+    Pixels that are NaN in either image do not count.
+    """
     both: Bools = np.isfinite(one) & np.isfinite(other)
     first, second = (levelled(np.where(both, image, np.nan)) for image in (one, other))
     power = float(np.sum(first**2) + np.sum(second**2))

@@ -3,6 +3,7 @@
 from tablegen.base.warnings import Finding, worst_first
 from tablegen.correction.job import Images
 from tablegen.correction.straight import StraightScan
+from tablegen.images.scan_angle import angle_text
 
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
 _OTHER = 1.4  # times the size of the file: another size
@@ -70,6 +71,10 @@ def _agreement(found: StraightScan) -> list[str]:
 def _findings(found: StraightScan, images: Images) -> list[Finding]:
     """The worst first; percentages are of the picture."""
     notes = [Finding("note", 0.0, f"left out: {text}") for text in images.left_out]
+    angle = found.record.get("scan_angle_deg")
+    if angle is not None and not found.record["by"].startswith("fit"):
+        text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
+        notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
     first, last = found.distortion.left_out
     rows, columns = images.shape
     if first or last:

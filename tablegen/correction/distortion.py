@@ -49,7 +49,13 @@ class Distortion:
     lag: float = 1.0
 
     def side(self, forward: bool) -> Sweep1D:
-        """One of the two. Raises ``KeyError`` if it was not imaged."""
+        """Return the sweep of a direction.
+
+        Raises
+        ------
+        KeyError
+            If the direction was not imaged.
+        """
         found = self.forward if forward else self.backward
         if found is None:
             raise KeyError(forward)
@@ -75,12 +81,12 @@ class Distortion:
     @property
     def left_out(self) -> tuple[int, int]:
         """The rows at the beginning and at the end that are left out."""
-        kept = ascending(self.y)
-        return kept.start, self.rows + 1 - kept.stop
+        rows_imaged = ascending(self.y)
+        return rows_imaged.start, self.rows + 1 - rows_imaged.stop
 
     @cached_property
     def grid(self) -> tuple[Floats, Floats]:
-        """x of the columns and y of the rows of the straight image, which has as many."""
+        """Return x of the columns and y of the rows of the straight image, which has as many."""
         low, high = self.x_range
         first, last = self.y_range
         x = low + (high - low) * (np.arange(self.columns) + _HALF) / self.columns
@@ -140,18 +146,18 @@ class Resampler:
 
     @classmethod
     def of(cls, distortion: Distortion, forward: bool) -> "Resampler":
-        """What belongs where."""
+        """Return the resampler of one direction of an image."""
         return cls(*distortion.sources(forward))
 
     def __call__(self, image: Floats) -> Floats:
-        """The straight image, rows x columns; NaN where nothing was imaged. Cubic splines, used once.
+        """Resample an image, rows x columns; NaN where nothing was imaged. Cubic splines, used once.
 
         They end as the image goes on if it is turned about its outer pixels: a slope is no edge then.
         """
         wide = np.pad(image, _MARGIN, mode="reflect", reflect_type="odd")
         at = np.stack([self.row, self.column]) + _MARGIN
-        found: Floats = map_coordinates(wide, at, order=_ORDER, mode="mirror")
-        return np.where(self.inside, found, np.nan)
+        heights: Floats = map_coordinates(wide, at, order=_ORDER, mode="mirror")
+        return np.where(self.inside, heights, np.nan)
 
 
 def _edges(x: Floats) -> tuple[float, float]:
@@ -160,7 +166,7 @@ def _edges(x: Floats) -> tuple[float, float]:
 
 
 def ascending(values: Floats) -> slice:
-    """The part from the lowest value near the beginning to the highest one near the end."""
+    """Return the part from the lowest value near the beginning to the highest one near the end."""
     outer = max(round(_OUTER * len(values)), 1)
     first = int(np.argmin(values[:outer]))
     last = len(values) - 1 - int(np.argmax(values[: -outer - 1 : -1]))
@@ -169,18 +175,20 @@ def ascending(values: Floats) -> slice:
 
 def _standing(values: Floats) -> int | None:
     """Where the ascending part stands still or goes back; None where it does nowhere."""
-    kept = ascending(values)
-    step = np.diff(values[kept])
+    filled = ascending(values)
+    step = np.diff(values[filled])
     at = int(np.argmin(step))
-    return kept.start + at if not float(step[at]) > _FINEST * float(np.mean(step)) * (0 < at < len(step) - 1) else None
+    return (
+        filled.start + at if not float(step[at]) > _FINEST * float(np.mean(step)) * (0 < at < len(step) - 1) else None
+    )
 
 
 def _inverted(x: Floats, at: Floats) -> Floats:
-    """The columns at which x is ``at``; straight on for half a pixel at either end, then beyond it for good."""
+    """Invert x: the columns at which x is ``at``; straight on for half a pixel at either end, then beyond it."""
     kept = ascending(x)
     part = x[kept]
     low, high = _edges(part)
     count = len(part)
     places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]]) + kept.start
-    found: Floats = np.interp(at, np.concatenate([[low], part, [high]]), places, left=-1.0, right=len(x))
-    return found
+    columns: Floats = np.interp(at, np.concatenate([[low], part, [high]]), places, left=-1.0, right=len(x))
+    return columns

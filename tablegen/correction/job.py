@@ -13,11 +13,13 @@ from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
+from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
+from tablegen.images.scan_angle import is_turned
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -108,9 +110,21 @@ class Images:
             for source in dict.fromkeys(channel.source for channel in self.channels)
         ]
 
+    @property
+    def angle(self) -> dict[str, float]:
+        """The scan angle in degrees, for the record; empty where the file states none, or 0."""
+        angle = self.first.angle_deg
+        return {"scan_angle_deg": round(angle, 4)} if angle is not None and is_turned(self.first) else {}
+
 
 def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
-    """All channels of one file, or of one for each direction. Raises ``Rejected``."""
+    """Read all channels of one file, or of one for each direction.
+
+    Raises
+    ------
+    Rejected
+        If a file cannot be read or has no such channels.
+    """
     groups: list[tuple[list[ScanImage], bool]] = []
     left_out: list[str] = []
     for path, forward in ((trace, True), (retrace, False)):
@@ -163,7 +177,7 @@ def _check_exchange(groups: Sequence[tuple[list[ScanImage], bool]]) -> None:
 
 
 def _judged(channels: Sequence[ScanImage], ways: Sequence[bool], choice: Choice, first: int) -> tuple[int, ...]:
-    """The trace and the retrace that are compared and fitted; one of them alone where there is no other."""
+    """Return the trace and the retrace that are compared and fitted; one of them if there is no other."""
 
     def named(wanted: str, among: range, way: bool | None) -> int:
         found = [i for i in among if channels[i].channel == wanted and way in (None, ways[i])]
@@ -203,7 +217,15 @@ def _height(channel: ScanImage) -> bool:
 
 
 def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
-    """Put straight by a scanner file. Raises ``Rejected`` and ``Unphysical``."""
+    """Correct images by a scanner file.
+
+    Raises
+    ------
+    Rejected
+        If the scanner file is faulty.
+    Unphysical
+        If the scan cannot have been taken so.
+    """
     model = _model(scanner)
     rate_hz = taken.rate_hz or images.first.line_rate_hz
     if rate_hz is None:
@@ -222,7 +244,7 @@ def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
 
 
 def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldScan) -> StraightScan:
-    """The same of an image of a build: the drive is that of the scan file, the scanner its own unless given."""
+    """Correct an image of a build: the drive is that of the scan file, the scanner its own unless given."""
     setup = load(scan)
     plan = make_plan(setup)
     model = (
@@ -244,7 +266,7 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldSca
 
 
 def _rows_window(first: float, y: AxisScan, back: bool) -> tuple[float, float]:
-    """The window that begins with the first row, ``first`` of a period."""
+    """Return the window that begins with the first row, ``first`` of a period."""
     if back:
         return 0.0, 1.0 - (first - y.turn) / (1.0 - y.turn)
     return first / y.turn, 1.0
@@ -265,7 +287,7 @@ def _model(scanner: Path) -> ScannerModel:
 
 
 def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: OldAxis, rate_hz: float) -> AxisScan:
-    """A triangle."""
+    """Return the scan of an axis that plays a triangle."""
     driver = model.scanner.driver
     size_v = taken.size_v
     if size_v is None and taken.size_nm is not None:
@@ -289,6 +311,7 @@ def _scanned(
     record: dict[str, Any] = {
         "by": "scanner file",
         "sources": images.sources,
+        **images.angle,
         "scanner": {"file": path.name, "sha256": file_sha256(path, CONFIGURATION)},
         **how,
     }
@@ -316,7 +339,11 @@ def _scanned(
 def by_fit(
     images: Images, taken: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
-    """Put straight by a fit to a periodic sample, and the fit. Raises ``Unphysical``."""
+    """Correct images by a fit to a periodic sample; return the fit too.
+
+    Raises ``Unphysical`` where there is no fit, or where the image does not support the correction: another cell would
+    do as well, the displacement is too large, or trace and retrace do not agree better.
+    """
     if not images.forward[images.judged[0]]:
         raise Unphysical("is a retrace by the file; a fit needs the trace")
     trace, retrace = (*(images.channels[i].heights for i in images.judged), None)[:2]
@@ -327,7 +354,7 @@ def by_fit(
     first, (rows, columns) = images.first, images.shape
     size: tuple[float, float] | None = None
     found: Distortion = fit.distortion
-    record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources}
+    record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources, **images.angle}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
             found = fit.of_lattice(lattice_nm)
@@ -340,6 +367,8 @@ def by_fit(
         size = found.x_range[1] - found.x_range[0], found.y_range[1] - found.y_range[0]
         if first.width_nm is not None:
             check_size(size[0], first.width_nm, "the file")
+        if first.height_nm is not None and fit.tells_y and lattice_nm is not None:
+            check_size(size[1], first.height_nm, "the file", "frame")
     elif first.width_nm is not None and first.height_nm is not None:
         size = first.width_nm, first.height_nm
     record |= {
@@ -349,7 +378,11 @@ def by_fit(
         "explained": round(fit.explained, 6),
         "slow_axis": "fitted" if fit.tells_y else "as taken: a grating does not tell it",
     }
-    return _made(images, found, size, record), fit
+    scan = _made(images, found, size, record)
+    check_moves(found)
+    check_cell(fit, images.heights(images.judged[0]), True)
+    check_agreement(scan.agreement)
+    return scan, fit
 
 
 def check_order(images: Images, distortion: Distortion) -> None:

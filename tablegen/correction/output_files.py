@@ -23,7 +23,7 @@ _NM_PER_CM = 1e7
 
 
 def files_of(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
-    """The files of a scan by name: ``name`` and ``suffix``, and what goes beside it."""
+    """Return the files of a scan by name: ``name`` and ``suffix``, and what goes beside it."""
     return _WRITERS[suffix](scan, name, suffix)
 
 
@@ -33,16 +33,16 @@ def _shown(picture: ScanPicture) -> Floats:
 
 
 def _titles(pictures: Sequence[ScanPicture]) -> list[str]:
-    """What pictures are called: all different, and each with its direction where there are both."""
+    """Return the titles of pictures: all different, and each with its direction where there are both."""
     both = len({picture.forward for picture in pictures}) > 1
-    found: list[str] = []
+    titles: list[str] = []
     for number, picture in enumerate(pictures):
         side = "trace" if picture.forward else "retrace"
         title = picture.title or (side if both else "corrected")
         if both and picture.title and not _says_direction(title):
             title = f"{title} {side}"
-        found.append(title if title not in found else f"{title} {number}")
-    return found
+        titles.append(title if title not in titles else f"{title} {number}")
+    return titles
 
 
 def _says_direction(title: str) -> bool:
@@ -67,7 +67,7 @@ def _npy(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
 
 
 def _tiff(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
-    """A page of 32-bit floating point a picture."""
+    """Return a page of 32-bit floating point for each picture."""
     import tifffile
 
     out = BytesIO()
@@ -92,11 +92,11 @@ def _tiff(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
 
 
 def _png(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
-    """A file of 16-bit grey a picture; its text says what black and white are."""
+    """Return a file of 16-bit grey for each picture; its text states the heights of black and white."""
     from PIL import Image as Pillow
     from PIL.PngImagePlugin import PngInfo
 
-    found = {}
+    files = {}
     titles = _titles(scan.pictures)
     for title, picture in zip(titles, scan.pictures, strict=True):
         shown = _shown(picture)
@@ -112,17 +112,17 @@ def _png(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
         more: dict[str, Any] = {} if seen.all() else {"transparency": 0}
         image.save(out, "png", pnginfo=info, **more)
         part = "" if len(titles) == 1 else f"_{_plain(title)}"
-        found[f"{name}{part}{suffix}"] = out.getvalue()
-    return found
+        files[f"{name}{part}{suffix}"] = out.getvalue()
+    return files
 
 
 def _plain(title: str) -> str:
-    """A title as a part of a file's name."""
+    """Reduce a title to a part of a file's name."""
     return "".join(c if c.isascii() and c.isalnum() else "_" for c in title)[:60]
 
 
 def _gwy(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
-    """A data field, a mask and a text a picture."""
+    """Return a data field, a mask and a text for each picture."""
     from gwyfile.objects import GwyContainer, GwyDataField
 
     container = GwyContainer()

@@ -49,7 +49,7 @@ class PeriodicScan:
     tells_y: bool
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
-        """The same in nm, where the bars of a grating, or the densest rows of a lattice, are ``pitch_nm`` apart.
+        """Return the distortion in nm, where bars of a grating, or densest rows of a lattice, are ``pitch_nm`` apart.
 
         ``aspect`` is the height of the frame over the length of the line.
         """
@@ -57,14 +57,18 @@ class PeriodicScan:
         return _scaled(self.distortion, length, length * aspect, 0.0)
 
     def of_lattice(self, constant_nm: float) -> Distortion:
-        """The same in nm, where the sample is a hexagonal or a square lattice of this constant, turned as it may be.
+        """Return the distortion in nm, where the sample is a hexagonal or a square lattice of this constant.
 
-        This gives the height of the frame too, and the shear of a steady drift. Raises ``Unphysical`` for a sample that
-        is no such lattice.
+        The lattice may be turned. This gives the height of the frame too, and the shear of a steady drift.
+
+        Raises
+        ------
+        Unphysical
+            If the sample is no such lattice.
         """
         if not self.tells_y:
             raise Unphysical("the images show waves of one direction; for a grating give its pitch, not a lattice")
-        found = []
+        readings = []
         for angle in (60.0, 90.0, 120.0):
             k = constant_nm * np.sin(np.radians(angle))
             turned = np.radians(angle)
@@ -73,8 +77,8 @@ class PeriodicScan:
             frame = apart @ self.waves  # from frames to nm, turned
             metric = np.linalg.cholesky(frame.T @ frame).T
             across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
-            found.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
-        worst, across, along, shear = min(found)
+            readings.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
+        worst, across, along, shear = min(readings)
         if worst > _MOST_BENT_LATTICE:
             raise Unphysical(
                 f"as a hexagonal or square lattice the frame would be {across:.4g} x {along:.4g} nm and sheared by "
@@ -83,11 +87,15 @@ class PeriodicScan:
         return _scaled(self.distortion, across, along, shear)
 
 
-def _scaled(found: Distortion, across: float, along: float, shear: float) -> Distortion:
+def _scaled(distortion: Distortion, across: float, along: float, shear: float) -> Distortion:
     """Lines of a length and frames of a height in nm, the last line further right by ``shear``."""
-    drift = across * found.drift + shear * (found.y - 0.5 * (found.y[0] + found.y[-1]))
-    sides = [None if one is None else Sweep1D(across * one.x, one.time) for one in (found.forward, found.backward)]
-    return Distortion(found.rows, found.columns, sides[0], sides[1], along * found.y, drift, found.lag)
+    drift = across * distortion.drift + shear * (distortion.y - 0.5 * (distortion.y[0] + distortion.y[-1]))
+    sides = [
+        None if one is None else Sweep1D(across * one.x, one.time) for one in (distortion.forward, distortion.backward)
+    ]
+    return Distortion(
+        distortion.rows, distortion.columns, sides[0], sides[1], along * distortion.y, drift, distortion.lag
+    )
 
 
 def periodic_scan(
@@ -98,9 +106,12 @@ def periodic_scan(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> PeriodicScan:
-    """Images rows x columns of heights in any unit, rows in the order of time, as for ``fit_pair``; or a trace alone.
+    """Fit images, rows x columns of heights in any unit, rows in the order of time; or a trace alone.
 
-    Raises ``Unphysical`` where the images do not show one periodic sample, or too little of it.
+    Raises
+    ------
+    Unphysical
+        If the images do not show one periodic sample, or too little of it.
     """
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
@@ -128,13 +139,13 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
     state = settle(model, state.parameters, free)
     change = np.inf
     for _ in range(_ROUNDS):
-        by = [_more_x(bends, *one) for one in zip(state.left, state.steepness, across, strict=True)]
+        by = [_more_x(bends, *one) for one in zip(state.residuals, state.steepness, across, strict=True)]
         across = [one + step for one, step in zip(across, by, strict=True)]
         more = _without_line(
             [step @ bends for step in by], [model.columns(state.parameters, way).x for way, _ in model.images]
         )
         off = [one + step for one, step in zip(model.off, [*more, np.zeros_like(more[0])], strict=False)]
-        ahead = _more_phase(row_bends, state.left, model.phase_slopes(state), along)
+        ahead = _more_phase(row_bends, state.residuals, model.phase_slopes(state), along)
         along = along + ahead
         rows = _less_line(ahead @ row_bends)
         change = max(float(np.max(np.abs(one))) for one in (*more, rows / q))
@@ -156,19 +167,19 @@ def _series(count: int, terms: int) -> Floats:
 
 
 def _penalty(terms: int, normal: Floats) -> Floats:
-    """What keeps the series smooth where nothing else does."""
+    """Return the penalty that keeps the series smooth where nothing else does."""
     n = np.arange(terms, dtype=np.float64)
-    found: Floats = _STIFFNESS * float(np.mean(np.diag(normal))) * (n**4 + 1e-3)
-    return found
+    penalty: Floats = _STIFFNESS * float(np.mean(np.diag(normal))) * (n**4 + 1e-3)
+    return penalty
 
 
-def _more_x(basis: Floats, left: Floats, steep: Floats, known: Floats) -> Floats:
+def _more_x(basis: Floats, residual: Floats, steep: Floats, known: Floats) -> Floats:
     """By how much more of each term x of the columns is to have than ``known``, by least squares over all rows."""
-    weight, aim = np.sum(steep**2, axis=0), np.sum(steep * left, axis=0)
+    weight, aim = np.sum(steep**2, axis=0), np.sum(steep * residual, axis=0)
     normal = (basis * weight) @ basis.T
     penalty = _penalty(len(basis), normal)
-    found: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * known)
-    return found
+    step: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * known)
+    return step
 
 
 def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
@@ -177,11 +188,11 @@ def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
     return [np.asarray(one - np.polyval(line, x), np.float64) for one, x in zip(more, places, strict=True)]
 
 
-def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
-    """The same of the phase of each base vector along the rows: (bases, terms)."""
+def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
+    """Return the step of the phase of each base vector along the rows: (bases, terms)."""
     count, bases = len(basis), len(slopes[0])
     normal, aim = np.zeros((bases * count, bases * count)), np.zeros(bases * count)
-    for image, slope in zip(left, slopes, strict=True):
+    for image, slope in zip(residuals, slopes, strict=True):
         for i in range(bases):
             part = slice(i * count, (i + 1) * count)
             aim[part] += basis @ np.sum(slope[i] * image, axis=1)
@@ -189,12 +200,12 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], k
                 weight = np.sum(slope[i] * slope[j], axis=1)
                 normal[part, j * count : (j + 1) * count] += (basis * weight) @ basis.T
     penalty = np.tile(_penalty(count, normal), bases)
-    found = np.linalg.solve(normal + np.diag(penalty), aim - penalty * known.ravel())
-    return np.asarray(found.reshape(bases, count), dtype=np.float64)
+    step = np.linalg.solve(normal + np.diag(penalty), aim - penalty * known.ravel())
+    return np.asarray(step.reshape(bases, count), dtype=np.float64)
 
 
 def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
-    """A base vector's wave in the rows, averaged over so many that waves of as many periods in the line vanish."""
+    """Return a base vector's wave in the rows, averaged so that waves of as many periods in the line vanish."""
     q, s = model.q(state.parameters), model.s(state.parameters)[:, 0]
     nearest = np.inf
     for spot in (*model.spots, *-model.spots):
@@ -208,7 +219,7 @@ def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Comp
 
 
 def _followed(wave: Complexes) -> Floats:
-    """The phase of each row in periods, followed from the middle outwards: each step is near the one before."""
+    """Unwrap the phase of each row in periods, from the middle outwards: each step is near the one before."""
     seen = np.angle(wave) / (2.0 * np.pi)
     out = seen.copy()
     middle = len(seen) // 2
@@ -246,19 +257,19 @@ def _scan(model: PeriodicModel, state: FitState) -> PeriodicScan:
     for forward, _ in model.images:
         column = model.columns(parameters, forward)
         sweeps[forward] = Sweep1D(column.x, column.time + 0.5)
-    left = min(float(np.min(one.x)) for one in sweeps.values())
-    found = Distortion(
+    edge = min(float(np.min(one.x)) for one in sweeps.values())
+    distortion = Distortion(
         rows,
         geometry.columns,
-        _from(sweeps.get(True), left),
-        _from(sweeps.get(False), left),
+        _from(sweeps.get(True), edge),
+        _from(sweeps.get(False), edge),
         y - y[0],
         drift,
         float(parameters[LAG]),
     )
-    found.check()
+    distortion.check()
     total = sum(float(np.vdot(image, image)) for _, image in model.images)
-    return PeriodicScan(found, np.stack([q, slopes], axis=1), 1.0 - 2.0 * state.cost / total, tells_y)
+    return PeriodicScan(distortion, np.stack([q, slopes], axis=1), 1.0 - 2.0 * state.cost / total, tells_y)
 
 
 def _at_edges(values: Floats) -> Floats:
@@ -267,9 +278,9 @@ def _at_edges(values: Floats) -> Floats:
     return np.concatenate([outer[:1], 0.5 * (values[1:] + values[:-1]), outer[1:]])
 
 
-def _from(sweep: Sweep1D | None, left: float) -> Sweep1D | None:
-    """The same counted from ``left``."""
-    return None if sweep is None else Sweep1D(sweep.x - left, sweep.time)
+def _from(sweep: Sweep1D | None, edge: float) -> Sweep1D | None:
+    """Return the sweep counted from ``edge``."""
+    return None if sweep is None else Sweep1D(sweep.x - edge, sweep.time)
 
 
 def _independent(q: Floats, s: Floats) -> bool:

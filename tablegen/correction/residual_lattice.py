@@ -31,8 +31,8 @@ class ResidualLattice:
     @property
     def worst(self) -> tuple[float, float]:
         """The largest in pixels, along x and y; without the outermost thousandth."""
-        found = [float(np.nanpercentile(np.abs(one), 99.9)) if one is not None else 0.0 for one in (self.x, self.y)]
-        return found[0], found[1]
+        largest = [float(np.nanpercentile(np.abs(one), 99.9)) if one is not None else 0.0 for one in (self.x, self.y)]
+        return largest[0], largest[1]
 
 
 def residual_lattice(image: Floats) -> ResidualLattice | None:
@@ -53,12 +53,12 @@ def residual_lattice(image: Floats) -> ResidualLattice | None:
         inside = inside & good
     if int(np.sum(inside)) < image.size // 8:
         return None
-    left = [_less_plane(phase, inside) for phase in phases]
+    flattened = [_less_plane(phase, inside) for phase in phases]
     if len(waves) == 1:
-        (along, across), (one,) = waves[0], left
+        (along, across), (one,) = waves[0], flattened
         return ResidualLattice(-one / along, None) if abs(along) > abs(across) else None
     inverse = np.linalg.inv(np.array(waves))
-    x, y = (-(row[0] * left[0] + row[1] * left[1]) for row in inverse)
+    x, y = (-(row[0] * flattened[0] + row[1] * flattened[1]) for row in inverse)
     return ResidualLattice(x, y)
 
 
@@ -71,29 +71,29 @@ def _strongest(flat: Floats) -> list[tuple[float, float]]:
     searched &= (u > 0.0) | ((u == 0.0) & (v > 0.0))
     usual = float(np.median(power[searched]))
     power = np.where(searched, power, 0.0)
-    found: list[tuple[float, float]] = []
+    waves: list[tuple[float, float]] = []
     strongest = 0.0
     for _ in range(64):
         at = np.unravel_index(int(np.argmax(power)), power.shape)
         value = float(power[at])
         strongest = strongest or value
         if value < max(_STANDS_OUT * usual, _SECOND * strongest):
-            return found
+            return waves
         wave = float(u[0, at[1]]), float(v[at[0], 0])
         near = np.hypot((u - wave[0]) * columns, (v - wave[1]) * rows) < 3.0
         power = np.where(near, 0.0, power)
-        if not found:
-            found.append(wave)
+        if not waves:
+            waves.append(wave)
         else:
-            one = found[0]
+            one = waves[0]
             sine = abs(one[0] * wave[1] - one[1] * wave[0]) / (np.hypot(*one) * np.hypot(*wave))
             if sine > _LEAST_ANGLE:
                 return [one, wave]
-    return found
+    return waves
 
 
 def _phase(flat: Floats, seen: Bools, wave: tuple[float, float]) -> tuple[Floats, Bools]:
-    """The phase less the wave's own in periods, unwrapped, and where it can be believed."""
+    """Return the phase less the wave's own in periods, unwrapped, and where it is reliable."""
     rows, columns = flat.shape
     y, x = np.mgrid[:rows, :columns]
     sigma = _PERIODS_A_MEAN / float(np.hypot(*wave))
@@ -114,5 +114,5 @@ def _less_plane(phase: Floats, inside: Bools) -> Floats:
     rows, columns = phase.shape
     y, x = np.mgrid[:rows, :columns]
     terms = np.stack([np.ones(int(np.sum(inside))), x[inside], y[inside]], axis=1)
-    found = np.linalg.lstsq(terms, phase[inside], rcond=None)[0]
-    return np.where(inside, phase - found[0] - found[1] * x - found[2] * y, np.nan)
+    plane = np.linalg.lstsq(terms, phase[inside], rcond=None)[0]
+    return np.where(inside, phase - plane[0] - plane[1] * x - plane[2] * y, np.nan)

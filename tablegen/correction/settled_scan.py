@@ -54,7 +54,7 @@ class AxisScan:
 
 
 def triangle(size_v: float, offset_v: float, turn: float) -> Waveform:
-    """What an instrument without correction plays; (14), with the turn at the end of a period for a saw."""
+    """Return the waveform of an instrument without correction; (14), the turn at the end of a period for a saw."""
 
     def volts(time: Floats) -> Floats:
         back = (1.0 - time) / max(1.0 - turn, 1e-12)
@@ -72,9 +72,14 @@ class ScannerModel:
     folder: Path
 
     def moved(self, axis: Literal["x", "y"], scan: AxisScan) -> Floats:
-        """nm at even times of a period, above the lower turn or thereabouts.
+        """Return the position in nm at even times of a period, from near the lower turn on.
 
-        Raises ``Rejected`` with the keys that do not serve, ``Unphysical`` for a drive that the driver cannot have.
+        Raises
+        ------
+        Rejected
+            If the scanner or scan file has unsuitable keys, which the message names.
+        Unphysical
+            If the driver cannot put out the drive.
         """
         its: ScannerAxis = getattr(self.scanner, axis)
         driver = self.scanner.driver
@@ -122,16 +127,16 @@ class ScannerModel:
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
         )
-        found = hysteresis.loop(
+        loop_and_creep = hysteresis.loop(
             request,
             driver.share(low),
             driver.share(high),
             ModelProblems(axis, Document("the image", None), self.file, problems),
         )
         problems.stop_if_any()
-        if found is None:
-            raise Rejected(problems.found)
-        loop, creep = found
+        if loop_and_creep is None:
+            raise Rejected(problems.entries)
+        loop, creep = loop_and_creep
         return settled(loop, driver.share(drive), scan.rate_hz, creep, response, _HARMONICS)
 
 
@@ -154,30 +159,37 @@ def scanner_distortion(
     sides: tuple[bool, ...] = (True, False),
     delay_pixels: float = 0.0,
 ) -> Distortion:
-    """Where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
+    """Compute where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
 
     Columns are evenly spread in time over the window of each sweep of ``x``; they show the sample ``delay_pixels``
     late. Rows follow each other, ``lines`` in a period of ``y``, from where its window begins, on its way there, or
-    ``back``; see ``lines_of``. Raises ``Rejected`` and ``Unphysical``.
+    ``back``; see ``lines_of``.
+
+    Raises
+    ------
+    Rejected
+        If the scanner file does not suit the scan.
+    Unphysical
+        If the driver cannot put out the drive.
     """
     moved = model.moved("x", x)
     low, high = x.window
     place = low + (high - low) * (np.arange(columns) + 0.5) / columns
     late = delay_pixels * (high - low) / columns
-    found: dict[bool, Sweep1D] = {}
+    sweeps: dict[bool, Sweep1D] = {}
     for forward in sides:
         way = (place if forward else 1.0 - place) - late
         time = x.turn * way if forward else x.turn + (1.0 - x.turn) * way
-        found[forward] = Sweep1D(_at(moved, time), time)
+        sweeps[forward] = Sweep1D(_at(moved, time), time)
     begin = y.turn + (1.0 - y.turn) * (1.0 - y.window[1]) if back else y.turn * y.window[0]
     frame = begin + np.arange(rows + 1) / (lines or lines_of(rows, y, back))
     slow = _at(model.moved("y", y), frame) * (-1.0 if back else 1.0)
-    whole = Distortion(rows, columns, found.get(True), found.get(False), slow, np.zeros(rows + 1))
+    whole = Distortion(rows, columns, sweeps.get(True), sweeps.get(False), slow, np.zeros(rows + 1))
     whole.check()
-    left, top = whole.x_range[0], whole.y_range[0]
+    left_edge, top = whole.x_range[0], whole.y_range[0]
 
     def shifted(one: Sweep1D | None) -> Sweep1D | None:
-        return None if one is None else replace(one, x=one.x - left)
+        return None if one is None else replace(one, x=one.x - left_edge)
 
     return replace(whole, forward=shifted(whole.forward), backward=shifted(whole.backward), y=whole.y - top)
 

@@ -47,12 +47,12 @@ class StraightScan:
     @property
     def moved_pixels(self) -> tuple[float, float]:
         """The largest displacement along x and y, the mean one aside."""
-        found = []
+        spreads = []
         for axis in (0, 1):
             parts = np.concatenate([self.distortion.moved(way)[axis].ravel() for way, _ in self.distortion.sides])
             parts = parts[np.isfinite(parts)]
-            found.append(float(np.max(np.abs(parts - np.mean(parts)))))
-        return found[0], found[1]
+            spreads.append(float(np.max(np.abs(parts - np.mean(parts)))))
+        return spreads[0], spreads[1]
 
 
 def put_straight(
@@ -70,17 +70,17 @@ def put_straight(
     pictures = tuple(
         ScanPicture(one.title, one.forward, ways[one.forward](one.heights), one.unit, one.bottom_first) for one in taken
     )
-    found = None
+    match = None
     if len(judged) == 2:
         first, second = judged
         raw, straight = ((group[first].heights, group[second].heights) for group in (tuple(taken), pictures))
-        found = agreement(raw, straight, distortion)
+        match = agreement(raw, straight, distortion)
     before_and_after: dict[str, Any] = {}
-    if found is not None:
+    if match is not None:
         names = ("before", "after")
-        before_and_after["difference"] = dict(zip(names, (round(v, 6) for v in found.difference), strict=True))
-        if found.worst is not None:
-            before_and_after["apart_pixels"] = dict(zip(names, (round(v, 4) for v in found.worst), strict=True))
+        before_and_after["difference"] = dict(zip(names, (round(v, 6) for v in match.difference), strict=True))
+        if match.worst is not None:
+            before_and_after["apart_pixels"] = dict(zip(names, (round(v, 4) for v in match.worst), strict=True))
     rows, columns = distortion.rows, distortion.columns
     lattice = residual_lattice(pictures[judged[0]].heights)
     record: dict[str, Any] = {
@@ -97,4 +97,4 @@ def put_straight(
     if lattice is not None:
         off = (100.0 * worst / count for worst, count in zip(lattice.worst, (columns, rows), strict=True))
         record["lattice_off_percent"] = [round(value, 4) for value in off]
-    return StraightScan(pictures, size_nm, distortion, found, lattice, tuple(taken), tuple(judged), record)
+    return StraightScan(pictures, size_nm, distortion, match, lattice, tuple(taken), tuple(judged), record)

@@ -1,1 +1,1 @@
-"""The integer model of a device: its schedule, its registers and its sequencer. Integers alone; it imports no plan."""
+"""The integer model of a device: its schedule, its registers and its sequencer. It uses integers only, and no plan."""

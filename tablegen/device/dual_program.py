@@ -1,4 +1,4 @@
-"""What a bank of the device holds."""
+"""The content of a bank of the device."""
 
 from msgspec import Struct
 
@@ -7,7 +7,7 @@ from tablegen.fixedpoint.program import Program
 
 
 class DualProgram(Struct, frozen=True, eq=False):
-    """What a bank holds: both axes and the schedule they share."""
+    """The content of a bank: both axes and their common schedule."""
 
     x: Program
     y: Program

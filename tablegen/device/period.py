@@ -12,7 +12,7 @@ from tablegen.numerics.arrays import Bools, Ints
 
 @dataclass(frozen=True, eq=False)
 class Period:
-    """Ticks [first, first + len) of a period. All arrays have the shape (ticks,).
+    """The ticks [first, first + len) of a period. All arrays have the shape (ticks,).
 
     ``start`` marks the first tick of the period, ``line`` of each line, ``pixel`` of each pixel; ``backward`` is the
     sweep back, and ``inside`` the imaging window of this axis.
@@ -28,14 +28,19 @@ class Period:
 
     @property
     def ticks(self) -> Ints:
-        """The number of each tick in the period."""
+        """The number of each tick in the period, (ticks,)."""
         return np.arange(self.first, self.first + len(self.codes), dtype=np.int64)
 
 
 def period_of(program: DualProgram, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> Period:
-    """Ticks [first, stop) of the period of an axis; to its end unless given. Raises ``ValueError`` outside of it.
+    """Return ticks [first, stop) of the period of an axis; to its end unless given.
 
-    Of a shaped axis they are those of the first period since the program began: no two are the same.
+    For a shaped axis they are those of the first period since the program began: no two periods are the same.
+
+    Raises
+    ------
+    ValueError
+        If the ticks are outside the period.
     """
     schedule = program.schedule
     whole = schedule.ticks if axis == "x" else schedule.frame_ticks

@@ -1,4 +1,4 @@
-"""Lines of a program as they are played undisturbed: codes of both axes and the markers of every tick."""
+"""The lines of a program as they are played undisturbed: codes of both axes and the markers of every tick."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,9 +35,9 @@ class PlayedLines:
         self._remainders = program.x.output.begin(), program.y.output.begin()
 
     def unclamped(self, line: int, count: int = 1) -> tuple[Ints, Ints]:
-        """Codes of x and y on the next lines, from ``line`` of a frame on, before clamp and slew guard.
+        """Return codes of x and y on the next lines, from ``line`` of a frame on, before clamp and slew guard.
 
-        There are ``count`` of them, shapes (ticks,); all belong to one frame.
+        There are ``count`` lines, all of one frame; shapes (ticks,).
         """
         program, ticks = self._program, self._program.schedule.ticks
         y = program.y.unclamped(line * ticks, (line + count) * ticks, self._remainders[1])
@@ -47,11 +47,11 @@ class PlayedLines:
         return np.concatenate(x), y
 
     def play(self, line: int, settled: bool = True) -> LineTicks:
-        """The next line, which is ``line`` of a frame, as ``play_line`` has it."""
+        """Return the next line, which is ``line`` of a frame, as ``play_line`` does."""
         return self.ticks(line, self.unclamped(line), settled)
 
     def ticks(self, line: int, unclamped: tuple[Ints, Ints], settled: bool = True) -> LineTicks:
-        """Lines from ``line`` of a frame on, of which codes before the clamp are there, as they leave the device."""
+        """Return lines from ``line`` of a frame on as they leave the device, from their codes before the clamp."""
         schedule = self._program.schedule
         count = len(unclamped[0]) // schedule.ticks
         first, pixel, backward, inside = (_repeated(marker, count) for marker in self._markers)
@@ -70,12 +70,12 @@ class PlayedLines:
 
     @cached_property
     def _x_line(self) -> Ints:
-        """Codes of x on every line, where it is not shaped."""
+        """The codes of x on every line, where it is not shaped."""
         return self._program.x.unclamped(0, self._program.schedule.ticks, self._remainders[0])
 
     @cached_property
     def _markers(self) -> tuple[Bools, Bools, Bools, Bools]:
-        """Of every line: where it begins, pixels, what is backward, and what is within the windows."""
+        """The markers of every line: its beginning, pixels, backward sweep, and imaging windows."""
         schedule = self._program.schedule
         k = np.arange(schedule.ticks, dtype=np.int64)
         pixel = np.zeros(schedule.ticks, dtype=np.bool_)
@@ -88,9 +88,12 @@ class PlayedLines:
 
 
 def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTicks:
-    """Line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling.
+    """Return line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling.
 
-    Raises ``ValueError`` where an axis is shaped: the lines before belong to it, and ``PlayedLines`` plays them.
+    Raises
+    ------
+    ValueError
+        If an axis is shaped: its codes depend on the lines before, and ``PlayedLines`` plays them.
     """
     program.x.require_period()
     program.y.require_period()
@@ -98,5 +101,5 @@ def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTick
 
 
 def _repeated(line: NDArray[Part], count: int) -> NDArray[Part]:
-    """What every line has, so many times; of one line no copy, since lines may be long."""
+    """Return the values of a line ``count`` times; of one line no copy, since lines may be long."""
     return line if count == 1 else np.tile(line, count)

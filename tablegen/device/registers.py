@@ -44,9 +44,12 @@ _MASK = (1 << 32) - 1
 
 
 def program_words(schedule: Schedule, x: Program, y: Program, harmonics: tuple[int, int] = (0, 0)) -> list[int]:
-    """All words of a program in order of address, unsigned; unused ones 0. Shape (3 * 16,).
+    """Return all words of a program in order of address, unsigned; unused ones 0. Shape (3 * 16,).
 
-    ``harmonics`` are those of x and y where the device renders the table from Fourier words, 0 where it is uploaded.
+    Parameters
+    ----------
+    harmonics
+        Those of x and y where the device renders the table from Fourier words, 0 where it is uploaded.
     """
     pages = [
         _scan(schedule, steps=y.hold != 1),

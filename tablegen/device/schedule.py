@@ -1,4 +1,4 @@
-"""Which tick belongs to which line, pixel and direction; one counter for both axes. Integers alone."""
+"""The schedule of both axes: which tick belongs to which line, pixel and direction. Integers only."""
 
 from fractions import Fraction
 from math import floor
@@ -49,7 +49,7 @@ class Schedule(Struct, frozen=True):
 
     @property
     def update_rate_millihz(self) -> int:
-        """Ticks in a thousand seconds, to the nearest, ties up: what an integer can say of the update rate."""
+        """The ticks in a thousand seconds, to the nearest, ties up: the update rate as an integer."""
         return floor(self.update_rate_hz * 1000 + Fraction(1, 2))
 
     @property
@@ -68,7 +68,7 @@ class Schedule(Struct, frozen=True):
         return self.line_rate / self.lines
 
     def seconds(self, ticks: Ints) -> Floats:
-        """When ticks happen, in s from tick 0: the nearest float to the exact quotient."""
+        """Return the times of ticks, in s from tick 0, of their shape: the nearest float to the exact quotient."""
         rate = self.update_rate_hz
         if rate.numerator < _EXACT and int(np.max(ticks, initial=0)) * rate.denominator < _EXACT:
             return ticks * rate.denominator / rate.numerator
@@ -76,14 +76,15 @@ class Schedule(Struct, frozen=True):
 
     @property
     def pixel_ticks(self) -> Fraction:
-        """Ticks per pixel of the forward sweep; pixel p starts at the tick ceil(p pixel_ticks) of the window."""
+        """The ticks per pixel of the forward sweep; pixel p starts at the tick ceil(p pixel_ticks) of the window."""
         return Fraction(self.forward.count, self.pixels)
 
 
 def pixel_starts(window: Window, pixels: int) -> Ints:
-    """Ticks at which pixels start: i-th tick of the window where floor(i pixels / count) exceeds the one before.
+    """Return the ticks at which pixels start: tick i of the window where floor(i pixels / count) rises.
 
-    A device adds ``pixels`` to an accumulator and takes off ``count`` when it can: no multiplier.
+    A device adds ``pixels`` to an accumulator and subtracts ``count`` when it can: no multiplier. Shape (pixels,) where
+    the window has a tick for each.
     """
     i = np.arange(window.count, dtype=np.int64)
     pixel = i * pixels // max(window.count, 1)

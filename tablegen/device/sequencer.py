@@ -12,14 +12,14 @@ import numpy as np
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.played_lines import LineTicks, PlayedLines
 from tablegen.device.schedule import Schedule
-from tablegen.device.slew import guarded
+from tablegen.device.slew import limit_slew
 from tablegen.numerics.arrays import Bools, Ints
 
-_MOST_TICKS = 1 << 14  # of lines that are worked out together, in the cache
+_MOST_TICKS = 1 << 14  # of lines that are computed at a time, so that they fit the cache
 
 
 class SequencerState(Enum):
-    """What the sequencer is doing."""
+    """The states of the sequencer."""
 
     PARKED = "parked"
     RUNNING = "running"
@@ -36,7 +36,7 @@ class Fault(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """What leaves the sequencer on one tick: two codes, markers, what it did, and the faults so far."""
+    """The outputs of the sequencer on one tick: two codes, markers, what it did, and the faults so far."""
 
     x: int
     y: int
@@ -55,10 +55,11 @@ class Tick:
 class Sequencer:
     """A device, tick by tick.
 
-    ``commit`` fills the idle bank; it is taken at the next line start, or on the next tick while no line plays.
+    ``commit`` fills the idle bank; it is swapped in at the next line start, or on the next tick while no line plays.
     ``arm`` and ``trigger`` start ``frames`` frames (0: without end) from line 0; ``park`` ends them at once. Parked
     and parking outputs follow the park code under the slew guard of the bank that plays. A device without a program
-    (``playing`` is None) holds its ``codes`` and ignores triggers.
+    (``playing`` is None) holds its ``codes``. It ignores triggers, unless its first program is committed: then the scan
+    starts when that program is swapped in.
     """
 
     playing: DualProgram | None
@@ -82,43 +83,47 @@ class Sequencer:
             self.codes = self.playing.x.output.park_code, self.playing.y.output.park_code
             self.parked = True
         self._lines: PlayedLines | None = None
-        # Lines that are worked out together, where their codes are clamped, and which tick of them is the next one.
+        # The lines that were computed ahead, where their codes are clamped, and which tick of them is the next one.
         self._ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
         self._at = 0
 
     @property
     def state(self) -> SequencerState:
-        """What the last tick and the requests since have made of it."""
+        """The state after the last tick and the requests since."""
         return (
             SequencerState.RUNNING if self.running else SequencerState.PARKED if self.parked else SequencerState.PARKING
         )
 
     def commit(self, program: DualProgram) -> None:
-        """Put a program into the idle bank, complete and checked, to be taken at the next line start."""
+        """Put a complete and checked program into the idle bank, to be swapped in at the next line start."""
         self.idle = program
 
     def withdraw(self) -> None:
-        """A committed program that was not taken yet is not to be played."""
+        """Discard a committed program that was not swapped in yet, and the scan of it if it is the first one."""
         self.idle = None
+        if self.playing is None:
+            self.running = False
 
     def arm(self, frames: int = 0) -> None:
-        """Let the next trigger start so many frames; 0 is without end."""
+        """Let the next trigger start that many frames; 0 is without end."""
         self.armed = True
         self._armed_frames = frames  # a scan that plays keeps its own count
 
     def trigger(self) -> bool:
         """Start at line 0 on the next tick; ignored unless armed, not running, and with a program to play.
 
-        The codes need not have parked: in a pipeline nobody knows yet, and the slew guard holds anyway.
+        A committed program counts: the next tick swaps it in. The codes need not have parked: in a pipeline that is not
+        known yet, and the slew guard acts anyway.
         """
-        if not self.armed or self.running or self.playing is None:
+        program = self.idle if self.playing is None else self.playing
+        if not self.armed or self.running or program is None:
             return False
         self.armed = self.parked = False
         self._endless = self._armed_frames == 0
         self.frames_left = self._armed_frames
         self.running = True
-        self._begin(self.playing)
+        self._begin(program)
         return True
 
     def park(self) -> None:
@@ -126,19 +131,19 @@ class Sequencer:
         self.armed = self.running = False
 
     def reset(self) -> None:
-        """As at power-up, but for program and codes: they ramp to the park codes, since a reset must not jump."""
+        """Reset to power-up, except program and codes: they ramp to the park codes, since a reset must not jump."""
         self.park()
         self.parked = False
         self.withdraw()
         self.clear_faults()
 
     def clear_faults(self) -> None:
-        """Forget sticky faults and their counts."""
+        """Clear sticky faults and their counts."""
         self.faults = Fault.NONE
         self.fault_counts = dict.fromkeys(self.fault_counts, 0)
 
     def step(self) -> Tick:
-        """Play one tick and return what leaves."""
+        """Play one tick and return the outputs."""
         swapped = False
         if self.idle is not None and (not self.running or self.tick == 0):
             self.playing, self.idle = self.idle, None
@@ -171,19 +176,19 @@ class Sequencer:
         return out
 
     def ahead(self, most: int) -> tuple[LineTicks, Ints] | None:
-        """Play the next ticks of a frame at once, at most so many: what ``step`` would make of each of them.
+        """Play the next ticks of a frame at once, at most ``most``, with the results of ``step`` for each of them.
 
-        With their faults so far, shape (ticks,). None where nothing plays, or another program begins.
+        Returns them with their faults so far, shape (ticks,); None where nothing plays, or another program begins.
         """
         program = self.playing
         if not self.running or program is None or (self.tick == 0 and self.idle is not None):
             return None
         lines, period = self._next_lines(program.schedule), program.schedule.ticks
-        if self.idle is not None:  # to be taken where the next line begins
+        if self.idle is not None:  # it is swapped in where the next line begins
             most = min(most, period - self.tick)
         part = slice(self._at, min(self._at + most, len(lines.x)))
-        x = guarded(lines.x[part], self.codes[0], program.x.output.max_step)
-        y = guarded(lines.y[part], self.codes[1], program.y.output.max_step)
+        x = limit_slew(lines.x[part], self.codes[0], program.x.output.max_step)
+        y = limit_slew(lines.y[part], self.codes[1], program.y.output.max_step)
         reached = (x == lines.x[part]) & (y == lines.y[part])
         slewed = ~reached
         if self.catching_up:  # no fault until the output has reached the waveform
@@ -202,7 +207,7 @@ class Sequencer:
         return LineTicks(x, y, *markers, valid), faults
 
     def _next_lines(self, schedule: Schedule) -> LineTicks:
-        """The lines that are played now; where they are over the next ones, at first one, then ever more of a frame."""
+        """Return the lines that are played now, or compute the next ones after their end: first one, then ever more."""
         assert self._lines is not None
         if self._ticks is None or self._at == len(self._ticks.x):
             before = 0 if self._ticks is None else len(self._ticks.x) // schedule.ticks
@@ -213,14 +218,14 @@ class Sequencer:
         return self._ticks
 
     def _begin(self, program: DualProgram) -> None:
-        """A program starts at its own line 0, unsettled, and away from where the output is."""
+        """Start a program at its own line 0, unsettled, and away from where the output is."""
         self.tick = self.line = 0
         self.settle_left = program.schedule.settle_lines
         self.catching_up = True
         self._lines, self._ticks = PlayedLines(program), None
 
     def _advance(self, schedule: Schedule, ticks: int = 1) -> None:
-        """So many ticks of a frame are over."""
+        """Advance by ``ticks`` ticks of a frame."""
         self._at += ticks
         lines, self.tick = divmod(self.tick + ticks, schedule.ticks)
         self.settle_left = max(self.settle_left - lines, 0)
@@ -242,7 +247,7 @@ class Sequencer:
         return Tick(*self.codes, swapped=swapped, parked=self.parked, faults=self.faults)
 
     def _approach(self, program: DualProgram, x: int, y: int) -> bool:
-        """Move both codes towards their targets, by at most max_step each; whether both arrived."""
+        """Move both codes towards their targets, by at most max_step each; return True if both arrived."""
         x_step, y_step = program.x.output.max_step, program.y.output.max_step
         x_now, y_now = self.codes
         self.codes = (

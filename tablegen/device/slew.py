@@ -1,14 +1,14 @@
-"""The slew guard over many ticks at once: what moving by at most a step a tick towards a moving target makes."""
+"""The slew guard over many ticks at once: codes that follow a moving target by at most a step a tick."""
 
 import numpy as np
 
 from tablegen.numerics.arrays import Ints
 
-_AHEAD = 256  # ticks of a ramp that are looked at together
+_AHEAD = 256  # ticks of a ramp that are examined at a time
 
 
-def guarded(targets: Ints, code: int, step: int) -> Ints:
-    """Codes of shape (ticks,) that follow ``targets`` from ``code`` on, by at most ``step`` >= 1 a tick."""
+def limit_slew(targets: Ints, code: int, step: int) -> Ints:
+    """Return codes of shape (ticks,) that follow ``targets`` from ``code`` on, by at most ``step`` >= 1 a tick."""
     codes = targets.copy()
     jumps = np.flatnonzero(np.abs(np.diff(targets)) > step) + 1  # ticks before which the output may be at the target
     at = 0

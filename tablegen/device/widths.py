@@ -1,4 +1,4 @@
-"""Whether a program fits the registers of a device of given widths, and the least widths that it fits.
+"""The check that a program fits the registers of a device of given widths, and the least widths that it fits.
 
 The arithmetic of ``dac_fit.v``, which refuses the commit of any other program: a value that does not fit would be
 another one in its register. Widths are the parameters of ``dac_sequencer``, in lower case.
@@ -18,7 +18,7 @@ LEAST_LINE_TICKS = 8
 
 
 class AxisWidths(Struct, frozen=True):
-    """Of an axis: a table of 2^``index_bits`` words, periods below 2^``period_bits``; no harmonics, no renderer."""
+    """The widths of an axis: a table of 2^``index_bits`` words, periods below 2^``period_bits``."""
 
     interpolated: bool
     index_bits: int
@@ -27,7 +27,7 @@ class AxisWidths(Struct, frozen=True):
 
 
 class Widths(Struct, frozen=True):
-    """Of a device; at most ``harmonics`` are rendered, 0 where it has no renderer; ``shaping`` up to that order."""
+    """The widths of a device; at most ``harmonics`` are rendered, 0 without a renderer; ``shaping`` is an order."""
 
     dac_bits: int
     tick_bits: int
@@ -39,16 +39,16 @@ class Widths(Struct, frozen=True):
 
 
 def misfits(words: Sequence[int], widths: Widths) -> list[str]:
-    """The words of a program that do not fit, as ``scan.line_ticks`` or ``y.gain``, in order of address.
+    """Return the words of a program that do not fit, as ``scan.line_ticks`` or ``y.gain``, in order of address.
 
     ``words`` are those of ``program_words``, unsigned, 48 of them.
     """
     pages = [words[page * PAGE_WORDS : (page + 1) * PAGE_WORDS] for page in range(3)]
-    found = [f"scan.{name}" for name, word in zip(SCAN_WORDS, pages[0], strict=False) if not _scan(name, word, widths)]
+    names = [f"scan.{name}" for name, word in zip(SCAN_WORDS, pages[0], strict=False) if not _scan(name, word, widths)]
     for axis, page, own in (("x", pages[1], widths.x), ("y", pages[2], widths.y)):
         wrong = (name for name, word in zip(AXIS_WORDS, page, strict=False) if not _axis(name, word, own, widths))
-        found += [f"{axis}.{name}" for name in wrong]
-    return found
+        names += [f"{axis}.{name}" for name in wrong]
+    return names
 
 
 def _scan(name: str, word: int, widths: Widths) -> bool:
@@ -94,7 +94,7 @@ def _is_signed(word: int, bits: int) -> bool:
 
 
 def least_widths(schedule: Schedule, y: Program) -> dict[str, int]:
-    """The least TICK_BITS, LINE_BITS and PERIOD_BITS of a ``dac_sequencer`` that plays a program, by name."""
+    """Return the least TICK_BITS, LINE_BITS and PERIOD_BITS of a ``dac_sequencer`` that plays a program, by name."""
     return {
         "TICK_BITS": max((schedule.ticks - 1).bit_length(), 3),
         "LINE_BITS": max((schedule.lines - 1).bit_length(), 1),

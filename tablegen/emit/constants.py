@@ -22,7 +22,7 @@ def scan_constants(content: Content) -> dict[str, int]:
 
 
 def shaping_constants(content: Content) -> dict[str, int]:
-    """The highest order of shaping, which a device has to have; none where neither axis shapes."""
+    """Return the highest order of shaping, which a device must have; nothing where neither axis shapes."""
     highest = max(axis.program.output.shaping.order for axis in content.axes)
     return {"SHAPING": highest} if highest else {}
 

@@ -20,7 +20,7 @@ _SUFFIX_RULE = re.compile(
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
-    """A rule for the target, and a target without a rule for each prerequisite.
+    """Write a rule for the target, and a target without a rule for each prerequisite.
 
     The latter are why a prerequisite that was removed makes its dependents be built again, and not make fail. Names are
     those of which ``why_unsafe`` says nothing.
@@ -31,7 +31,7 @@ def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
 
 
 def _escaped(name: bytes) -> bytes:
-    """A file name as make reads it: a backslash counts only where it stands before what it escapes."""
+    """Escape a file name for make: a backslash counts only where it stands before what it escapes."""
     return re.sub(rb"(\\*)([ #:])", rb"\1\1\\\2", name).replace(b"$", b"$$")
 
 
@@ -65,19 +65,19 @@ _OTHER_MODULES = ("firmware_templates/__init__.py",)
 
 
 def deciding_files(formats: Iterable[str]) -> list[Path]:
-    """What decides the bytes of a build in these formats, beside its input, in order of path.
+    """List what decides the bytes of a build in these formats, beside its input, in order of path.
 
     The modules of this package, those of the formats, their templates and their runtime. In an installed package the
     record of the installation too, whose path has the version: package managers that give files the times of an
     archive would otherwise hide a change of version from make.
     """
-    wanted = chosen(formats)
-    names = {each.name for each in wanted}
+    formats_used = chosen(formats)
+    names = {each.name for each in formats_used}
     others = {PACKAGE / name for name in (*_OTHER_FOLDERS, *_OTHER_MODULES)}
     others |= {PACKAGE / "emit" / "formats" / f"{n.replace('-', '_')}.py" for n in own_names() if n not in names}
     others.add(PACKAGE / "firmware_templates")
     modules = {path for path in PACKAGE.rglob("*.py") if not others.intersection((path, *path.parents))}
-    for each in wanted:
+    for each in formats_used:
         with failing_as_format(each):
             modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
     return sorted({*modules, *records(PACKAGE.parent)})

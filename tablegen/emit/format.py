@@ -39,7 +39,7 @@ class Format(ABC):
 
     @abstractmethod
     def files(self, content: Content) -> dict[str, bytes]:
-        """The files of a build by name, without the runtime. Raises ``Unphysical`` for one that it cannot hold."""
+        """Render the files of a build by name, without the runtime. Raises ``Unphysical`` if it cannot hold it."""
 
     def runtime(self) -> list[Path]:
         """Files that go with it unchanged, such as a sequencer."""
@@ -50,31 +50,31 @@ class Format(ABC):
         return self.runtime()
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
-        """The files in a folder against the content of a manifest: unless overridden, made again and compared."""
-        wanted, wrong = self.files(content), []
-        for name, right in wanted.items():
+        """Compare the files in a folder with the content of a manifest; unless overridden, by rendering them again."""
+        expected, wrong = self.files(content), []
+        for name, right in expected.items():
             try:
-                found = read_bytes(folder / name, BUILD_FILE)
+                content_read = read_bytes(folder / name, BUILD_FILE)
             except OSError as error:
                 wrong.append(f"{name}: cannot be read: {error.strerror or error}")
                 continue
-            if difference := self._first_difference(found, right):
+            if difference := self._first_difference(content_read, right):
                 wrong.append(f"{name}: {difference}")
-        count = len(wanted)
+        count = len(expected)
         return [Comparison("files", f"{count} file{'s' if count != 1 else ''}", wrong)]
 
-    def _first_difference(self, found: bytes, right: bytes) -> str | None:
+    def _first_difference(self, stored: bytes, right: bytes) -> str | None:
         """Where a file and what the manifest makes of it differ first, but for the comment at the beginning."""
-        skipped, body = self._after_comment(found)
-        wanted = self._after_comment(right)[1]
-        if body == wanted:
+        skipped, body = self._after_comment(stored)
+        expected = self._after_comment(right)[1]
+        if body == expected:
             return None
         try:
-            ours, others = body.decode("ascii").splitlines(), wanted.decode("ascii").splitlines()
+            ours, others = body.decode("ascii").splitlines(), expected.decode("ascii").splitlines()
         except UnicodeDecodeError:
-            pairs = enumerate(zip(body, wanted, strict=False))
-            at = next((i for i, (a, b) in pairs if a != b), min(len(body), len(wanted)))
-            return f"byte {at} is not as the manifest has it; {len(body)} bytes, {len(wanted)} by the manifest"
+            pairs = enumerate(zip(body, expected, strict=False))
+            at = next((i for i, (a, b) in pairs if a != b), min(len(body), len(expected)))
+            return f"byte {at} is not as the manifest has it; {len(body)} bytes, {len(expected)} by the manifest"
         for at, (line, other) in enumerate(zip(ours, others, strict=False)):
             if line != other:
                 return f"line {skipped + at + 1} is {line.strip()[:40]!r}, it is {other.strip()[:40]!r} by the manifest"
@@ -90,15 +90,15 @@ class Format(ABC):
         return skipped, b"".join(lines[skipped:])
 
 
-def differing(name: str, found: Mapping[str, int | str], wanted: Mapping[str, int | str]) -> list[str]:
-    """The constants that a header has not, has otherwise, or has beyond those that it is to have."""
+def differing(name: str, stored: Mapping[str, int | str], expected: Mapping[str, int | str]) -> list[str]:
+    """List the constants that a header lacks, has with another value, or has beyond those that are expected."""
     wrong = []
-    for key, value in wanted.items():
-        if key not in found:
+    for key, value in expected.items():
+        if key not in stored:
             wrong.append(f"{name}: {key} is missing, it is {_shown(value)} in the manifest")
-        elif found[key] != value:
-            wrong.append(f"{name}: {key} is {_shown(found[key])}, it is {_shown(value)} in the manifest")
-    return wrong + [f"{name}: {key} is not in the manifest" for key in found if key not in wanted]
+        elif stored[key] != value:
+            wrong.append(f"{name}: {key} is {_shown(stored[key])}, it is {_shown(value)} in the manifest")
+    return wrong + [f"{name}: {key} is not in the manifest" for key in stored if key not in expected]
 
 
 def _shown(value: int | str) -> str:

@@ -40,7 +40,7 @@ class Memory(Struct, frozen=True, eq=False):
         return np.array([word & mask for word in self.words], dtype=f"<u{self.word_bytes}").tobytes()
 
     def described(self, content: Content) -> str:
-        """A line for a comment: which words of which build these are."""
+        """Return a line for a comment: which words of which build these are."""
         return f"{content.name}, {self.what}: {len(self.words)} words of {self.bits} bits; plan {content.hash}"
 
 
@@ -51,7 +51,7 @@ def memories(content: Content) -> list[Memory]:
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
-    """The words, each in as many hexadecimal digits as ``bits`` take."""
+    """Write the words, each in as many hexadecimal digits as ``bits`` take."""
     digits, mask = -(-bits // 4), (1 << bits) - 1
     values = np.asarray(words if isinstance(words, np.ndarray | list) else list(words), dtype=np.int64)
     if len(values) and digits % 2 == 0:  # whole bytes, which are spelled all at once
@@ -69,17 +69,17 @@ def memory_files(
     last register of their axis, which is 0 here. The quarter sine is that of the longest interpolated table, and serves
     shorter ones too; where no table is interpolated there is none.
     """
-    found = _memories(schedule, x, y, fourier)
-    return {f"{name}_{memory.name}.mem": memory_file(memory.words, memory.bits) for memory in found}
+    memories = _memories(schedule, x, y, fourier)
+    return {f"{name}_{memory.name}.mem": memory_file(memory.words, memory.bits) for memory in memories}
 
 
 def _memories(schedule: Schedule, x: Program, y: Program, fourier: Mapping[Literal["x", "y"], Ints]) -> list[Memory]:
-    found = []
+    memories = []
     programs: tuple[tuple[Literal["x", "y"], Program], ...] = (("x", x), ("y", y))
     for axis, program in programs:
-        found.append(Memory(axis, program.words.tolist(), program.bits, f"table of {axis}"))
-        found.append(Memory(f"{axis}_fourier", fourier[axis].tolist(), WORD_BITS, f"Fourier words of {axis}"))
-    found.append(Memory("program", program_words(schedule, x, y), WORD_BITS, "registers of the program"))
+        memories.append(Memory(axis, program.words.tolist(), program.bits, f"table of {axis}"))
+        memories.append(Memory(f"{axis}_fourier", fourier[axis].tolist(), WORD_BITS, f"Fourier words of {axis}"))
+    memories.append(Memory("program", program_words(schedule, x, y), WORD_BITS, "registers of the program"))
     if index_bits := max(x.index_bits, y.index_bits):
-        found.append(Memory("sine", sine_quarter(index_bits).tolist(), WORD_BITS, "quarter sine"))
-    return found
+        memories.append(Memory("sine", sine_quarter(index_bits).tolist(), WORD_BITS, "quarter sine"))
+    return memories

@@ -30,13 +30,13 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     ``formats`` are those of the plan unless given. Raises ``UnknownFormat``, and ``Unphysical`` for a scan that a
     format cannot hold.
     """
-    wanted = chosen(plan.formats if formats is None else formats)
+    chosen_formats = chosen(plan.formats if formats is None else formats)
     record = plan_record(plan)
     digest = content_hash(record)
     content = plan_content(plan, certificates, digest)
     files: dict[str, bytes] = {}
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
-    for each in wanted:
+    for each in chosen_formats:
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each)
@@ -51,7 +51,7 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
                 raise UnknownFormat(f"{each.name!r} writes {name!r} beside {other!r}, which some disks take for one")
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
-    files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
+    files[MANIFEST] = manifest_file(record, digest, [each.name for each in chosen_formats], certificates, files)
     return files
 
 
@@ -110,7 +110,7 @@ def format_rejected(setup: Setup, why: str, *, given: bool) -> Rejected:
 
 
 def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) -> Content:
-    """What formats see of a plan."""
+    """Return what formats see of a plan."""
 
     def axis(line: LinePlan) -> AxisContent:
         converter = line.converter
@@ -131,13 +131,13 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
 
 @cache
 def runtime_files(of: Format) -> dict[str, bytes]:
-    """What goes with a format unchanged, by name: a sequencer, or nothing."""
+    """Read the files that go with a format unchanged, by name: a sequencer, or nothing."""
     return {path.name: path.read_bytes() for path in of.runtime()}
 
 
 @cache
 def own_runtime(of: Format) -> set[str]:
-    """The names of those files among ``runtime_files`` that are tablegen's own, whoever's format this is."""
+    """List the names among ``runtime_files`` that are tablegen's own, whoever's format this is."""
     known, own = own_runtime_folders(), resource_folder("firmware_templates").resolve()
     # Links are followed only where the path does not say it: to follow that of every file is some percent of a build.
     return {path.name for path in of.runtime() if path.parent in known or own in path.resolve().parents}

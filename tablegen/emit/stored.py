@@ -8,11 +8,11 @@ from tablegen.manifest.read import StoredBuild
 
 
 def stored_content(stored: StoredBuild) -> Content:
-    """The content of a build, from its manifest alone."""
+    """Return the content of a build, from its manifest alone."""
 
     def axis(name: Literal["x", "y"], program: Program) -> AxisContent:
-        found = getattr(stored.manifest.axes, name)
-        return AxisContent(name, program, found.fourier_words, found.output.v_zero, found.output.v_per_code)
+        entry = getattr(stored.manifest.axes, name)
+        return AxisContent(name, program, entry.fourier_words, entry.output.v_zero, entry.output.v_per_code)
 
     name = stored.manifest.name
     return Content(

@@ -19,7 +19,7 @@ _SETTINGS: dict[str, Any] = {
 def template(
     name: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., object]
 ) -> bytes:
-    """A template of ``firmware_templates/`` rendered; ``literal`` is the filter that spells an integer."""
+    """Render a template of ``firmware_templates/``; ``literal`` is the filter that spells an integer."""
     text: str = _environment(literal, tuple(filters.items())).get_template(name).render(context)
     return text.encode("ascii")
 
@@ -27,7 +27,7 @@ def template(
 def template_text(
     text: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., object]
 ) -> bytes:
-    """The same for a template that is given as text."""
+    """Render a template that is given as text; ``literal`` is the filter that spells an integer."""
     rendered: str = _environment(literal, tuple(filters.items())).from_string(text).render(context)
     return rendered.encode("ascii")
 

@@ -29,7 +29,7 @@ class Waveform:
 
 
 def waveforms(content: Content) -> tuple[Waveform, Waveform]:
-    """A line of x and a frame of y. Raises ``Unphysical`` where there is no file of one period."""
+    """Compute a line of x and a frame of y. Raises ``Unphysical`` where there is no file of one period."""
     require_period(content)
     return _waveform(content, "x"), _waveform(content, "y")
 

@@ -39,10 +39,10 @@ def write_files(
     """
     if (other := other_than_file(folder)) not in (None, "a directory"):
         raise NoPlace(f"{folder}: is {other}, where a directory has to go")
-    made = [path for path in (folder, *folder.parents) if not os.path.exists(path)]
+    new_folders = [path for path in (folder, *folder.parents) if not os.path.exists(path)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with locked(folder), _removed_if_empty(made):
+        with locked(folder), _removed_if_empty(new_folders):
             _remove_litter(folder)
             return _write(folder, files, list(outdated() if callable(outdated) else outdated))
     except OSError as error:
@@ -83,12 +83,12 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
 
 
 @contextmanager
-def _removed_if_empty(made: Sequence[Path]) -> Iterator[None]:
+def _removed_if_empty(new_folders: Sequence[Path]) -> Iterator[None]:
     """Directories that were made, the innermost first, go again at the end if nothing came to stand in them."""
     try:
         yield
     finally:
-        for path in made:
+        for path in new_folders:
             if not os.path.isdir(path) or any(path.iterdir()):
                 break
             path.rmdir()
@@ -164,7 +164,7 @@ def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
-    """What the manifest in a folder lists beyond these files, with digests; nothing where it is not one of a build.
+    """Read what the manifest in a folder lists beyond these files, with digests; nothing where it is not of a build.
 
     A manifest of another program, or one that somebody has edited, says nothing of what may be removed.
     """

@@ -47,20 +47,25 @@ class Growth:
 
 
 def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Growth:
-    """(22) through the residuals of one direction at normalised amplitudes, weighted by their standard errors.
+    """Fit (22) to the residuals of one direction at normalised amplitudes, weighted by their standard errors.
 
-    ``rho`` is kept where the amplitudes do not determine it. Raises ``Unphysical``.
+    ``rho`` is kept where the amplitudes do not determine it.
+
+    Raises
+    ------
+    Unphysical
+        If the residuals have the wrong sign or make no law.
     """
     remarks: list[Remark] = []
     beta = np.array([branch.beta.value for branch in branches])
     error = np.maximum([branch.beta.standard_error for branch in branches], _LEAST_BETA_ERROR)
-    found = None
+    fit = None
     if float(np.max(v)) - float(np.min(v)) > 0.05:
-        found = _both(v, beta, error, rho, remarks)
-    freedom = max(len(v) - (1 if found is None else 2), 1)
-    if found is None:
+        fit = _both(v, beta, error, rho, remarks)
+    freedom = max(len(v) - (1 if fit is None else 2), 1)
+    if fit is None:
         steep = _steepest(v, beta, error, rho)
-        found = _height(v, beta, error, steep or rho, remarks)
+        fit = _height(v, beta, error, steep or rho, remarks)
         remarks.append(
             Remark(f"the residual hardly grows with the amplitude: rho is only known to be large, {steep:g} was taken")
             if steep
@@ -69,7 +74,7 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
                 f"more, best from 0.2 to 1 of v_max"
             )
         )
-    beta_max, estimate = found
+    beta_max, estimate = fit
     if beta_max.value <= 0.0 and np.all(beta > -_NOISE_LIMIT_ERRORS * error):
         raise Unphysical(_NO_HYSTERESIS)
     if beta_max.value <= 0.0:
@@ -92,27 +97,27 @@ def _both(
     """beta_max and rho, or None where rho stays open."""
 
     def residuals(x: Floats) -> Floats:
-        left: Floats = (x[0] * _share(v, float(x[1])) - beta) / error
-        return left
+        misfit: Floats = (x[0] * _share(v, float(x[1])) - beta) / error
+        return misfit
 
     start = [float(beta[np.argmax(v)]) / float(_share(np.array(np.max(v)), rho)), rho]
-    found = solve(residuals, start, ("beta_max", "rho"), [0.5, 5.0], ([-1.0, 1e-6], [1.0, 100.0]))
-    value, spread = found.values, np.sqrt(np.diag(found.unit_covariance))
+    solution = solve(residuals, start, ("beta_max", "rho"), [0.5, 5.0], ([-1.0, 1e-6], [1.0, 100.0]))
+    value, spread = solution.values, np.sqrt(np.diag(solution.unit_covariance))
     if not 2e-6 < value[1] < _LARGEST_RHO or not spread[1] < _OPEN_RHO:
         return None
-    what, percent = "(22) misses the measured residuals", _percent(found.residuals * error)
-    spread = spread * sqrt(_variance(found.residuals, found.freedom, what, remarks, percent))
+    what, percent = "(22) misses the measured residuals", _percent(solution.residuals * error)
+    spread = spread * sqrt(_variance(solution.residuals, solution.freedom, what, remarks, percent))
     return Estimate(float(value[0]), float(spread[0])), Estimate(float(value[1]), float(spread[1]))
 
 
 def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | None:
-    """The rho that fits best where it is large and open, if the one that would be kept is far worse; else None."""
+    """Return the rho that fits best where it is large and open, if the usual one fits far worse; else None."""
     grid = np.geomspace(_OPEN_RHO, _LARGEST_RHO, 60)
 
     def cost(one: float) -> float:
         share = _share(v, one) / error
-        left = float(share @ (beta / error)) / float(share @ share) * share - beta / error
-        return float(left @ left)
+        misfit = float(share @ (beta / error)) / float(share @ share) * share - beta / error
+        return float(misfit @ misfit)
 
     costs = [cost(one) for one in grid.tolist()]
     best = int(np.argmin(costs))
@@ -124,14 +129,14 @@ def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Re
     """beta_max alone."""
     share = _share(v, rho) / error
     value = float(share @ (beta / error)) / float(share @ share)
-    left = value * share - beta / error
+    misfit = value * share - beta / error
     what = f"(22) with rho = {rho:g} misses the measured residuals"
-    variance = _variance(left, len(v) - 1, what, remarks, _percent(left * error))
+    variance = _variance(misfit, len(v) - 1, what, remarks, _percent(misfit * error))
     return Estimate(value, sqrt(variance / float(share @ share))), Estimate(rho)
 
 
 def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[Remark]) -> Estimate:
-    """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
+    """Return the mean of u_peak over the amplitudes, weighted by its errors: the paper has the same at all."""
     seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
     if not seen:
         raise Unphysical(_NO_HYSTERESIS)
@@ -139,24 +144,24 @@ def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remar
     spread = np.maximum([estimate.standard_error for estimate in seen], _LEAST_BETA_ERROR)
     weight = 1.0 / spread**2
     mean = float(value @ weight) / float(np.sum(weight))
-    left = (value - mean) / spread
+    misfit = (value - mean) / spread
     low, high = float(np.min(value)), float(np.max(value))
     what = f"u_peak differs from amplitude to amplitude, {low:.3g} to {high:.3g}, where the scanner file has one,"
     more = "; --points writes it as measured, or leave out amplitudes that you do not scan with"
-    variance = _variance(left, len(seen) - 1, what, remarks, more=more)
+    variance = _variance(misfit, len(seen) - 1, what, remarks, more=more)
     return Estimate(mean, sqrt(variance / float(np.sum(weight))))
 
 
 def _percent(missed: Floats) -> float:
-    """What is missed of the scan, rms."""
+    """Return the rms residual in percent of the scan."""
     return 100.0 * sqrt(float(np.mean(missed**2)))
 
 
 def _variance(
-    left: Floats, freedom: int, what: str, remarks: list[Remark], percent: float = 0.0, more: str = ""
+    residuals: Floats, freedom: int, what: str, remarks: list[Remark], percent: float = 0.0, more: str = ""
 ) -> float:
     """1 where errors explain what is left; otherwise by how much they have to be widened, which is remarked."""
-    total = float(left @ left)
+    total = float(residuals @ residuals)
     if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANCE_LEVEL:
         return 1.0
     text = f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened{more}"

@@ -73,12 +73,17 @@ def solve(
     """Minimise the sum of squares of ``residuals``.
 
     ``scales`` says of each parameter by how much it could at most differ from scanner to scanner: one whose standard
-    error is larger was not determined. Raises ``Unphysical`` where no minimum is found.
+    error is larger was not determined.
+
+    Raises
+    ------
+    Unphysical
+        If no minimum is found.
     """
     start = np.asarray(start, dtype=np.float64)
     scales = np.asarray(scales, dtype=np.float64)
     low, high = (np.full(len(start), -np.inf), np.full(len(start), np.inf)) if bounds is None else map(np.array, bounds)
-    found = least_squares(
+    minimum = least_squares(
         residuals,
         np.clip(start, low + 1e-9 * scales, high - 1e-9 * scales),
         jac="3-point" if jacobian is None else jacobian,
@@ -89,10 +94,10 @@ def solve(
         gtol=1e-13,
         max_nfev=200,
     )
-    if not found.success or not np.all(np.isfinite(found.x)):
+    if not minimum.success or not np.all(np.isfinite(minimum.x)):
         raise Unphysical("the fit does not converge; check the data for gaps, steps and wrong units")
-    values, left = found.x, found.fun
-    jac = np.asarray(found.jac)
+    values, misfit = minimum.x, minimum.fun
+    jac = np.asarray(minimum.jac)
     _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)
     size = np.append(size, np.zeros(len(values) - len(size)))
     weak = size <= _SINGULAR_VALUE_LIMIT * size[0]
@@ -102,19 +107,26 @@ def solve(
     blind = np.sqrt(np.sum(rows[weak[: len(rows)]] ** 2, axis=0)) > 0.1
     if len(rows) < len(values):  # fewer points than parameters: what no row sees
         blind |= np.sum(rows**2, axis=0) < 0.99
-    freedom = len(left) - len(values)
+    freedom = len(misfit) - len(values)
     if freedom > 0:
-        errors = np.sqrt(np.diag(covariance) * float(left @ left) / freedom)
+        errors = np.sqrt(np.diag(covariance) * float(misfit @ misfit) / freedom)
         blind |= errors * few_points(freedom) > scales
     undetermined = tuple(name for name, is_blind in zip(names, blind, strict=True) if is_blind)
-    return Solution(tuple(names), values, covariance, left, jac, undetermined)
+    return Solution(tuple(names), values, covariance, misfit, jac, undetermined)
 
 
 def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Floats) -> Solution:
-    """A fit of values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
+    """Fit values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
 
     Where values scatter by more than that, since no law is exact, all get one relative error more: as much as makes
     their scatter the expected one (Paule and Mandel, 1982). Else precise values would bend the law for all others.
+
+    Parameters
+    ----------
+    values
+        Measured values, shape (points,).
+    errors
+        Their standard errors, shape (points,).
     """
 
     def at(share: float) -> Solution:
@@ -123,12 +135,12 @@ def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Float
     def excess(solution: Solution) -> float:
         return float(solution.residuals @ solution.residuals) - solution.freedom
 
-    found = at(0.0)
-    if found.freedom <= 0 or excess(found) <= 0.0:
-        return found
-    low, high = 0.0, float(np.max(np.abs(found.residuals) * errors / values))
+    best = at(0.0)
+    if best.freedom <= 0 or excess(best) <= 0.0:
+        return best
+    low, high = 0.0, float(np.max(np.abs(best.residuals) * errors / values))
     for _ in range(_SCATTER_STEPS):
         middle = 0.5 * (low + high)
-        found = at(middle)
-        low, high = (middle, high) if excess(found) > 0.0 else (low, middle)
+        best = at(middle)
+        low, high = (middle, high) if excess(best) > 0.0 else (low, middle)
     return at(high)

@@ -45,7 +45,7 @@ class AmplitudeFit:
 
 
 def measured_branch(shape: Floats, covariance: Floats) -> MeasuredBranch:
-    """The branch at these coordinates, (2,), and their covariance, (2, 2)."""
+    """Return the branch at these coordinates, (2,), with their covariance, (2, 2)."""
     beta, u_peak = BranchShape.at(shape).peak()
     step = 1e-6 * max(float(np.max(np.abs(shape))), 1e-3)
     steps = step * np.eye(len(shape))

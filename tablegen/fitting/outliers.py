@@ -9,32 +9,39 @@ _FALSE_ALARM_RATE = 0.01  # per set of points, whatever their number
 
 
 def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ...]:
-    """Indices of points that the fit to all others would not have left there, the worst first.
+    """Return the indices of points that the fit to all others would not have left there, the worst first.
 
     Each residual is held against the scatter of the fit without it (an externally studentised residual), at a level
     that is divided by the number of points. The worst is set aside and the rest is looked at again, while
     at least three quarters of the points and two degrees of freedom remain. ``least`` is the scatter that
     counts as none, in the unit of the residuals.
+
+    Parameters
+    ----------
+    jacobian
+        Derivatives of the residuals, shape (points, parameters).
+    residuals
+        Shape (points,).
     """
     count, parameters = jacobian.shape
-    kept = np.arange(count)
-    found: list[int] = []
-    while len(kept) - parameters >= 3 and 4 * (len(found) + 1) <= count:
-        scores = _studentised(jacobian[kept], residuals[kept], least)
+    remaining = np.arange(count)
+    outlying: list[int] = []
+    while len(remaining) - parameters >= 3 and 4 * (len(outlying) + 1) <= count:
+        scores = _studentised(jacobian[remaining], residuals[remaining], least)
         worst = int(np.argmax(scores))
-        if scores[worst] <= stdtrit(len(kept) - parameters - 1, 1.0 - _FALSE_ALARM_RATE / (2 * len(kept))):
+        if scores[worst] <= stdtrit(len(remaining) - parameters - 1, 1.0 - _FALSE_ALARM_RATE / (2 * len(remaining))):
             break
-        found.append(int(kept[worst]))
-        kept = np.delete(kept, worst)
-    return tuple(found)
+        outlying.append(int(remaining[worst]))
+        remaining = np.delete(remaining, worst)
+    return tuple(outlying)
 
 
 def _studentised(jacobian: Floats, residuals: Floats, least: float) -> Floats:
     orthogonal, _ = np.linalg.qr(jacobian)
-    left = residuals - orthogonal @ (orthogonal.T @ residuals)
+    deviation = residuals - orthogonal @ (orthogonal.T @ residuals)
     share = np.clip(1.0 - np.sum(orthogonal**2, axis=1), 1e-9, 1.0)  # share of its own error that a point keeps
-    freedom = len(left) - jacobian.shape[1]
-    without = (float(left @ left) - left**2 / share) / (freedom - 1)
+    freedom = len(deviation) - jacobian.shape[1]
+    without = (float(deviation @ deviation) - deviation**2 / share) / (freedom - 1)
     spread = np.sqrt(np.maximum(without, least**2))
     # A point that alone decides a parameter has no residual of its own to judge it by.
-    return np.where(share > 1e-6, np.abs(left) / (spread * np.sqrt(share)), 0.0)
+    return np.where(share > 1e-6, np.abs(deviation) / (spread * np.sqrt(share)), 0.0)

@@ -1,4 +1,4 @@
-"""Volts to codes, and the words of the output stage that scale a table to a drive."""
+"""Conversion of volts to codes, and the words of the output stage that scale a table to a drive."""
 
 from math import ceil, floor
 
@@ -14,7 +14,7 @@ from tablegen.numerics.driver import Driver
 
 
 class Converter(Struct, frozen=True):
-    """Volts at the piezo to codes of the converter, as real numbers: code = (V - v_zero) / v_per_code."""
+    """Conversion of volts at the piezo to codes, as real numbers: code = (V - v_zero) / v_per_code."""
 
     v_zero: float
     v_per_code: float
@@ -22,21 +22,21 @@ class Converter(Struct, frozen=True):
 
     @classmethod
     def of(cls, dac: AxisDac, amplifier: AxisAmplifier) -> "Converter":
-        """The chain of converter and amplifier.
+        """Return the chain of converter and amplifier.
 
-        v_per_code has the sign of the amplifier's gain, and the other one where the converter's codes are inverted.
+        v_per_code has the sign of the amplifier's gain, and the opposite one where the converter's codes are inverted.
         """
         lsb = (dac.v_max - dac.v_min) / float(1 << dac.bits)
         first, step = (dac.highest_v, -lsb) if dac.inverted else (dac.v_min, lsb)
         return cls(amplifier.gain * first + amplifier.bias_v, amplifier.gain * step, dac.bits)
 
     def code(self, volts: float) -> float:
-        """The code, as a real number, of a voltage at the piezo."""
+        """Return the code, as a real number, of a voltage at the piezo."""
         return (volts - self.v_zero) / self.v_per_code
 
 
 def fit_gain(amplitude: float, peak: float, bits: int, dac_bits: int) -> tuple[int, float]:
-    """The gain word, and the scale of the table that makes their product exact.
+    """Return the gain word, and the scale of the table that makes their product exact.
 
     ``amplitude`` is in codes for 2 w - 1 = 1 and may be negative; ``peak`` is the largest |2 w - 1|, at least 1.
     The scale is the least that keeps the peak inside the table's words, raised until the gain is a whole
@@ -49,14 +49,14 @@ def fit_gain(amplitude: float, peak: float, bits: int, dac_bits: int) -> tuple[i
 
 
 def code_limits(converter: Converter, driver: Driver) -> tuple[int, int]:
-    """The lowest and the highest code that both the driver and the converter reach."""
+    """Return the lowest and the highest code that both the driver and the converter reach."""
     ends = sorted((converter.code(driver.v_min), converter.code(driver.v_max)))
-    # A millionth of a code forgives the last bits of the voltages, not the voltages.
+    # A millionth of a code allows for the rounding of the voltages in their last bits.
     return max(0, ceil(ends[0] - 1e-6)), min((1 << converter.bits) - 1, floor(ends[1] + 1e-6))
 
 
 def make_output(dac: AxisDac, converter: Converter, driver: Driver, v_park: float, shaping: Shaping = OFF) -> Output:
-    """The output stage of one axis, whose gain and largest step are not known yet.
+    """Return the output stage of one axis, with gain and largest step still to be set.
 
     The clamp keeps the piezo in the driver's range, the code in the converter's.
     """
@@ -79,7 +79,7 @@ def make_output(dac: AxisDac, converter: Converter, driver: Driver, v_park: floa
 
 
 def scaled_output(output: Output, offset: float, bits: int, gain_word: int) -> Output:
-    """An output stage with the gain of a table of so many bits, and an offset in codes."""
+    """Return an output stage with the gain of a table of words of ``bits`` bits, and an offset in codes."""
     gain_q = UNIT_GAIN_BITS + bits + guard_bits(bits) - output.dac_bits
     offset_word = round_number(offset * float(1 << gain_q))
     return replace(output, gain_word=gain_word, gain_q=gain_q, offset_word=offset_word)

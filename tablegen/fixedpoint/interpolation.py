@@ -1,4 +1,4 @@
-"""From phase to sample: which two words, and how far between them."""
+"""Interpolation of a sample at a phase: the two words beside it, and the fraction between them."""
 
 import numpy as np
 
@@ -15,17 +15,17 @@ MAXIMUM_SAMPLE_BITS = 25
 
 
 def guard_bits(word_bits: int) -> int:
-    """Bits that a sample has below the LSB of a table word: 4, and fewer above 21-bit words."""
+    """Return how many bits a sample has below the LSB of a table word: 4, and fewer above 21-bit words."""
     return min(_GUARD_BITS, MAXIMUM_SAMPLE_BITS - word_bits)
 
 
 def index_bits_of(length: int) -> int:
-    """P of a table of 2^P words."""
+    """Return P of a table of 2^P words."""
     return length.bit_length() - 1
 
 
 def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
-    """Samples at phases in [0, 2^32), from a table of 2^P words, P <= 17.
+    """Return samples at phases in [0, 2^32), of their shape, from a table of 2^P words, P <= 17.
 
     The top P bits of a phase are the index of word t0, the next 15 the fraction on the way to the word after it, t1;
     the rest is dropped.
@@ -42,10 +42,10 @@ def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
 
 
 def between(here: Ints, there: Ints, fraction: Ints, guard: int) -> Ints:
-    """The sample at a fraction in [0, 2^15) of the way from one word to the next; monotonic in the fraction."""
+    """Return the sample at a fraction in [0, 2^15) of the way from one word to the next; monotonic in the fraction."""
     return (here << guard) + shift_round((there - here) * fraction, FRACTION_BITS - guard)
 
 
 def direct(table: Ints, k: Ints, guard: int) -> Ints:
-    """Samples of a table with one word an advance: word k times 2^G."""
+    """Return samples of a table with one word an advance: word k times 2^G."""
     return np.asarray(table[k] << guard)

@@ -1,4 +1,4 @@
-"""From sample to code: gain, offset, rounding, clamp, and the coding of the converter."""
+"""Conversion of a sample to a code: gain, offset, rounding, clamp, and the coding of the converter."""
 
 import numpy as np
 from msgspec import Struct
@@ -13,12 +13,12 @@ UNIT_GAIN_BITS = 16
 
 
 class Output(Struct, frozen=True):
-    """code = clamp(round((gain_word sample + offset_word) / 2^gain_q), code_min, code_max), ties up.
+    """The output stage: code = clamp(round((gain_word sample + offset_word) / 2^gain_q), code_min, code_max), ties up.
 
     Codes are straight binary, 0 at the converter's v_min; ``offset_word`` is the offset in codes with ``gain_q``
     fraction bits, ``offset_code`` the nearest whole code to it. ``channel`` is the output of a dual converter, A or B,
-    where the configuration says it; the arithmetic is the same on both. ``shaping`` says what becomes of the remainder
-    of the rounding; ``begin`` and ``shaped`` play it.
+    where the configuration gives it; the arithmetic is the same on both. ``shaping`` defines what becomes of the
+    remainder of the rounding; ``begin`` and ``shaped`` play it.
     """
 
     gain_word: int
@@ -41,7 +41,7 @@ class Output(Struct, frozen=True):
         return shift_round(self.offset_word, self.gain_q)
 
     def unclamped(self, sample: Ints) -> Ints:
-        """Codes before the clamp.
+        """Return codes before the clamp, of the shape of ``sample``.
 
         |gain_word| <= 2^17 and |sample| <= 2^24 give a product of at most 2^41; |offset_word| < 2^42 by
         construction; the sum and its rounding stay below 2^43.
@@ -49,32 +49,32 @@ class Output(Struct, frozen=True):
         return shift_round(self.gain_word * sample + self.offset_word, self.gain_q)
 
     def unrounded(self, sample: Ints) -> Floats:
-        """Codes before the rounding, as real numbers."""
+        """Return codes before the rounding, as real numbers, of the shape of ``sample``."""
         return np.asarray((self.gain_word * sample + self.offset_word) / float(1 << self.gain_q))
 
     def code(self, sample: Ints) -> Ints:
-        """Codes as the converter plays them, without shaping."""
+        """Return codes as the converter plays them, without shaping, of the shape of ``sample``."""
         return self.clamp(self.unclamped(sample))
 
     def clamp(self, codes: Ints) -> Ints:
-        """Codes within the limits of this axis."""
+        """Return codes within the limits of this axis."""
         return np.clip(codes, self.code_min, self.code_max)
 
     def begin(self) -> Remainders:
-        """The remainders with which a program begins."""
+        """Return the remainders at the beginning of a program."""
         return Remainders(self.shaping, remainder_bits(self.dac_bits))
 
     def shaped(self, sample: Ints, remainders: Remainders) -> Ints:
-        """Codes before the clamp at consecutive ticks; ``remainders`` run on."""
+        """Return codes before the clamp at consecutive ticks, shape (n,), and update ``remainders``."""
         return remainders.codes(self.fed(sample)) if self.shaping.order else self.unclamped(sample)
 
     def fed(self, sample: Ints) -> Ints:
-        """What shaping rounds down: codes with ``remainder_bits`` fraction bits, and half a code more."""
+        """Return the input of shaping: codes with ``remainder_bits`` fraction bits, and half a code more."""
         half = 1 << (self.gain_q - 1)
         return (self.gain_word * sample + self.offset_word + half) >> (self.gain_q - remainder_bits(self.dac_bits))
 
     def word(self, code: Integer) -> Integer:
-        """A code as it is sent to the converter: its coding, then its alignment."""
+        """Return a code as it is sent to the converter: its coding, then its alignment."""
         if self.coding == "twos-complement":
             code = code ^ (1 << (self.dac_bits - 1))
         return code << (self.word_bits - self.dac_bits) if self.align == "left" else code

@@ -10,10 +10,10 @@ MAXIMUM_TICKS = (1 << 31) - 1
 
 
 class RationalPhase(Struct, frozen=True):
-    """Phase of a period of ``ticks`` advances, 1 <= ticks <= 2^31 - 1: ticks, or lines where an axis steps once a line.
+    """The phase of a period of ``ticks`` advances, 1 <= ticks <= 2^31 - 1: ticks, or lines of a stepped axis.
 
     The device adds ``step`` at every advance, and 1 more whenever the remainder, which grows by ``remainder``
-    modulo ``ticks``, wraps. After ``ticks`` ticks both are back at 0: no drift, for ever.
+    modulo ``ticks``, wraps. After ``ticks`` ticks both are back at 0, so that there is no drift.
     """
 
     ticks: int
@@ -24,14 +24,14 @@ class RationalPhase(Struct, frozen=True):
 
     @property
     def step(self) -> int:
-        """floor(2^32 / L), the integer step; 32 bits for L >= 2."""
+        """The integer step floor(2^32 / L); 32 bits for L >= 2."""
         return (1 << PHASE_BITS) // self.ticks
 
     @property
     def remainder(self) -> int:
-        """2^32 mod L."""
+        """The remainder 2^32 mod L."""
         return (1 << PHASE_BITS) % self.ticks
 
     def at(self, k: Ints) -> Ints:
-        """floor(k 2^32 / L) for k in [0, L): k < 2^31, hence k 2^32 < 2^63."""
+        """Return floor(k 2^32 / L) for k in [0, L): k < 2^31, hence k 2^32 < 2^63."""
         return (np.asarray(k, dtype=np.int64) << PHASE_BITS) // self.ticks

@@ -1,7 +1,8 @@
-"""A table in pieces on which a sample only rises or only falls: whole segments of lines, and parts of those of splines.
+"""A table in monotonic pieces: whole segments of lines, and parts of the segments of splines.
 
 On a piece a sample is base + round(slope f / 2^shift) of the fraction f of the segment, ties up. The rounded Horner's
-rule of a spline is that wherever its inner sums do not change, and each of those is alike on parts of a segment.
+rule of a spline has that form wherever its inner sums are constant, and each of those is constant on parts of a
+segment.
 """
 
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from tablegen.fixedpoint.rounding import shift_round
 from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, WORDS_BEHIND, coefficients
 from tablegen.numerics.arrays import Ints
 
-_PIECES = 1 << 14  # pieces that are worked out together, in the cache
+_PIECES = 1 << 14  # pieces that are computed at a time, so that they fit the cache
 _SPLINE_SHIFT = SPLINE_FRACTION_BITS + 1
 
 
@@ -37,15 +38,15 @@ class Pieces(Struct, frozen=True, eq=False):
     index_bits: int
 
     def ends_of_samples(self) -> Ints:
-        """The first and the last sample of each piece, of shape (2, n)."""
+        """Return the first and the last sample of each piece, of shape (2, n)."""
         return np.stack([self.base + shift_round(self.slope * f, self.shift) for f in (self.begins, self.ends - 1)])
 
     def first_fraction(self, piece: Ints, sample: Ints) -> Ints:
-        """The least fractions at which these pieces reach these samples, both of shape (n,)."""
+        """Return the least fractions at which these pieces reach these samples, both of shape (n,)."""
         return _first_fraction(self.slope[piece], sample - self.base[piece], self.shift)
 
     def phase(self, piece: Ints, fraction: Ints) -> Ints:
-        """The least phases of 32 bits that have these fractions of the segments of these pieces."""
+        """Return the least phases of 32 bits that have these fractions of the segments of these pieces."""
         place = (self.segment[piece] << self.fraction_bits) | fraction
         return np.asarray(place << (PHASE_BITS - self.fraction_bits - self.index_bits))
 
@@ -56,14 +57,14 @@ class Pieces(Struct, frozen=True, eq=False):
 
 
 def pieces_of(program: Program) -> Iterator[Pieces]:
-    """A period of an ``interpolated`` or a ``cubic`` program, some segments at a time."""
+    """Return the pieces of a period of an ``interpolated`` or a ``cubic`` program, some segments at a time."""
     return _splines(program) if program.mode == "cubic" else iter([_lines(program)])
 
 
 def most_levels(program: Program) -> int:
-    """How many codes the pieces of a period begin, at the most.
+    """Return an upper bound of how many codes the pieces of a period begin.
 
-    Of a spline by the sizes of its coefficients; where one piece ends and the next begins a sample may be one beside.
+    For a spline it follows from the sizes of its coefficients; at the joint of two pieces a sample may be off by one.
     """
     output, words = program.output, program.words
     if program.mode == "cubic":
@@ -111,12 +112,12 @@ def _splines(program: Program) -> Iterator[Pieces]:
 
 
 def _segments(words: Ints) -> list[Ints]:
-    """The four words of each segment."""
+    """Return the four words of each segment."""
     return [np.roll(words, -ahead) for ahead in range(WORDS_BEHIND + 1)]
 
 
 def _most_pieces(b2: Ints, b3: Ints) -> Ints:
-    """How many pieces segments have at the most, by the sizes of their coefficients: v is below 1/2.
+    """Return an upper bound of the pieces of segments, by the sizes of their coefficients: v is below 1/2.
 
     The inmost sum takes |b3| / 2 + 1 values. The next one changes by |b2 + b3 v| / 2 and b3 v^2 / 2, and once more for
     each of those values.
@@ -125,9 +126,9 @@ def _most_pieces(b2: Ints, b3: Ints) -> Ints:
 
 
 def _steps(begins: Ints, ends: Ints, slope: Ints) -> tuple[Ints, Ints, Ints, Ints]:
-    """Parts of stretches [begins, ends) of fractions on which round(slope f / 2^19) is one value.
+    """Return parts of stretches [begins, ends) of fractions on which round(slope f / 2^19) is one value.
 
-    The number of its stretch, first fraction, end and value of each part, in order.
+    The result has the number of its stretch, first fraction, end and value of each part, in order.
     """
     first, last = (shift_round(slope * f, _SPLINE_SHIFT) for f in (begins, ends - 1))
     count = np.abs(last - first) + 1
@@ -144,7 +145,7 @@ def _steps(begins: Ints, ends: Ints, slope: Ints) -> tuple[Ints, Ints, Ints, Int
 
 
 def _first_fraction(slope: Ints, value: Ints, shift: int) -> Ints:
-    """The least f with round(slope f / 2^shift) >= value where it rises, <= value where it falls; all of one shape."""
+    """Return the least f with round(slope f / 2^shift) >= value where it rises, <= value where it falls; one shape."""
     falls = slope < 0
     distance = ((value + falls) << shift) - (1 << (shift - 1)) - falls
     return np.asarray(-(-distance // np.where(slope == 0, 1, slope)))

@@ -1,4 +1,4 @@
-"""What one axis of a device holds: a period, a table, and an output stage. It plays codes, and nothing else."""
+"""The program of one axis of a device: a period, a table, and an output stage, which together play codes."""
 
 from typing import Literal
 
@@ -15,11 +15,11 @@ from tablegen.fixedpoint.spline import SPLINE_UNIT, cubic
 from tablegen.numerics.arrays import Ints, freeze
 
 Mode = Literal["interpolated", "cubic", "direct"]
-_CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
+_CHUNK_TICKS = 1 << 14  # ticks that are computed at a time, so that they fit the cache
 
 
 def sample_gain(mode: Mode) -> float:
-    """What the gain has to make up for: a spline's sample has 12 units for each LSB of a word, others have 2^4."""
+    """Return the factor that the gain makes up for: a spline's sample has 12 units for an LSB of a word, others 2^4."""
     return float(1 << guard_bits(MAXIMUM_SPLINE_BITS)) / SPLINE_UNIT if mode == "cubic" else 1.0
 
 
@@ -57,16 +57,16 @@ class Program(Struct, frozen=True, eq=False):
         return 0 if self.mode == "direct" else index_bits_of(len(self.words))
 
     def resting(self, words: Ints) -> Ints:
-        """Samples of tables that hold one word throughout, one for each of ``words``: none of a table goes beyond."""
+        """Return the samples of constant tables, one for each of ``words``: they bound all samples."""
         return words * SPLINE_UNIT if self.mode == "cubic" else words << self.guard
 
     @property
     def rounded(self) -> "Program":
-        """The same without shaping."""
+        """The program without shaping."""
         return replace(self, output=replace(self.output, shaping=OFF)) if self.output.shaping.order else self
 
     def samples(self, k: Ints) -> Ints:
-        """Samples at ticks k in [0, ticks), with ``guard`` bits below the word's LSB."""
+        """Return samples at ticks k in [0, ticks), of the shape of ``k``, with ``guard`` bits below the word's LSB."""
         advance = k if self.hold == 1 else k // self.hold
         if self.mode == "direct":
             return direct(self.words, advance, self.guard)
@@ -75,9 +75,12 @@ class Program(Struct, frozen=True, eq=False):
         return interpolate(self.words, self.phase.at(advance), self.guard)
 
     def codes(self, k: Ints) -> Ints:
-        """Codes at ticks k in [0, ticks), before the slew guard.
+        """Return codes at ticks k in [0, ticks), shape (n,), before the slew guard.
 
-        Raises ``ValueError`` where the output is shaped: a code is then none of its tick, but of all before it too.
+        Raises
+        ------
+        ValueError
+            If the output is shaped: a code then depends on all ticks before it.
         """
         self.require_period()
         if len(k) <= _CHUNK_TICKS:
@@ -91,13 +94,13 @@ class Program(Struct, frozen=True, eq=False):
             raise ValueError("shaped codes are not periodic: they are played from the beginning of a program")
 
     def unclamped(self, first: int, stop: int, remainders: Remainders) -> Ints:
-        """Codes at ticks [first, stop) of a period before the clamp; ``remainders`` are those before, and run on."""
+        """Return codes at ticks [first, stop) of a period before the clamp, and update ``remainders``."""
         chunks = range(first, stop, _CHUNK_TICKS)
         samples = (self.samples(np.arange(at, min(at + _CHUNK_TICKS, stop), dtype=np.int64)) for at in chunks)
         return np.concatenate([self.output.shaped(chunk, remainders) for chunk in samples])
 
     def played(self, first: int, stop: int) -> Ints:
-        """Codes at ticks [first, stop) since a program began, over as many periods, before the slew guard."""
+        """Return codes at ticks [first, stop) since a program began, over as many periods, before the slew guard."""
         if not self.output.shaping.order:
             return self.codes(np.arange(first, stop, dtype=np.int64) % self.ticks)
         remainders, codes = self.output.begin(), []

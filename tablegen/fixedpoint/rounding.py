@@ -10,28 +10,28 @@ Integer = TypeVar("Integer", int, Ints)
 
 
 def round_half_up(x: Floats) -> Ints:
-    """The nearest integers to finite x with |x| < 2^53, ties up."""
+    """Return the nearest integers to finite x with |x| < 2^53, ties up, of the shape of ``x``."""
     whole = np.floor(x)
     # Not floor(x + 0.5): that sum rounds by itself, up to 1 for 0.49999999999999994.
     return (whole + (x - whole >= 0.5)).astype(np.int64)
 
 
 def round_number(x: float) -> int:
-    """``round_half_up`` of one number."""
+    """Return ``round_half_up`` of one number."""
     return int(round_half_up(np.asarray(x, dtype=np.float64)))
 
 
 def shift_round(value: Integer, bits: int) -> Integer:
-    """value / 2^bits to the nearest integer, ties up; bits >= 1, |value| < 2^62. An arithmetic shift."""
+    """Return value / 2^bits, to the nearest integer, ties up; bits >= 1, |value| < 2^62. An arithmetic shift."""
     return (value + (1 << (bits - 1))) >> bits
 
 
 def signed_limits(bits: int) -> tuple[int, int]:
-    """The least and greatest two's complement number of so many bits."""
+    """Return the least and greatest two's complement number of ``bits`` bits."""
     return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
 
 
 def saturate(value: Ints, bits: int) -> Ints:
-    """value, held inside the signed range of so many bits."""
+    """Return ``value`` limited to the signed range of ``bits`` bits."""
     low, high = signed_limits(bits)
     return np.clip(value, low, high)

@@ -12,13 +12,16 @@ from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
 
 _MIN_TICKS_PER_RUN = 4  # average ticks per run from which runs are cheaper than ticks
-_MOST_TICKS_PER_CODE = 8  # up to which all ticks from the first to the last are gone through for some codes
-_CHUNK_TICKS = 1 << 13  # ticks whose codes are looked for together, in the cache
-_CHUNK_LEVELS = 1 << 13  # codes or samples that are worked out together, in the cache
+_MOST_TICKS_PER_CODE = 8  # up to which a search for codes scans all ticks from the first to the last
+_CHUNK_TICKS = 1 << 13  # ticks whose codes are searched at a time, so that they fit the cache
+_CHUNK_LEVELS = 1 << 13  # codes or samples that are computed at a time, so that they fit the cache
 
 
 class Runs(Struct, frozen=True, eq=False):
-    """Run i plays ``codes[i]`` on the ticks [starts[i], starts[i + 1]), the last up to ``ticks``; none is empty."""
+    """Runs of one code: run i plays ``codes[i]`` on the ticks [starts[i], starts[i + 1]), the last up to ``ticks``.
+
+    No run is empty; both arrays have the shape (runs,).
+    """
 
     starts: Ints
     codes: Ints
@@ -26,19 +29,19 @@ class Runs(Struct, frozen=True, eq=False):
 
     @property
     def lengths(self) -> Ints:
-        """Ticks of each run."""
+        """The ticks of each run, (runs,)."""
         if self.by_tick:
             return np.broadcast_to(np.int64(1), (self.ticks,))
         return np.diff(self.starts, append=self.ticks)
 
     def lengths_of(self, which: slice) -> Ints:
-        """Ticks of some runs; ``which`` begins at a run and may end beyond the last one."""
+        """Return the ticks of some runs; ``which`` begins at a run and may end beyond the last one."""
         after = which.stop if which.stop is not None and which.stop < len(self.starts) else None
         return np.diff(self.starts[which], append=self.ticks if after is None else self.starts[after])
 
     @property
     def by_tick(self) -> bool:
-        """Whether every run is a single tick."""
+        """True if every run is a single tick."""
         return len(self.starts) == self.ticks
 
     @property
@@ -47,7 +50,7 @@ class Runs(Struct, frozen=True, eq=False):
         return self.starts if self.by_tick else np.append(self.starts[1:], self.ticks) - 1
 
     def at(self, k: Ints) -> Ints:
-        """The codes at ticks k."""
+        """Return the codes at ticks k, of its shape."""
         if self.by_tick:
             return self.codes[k]
         if len(k) <= _CHUNK_TICKS:
@@ -58,14 +61,14 @@ class Runs(Struct, frozen=True, eq=False):
         low, high = (int(k.min()), int(k.max())) if len(k) else (0, -1)
         if high - low >= _MOST_TICKS_PER_CODE * len(k):
             return self.codes[np.searchsorted(self.starts, k, side="right") - 1]
-        # To count the runs that begin takes less than to look for each tick.
+        # Counting the runs that begin is faster than a search for each tick.
         first, last = np.searchsorted(self.starts, (low, high), side="right")
         begins = np.zeros(high - low + 1, dtype=np.bool_)
         begins[self.starts[first:last] - low] = True
         return self.codes[first - 1 :].take(np.cumsum(begins, dtype=np.int32)[k - low])
 
     def split_at(self, k: Ints) -> "Runs":
-        """The same playback with runs that begin at ticks k as well, ascending and each once."""
+        """Return the same playback with runs that begin at ticks k as well, ascending and each once."""
         if self.by_tick:
             return self
         within = np.searchsorted(self.starts, k, side="right") - 1
@@ -77,7 +80,13 @@ class Runs(Struct, frozen=True, eq=False):
 
 
 def runs_of(program: Program) -> Runs:
-    """The period of a program as runs. Raises ``ValueError`` for one that is shaped, which has no period."""
+    """Return the period of a program as runs.
+
+    Raises
+    ------
+    ValueError
+        If the output is shaped, so that there is no period.
+    """
     runs = long_runs(program)
     if runs is not None:
         return runs
@@ -86,10 +95,15 @@ def runs_of(program: Program) -> Runs:
 
 
 def long_runs(program: Program) -> Runs | None:
-    """The same of a table, on whose pieces codes rise or fall one by one; None where ticks are fewer.
+    """Return the runs of a table on whose pieces codes rise or fall one by one; None where ticks are fewer.
 
     Along a piece the sample is monotonic in the fraction, so that there is one at which each sample, and each code,
-    is first reached. A run begins with each segment. Raises ``ValueError`` as ``runs_of``.
+    is first reached. A run begins with each segment.
+
+    Raises
+    ------
+    ValueError
+        As ``runs_of``.
     """
     program.require_period()
     if program.hold != 1 or program.mode == "direct":
@@ -105,10 +119,10 @@ def long_runs(program: Program) -> Runs | None:
 
 
 def _levels(program: Program, pieces: Pieces) -> Iterator[tuple[Ints, Ints]]:
-    """The first ticks and the codes of the runs of some pieces, some at a time."""
+    """Yield the first ticks and the codes of the runs of some pieces, some at a time."""
     output, samples = program.output, pieces.ends_of_samples()
     codes = output.code(samples)
-    # Where a sample is a code or more each is another code, so that samples are all there is to look at.
+    # Where a sample is a code or more, each sample is another code, so that samples alone are examined.
     by_sample = abs(output.gain_word) >= 1 << output.gain_q and bool((codes == output.unclamped(samples)).all())
     first, last = samples if by_sample else codes
     changes = np.abs(last - first)
@@ -131,16 +145,16 @@ def _levels(program: Program, pieces: Pieces) -> Iterator[tuple[Ints, Ints]]:
         start = (pieces.phase(piece, reached) * program.ticks + ((1 << PHASE_BITS) - 1)) >> PHASE_BITS
         if at + _CHUNK_LEVELS >= levels:
             start = np.append(start, behind)
-        taken = np.flatnonzero(start[1:] > start[:-1])  # of codes that are reached at one tick the last is played
-        start, code, segment = start[taken], code[taken], pieces.segment[piece[taken]]
-        others = (np.diff(code, prepend=played[0]) != 0) | (np.diff(segment, prepend=played[1]) != 0)
+        visible = np.flatnonzero(start[1:] > start[:-1])  # of codes that are reached at one tick the last is played
+        start, code, segment = start[visible], code[visible], pieces.segment[piece[visible]]
+        changed = (np.diff(code, prepend=played[0]) != 0) | (np.diff(segment, prepend=played[1]) != 0)
         if len(code):
             played = int(code[-1]), int(segment[-1])
-        yield start[others], code[others]
+        yield start[changed], code[changed]
 
 
 class _Inverse:
-    """The samples at which codes are first reached: ``Output.unclamped`` solved for the sample, in whole numbers.
+    """The inverse of ``Output.unclamped`` in whole numbers: the samples at which codes are first reached.
 
     A code rises to c where gain sample + offset + 1/2 >= c, and falls to it where that is < c + 1.
     """
@@ -148,14 +162,14 @@ class _Inverse:
     def __init__(self, output: Output, direction: Ints, pieces: Pieces) -> None:
         """``direction`` is that of the codes along each piece, 1 where they rise, shape (n,)."""
         self._gain_q = output.gain_q
-        self._gain = abs(output.gain_word) or 1  # without gain no code changes, and nothing of this is used
+        self._gain = abs(output.gain_word) or 1  # without gain no code changes, and the inverse is not used
         self._sign = -1 if output.gain_word < 0 else 1
         self._code_falls = np.where(direction > 0, 0, 1)
         self._bound = output.offset_word + (1 << (output.gain_q - 1)) + self._code_falls
         self._sample_falls = pieces.slope <= 0
 
     def sample(self, piece: Ints, code: Ints) -> Ints:
-        """The samples at which these pieces first play these codes, both of shape (n,)."""
+        """Return the samples at which these pieces first play these codes, both of shape (n,)."""
         product = (((code + self._code_falls[piece]) << self._gain_q) - self._bound[piece]) * self._sign
         least = product + np.where(self._sample_falls[piece], 0, self._gain - 1)
         return np.asarray(least // self._gain)

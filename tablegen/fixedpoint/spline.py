@@ -1,4 +1,4 @@
-"""From phase to sample by a uniform cubic B-spline: four words a sample, and far fewer words than lines between them.
+"""Evaluation of a uniform cubic B-spline at a phase: four words a sample, and far fewer words than lines need.
 
 A spline stays between the least and the greatest of its words, and its slope between the least and the greatest of
 their differences: what a device checks of a table of lines holds for it too.
@@ -20,10 +20,11 @@ SPLINE_FRACTION_BITS = 18
 
 
 def cubic(table: Ints, phase: Ints) -> Ints:
-    """Samples at phases in [0, 2^32), from a table of 2^P words of up to 21 bits, 3 <= P <= 14; 12 times the spline.
+    """Return samples at phases in [0, 2^32), of their shape; a sample is 12 times the spline.
 
-    The top P bits of a phase are the index of the first of four words, the next 18 the fraction of the segment that
-    is behind it; the rest is dropped. Word k is the coefficient of the B-spline centred on (k - 1) / 2^P.
+    The table has 2^P words of up to 21 bits, 3 <= P <= 14. The top P bits of a phase are the index of the first of four
+    words, the next 18 the fraction of the segment that is behind it; the rest is dropped. Word k is the coefficient of
+    the B-spline centred on (k - 1) / 2^P.
     """
     index_bits = index_bits_of(len(table))
     index = phase >> (PHASE_BITS - index_bits)
@@ -32,7 +33,7 @@ def cubic(table: Ints, phase: Ints) -> Ints:
 
 
 def along(words: Sequence[Ints], fraction: Ints) -> Ints:
-    """The sample at a fraction in [0, 2^18) of the segment of four words.
+    """Return the sample at a fraction in [0, 2^18) of the segment of four words.
 
     Horner's rule for 12 S = b0 + b1 v + b2 v^2 + b3 v^3 with v = fraction / 2^19; b_k holds the 2^k that the half of
     each v takes. For words of B bits |b3| <= 2^(B+6), |b2| <= 1.5 2^(B+5), |b1| <= 1.5 2^(B+3), and the sums on the
@@ -47,7 +48,7 @@ def along(words: Sequence[Ints], fraction: Ints) -> Ints:
 
 
 def coefficients(words: Sequence[Ints]) -> tuple[Ints, Ints, Ints, Ints]:
-    """b0 to b3 of the segments of four words."""
+    """Return b0 to b3 of the segments of four words, each of their shape."""
     first, second, third, fourth = words
     outer, inner = fourth - first, second - third
     return (

@@ -10,12 +10,17 @@ _OVERLAP = (2416.0, 1191.0, 120.0, 1.0)
 
 
 def spline_factors(harmonics: int, length: int) -> tuple[Floats, Floats]:
-    """Real and imaginary factors for harmonics 1..``harmonics`` of a waveform: then its values at k / length are words.
+    """Return factors of harmonics 1..``harmonics`` of a waveform after which its values at k / length are spline words.
 
-    The spline of these ``length`` words is the one nearest to the waveform by the mean of squares; the harmonics are
+    The spline of these ``length`` words is the one nearest to the waveform in least squares; the harmonics are
     below half of them. In closed form, since the normal equations of a periodic spline are circulant: sinc^4(n /
     length) over the spectrum of the overlaps of B-splines. Word k is the coefficient of the B-spline centred on
-    (k - 1) / length, hence the turn.
+    (k - 1) / length, hence the rotation of the phase.
+
+    Returns
+    -------
+    real, imaginary
+        Both parts of the factors, shape (harmonics,).
     """
     share = np.arange(1, harmonics + 1) / length
     overlap = np.full(harmonics, _OVERLAP[0])

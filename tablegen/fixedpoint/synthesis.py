@@ -14,12 +14,12 @@ WORD_BITS = 32
 FRACTION_BITS = 30  # Q2.30: |s| <= 1 bounds every coefficient by 4/pi
 SINE_FRACTION_BITS = 30
 ACCUMULATOR_BITS = 64
-_KEPT = 1 << 16  # words of the longest sine table that is kept
-_KEPT_WAVES = 1 << 17  # words of the cosines of all harmonics that are kept, and as many of the sines: 2 MB
+_CACHED = 1 << 16  # words of the longest sine table that is cached
+_CACHED_WAVES = 1 << 17  # words of the cosines of all harmonics that are cached, and as many of the sines: 2 MB
 
 
 class FourierWords(Struct, frozen=True, eq=False):
-    """s(t) = (2 w(t) - 1) / scale in Q2.30: s = a0 + sum a_n cos + b_n sin, each an int32 divided by 2^30."""
+    """The Fourier words of s(t) = (2 w(t) - 1) / scale in Q2.30: s = a0 + sum a_n cos + b_n sin, int32 over 2^30."""
 
     a0: int
     a: Ints
@@ -30,17 +30,28 @@ class FourierWords(Struct, frozen=True, eq=False):
 
     @property
     def harmonics(self) -> int:
-        """H, the highest harmonic."""
+        """The highest harmonic H."""
         return len(self.a)
 
     @property
     def in_order(self) -> Ints:
-        """All 2 H + 1 words in the order in which devices hold them: a0, a1..aH, b1..bH."""
+        """The 2 H + 1 words in the order in which devices hold them: a0, a1..aH, b1..bH."""
         return np.concatenate([[self.a0], self.a, self.b])
 
 
 def encode(a0: float, a: Floats, b: Floats, scale: float) -> FourierWords:
-    """The words of (2 w - 1) / scale for w = a0 + sum a_n cos + b_n sin, rounded to nearest, ties up."""
+    """Return the words of (2 w - 1) / scale for w = a0 + sum a_n cos + b_n sin, rounded to nearest, ties up.
+
+    Parameters
+    ----------
+    a, b
+        Coefficients of harmonics 1..H, (H,).
+
+    Raises
+    ------
+    OverflowError
+        If a word does not fit 32 bits, or their sum does not fit the accumulator.
+    """
     unit = float(1 << FRACTION_BITS)
     high = signed_limits(WORD_BITS)[1]
     mean = round_number((2.0 * a0 - 1.0) / scale * unit)
@@ -56,11 +67,11 @@ def encode(a0: float, a: Floats, b: Floats, scale: float) -> FourierWords:
 
 
 def sine_table(length: int) -> Ints:
-    """round(2^30 sin(2 pi j / length)) for j in [0, length), ties away from 0 so that the table is odd.
+    """Return round(2^30 sin(2 pi j / length)) for j in [0, length), ties away from 0 so that the table is odd.
 
-    A device keeps a quarter of it: for a length divisible by 4 the rest follows by symmetry, word for word.
+    A device holds a quarter of it: for a length divisible by 4 the rest follows by symmetry, word for word.
     """
-    return _kept_sine_table(length) if length <= _KEPT else _sine_table(length)
+    return _cached_sine_table(length) if length <= _CACHED else _sine_table(length)
 
 
 def _sine_table(length: int) -> Ints:
@@ -72,30 +83,30 @@ def _sine_table(length: int) -> Ints:
 
 
 @lru_cache(maxsize=4)  # a build asks for the same one or two again and again
-def _kept_sine_table(length: int) -> Ints:
+def _cached_sine_table(length: int) -> Ints:
     return _sine_table(length)
 
 
 def sine_quarter(index_bits: int) -> Ints:
-    """The sine words that a device holds for tables of up to 2^index_bits words, index_bits >= 3: the first quarter.
+    """Return the first quarter of the sine words, which a device holds for tables of up to 2^index_bits words.
 
-    sin(pi/2) is not among them: it is 2^30, the only word that does not fit 30 bits. The sine table of a shorter length
-    is every 2^n-th word of a longer one.
+    index_bits >= 3. sin(pi/2) is not among them: it is 2^30, the only word that does not fit 30 bits. The sine table of
+    a shorter length is every 2^n-th word of a longer one.
     """
     return sine_table(1 << index_bits)[: 1 << (index_bits - 2)]
 
 
 def sine_periods(index_bits: int) -> Ints:
-    """One period and a quarter of the sine table of 2^index_bits words: the cosine begins a quarter after the sine.
+    """Return a period and a quarter of the sine table of 2^index_bits words: the cosine begins a quarter later.
 
-    What the C runtime renders with, from a longer table too. Shape (5/4 2^index_bits,), index_bits >= 2.
+    The C runtime renders with it, from a longer table too. Shape (5/4 2^index_bits,), index_bits >= 2.
     """
     sines = sine_table(1 << index_bits)
     return np.concatenate([sines, sines[: len(sines) // 4]])
 
 
 def _waves(length: int, harmonics: int) -> Iterator[tuple[Ints, Ints]]:
-    """C[n k mod length] and S[n k mod length] for k in [0, length / 2], for n = 1..harmonics."""
+    """Yield C[n k mod length] and S[n k mod length] for k in [0, length / 2], for n = 1..harmonics."""
     sines = sine_table(length)
     if length % 4 == 0:
         cosines = np.roll(sines, -(length // 4))
@@ -107,7 +118,7 @@ def _waves(length: int, harmonics: int) -> Iterator[tuple[Ints, Ints]]:
 
 
 @lru_cache(maxsize=4)  # tables of one length and as many harmonics are made again and again
-def _kept_waves(length: int, harmonics: int) -> tuple[Ints, Ints]:
+def _cached_waves(length: int, harmonics: int) -> tuple[Ints, Ints]:
     cosines, sines = (np.empty((harmonics, length // 2 + 1), dtype=np.int64) for _ in "cs")
     for n, (cosine, sine_) in enumerate(_waves(length, harmonics)):
         cosines[n], sines[n] = cosine, sine_
@@ -116,7 +127,7 @@ def _kept_waves(length: int, harmonics: int) -> tuple[Ints, Ints]:
 
 
 def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
-    """Table words k = 0..length-1: saturate(round(2^(bits-1) s(k / length))), ties up, int64 of shape (length,).
+    """Return the table words saturate(round(2^(bits-1) s(k / length))) for k = 0..length-1, ties up, int64, (length,).
 
     acc = a0 2^30 + sum_n a_n C[n k mod length] + b_n S[n k mod length], exact in 64 bits, so that the order of the
     terms and any use of symmetry do not matter; C[j] is S[j + length/4], or the cosine rounded alike
@@ -124,8 +135,8 @@ def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     """
     # Word length - k has the cosines of word k, and its sines with the other sign.
     half = length // 2 + 1
-    if half * words.harmonics <= _KEPT_WAVES:
-        cosines, sines = _kept_waves(length, words.harmonics)
+    if half * words.harmonics <= _CACHED_WAVES:
+        cosines, sines = _cached_waves(length, words.harmonics)
         even, odd = (np.einsum("n,nk->k", *both) for both in ((words.a, cosines), (words.b, sines)))
     else:
         even, odd = np.zeros(half, dtype=np.int64), np.zeros(half, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""How a waveform is stored: the mode that plays a table, how many words it has, and how wide they are."""
+"""The shape of a table: the mode that plays it, how many words it has, and how wide they are."""
 
 from msgspec import Struct
 
@@ -13,7 +13,7 @@ MOST_LENGTH: dict[Mode, int] = {"direct": 1 << 16, "interpolated": 1 << 16, "cub
 
 
 class TableShape(Struct, frozen=True):
-    """``length`` words of ``bits`` bits, played in a ``mode``."""
+    """A table of ``length`` words of ``bits`` bits, played in a ``mode``."""
 
     mode: Mode
     length: int
@@ -21,12 +21,12 @@ class TableShape(Struct, frozen=True):
 
     @property
     def memory_bits(self) -> int:
-        """Bits of all words, packed."""
+        """The bits of all words, packed."""
         return self.length * self.bits
 
     @property
     def order(self) -> tuple[int, int, int, int]:
-        """By memory; of two that need the same, the one that is simpler to play, and then the shorter one."""
+        """The sort key: memory, then how simple the mode is to play, then the length."""
         return self.memory_bits, MODES.index(self.mode), self.length, self.bits
 
     def __str__(self) -> str:

@@ -22,13 +22,13 @@ def asked(subject: Subject) -> Section:
     for axis, entry in subject.axes:
         drive = entry.drive
         low, high = entry.fourier.window
-        wanted, offset = "", ""
+        request, offset = "", ""
         if planned is not None:
             scan = getattr(planned.setup.scan, axis)
-            wanted = f"{scan.size_nm:g} nm {scan.size_of}" if scan.size_nm is not None else f"{scan.size_v:g} V"
+            request = f"{scan.size_nm:g} nm {scan.size_of}" if scan.size_nm is not None else f"{scan.size_v:g} V"
             offset = f"{scan.offset_v:g} V" if scan.offset_v is not None else f"{scan.offset_nm:g} nm"
         rows += [
-            row(f"{axis} size", wanted, f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm imaged"),
+            row(f"{axis} size", request, f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm imaged"),
             row(f"{axis} offset", offset, f"{drive.v_offset:.6g} V"),
             row(f"{axis} drive", "", f"{drive.v_amplitude:.6g} V peak to peak, turns at {drive.turn:g} of the period"),
             row(f"{axis} imaged", "", f"{low:g}..{high:g} of the line, {entry.fourier.directions}"),
@@ -61,21 +61,22 @@ def _image(sequence: ManifestSequence) -> str:
 
 def _codes(subject: Subject, axis: str) -> str:
     entry = dict(subject.axes)[axis]  # type: ignore[index]
-    found, output = entry.certificate, entry.output
-    if found.lowest_code is None or found.highest_code is None:
+    certificate, output = entry.certificate, entry.output
+    if certificate.lowest_code is None or certificate.highest_code is None:
         return f"{output.dac_bits} bits"
-    share = 100.0 * (found.highest_code - found.lowest_code + 1) / (1 << output.dac_bits)
-    return f"{found.lowest_code}..{found.highest_code}, {share:.3g} % of the converter's {output.dac_bits} bits"
+    share = 100.0 * (certificate.highest_code - certificate.lowest_code + 1) / (1 << output.dac_bits)
+    codes = f"{certificate.lowest_code}..{certificate.highest_code}"
+    return f"{codes}, {share:.3g} % of the converter's {output.dac_bits} bits"
 
 
 def _table(axis: str, entry: ManifestAxis) -> list[tuple[TableCell, ...]]:
-    """A table that the build chose."""
+    """List the properties of a table that the build chose."""
     table = entry.table
     if table.asked is None:
         return []
-    wanted = f"the least memory within {table.asked.max_error_lsb:g} LSB"
+    request = f"the least memory within {table.asked.max_error_lsb:g} LSB"
     played = f"{len(table.words)} words of {table.bits} bits, {table.mode}: {len(table.words) * table.bits} bits"
-    return [row(f"{axis} table", wanted, played)]
+    return [row(f"{axis} table", request, played)]
 
 
 def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
@@ -85,7 +86,7 @@ def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
 
 
 def verification(subject: Subject) -> Section:
-    """The checks of a record, or how to get one."""
+    """Show the checks of a record, or how to get one."""
     record, title = subject.verified, "What verify found"
     if record is None:
         text = "No record was given. `tablegen verify DIR --junit verify.xml` makes one, `tablegen report --verified "
@@ -97,10 +98,10 @@ def verification(subject: Subject) -> Section:
         which = Paragraph(f"\u2717 The record {why}: it tells nothing of this one. Verify again.", "bad")
     rows = []
     for check in record.checks:
-        said = TableCell("\u2713 passed", "good") if check.exercised else TableCell("not exercised", "quiet")
+        cell = TableCell("\u2713 passed", "good") if check.exercised else TableCell("not exercised", "quiet")
         if check.failure:
-            said = TableCell(f"\u2717 {check.failure}", "bad")
-        rows.append(row(check.name, said))
+            cell = TableCell(f"\u2717 {check.failure}", "bad")
+        rows.append(row(check.name, cell))
     failed = sum(bool(check.failure) for check in record.checks)
     caption = f"{len(rows)} checks, {failed or 'none'} failed"
     return Section("verify", title, (which, Grid(caption, ("check", ""), tuple(rows), folded=not failed)))

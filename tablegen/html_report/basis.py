@@ -26,7 +26,7 @@ def basis(planned: PlannedScan) -> Section:
     setup = planned.setup
     comments = [*_comments(setup.scanner_file), *_comments(setup.scan_file)]
     known = {key.split(".branches")[0] for key, _, _ in comments}
-    rows = [row(key, said, sources or "-") for key, said, sources in comments]
+    rows = [row(key, text, sources or "-") for key, text, sources in comments]
     for axis in ("x", "y"):
         tables = getattr(setup.scanner, axis)
         for kind in _KINDS:
@@ -54,7 +54,7 @@ def basis(planned: PlannedScan) -> Section:
 
 
 def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
-    """The table below a comment of `calibrate` or `refine`, what it says, and its files."""
+    """Yield the table below a comment of `calibrate` or `refine`, the text of the comment, and its files."""
     if file.lines is None:
         return
     try:
@@ -63,8 +63,8 @@ def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
         return
     waiting: list[tuple[str, list[str]]] = []
     for line in map(str.strip, text.splitlines()):
-        if found := _MARK.match(line):
-            waiting.append((f"{found[1]} {found[2]}: {found[3]}", []))
+        if mark := _MARK.match(line):
+            waiting.append((f"{mark[1]} {mark[2]}: {mark[3]}", []))
         elif line.startswith("# from ") and waiting:
             waiting[-1][1].append(line.removeprefix("# from "))
         elif header := _TABLE.match(line):

@@ -84,5 +84,5 @@ class Section:
 
 
 def row(name: str, *cells: TableCell | str) -> tuple[TableCell, ...]:
-    """A row of a table; texts become cells without a tone."""
+    """Make a row of a table; texts become cells without a tone."""
     return (TableCell(name), *(cell if isinstance(cell, TableCell) else TableCell(cell) for cell in cells))

@@ -90,15 +90,15 @@ def _lattice(scan: StraightScan) -> Chart:
 
 
 def _arrows(right: Floats, down: Floats, bottom_first: bool, scale: float) -> Arrows:
-    """Some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
+    """Select some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
     rows, columns = right.shape
     at_row, at_column = _places(rows), _places(columns)
     grid = np.ix_(at_row, at_column)
     across, below = np.meshgrid(at_column + 0.5, at_row + 0.5)
     up = below if bottom_first else rows - below
     rising = down[grid] if bottom_first else -down[grid]
-    kept = np.isfinite(right[grid]) & np.isfinite(rising)
-    return Arrows(across[kept], up[kept], scale * right[grid][kept], scale * rising[kept])
+    finite = np.isfinite(right[grid]) & np.isfinite(rising)
+    return Arrows(across[finite], up[finite], scale * right[grid][finite], scale * rising[finite])
 
 
 def _places(count: int) -> Ints:
@@ -123,14 +123,14 @@ def _difference(scan: StraightScan) -> Chart:
 
 
 def _apart(scan: StraightScan) -> Chart:
-    found = scan.agreement
-    assert found is not None
+    agreement = scan.agreement
+    assert agreement is not None
     title, curves = "trace and retrace have too little in common", []
-    if len(found.place):
-        after = float(np.max(np.abs(found.apart[1])))
+    if len(agreement.place):
+        after = float(np.max(np.abs(agreement.apart[1])))
         title = f"retrace right of the trace, after: {after:.2g} pixels"
-        before = DrawnCurve("before", "before", found.place, found.apart[0])
-        curves = [before, DrawnCurve("after", "other", found.place, found.apart[1])]
+        before = DrawnCurve("before", "before", agreement.place, agreement.apart[0])
+        curves = [before, DrawnCurve("after", "other", agreement.place, agreement.apart[1])]
     zero = (Mark(0.0, "", "y"),)
     return Chart("apart", title, "column [pixels]", "distance [pixels]", tuple(curves), marks=zero)
 

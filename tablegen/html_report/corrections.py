@@ -14,7 +14,7 @@ _HEAD = ("", "equation", "factor", "after it")
 
 
 def corrections(subject: Subject) -> Section:
-    """A table an axis, and the shape of the hysteresis that is applied."""
+    """Show a table an axis, and the shape of the hysteresis that is applied."""
     tables, charts = [], []
     for at, (axis, entry) in enumerate(subject.axes):
         line = None if subject.planned is None else subject.planned.plan.lines[at]
@@ -45,23 +45,23 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         text = text if applied else "not compensated"
         rows.append(row(f"hysteresis {side}", equation, f"{branch.beta:+.5f}", text))
     rate = entry.line.rate_exact[0] / entry.line.rate_exact[1]
-    (low, high), kept = fourier.window, fourier.max_scaling_error_percent
+    (low, high), error = fourier.window, fourier.max_scaling_error_percent
     rows.append(
         row(
             "band limit",
             fourier.band_limit,
             f"{fourier.harmonics}",
             f"harmonics, up to {hertz(fourier.harmonics * rate)}; straight over {low:g}..{high:g} {fourier.directions}"
-            + (f"; least acceleration at {kept:g} % of scaling error" if kept is not None else ""),
+            + (f"; least acceleration at {error:g} % of scaling error" if error is not None else ""),
         )
     )
     if fourier.refinement is not None:
         rows.append(row("refinement", "learnt", f"{len(fourier.refinement.a)}", "harmonics from traces of this scan"))
     if drive.resonance is not None:
-        held = len(fourier.held_harmonics)
+        limited = len(fourier.held_harmonics)
         text = f"inverse of the resonance at {hertz(drive.resonance.hz)}"
         rows.append(
-            row("dynamics", "1 / H(f)", "", text + (f"; {held} harmonics held back by max_boost_db" * (held > 0)))
+            row("dynamics", "1 / H(f)", "", text + (f"; {limited} harmonics held back by max_boost_db" * (limited > 0)))
         )
     hold_us = 5e5 / rate * entry.line.hold_ticks / entry.line.ticks
     rows.append(row("converter's hold", "", "", f"played {hold_us:.4g} us ahead, half of what a code is held"))

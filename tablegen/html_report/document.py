@@ -23,7 +23,7 @@ def document(
     notice: str = "",
     foot: str = "",
 ) -> bytes:
-    """The whole page as UTF-8. All texts are escaped here, whoever wrote them."""
+    """Render the whole page as UTF-8. All texts are escaped here, whoever wrote them."""
     script = _resource("page.js")
     context = {
         "title": visible(title),

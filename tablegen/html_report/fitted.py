@@ -27,7 +27,7 @@ _FOOT = f"Made by tablegen {__version__} from measurements whose SHA-256 are abo
 
 
 def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[str], points: bool = False) -> bytes:
-    """The page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
+    """Render the page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
     kind = change(fit, []).kind
     meaningless = doubts(fit, points)
     findings = fit_findings(fit, places, points)
@@ -37,12 +37,12 @@ def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[st
     elif places:
         many = "one outlier" if len(places) == 1 else f"{len(places)} outliers"
         verdict = TableCell(f"! Look at {many} first.", "warn")
-    found = [
+    sections = [
         _parameters(fit),
         Section("data", "Data and fit", (Charts(fit_charts(fit, axis).charts),)),
         _sources(sources),
     ]
-    return document(f"{kind} of {axis}", verdict, findings, found, "", _FOOT)
+    return document(f"{kind} of {axis}", verdict, findings, sections, "", _FOOT)
 
 
 def _parameters(fit: Fit) -> Section:
@@ -70,7 +70,7 @@ def _error(estimate: Estimate) -> str:
 
 
 def _traces(fit: HysteresisFit) -> Grid:
-    """What each trace, or pair of images, says by itself."""
+    """List the results of each trace, or pair of images, by itself."""
     rows = []
     for branch in fit.branches:
         for trace in branch.traces:
@@ -87,7 +87,7 @@ def _trace(turn: float, trace: AmplitudeFit, at: int, side: str) -> tuple[TableC
 
 
 def fit_charts(fit: Fit, axis: str) -> PlottedCharts:
-    """The data of a calibration with the fit."""
+    """Draw the data of a calibration with the fit."""
     heading = f"{change(fit, []).kind} of {axis}: data and fit"
     return PlottedCharts(heading, tuple(_chart(number, curve) for number, curve in enumerate(fit.curves, 1)), 3)
 
@@ -107,19 +107,19 @@ def _chart(number: int, curve: Curve) -> Chart:
 def drawn_curves(curve: Curve) -> list[DrawnCurve]:
     """Measured points and the fitted line, of each direction that the curve has."""
     kinds: tuple[Literal["points", "line"], ...] = ("points", "line")
-    found = []
+    curves = []
     for name, kind, (x, y), at in zip(
         ("measured", "fit"), kinds, (curve.measured, curve.fitted), curve.backward or (None, None), strict=True
     ):
         many = kind == "points" and len(x) > _FEW
         if at is not None:
-            found.append(DrawnCurve(f"forward, {name}", "forward", x[:at], y[:at], kind, many))
-            found.append(DrawnCurve(f"backward, {name}", "backward", x[at:], y[at:], kind, many))
+            curves.append(DrawnCurve(f"forward, {name}", "forward", x[:at], y[:at], kind, many))
+            curves.append(DrawnCurve(f"backward, {name}", "backward", x[at:], y[at:], kind, many))
         elif curve.direction:
-            found.append(DrawnCurve(f"{curve.direction}, {name}", curve.direction, x, y, kind, many))
+            curves.append(DrawnCurve(f"{curve.direction}, {name}", curve.direction, x, y, kind, many))
         else:
-            found.append(DrawnCurve(name, "other", x, y, kind, many))
-    return found
+            curves.append(DrawnCurve(name, "other", x, y, kind, many))
+    return curves
 
 
 def _over_decades(curve: Curve) -> bool:
@@ -141,7 +141,7 @@ def operator_page(
     further: str,
     sources: Sequence[Source],
 ) -> bytes:
-    """The page of an operator.
+    """Render the page of an operator.
 
     ``traces`` have a name, size and offset in V, rate in Hz; rms, scaling error and mismatch in percent as they are in
     the fit; and the same with the size where the trace is left out. ``further`` says what to measure next.
@@ -165,7 +165,7 @@ def operator_page(
         marks=(Mark(0.0, "", "y"),),
         x_range=(0.0, len(traces) + 1.0),
     )
-    found = [
+    sections = [
         Section("traces", "Traces", (Grid(caption, head, rows), Charts((chart,)))),
         Section("family", "Family", (Paragraph(f"Chosen: {family}."), tried)),
         _sources(sources),
@@ -176,7 +176,7 @@ def operator_page(
     )
     note = f"the worst is {traces[worst][0]}, {left_out[worst]:.2g} % rms where it is left out"
     findings = [Finding("expect", 1.0, note), Finding("note", 0.0, further)]
-    return document(f"operator of {axis}", verdict, findings, found, "", _FOOT)
+    return document(f"operator of {axis}", verdict, findings, sections, "", _FOOT)
 
 
 def _candidates(candidates: Sequence[tuple[str, float]]) -> tuple[tuple[TableCell, ...], ...]:

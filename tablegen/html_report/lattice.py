@@ -100,7 +100,7 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple
 
 
 def _size(line: LinePlan) -> float:
-    """nm of the imaged window."""
+    """Return the size of the imaged window in nm."""
     return line.drive.window_nm
 
 
@@ -125,7 +125,7 @@ def _about_window(run: AxisRun, line: LinePlan) -> Floats:
 
 
 def _heights(x: Floats, y: Floats, constant: float) -> Floats:
-    """A hexagonal lattice with a spot at the origin."""
+    """Compute a hexagonal lattice with a spot at the origin."""
     wave = 4.0 * np.pi / (np.sqrt(3.0) * constant)
     total = np.zeros(np.broadcast(x, y).shape)
     for turned in (0.0, 60.0, 120.0):
@@ -137,12 +137,12 @@ def _heights(x: Floats, y: Floats, constant: float) -> Floats:
 def _sites(nominal: tuple[float, float], constant: float) -> tuple[tuple[float, float], ...]:
     """Where the spots are, in shares of width and height from the upper left."""
     width, height = nominal
-    found = []
+    sites = []
     rows = int(height / (constant * np.sqrt(0.75))) + 2
     columns = int(width / constant) + 2
     for j in range(-rows, rows + 1):
         for i in range(-2 * columns, 2 * columns + 1):
             x, y = constant * (i + 0.5 * (j % 2)), constant * np.sqrt(0.75) * j
             if abs(x) < 0.48 * width and abs(y) < 0.48 * height:
-                found.append((round(0.5 + x / width, 4), round(0.5 - y / height, 4)))
-    return tuple(found)
+                sites.append((round(0.5 + x / width, 4), round(0.5 - y / height, 4)))
+    return tuple(sites)

@@ -17,52 +17,52 @@ from tablegen.version import __version__
 _TURNS = np.linspace(0.0, 1.0, 601)
 
 
-def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
-    """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
-    axis, lesson = found.line.axis, found.lesson
-    findings = worst_first(of_remarks(found.remarks))
-    both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
+def round_page(round_: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
+    """Render the page of a round. ``earlier`` are comments of earlier rounds, ``refused`` why it is not learnt from."""
+    axis, update = round_.line.axis, round_.update
+    findings = worst_first(of_remarks(round_.remarks))
+    both = f"{update.before.rms_percent:.3g} % rms measured; {update.after.rms_percent:.2g} % predicted after it."
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:
         findings.insert(0, Finding("limit", 1.0, refused, "\u2717 not used"))
         verdict = TableCell("\u2717 This trace is not learnt from.", "bad")
-    elif not lesson.harmonics:
+    elif not update.harmonics:
         verdict = TableCell("Nothing was learnt: what is left is noise.", "quiet")
-    found_in = [_errors(found), _layer(found)]
+    found_in = [_errors(round_), _layer(round_)]
     if earlier:
-        rows = tuple(row(str(number), said) for number, said in enumerate(earlier, 1))
+        rows = tuple(row(str(number), text) for number, text in enumerate(earlier, 1))
         found_in.append(Section("rounds", "Rounds before", (Grid("", ("round", "learnt from"), rows),)))
     files = ", ".join(f"{source.name}, sha256 {source.sha256}" for source in sources)
     foot = f"From {files}; tablegen {__version__}."
     return document(f"{name}: refinement of {axis}", verdict, findings, found_in, "", foot)
 
 
-def _errors(found: Round) -> Section:
-    lesson = found.lesson
+def _errors(round_: Round) -> Section:
+    update = round_.update
     rows = []
-    for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
+    for label, departure in (("measured", update.before), ("predicted", update.after)):
         for side, (rms, largest) in departure.residual_percent.items():
             figures = (rms, largest, departure.scaling_percent[side])
             rows.append(row(f"{side}, {label}", *(f"{value:.3g}" for value in figures)))
-    noise = f"{lesson.chord_noise_percent:.2g} rms of a chord"
-    rows.append(row("noise of it", f"{lesson.noise_percent:.2g}", "", noise))
+    noise = f"{update.chord_noise_percent:.2g} rms of a chord"
+    rows.append(row("noise of it", f"{update.noise_percent:.2g}", "", noise))
     head = ("", "rms residual [% of the line]", "largest [% of the line]", "scaling error [%, peak to peak]")
-    parts = (Grid("", head, tuple(rows)), Charts(_residuals(found)))
-    return Section("errors", "Measured and predicted", parts, f"{found.recorded}.")
+    parts = (Grid("", head, tuple(rows)), Charts(_residuals(round_)))
+    return Section("errors", "Measured and predicted", parts, f"{round_.recorded}.")
 
 
-def round_charts(found: Round, name: str) -> PlottedCharts:
-    """What a round measured, what it predicts, and what it adds to the drive."""
-    heading = f"{name}: refinement of {found.line.axis}"
-    return PlottedCharts(heading, (*_residuals(found), _layer_chart(found)), 3)
+def round_charts(round_: Round, name: str) -> PlottedCharts:
+    """Draw what a round measured, what it predicts, and what it adds to the drive."""
+    heading = f"{name}: refinement of {round_.line.axis}"
+    return PlottedCharts(heading, (*_residuals(round_), _layer_chart(round_)), 3)
 
 
-def _residuals(found: Round) -> tuple[Chart, ...]:
-    lesson = found.lesson
+def _residuals(round_: Round) -> tuple[Chart, ...]:
+    update = round_.update
     charts = []
-    points = lesson.before.points
+    points = update.before.points
     for side, x in points.by_side(points.position).items():
-        before, after = (100.0 * one.points.by_side(one.error)[side] for one in (lesson.before, lesson.after))
+        before, after = (100.0 * one.points.by_side(one.error)[side] for one in (update.before, update.after))
         curves = (DrawnCurve("measured", "before", x, before), DrawnCurve("predicted", "forward", x, after))
         if side == "backward":
             curves = (curves[0], DrawnCurve("predicted", "backward", x, after))
@@ -72,21 +72,21 @@ def _residuals(found: Round) -> tuple[Chart, ...]:
     return tuple(charts)
 
 
-def _layer(found: Round) -> Section:
-    lesson, bound = found.lesson, found.bound
+def _layer(round_: Round) -> Section:
+    update, bound = round_.update, round_.bound
     text = (
-        f"Harmonics 1 to {lesson.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
+        f"Harmonics 1 to {update.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
         f"response of the scanner is below {bound.largest_gain:.3g} times the modelled one, or off by less than "
         f"{bound.phase_deg:.3g} degrees."
     )
-    return Section("layer", "What was learnt", (Paragraph(text), Charts((_layer_chart(found),))))
+    return Section("layer", "What was learnt", (Paragraph(text), Charts((_layer_chart(round_),))))
 
 
-def _layer_chart(found: Round) -> Chart:
-    lesson = found.lesson
+def _layer_chart(round_: Round) -> Chart:
+    update = round_.update
     curves = (
-        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS), faint=True),
-        DrawnCurve("the layer now", "other", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
+        DrawnCurve("this round", "other", _TURNS, 100.0 * update.change.value(_TURNS), faint=True),
+        DrawnCurve("the layer now", "other", _TURNS, 100.0 * update.layer.value(_TURNS)),
     )
     return Chart(
         "layer",
@@ -94,5 +94,5 @@ def _layer_chart(found: Round) -> Chart:
         "time [periods]",
         "added to the drive [% of V_scan]",
         curves,
-        windows(found.line, 1.0),
+        windows(round_.line, 1.0),
     )

@@ -59,7 +59,7 @@ def time_unit(period_s: float) -> tuple[float, str]:
 def drive_chart(
     axis: str, drive: DriveFigures, series: FourierSeries, window: tuple[float, float], both: bool, period_s: float
 ) -> Chart:
-    """The drive over a period, forward and backward, beside a plain triangle; the imaged windows are shaded."""
+    """Draw the drive over a period, forward and backward, beside a plain triangle; the imaged windows are shaded."""
     times, unit = time_unit(period_s)
     period, turn, (low, high) = times * period_s, drive.turn, window
     t = np.linspace(0.0, 1.0, _POINTS)

@@ -4,7 +4,7 @@ from markupsafe import Markup, escape
 
 
 def figure(value: float, digits: int = 4, signed: bool = False) -> str:
-    """A number in some significant digits, without an exponent where that is not needed; 0.000 for next to nothing."""
+    """Format a number in significant digits, without an exponent where none is needed; 0.000 for next to nothing."""
     sign = "+" if signed and value >= 0.0005 else ""
     if abs(value) < 0.0005:
         return "0.000"
@@ -14,7 +14,7 @@ def figure(value: float, digits: int = 4, signed: bool = False) -> str:
 
 
 def hertz(value: float) -> str:
-    """A frequency."""
+    """Format a frequency."""
     for least, unit in ((1e6, "MHz"), (1e3, "kHz")):
         if value >= least:
             return f"{value / least:.4g} {unit}"

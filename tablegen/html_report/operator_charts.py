@@ -20,7 +20,7 @@ _SIDES: tuple[Role, Role] = ("forward", "backward")
 def operator_charts(
     fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver, axis: str
 ) -> PlottedCharts:
-    """The map over size and offset, then a chart for each trace with its residual left out and in the fit."""
+    """Draw the map over size and offset, then a chart for each trace with its residual left out and in the fit."""
     where = _map(fit, lines, further, driver)
     traces = tuple(_trace(number, fit, line, driver) for number, line in enumerate(lines))
     worst = max(range(len(lines)), key=lambda at: fit.left_out[at].rms)
@@ -29,7 +29,7 @@ def operator_charts(
 
 def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) -> Chart:
     """Left out is what a scan is off that was predicted from the other traces; in the fit is fainter."""
-    inside, outside = fit.left[number], fit.left_out[number]
+    inside, outside = fit.in_fit[number], fit.left_out[number]
     curves = []
     for name, errors in (("in the fit", inside), ("left out", outside)):
         if errors.sides is not None:
@@ -51,7 +51,7 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) ->
 
 
 def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver) -> Chart:
-    """The rms residual to expect, where the driver reaches and scans are not refused."""
+    """Draw the rms residual to expect, where the driver reaches and scans are not refused."""
     span, ends = driver.span, (driver.v_min, driver.v_max)
     strokes, centres = np.linspace(1.0, 0.02, _GRID), np.linspace(0.0, 1.0, _GRID)
     points = np.array([(stroke, centre) for stroke in strokes for centre in centres])

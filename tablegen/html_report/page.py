@@ -25,8 +25,8 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
     """All that the page shows, what tells most of the image first."""
     planned = subject.planned
     if planned is None:
-        found = [asked(subject), certificate(subject), lines(subject, None), spectrum(subject), quantisation(subject)]
-        return [*found, corrections(subject), verification(subject), files(subject)]
+        parts = [asked(subject), certificate(subject), lines(subject, None), spectrum(subject), quantisation(subject)]
+        return [*parts, corrections(subject), verification(subject), files(subject)]
     tell("playing the scan on what the scanner file says")
     axes = played_axes(planned)
     tell("drawing")
@@ -47,14 +47,14 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
     ]
 
 
-def charts_of(found: list[Section]) -> dict[str, Chart]:
+def charts_of(parts: list[Section]) -> dict[str, Chart]:
     """Every chart of a page by its key."""
-    blocks = (block for section in found for block in section.blocks if isinstance(block, Charts))
+    blocks = (block for section in parts for block in section.blocks if isinstance(block, Charts))
     return {chart.key: chart for block in blocks for chart in block.charts}
 
 
-def page(subject: Subject, found: list[Section]) -> bytes:
-    """The page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
+def page(subject: Subject, parts: list[Section]) -> bytes:
+    """Render the page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
     manifest, planned = subject.manifest, subject.planned
     findings = ranked(subject)
     notice = ""
@@ -65,7 +65,7 @@ def page(subject: Subject, found: list[Section]) -> bytes:
         )
     title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
     foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is worked out from the scan; nothing is measured."
-    return document(title, _verdict(subject, findings), findings, found, notice, foot)
+    return document(title, _verdict(subject, findings), findings, parts, notice, foot)
 
 
 def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:

@@ -7,7 +7,7 @@ from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.scan_warnings import weighed_warnings
 from tablegen.config.load import load
 from tablegen.emit.render import render_scan
-from tablegen.html_report.ranking import placed
+from tablegen.html_report.ranking import without_folder
 from tablegen.html_report.subject import PlannedScan, Subject, of_scan
 from tablegen.html_report.verify_record import VerifyRecord
 
@@ -42,8 +42,10 @@ def planned_scan(
     warnings = []
     if remedies:
         progress("looking for remedies")
-        warnings = [(percent, placed(problem)) for percent, problem in weighed_warnings(setup, plan, certificates)]
+        warnings = [
+            (percent, without_folder(problem)) for percent, problem in weighed_warnings(setup, plan, certificates)
+        ]
     progress("writing the formats")
     files = render_scan(setup, plan, certificates)
-    broken = tuple(map(placed, certified.broken))
+    broken = tuple(map(without_folder, certified.broken))
     return of_scan(PlannedScan(setup, plan, certificates, broken, tuple(warnings)), files, verified)

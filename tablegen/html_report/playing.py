@@ -98,7 +98,7 @@ class PlayedAxis:
 
 
 def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
-    """The axes that move."""
+    """Play the axes that move."""
     setup = without_refinement(planned.setup)
     plain = planned.plan if setup is planned.setup else make_plan(setup)
     others = {model: _planned(setup, model) for model in _models(planned)}
@@ -107,7 +107,7 @@ def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
 
 
 def without_refinement(setup: Setup) -> Setup:
-    """The same scan without its layers, which were learnt on the scanner itself."""
+    """Return the same scan without its layers, which were learnt on the scanner itself."""
     scan = setup.scan
     if scan.x.refinement is None and scan.y.refinement is None:
         return setup
@@ -116,20 +116,20 @@ def without_refinement(setup: Setup) -> Setup:
 
 
 def _models(planned: PlannedScan) -> list[str]:
-    """The models to compare with: without correction, and beside an operator the laws."""
-    found = [models.UNCOMPENSATED]
+    """List the models to compare with: without correction, and beside an operator the laws."""
+    names = [models.UNCOMPENSATED]
     for line in planned.plan.lines:
         if isinstance(line.drive.shape, OperatorLine):
             table = line.drive.hysteresis
             served = [kind for kind in models.own() if kind.like(table) is not None and kind.order < table.order]
             best = max(served, key=lambda kind: kind.order, default=None)
-            if best is not None and best.model() not in found and getattr(table, "branches", None):
-                found.append(best.model())
-    return found
+            if best is not None and best.model() not in names and getattr(table, "branches", None):
+                names.append(best.model())
+    return names
 
 
 def _planned(setup: Setup, model: str) -> tuple[LinePlan, LinePlan] | str:
-    """The lines of another model, or why there are none."""
+    """Plan the lines of another model, or return why there are none."""
     try:
         return make_plan(with_model(setup, model)).lines
     except Rejected as rejected:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from tablegen.certificate.excess import LARGEST_PERCENT
+from tablegen.certificate.expectation_checks import RESONANCE_PERCENT
 from tablegen.config.schema import Limits
 from tablegen.html_report.blocks import Grid, Paragraph, Section, TableCell, row
 from tablegen.html_report.number_text import figure
@@ -13,7 +14,7 @@ _HEAD = ("", "figure", "limit", "")
 
 
 def certificate(subject: Subject) -> Section:
-    """A table an axis."""
+    """Show a table of the certificate for each axis."""
     planned = subject.planned
     limits = Limits() if planned is None else planned.plan.limits
     tables = [
@@ -46,40 +47,51 @@ def _slew(planned: PlannedScan | None, axis: str) -> float | None:
 
 
 def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[TableCell, ...]]:
-    found, output = entry.certificate, entry.output
-    of = "a code" if found.shaped is None else "the position"
-    rows = [_bounded(f"largest error of {of}", found.max_error_lsb, limits.max_error_lsb, "LSB")]
-    if found.rms_error_lsb is not None:
-        rows.append(row(f"rms error of {of}", f"{figure(found.rms_error_lsb, 3)} LSB", "", ""))
-    if found.shaped is not None:
-        rows += _shaped(found.shaped)
-    for side, error in (found.scaling_error_percent or {}).items():
-        most = limits.max_scaling_error_percent
-        worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
-        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
-        rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
-    for side, moved in (found.refinement_percent or {}).items():
+    certificate, output = entry.certificate, entry.output
+    of = "a code" if certificate.shaped is None else "the position"
+    rows = [_bounded(f"largest error of {of}", certificate.max_error_lsb, limits.max_error_lsb, "LSB")]
+    if certificate.rms_error_lsb is not None:
+        rows.append(row(f"rms error of {of}", f"{figure(certificate.rms_error_lsb, 3)} LSB", "", ""))
+    if certificate.shaped is not None:
+        rows += _shaped(certificate.shaped)
+    rows += _scaling(certificate, limits.max_scaling_error_percent)
+    for side, moved in (certificate.refinement_percent or {}).items():
         text = f"moves {moved.get('position', 0.0):.3g} % of the line, removes {moved.get('scaling', 0.0):.3g} %"
         rows.append(row(f"refinement {side}", text, "", ""))
-    if found.largest_step is not None:
-        rows.append(_bounded("largest step", found.largest_step, output.max_step, "codes a tick"))
-    if found.peak_slew_v_per_s is not None:
-        rows.append(_bounded("steepest slope at the piezo", found.peak_slew_v_per_s, slew, "V/s"))
-    if found.peak_acceleration is not None:
-        rows.append(row("largest acceleration", f"{found.peak_acceleration:.4g} of the line a period squared", "", ""))
-    for name, room in (("below", found.headroom_low), ("above", found.headroom_high)):
+    if certificate.largest_step is not None:
+        rows.append(_bounded("largest step", certificate.largest_step, output.max_step, "codes a tick"))
+    if certificate.peak_slew_v_per_s is not None:
+        rows.append(_bounded("steepest slope at the piezo", certificate.peak_slew_v_per_s, slew, "V/s"))
+    if certificate.peak_acceleration is not None:
+        rows.append(
+            row("largest acceleration", f"{certificate.peak_acceleration:.4g} of the line a period squared", "", "")
+        )
+    for name, room in (("below", certificate.headroom_low), ("above", certificate.headroom_high)):
         if room is not None:
             tone, sign = ("good", "\u2713 within") if room >= 0 else ("bad", "\u2717 outside")
             rows.append(row(f"room {name}", f"{room} codes", "0", TableCell(sign, tone)))  # type: ignore[arg-type]
-    if found.beyond_cutoff_db is not None:
-        rows.append(row("power beyond the cutoff", f"{found.beyond_cutoff_db:.1f} dB", "", ""))
-    if found.at_resonance_db is not None:
-        rows.append(row("power at the resonance", f"{found.at_resonance_db:.1f} dB", "", ""))
+    if certificate.beyond_cutoff_db is not None:
+        rows.append(row("power beyond the cutoff", f"{certificate.beyond_cutoff_db:.1f} dB", "", ""))
+    if certificate.at_resonance_db is not None:
+        rows.append(row("power at the resonance", f"{certificate.at_resonance_db:.1f} dB", "", ""))
+    return rows
+
+
+def _scaling(certificate: ManifestCertificate, most: float | None) -> list[tuple[TableCell, ...]]:
+    """Return the rows of scaling and size errors, with ``most`` percent as their limit."""
+    rows = []
+    for side, error in (certificate.scaling_error_percent or {}).items():
+        worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
+        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
+        rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
+    if certificate.position is not None:
+        for side, value in certificate.position.scaling_error_percent.items():
+            rows.append(_bounded(f"with the resonance that steps drive, {side}", value, None, "%", RESONANCE_PERCENT))
     return rows
 
 
 def _shaped(shaped: ManifestShaped) -> list[tuple[TableCell, ...]]:
-    """What shaping is for, and what it costs, beside the same without it."""
+    """List what shaping is for, and what it costs, beside the same without it."""
     now, before, rounded = shaped.changes, shaped.rounded.changes, shaped.rounded
     rows = [row("the same without shaping", f"{figure(rounded.rms_error_lsb, 3)} LSB rms", "", "")]
     for side, value in rounded.scaling_error_percent.items():
@@ -95,7 +107,7 @@ _PARTS = ("uncompensated", "total", "band_limit", "quantisation", "model")
 
 
 def _parts(subject: Subject) -> Grid:
-    """What the scaling errors are made of; peaks of the parts are at different places, and do not add up."""
+    """List the parts of the scaling errors; their peaks are at different places, and do not add up."""
     rows = []
     for axis, entry in subject.axes:
         for side, error in (entry.certificate.scaling_error_percent or {}).items():
@@ -107,19 +119,19 @@ def _parts(subject: Subject) -> Grid:
 def _bounded(
     name: str, value: float, limit: float | None, unit: str, advice: float | None = None, signed: bool = False
 ) -> tuple[TableCell, ...]:
-    """A figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
+    """Show a figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
     shown = f"{figure(value, 4, signed)} {unit}"
     if limit is not None:
         good = abs(value) <= limit
-        said = TableCell("\u2713 within", "good") if good else TableCell("\u2717 exceeded", "bad")
-        return row(name, shown, f"{figure(limit, 6)} {unit}", said)
+        cell = TableCell("\u2713 within", "good") if good else TableCell("\u2717 exceeded", "bad")
+        return row(name, shown, f"{figure(limit, 6)} {unit}", cell)
     if advice is not None and abs(value) > advice:
         return row(name, shown, "none", TableCell(f"! above {advice:g} {unit}", "warn"))
     return row(name, shown, "none" if advice is not None else "", "")
 
 
-def _expected(found: ManifestCertificate, most: float | None) -> tuple[tuple[TableCell, ...], ...]:
-    expected = found.expected
+def _expected(certificate: ManifestCertificate, most: float | None) -> tuple[tuple[TableCell, ...], ...]:
+    expected = certificate.expected
     if expected is None:
         return ()
     basis = "by the operator" if expected.basis == "traces" else "by the laws"
@@ -130,7 +142,7 @@ def _expected(found: ManifestCertificate, most: float | None) -> tuple[tuple[Tab
     )
     for name, figures in sides:
         rows += [_figure(f"{name} {side}", one, basis) for side, one in figures.items()]
-    own = found.scaling_error_percent or {}
+    own = certificate.scaling_error_percent or {}
     for side, one in expected.scaling_percent.items():
         parts = own.get(side, {})
         both = one.value + max(parts.get("total", 0.0), parts.get("band_limit", 0.0))
@@ -145,7 +157,7 @@ def _expected(found: ManifestCertificate, most: float | None) -> tuple[tuple[Tab
     return tuple(rows)
 
 
-def _figure(name: str, found: ManifestFigure, basis: str, signed: bool = False) -> tuple[TableCell, ...]:
-    shown = f"{figure(found.value, 3, signed)} %"
-    by = "not known" if found.uncertainty is None else f"\u00b1 {found.uncertainty:.2g} %"
+def _figure(name: str, figure_: ManifestFigure, basis: str, signed: bool = False) -> tuple[TableCell, ...]:
+    shown = f"{figure(figure_.value, 3, signed)} %"
+    by = "not known" if figure_.uncertainty is None else f"\u00b1 {figure_.uncertainty:.2g} %"
     return row(name, shown, by, TableCell(basis, "quiet"))

@@ -19,7 +19,7 @@ _POINTS = 321
 
 
 def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], brief: bool) -> PlottedCharts:
-    """A row for each axis; ``brief`` is without the last chart of it, for which the scan is played."""
+    """Draw a row for each axis; ``brief`` is without its last chart, for which the scan is played."""
     rows = [[drive_of(line), *([shape_chart(line)] if _bent(line) else [])] for line in plan.moving]
     if not brief:
         for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
@@ -33,7 +33,7 @@ def _bent(line: LinePlan) -> bool:
 
 
 def drive_of(line: LinePlan) -> Chart:
-    """The drive over a period."""
+    """Draw the drive over a period."""
     both = line.band_limit.directions == "both"
     return drive_chart(line.axis, line.drive, line.series, line.band_limit.window, both, float(1 / line.rate))
 
@@ -45,19 +45,19 @@ def modelled_error(line: LinePlan) -> Chart:
     """
     low, high = line.band_limit.window
     x = np.linspace(low, high, _POINTS)
-    shape, plain, found = line.drive.shape, [], []
+    shape, plain, errors = line.drive.shape, [], []
     for side in SIDES[: 2 if line.band_limit.directions == "both" else 1]:
         times, rising = np.asarray(shape.times(side, x)), side == "forward"
         branch, along = (shape.forward, x) if rising else (shape.backward, 1.0 - x)
         error = (line.described.value(times) - shape.value(times)) / branch.slope(along)
         without = (branch.inverse(along) - along) * (1.0 if rising else -1.0)
         plain.append(DrawnCurve(f"{side}, triangle", side, x, 100.0 * without, faint=True))
-        found.append(DrawnCurve(f"{side}, compensated", side, x, 100.0 * error))
+        errors.append(DrawnCurve(f"{side}, compensated", side, x, 100.0 * error))
     return Chart(
         f"modelled-{line.axis}",
         f"{line.axis}: modelled error",
         POSITION,
         "error [% of the line]",
-        (*plain, *found),
+        (*plain, *errors),
         marks=(Mark(0.0, "", "y"),),
     )

@@ -58,12 +58,12 @@ def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
 def inside(branch: BranchError) -> tuple[Floats, Floats]:
     """Position and residual within the window."""
     low, high = branch.window
-    kept = (branch.position >= low - 1e-9) & (branch.position <= high + 1e-9)
-    return branch.position[kept], branch.residual[kept]
+    inside_window = (branch.position >= low - 1e-9) & (branch.position <= high + 1e-9)
+    return branch.position[inside_window], branch.residual[inside_window]
 
 
 def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
-    """What is left in the image, about the best straight line through it."""
+    """Draw what is left in the image, about the best straight line through it."""
     run = correction.run
     return Chart(
         f"residual-{axis}-{correction.name}",
@@ -115,18 +115,18 @@ def _refinement(line: LinePlan) -> list[Chart]:
 
 
 def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
-    """The imaged stretches of a period, in its unit of time."""
+    """Return the imaged stretches of a period, in its unit of time."""
     sides = SIDES if line.band_limit.directions == "both" else SIDES[:1]
     low, high = line.band_limit.window
-    found = []
+    bands = []
     for side in sides:
         first, last = sorted(float(t) for t in line.drive.shape.times(side, np.array([low, high])))
-        found.append(Band(first * period, last * period, "imaged"))
-    return tuple(found)
+        bands.append(Band(first * period, last * period, "imaged"))
+    return tuple(bands)
 
 
 def over_time(run: AxisRun, line: LinePlan, period: float) -> list[DrawnCurve]:
-    """The residual in nm when it happens."""
+    """Return the curves of the residual in nm over time."""
     curves = []
     for side in (side for side in SIDES if side in run.directions):
         x, residual = inside(getattr(run.imaged, side))

@@ -35,7 +35,7 @@ def _titled(stage: SimulationStage, run: Run, axis: str) -> str:
 
 
 def own_charts(name: str, runs: Sequence[OwnRun]) -> PlottedCharts:
-    """What each correction leaves on the first of the scanners that depart from the operator."""
+    """Draw what each correction leaves on the first of the scanners that depart from the operator."""
     shown = [
         (f"{run.axis}, {row.correction}", f"{run.axis}-{row.correction}", row.example)
         for run in runs

@@ -72,12 +72,12 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
 
 
 def _db(power: Floats) -> Floats:
-    found: Floats = 10.0 * np.log10(np.maximum(power, 10.0 ** (0.1 * _FLOOR_DB)))
-    return found
+    decibels: Floats = 10.0 * np.log10(np.maximum(power, 10.0 ** (0.1 * _FLOOR_DB)))
+    return decibels
 
 
 def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
-    """The largest power of each bin, where it is."""
+    """Return the largest power of each bin, where it is."""
     if len(f) <= _BINS:
         return f, power
     which = np.searchsorted(np.geomspace(f[0], f[-1], _BINS + 1), f, side="right")
@@ -87,7 +87,7 @@ def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
 
 
 def quantisation(subject: Subject) -> Section:
-    """Emitted code less the code that the float waveform asks for."""
+    """Show the emitted code less the code of the float waveform."""
     charts = []
     for axis, entry in subject.axes:
         k = _looked_at(entry.program)

@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from tablegen.base.input_errors import Problem
 from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
@@ -41,8 +42,8 @@ class PlannedScan:
     setup: Setup
     plan: Plan
     certificates: Mapping[str, Certificate]
-    broken: tuple[str, ...] = ()
-    warnings: tuple[tuple[float, str], ...] = ()
+    broken: tuple[Problem, ...] = ()
+    warnings: tuple[tuple[float, Problem], ...] = ()
 
     @property
     def limited(self) -> bool:
@@ -72,13 +73,13 @@ class Subject:
 
 
 def series_of(axis: ManifestAxis) -> FourierSeries:
-    """The waveform w(t) that is played."""
+    """Return the waveform w(t) that is played."""
     fourier = axis.fourier
     return FourierSeries(fourier.a0, np.array(fourier.a), np.array(fourier.b))
 
 
 def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRecord | None = None) -> Subject:
-    """A scan and the files that a build of it writes, the manifest among them."""
+    """Return a scan and the files that a build of it writes, the manifest among them."""
     content = files[MANIFEST]
     manifest = msgspec.convert(read_json(content), Manifest)
     states = tuple(FileState(name, sha256(data).hexdigest()) for name, data in sorted(files.items()))
@@ -86,7 +87,7 @@ def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRe
 
 
 def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
-    """The build in a directory. Raises ``NotABuild``."""
+    """Read the build in a directory. Raises ``NotABuild``."""
     manifest = read_build(folder).manifest
     digest = sha256(read_bytes(folder / MANIFEST, MANIFEST_KIND)).hexdigest()
     states = [FileState(MANIFEST, digest)]

@@ -15,12 +15,12 @@ _HIGHEST = 4.0  # of what is asked
 
 
 def table_charts(name: str, axes: Sequence[AxisTables]) -> PlottedCharts:
-    """A chart an axis: the tables of each mode, the one that is chosen, and what was asked for."""
+    """Draw a chart an axis: the tables of each mode, the chosen one, and the requested error."""
     return PlottedCharts(f"tables of {name}", tuple(map(table_chart, axes)), len(axes))
 
 
 def table_chart(tables: AxisTables) -> Chart:
-    """The tables of one axis."""
+    """Draw the tables of one axis."""
     most = _HIGHEST * tables.max_error_lsb
     curves = []
     for mode in MODES:

@@ -1,13 +1,62 @@
 """What the modes of a table take on a device: measured, and written by ``python benchmarks/tables.py --costs``."""
 
+from typing import NamedTuple
+
 from tablegen.fixedpoint.program import Mode
 
-# Instructions of the C sequencer for a sample of one axis, mean of a frame, gcc -O2.
-INSTRUCTIONS: dict[Mode, dict[str, float]] = {
-    "direct": {"cortex-m4": 19.4, "cortex-m0plus": 35.6},
-    "interpolated": {"cortex-m4": 19.4, "cortex-m0plus": 35.6},
-    "cubic": {"cortex-m4": 26.9, "cortex-m0plus": 65.8},
+
+class MeasuredRun(NamedTuple):
+    """What the instructions of a sample depend on beside its mode: the memory of words, and the converter's coding."""
+
+    table_storage_bits: int  # 16, or 32 if a table of either axis has words of more than 16 bits
+    output_storage_bits: int  # 16, or 32 if a converter's word has more than 16 bits
+    coded: bool  # two's complement or left-aligned: each code takes a step more
+
+
+# Instructions of the C sequencer for a sample of one axis of the example, mean of a frame, gcc -O2.
+COUNTS: dict[MeasuredRun, dict[Mode, dict[str, float]]] = {
+    MeasuredRun(16, 16, False): {
+        "direct": {"cortex-m4": 19.4, "cortex-m0plus": 35.6},
+        "interpolated": {"cortex-m4": 19.4, "cortex-m0plus": 35.6},
+        "cubic": {"cortex-m4": 26.9, "cortex-m0plus": 65.8},
+    },
+    MeasuredRun(16, 16, True): {
+        "direct": {"cortex-m4": 26.4, "cortex-m0plus": 43.6},
+        "interpolated": {"cortex-m4": 26.4, "cortex-m0plus": 43.6},
+        "cubic": {"cortex-m4": 33.9, "cortex-m0plus": 73.8},
+    },
+    MeasuredRun(16, 32, False): {
+        "direct": {"cortex-m4": 19.7, "cortex-m0plus": 35.8},
+        "interpolated": {"cortex-m4": 19.7, "cortex-m0plus": 35.8},
+        "cubic": {"cortex-m4": 27.1, "cortex-m0plus": 64.9},
+    },
+    MeasuredRun(16, 32, True): {
+        "direct": {"cortex-m4": 27.7, "cortex-m0plus": 44.8},
+        "interpolated": {"cortex-m4": 27.7, "cortex-m0plus": 44.8},
+        "cubic": {"cortex-m4": 35.1, "cortex-m0plus": 73.9},
+    },
+    MeasuredRun(32, 16, False): {
+        "direct": {"cortex-m4": 36.5, "cortex-m0plus": 144.3},
+        "interpolated": {"cortex-m4": 36.5, "cortex-m0plus": 144.3},
+        "cubic": {"cortex-m4": 26.7, "cortex-m0plus": 232.3},
+    },
+    MeasuredRun(32, 16, True): {
+        "direct": {"cortex-m4": 43.5, "cortex-m0plus": 152.3},
+        "interpolated": {"cortex-m4": 43.5, "cortex-m0plus": 152.3},
+        "cubic": {"cortex-m4": 33.7, "cortex-m0plus": 240.3},
+    },
+    MeasuredRun(32, 32, False): {
+        "direct": {"cortex-m4": 36.6, "cortex-m0plus": 144.6},
+        "interpolated": {"cortex-m4": 36.6, "cortex-m0plus": 144.5},
+        "cubic": {"cortex-m4": 27.0, "cortex-m0plus": 232.7},
+    },
+    MeasuredRun(32, 32, True): {
+        "direct": {"cortex-m4": 44.6, "cortex-m0plus": 153.5},
+        "interpolated": {"cortex-m4": 44.6, "cortex-m0plus": 153.5},
+        "cubic": {"cortex-m4": 35.0, "cortex-m0plus": 241.7},
+    },
 }
+INSTRUCTIONS = COUNTS[MeasuredRun(16, 16, False)]
 # Cells of one axis in Verilog on an iCE40 HX8K, a sample a clock, of a cubic table one in 11.
 CELLS: dict[Mode, int] = {
     "direct": 1326,

@@ -10,10 +10,11 @@ import numpy as np
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import Setup
 from tablegen.emit.constants import storage_bits
+from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import WORD_BITS
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.html_report.table_costs import CELLS, INSTRUCTIONS
+from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
 from tablegen.planning.table_front import table_front
@@ -27,6 +28,7 @@ class TableRow:
     """A table with its errors over all ticks, in LSB of the converter; of shaped output before the rounding.
 
     ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
+    ``run`` is what its instructions depend on, if no word of the other axis is wider.
     """
 
     shape: TableShape
@@ -35,11 +37,12 @@ class TableRow:
     stored_bits: int
     chosen: bool
     planned: bool
+    run: MeasuredRun
 
     @property
     def instructions(self) -> dict[str, float]:
-        """A sample in C, by processor."""
-        return INSTRUCTIONS[self.shape.mode]
+        """A sample in C that is not shaped, by processor."""
+        return COUNTS[self.run][self.shape.mode]
 
     @property
     def cells(self) -> int:
@@ -109,8 +112,15 @@ def _behind(shape: TableShape) -> int:
     return WORDS_BEHIND if shape.mode == "cubic" else 1
 
 
+def _run(shape: TableShape, output: Output) -> MeasuredRun:
+    """Return the class of a table and a converter by which instructions are measured."""
+    shifted = output.align == "left" and output.word_bits > output.dac_bits
+    coded = shifted or output.coding == "twos-complement"
+    return MeasuredRun(storage_bits(shape.bits), storage_bits(output.word_bits), coded)
+
+
 def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
-    """The tables of a planned axis. Raises ``Unphysical`` where none keeps the error that its scan file asks for."""
+    """List the tables of a planned axis. Raises ``Unphysical`` where none keeps the requested error."""
     front = table_front(setup, line)
 
     def rows() -> Iterator[TableRow]:
@@ -121,6 +131,7 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
                 (shape.length + _behind(shape)) * storage_bits(shape.bits),
                 shape == front.chosen,
                 shape == front.planned,
+                _run(shape, line.program.output),
             )
 
     return AxisTables(

@@ -12,13 +12,14 @@ _HEAD = (
 
 def tables_text(tables: AxisTables) -> Iterator[str]:
     """Title, a line a table, and what to write into the scan file."""
-    shaped = "; shaped: errors are those before the rounding" if tables.shaped else ""
+    shaped = "; shaped: errors are those before the rounding, instructions without it" if tables.shaped else ""
     yield f"{tables.axis}: {tables.harmonics} harmonics, {tables.ticks} ticks{shaped}"
     yield from _HEAD
     yield from (_row(row, 4 if tables.shaped else 3) for row in tables.rows)
     if tables.rendered is not None:
         into = f"rendered on the device into {tables.rendered}: {tables.rendered.memory_bits} bits"
         yield f"     {'Fourier words':<13}{2 * tables.harmonics + 1:>7}{32:>6}{tables.upload_bits:>11}  {into}"
+    yield "     (cells: of words and codes of 16 bits, cubic of words of 14)"
     chosen = tables.chosen.shape
     yield ""
     yield f"* the least memory within {tables.max_error_lsb:g} LSB. In the scan file, so that each build finds it:"

@@ -19,13 +19,13 @@ _SIZES = 241
 
 
 def usable(planned: PlannedScan) -> Section:
-    """A chart an axis."""
-    found = [_axis(planned, line) for line in planned.plan.moving]
-    words = [word for _, words in found for word in words]
+    """Draw a chart an axis."""
+    blocks = [_axis(planned, line) for line in planned.plan.moving]
+    words = [word for _, words in blocks for word in words]
     return Section(
         "usable",
         "Usable offsets and sizes",
-        (Charts(tuple(chart for chart, _ in found)), *(Paragraph(word, "quiet") for word in words)),
+        (Charts(tuple(chart for chart, _ in blocks)), *(Paragraph(word, "quiet") for word in words)),
         "Lines below the curve fit, at this rate and with the waveform of this scan. Other sizes have slightly other "
         "waveforms, so near the curve `tablegen check` decides.",
     )
@@ -100,7 +100,7 @@ def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats,
 
 
 def _surface(planned: PlannedScan, line: LinePlan) -> OffsetSurface:
-    """m over offset and size."""
+    """Compute m over offset and size."""
     axis = getattr(planned.setup.scanner, line.axis)
     if axis.offset is None:
         return OffsetSurface.everywhere(OffsetLaw())

@@ -28,7 +28,7 @@ class VerifyRecord:
 
 
 def read_record(path: Path) -> VerifyRecord:
-    """A JUnit file of `tablegen verify`. Raises ``OSError`` and ``ValueError``, each with a reason."""
+    """Read a JUnit file of `tablegen verify`. Raises ``OSError`` and ``ValueError``, each with a reason."""
     try:
         text = read_text(path, RECORD)  # in no other encoding, whatever it says of itself
     except UnicodeDecodeError:
@@ -48,9 +48,9 @@ def read_record(path: Path) -> VerifyRecord:
     checks = []
     for case in suite.iterfind("testcase"):
         failure = case.find("failure")
-        said = "" if failure is None else (failure.get("message") or "failed")
+        message = "" if failure is None else (failure.get("message") or "failed")
         subject = case.get("classname", "").rpartition(".")[2]
-        checks.append(RecordedCheck(f"{subject}: {case.get('name', '')}", said, case.find("skipped") is None))
+        checks.append(RecordedCheck(f"{subject}: {case.get('name', '')}", message, case.find("skipped") is None))
     if len(checks) > _MOST_CHECKS:
         raise ValueError(f"has {len(checks)} checks, more than the {_MOST_CHECKS} of any build")
     return VerifyRecord(suite.get("name", "").removeprefix("tablegen verify "), digest, tuple(checks))

@@ -17,7 +17,7 @@ from tablegen.fitting.measured_branch import BINS
 from tablegen.images.model_start import begin, grown, prepared
 from tablegen.images.pair_checks import ALIASING_HINT, MIN_PERIODS
 from tablegen.images.periodic_model import BASES, FitState, Geometry, PeriodicModel, settle
-from tablegen.images.position_errors import LeftInBins, covariance, loud_rows, pixel_noise
+from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _MOST_RIPPLES = 12  # of each sweep
@@ -75,8 +75,8 @@ class ImageLine:
         at = [
             self.model.rippled_from - (self.model.bases - j) * step + k for j in range(self.model.bases) for k in (0, 1)
         ]
-        found: Floats = self.covariance[np.ix_(at, at)]
-        return found
+        part: Floats = self.covariance[np.ix_(at, at)]
+        return part
 
     @property
     def spots(self) -> Ints:
@@ -86,8 +86,8 @@ class ImageLine:
     @property
     def amplitudes(self) -> Floats:
         """(spots,), of unit variance of the heights."""
-        found: Floats = np.abs(self.state.amplitudes)
-        return found
+        magnitudes: Floats = np.abs(self.state.amplitudes)
+        return magnitudes
 
     @property
     def both(self) -> bool:
@@ -95,25 +95,25 @@ class ImageLine:
         return len(self.model.images) == 2
 
     def position(self, drive: Floats, forward: bool) -> Floats:
-        """The position where the drive, 0..1 between the turns, is on its way up or down."""
+        """Return positions, of the shape of ``drive`` (0..1 between the turns), on the way up or down."""
         i = 0 if forward else 2
         along = drive if forward else 1.0 - drive
         tau = BranchShape.at(self.state.parameters[i : i + 2]).inverse(along)
         more = self._coefficients(forward) @ bubbles(along, self.degrees)
-        found: Floats = tau + more if forward else 1.0 - tau + more
-        return found
+        place: Floats = tau + more if forward else 1.0 - tau + more
+        return place
 
     def position_error(self, drive: Floats, forward: bool) -> Floats:
         """Its standard error."""
         first = self.model.rippled_from + (0 if forward else self.degrees)
         part = self.covariance[first : first + self.degrees, first : first + self.degrees]
         shown = bubbles(drive if forward else 1.0 - drive, self.degrees)
-        found: Floats = np.sqrt(np.einsum("ic,ij,jc->c", shown, part, shown))
-        return found
+        errors: Floats = np.sqrt(np.einsum("ic,ij,jc->c", shown, part, shown))
+        return errors
 
     def _coefficients(self, forward: bool) -> Floats:
-        found: Floats = self.state.parameters[self.model.rippled_from :].reshape(2, -1)[0 if forward else 1]
-        return found
+        ripples: Floats = self.state.parameters[self.model.rippled_from :].reshape(2, -1)[0 if forward else 1]
+        return ripples
 
 
 def bubbles(u: Floats, count: int) -> Floats:
@@ -132,10 +132,14 @@ def fit_line(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> ImageLine:
-    """Positions and periods from heights in any unit, rows x columns, rows in the order of time.
+    """Fit positions and periods to heights in any unit, rows x columns, rows in the order of time.
 
     Columns are evenly spread in time over ``window`` of each sweep of a triangle; the rest is as in ``fit_pair``.
-    Raises ``Unphysical``.
+
+    Raises
+    ------
+    Unphysical
+        If the image does not support the fit.
     """
     if retrace is not None and retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
@@ -165,7 +169,7 @@ class _Degree:
 
 
 def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree]:
-    """The same with polynomials on both sweeps: of every number, from the most that such an image may tell."""
+    """Fit polynomials on both sweeps: of every degree, from the highest that such an image may show."""
     geometry = model.geometry
     along = np.abs(model.spots @ model.q(state.parameters))
     seen = np.abs(state.amplitudes)
@@ -185,13 +189,13 @@ def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree
         loose = np.concatenate([free, np.ones(count, bool), np.full(count, len(model.images) == 2)])
         loose[:4] = False  # the polynomials have what (17) has
         one = PeriodicModel(geometry, model.images, spots, model.order, plain, _ripples(geometry, count))
-        found = settle(one, start, loose)
-        loss = pixels * float(np.log(2.0 * found.cost / pixels)) + 2.0 * float(np.sum(loose))
-        fits.append(_Degree(one, found, loose, loss))
+        settled = settle(one, start, loose)
+        loss = pixels * float(np.log(2.0 * settled.cost / pixels)) + 2.0 * float(np.sum(loose))
+        fits.append(_Degree(one, settled, loose, loss))
         if loss > min(fit.loss for fit in fits) + _HOPELESS:
             break
-        base = found.parameters[: one.rippled_from]
-        known = list(found.parameters[one.rippled_from :].reshape(2, -1))
+        base = settled.parameters[: one.rippled_from]
+        known = list(settled.parameters[one.rippled_from :].reshape(2, -1))
     return fits
 
 
@@ -201,8 +205,8 @@ def _ripples(geometry: Geometry, count: int) -> tuple[Floats, Floats]:
 
 def _check(model: PeriodicModel, state: FitState) -> None:
     """Whether it is a fit at all, and of a trace and its retrace."""
-    for name, (_, image), left in zip(("trace", "retrace"), model.images, state.left, strict=False):
-        share = 1.0 - float(np.mean(left**2)) / float(np.mean(image**2))
+    for name, (_, image), residual in zip(("trace", "retrace"), model.images, state.residuals, strict=False):
+        share = 1.0 - float(np.mean(residual**2)) / float(np.mean(image**2))
         if share < _MIN_EXPLAINED:
             raise Unphysical(
                 f"{100.0 * max(share, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is "
@@ -229,15 +233,15 @@ def _check(model: PeriodicModel, state: FitState) -> None:
 
 def _opening(model: PeriodicModel, state: FitState) -> Floats:
     """How far the retrace is to the right of the trace at each column, of the line."""
-    found: Floats = model.columns(state.parameters, False).x - model.columns(state.parameters, True).x
-    return found
+    gap: Floats = model.columns(state.parameters, False).x - model.columns(state.parameters, True).x
+    return gap
 
 
 def _cropped(model: PeriodicModel, state: FitState, gap: Floats) -> Floats:
     """How much of the line is missing at each end, (2,), if that is what keeps trace and retrace apart there."""
     width = np.abs(np.interp(_NEAR_TURN, model.geometry.place, _opening(model, state)))
-    found: Floats = np.abs(gap) / np.maximum(width, _LEAST_WIDTH) * _NEAR_TURN[0]
-    return found
+    size: Floats = np.abs(gap) / np.maximum(width, _LEAST_WIDTH) * _NEAR_TURN[0]
+    return size
 
 
 def _gap(fit: _Degree) -> tuple[Floats, Floats]:
@@ -255,17 +259,20 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     at = model.rippled_from
     start = np.concatenate([state.parameters[: at + count], np.zeros(2), state.parameters[at + count :], np.zeros(2)])
     loose = np.concatenate([free[: at + count], [False, False], free[at + count :], [True, True]])
-    found = settle(wider, start, loose)
+    settled = settle(wider, start, loose)
     watched = np.arange(len(loose)) >= len(loose) - 2
-    errors = covariance(wider, found, loose, watched, 1.0, list(found.left))[0]
-    gap, error = found.parameters[-2:], np.sqrt(np.diag(errors)[-2:])
+    errors = covariance(wider, settled, loose, watched, 1.0, list(settled.residuals))[0]
+    gap, error = settled.parameters[-2:], np.sqrt(np.diag(errors)[-2:])
     worst = int(np.argmax(np.abs(gap)))
     # A narrow loop is as little open where much is cropped: how much, its width a tenth of the line further says.
     cropped = float(_cropped(model, state, gap)[worst])
-    told = abs(gap[worst]) / error[worst]
+    significance = abs(gap[worst]) / error[worst]
     fast = min(sqrt(0.5 / min(geometry.turn, 1.0 - geometry.turn)), 3.0)
-    if (abs(gap[worst]) > fast * _LARGEST_GAP and told > _GAP_ERRORS) or (
-        cropped > _LARGEST_CROP and abs(gap[worst]) > fast * _LAG_GAP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
+    if (abs(gap[worst]) > fast * _LARGEST_GAP and significance > _GAP_ERRORS) or (
+        cropped > _LARGEST_CROP
+        and abs(gap[worst]) > fast * _LAG_GAP
+        and significance > _CROP_ERRORS
+        and count >= _CROP_RIPPLES
     ):
         raise Unphysical(
             f"trace and retrace are {100.0 * abs(gap[worst]):.2g} % of the line apart at its "
@@ -277,22 +284,24 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
 
 def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> ImageLine:
     model, state, free = best.model, best.state, best.free
-    binned = [LeftInBins.of(model.geometry, *pair) for pair in zip(state.left, state.steepness, strict=True)]
+    binned = [BinnedResidual.of(model.geometry, *pair) for pair in zip(state.residuals, state.steepness, strict=True)]
     beyond = sum(float(np.sum((one.off / one.error) ** 2)) for one in binned)
     expected = max(len(binned) * BINS - int(np.sum(free[model.rippled_from :])), 1)
     misfit = beyond / expected if chdtrc(expected, beyond) < _MISFIT_SIGNIFICANCE else 1.0
     indices = np.arange(len(free))
     watched = free & ((indices >= 5) & (indices < model.rippled_from) & ((indices - 5) % (model.order + 1) == 0))
-    found, widened = covariance(model, state, free, watched, max(misfit, 1.0), [one.clean for one in binned])
-    found = found + _of_the_form(best, fits, gap, gap_error)
+    matrix, widened = covariance(model, state, free, watched, max(misfit, 1.0), [one.clean for one in binned])
+    matrix = matrix + _of_the_form(best, fits, gap, gap_error)
     power = sum(float(np.vdot(image, image)) for _, image in model.images)
-    drawn = np.concatenate([image - left for (_, image), left in zip(model.images, state.left, strict=True)])
+    drawn = np.concatenate(
+        [image - residual for (_, image), residual in zip(model.images, state.residuals, strict=True)]
+    )
     return ImageLine(
         geometry=model.geometry,
         model=model,
         state=state,
         free=free,
-        covariance=found,
+        covariance=matrix,
         degrees=len(model.ripples[0]),
         gap=gap,
         gap_error=gap_error,
@@ -304,7 +313,7 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
 
 
 def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> Floats:
-    """What the choice of the polynomials adds to the covariance of the base waves; what is open at the turns as well.
+    """Return what the choice of the polynomials adds to the covariance of the base waves, and the open ends.
 
     Fits of neighbouring degrees describe the image about as well.
     """

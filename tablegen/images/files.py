@@ -65,16 +65,27 @@ class ScanImage:
     first_row: FirstRow | None = None  # where row 0 is in the picture
     frame: int = 0  # counted from 0
     frames: int = 1  # images of a movie
+    angle_deg: float | None = None  # of the fast axis against the scanner's x
 
 
 def read_image(
     path: Path, channel: str | None = None, direction: Direction | None = None, frame: int | None = None
 ) -> ScanImage:
-    """An image of heights.
+    """Read an image of heights.
 
-    ``channel`` is the title, or the number, of the data in a file that has several; or the title without the
-    direction, of which ``direction`` then chooses. ``frame`` counts from 0 in a movie. Raises ``Rejected`` with file
-    and reason.
+    Parameters
+    ----------
+    channel
+        Title or number of the data in a file that has several; or the title without the direction.
+    direction
+        The direction of a title that has both.
+    frame
+        Frame of a movie, counted from 0.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read or has no such heights; the message has file and reason.
     """
     file = _opened(path)
     with file.named():
@@ -88,7 +99,7 @@ def read_pair(
     retrace_channel: str | None = None,
     frame: int | None = None,
 ) -> tuple[ScanImage, ScanImage]:
-    """Trace and retrace of one scan, from two files, or from one that has both.
+    """Read trace and retrace of one scan, from two files, or from one that has both.
 
     The retrace is ``retrace_channel``, or the retrace that belongs to the trace's channel, or the channel of the same
     name. Raises ``Rejected`` with file and reason, also where a file calls the trace a retrace, or the reverse.
@@ -114,7 +125,13 @@ def _required(channel: Channel, direction: Direction) -> Channel:
 
 
 def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
-    """All channels of a file, each of which has to be an image of heights. Raises ``Rejected``."""
+    """Read all channels of a file, each of which has to be an image of heights.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read, or a channel is no image of heights.
+    """
     file = _opened(path)
     with file.named():
         if not file.channels:
@@ -123,7 +140,13 @@ def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
 
 
 def channels_of(path: Path) -> list[Channel]:
-    """What a file has, without reading more of it than its format needs for that. Raises ``Rejected``."""
+    """Return the channels of a file, without reading more of it than its format needs for that.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read.
+    """
     return _opened(path).channels
 
 
@@ -145,7 +168,7 @@ class _ImageFile:
 
 
 def _opened(path: Path) -> _ImageFile:
-    """The channels of a file. Raises ``Rejected``."""
+    """Return the channels of a file. Raise ``Rejected`` if it cannot be read."""
     name = shown_path(path)
     file = _ImageFile(name, Source(path.name, ""), [])
     ending = path.suffix.lower()
@@ -163,7 +186,7 @@ def _opened(path: Path) -> _ImageFile:
 
 
 def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
-    """The image of a channel, which has to be heights. Raises ``ValueError``."""
+    """Return the image of a channel. Raise ``ValueError`` unless it has heights."""
     what = f"channel {channel.number} ({quoted(channel.title)}): " if len(file.channels) > 1 else ""
     size = " x ".join(map(str, channel.shape))
     if len(channel.shape) != 2:
@@ -207,6 +230,7 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         first_row=channel.first_row,
         frame=chosen,
         frames=channel.frames,
+        angle_deg=channel.angle_deg,
     )
 
 

@@ -99,29 +99,38 @@ class ImagedWaves(Protocol):
 def size_of_line(
     line: ImagedWaves, cell: Cell | None, grating: Grating | None, aspect: float | None = None
 ) -> LineSize:
-    """The size by what the image shows: two base waves are the lattice, one is the grating.
+    """Return the size of a line by what the image shows: two base waves are the lattice, one is the grating.
 
-    ``aspect`` is the frame's height over the line's length: its standard error is 10 %. It decides between readings of
-    a lattice that differ in size by a tenth and more, and gives the angle of a grating. Where it is not given, pixels
-    or the frame may be square. Raises ``Unphysical``, also where that makes a difference to a lattice.
+    ``aspect`` decides between readings of a lattice that differ in size by a tenth and more, and gives the angle of a
+    grating. Where it is not given, pixels or the frame may be square.
+
+    Parameters
+    ----------
+    aspect
+        The frame's height over the line's length; its standard error is 10 %.
+
+    Raises
+    ------
+    Unphysical
+        If no reading fits, or several do that differ without ``aspect``.
     """
     if aspect is not None:
         return _size(line, cell, grating, aspect)
     span = line.geometry.window[1] - line.geometry.window[0]
-    found = _size(line, cell, grating, line.geometry.rows * span / line.geometry.columns)
+    size = _size(line, cell, grating, line.geometry.rows * span / line.geometry.columns)
     if line.geometry.rows == line.geometry.columns:
-        return found
+        return size
     try:
         other = _size(line, cell, grating, span)
     except Unphysical:
-        return found
-    differs = abs(other.nm.value / found.nm.value - 1.0)
+        return size
+    differs = abs(other.nm.value / size.nm.value - 1.0)
     if differs > _SAME_SIZE:
         raise Unphysical(
-            f"the line is {found.nm.value:.4g} nm long if pixels are square, and {other.nm.value:.4g} nm if the frame "
+            f"the line is {size.nm.value:.4g} nm long if pixels are square, and {other.nm.value:.4g} nm if the frame "
             f"is; say how high it is with --aspect"
         )
-    return replace(found, shared=hypot(found.shared, differs if isnan(found.aspect) else 0.0))
+    return replace(size, shared=hypot(size.shared, differs if isnan(size.aspect) else 0.0))
 
 
 def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expected: float) -> LineSize:
@@ -167,7 +176,7 @@ def _of_grating(wave: Floats, covariance: Floats, grating: Grating, aspect: floa
 
 
 def _of_lattice(waves: Floats, covariance: Floats, cell: Cell, aspect: float) -> LineSize:
-    """The reading of the waves, as whole numbers of the cell's, with the least strain across the rows."""
+    """Return the reading of the waves, as whole numbers of the cell's, with the least strain across the rows."""
     direct = cell.vectors
     reciprocal = np.linalg.inv(direct).T
     readings: list[tuple[float, LineSize]] = []
@@ -208,7 +217,7 @@ def _of_lattice(waves: Floats, covariance: Floats, cell: Cell, aspect: float) ->
 
 
 def _turned(angle_deg: float, cell: Cell) -> float:
-    """The least angle that looks the same."""
+    """Return the least angle by which the same lattice is turned."""
     same = {"hexagonal": 60.0, "square": 90.0}.get(cell.name, 180.0)
     return (angle_deg + 0.5 * same) % same - 0.5 * same
 
@@ -225,7 +234,7 @@ def _check_whole_period(line: ImagedWaves) -> None:
 
 
 def _primitive(line: ImagedWaves, waves: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Base waves of all waves that are seen, where halves or thirds of the fitted ones are among them."""
+    """Return base waves of all visible waves, where halves or thirds of the fitted ones are among them."""
     for part in _SUPERCELLS:
         between = _strongest_part(line, part)
         if between is None:
@@ -244,12 +253,12 @@ def _primitive(line: ImagedWaves, waves: Floats, covariance: Floats) -> tuple[Fl
 
 
 def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
-    """The strongest wave between those of whole numbers, in parts of the base waves; None where none counts."""
+    """Return the strongest wave between those of whole numbers, in parts of the base waves; None if none counts."""
     model, state = line.model, line.state
     span = line.geometry.window[1] - line.geometry.window[0]
     reach = range(-2 * part, 2 * part + 1)
     waves = np.stack([model.q(state.parameters), model.s(state.parameters)[:, 0]], axis=1) / part
-    kept = []
+    spots = []
     for spot in product(reach, repeat=model.bases):
         q, s = np.array(spot) @ waves
         leading = next((n for n in spot if n), 0)
@@ -260,13 +269,13 @@ def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
             and abs(q) * span < 0.45 * line.geometry.columns
             and abs(s) < 0.45 * line.geometry.rows
         ):
-            kept.append(spot)
-    if not kept:
+            spots.append(spot)
+    if not spots:
         return None
     finer, at = model.divided(state, part)
-    strength = finer.strengths(at, np.array(kept))
+    strength = finer.strengths(at, np.array(spots))
     best = int(np.argmax(strength))
     pixels = line.geometry.rows * line.geometry.columns * len(model.images)
     noise = sqrt(2.0 * state.cost / pixels) * sqrt(2.0 * len(model.images) / pixels)
     least = max(_MIN_PART * float(np.max(line.amplitudes)), _MIN_PART_ERRORS * noise)
-    return tuple(kept[best]) if strength[best] > least else None
+    return tuple(spots[best]) if strength[best] > least else None

@@ -53,7 +53,7 @@ def prepared(
 
 
 def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Spot, tuple[Bend, ...]]:
-    """The strongest spot and each image's shape; whether the retrace, if there is one, is the trace's retrace."""
+    """Find the strongest spot and each image's shape; check that the retrace, if any, belongs to the trace."""
     spot = strongest(geometry, heights[0])
     forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
     if len(heights) == 1:
@@ -84,16 +84,21 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
 
 
 def row_order() -> int:
-    """The order of the polynomial over rows."""
+    """Return the order of the polynomial over rows."""
     return _ROW_POLYNOMIAL_ORDER
 
 
 def grown(
     geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, ...]
 ) -> tuple[PeriodicModel, FitState, Bools]:
-    """The fit, first of the strongest spot, then with another base vector if there is one, and all spots seen.
+    """Fit the strongest spot, then another base vector if there is one, and all visible spots.
 
     The shape of a retrace that there is not stays straight.
+
+    Parameters
+    ----------
+    heights
+        Levelled images, each (rows, columns).
     """
     images = list(zip((True, False), heights, strict=False))
     start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
@@ -121,9 +126,16 @@ def grown(
 def described(
     geometry: Geometry, images: list[tuple[bool, Floats]], start: Floats, free: Bools, off: tuple[Floats, Floats]
 ) -> tuple[PeriodicModel, FitState, Bools]:
-    """The fit from the parameters of one base vector: with another one if there is one, and all spots seen.
+    """Fit from the parameters of one base vector: with another one if there is one, and all visible spots.
 
     ``start`` has a polynomial of ``row_order()`` in the rows.
+
+    Parameters
+    ----------
+    images
+        Whether each is forward, and its heights, (rows, columns).
+    start
+        Parameters, with a polynomial of ``row_order()`` in the rows.
     """
     nowhere = np.zeros(geometry.columns)
     model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
@@ -134,12 +146,12 @@ def described(
         plain = PeriodicModel(
             geometry, images, list(map(tuple, model.spots.tolist())), _ROW_POLYNOMIAL_ORDER, 2 * (nowhere,)
         )
-        found = settle(plain, state.parameters, free)
-        if found.cost < state.cost:
-            model, state, off = plain, found, (nowhere, nowhere)
+        straight = settle(plain, state.parameters, free)
+        if straight.cost < state.cost:
+            model, state, off = plain, straight, (nowhere, nowhere)
     other = second_base(
         geometry,
-        state.left[0],
+        state.residuals[0],
         state.parameters[:2],
         _multiples(model, state.parameters),
         float(np.max(np.abs(state.amplitudes))),
@@ -168,20 +180,20 @@ def described(
 def _tracked(
     geometry: Geometry, heights: list[Floats], bends: tuple[Bend, ...], polynomial: Floats
 ) -> tuple[Floats, float, tuple[Floats, Floats]]:
-    """The shapes and q from the phase along each image, and what they leave of it, where that is much of a period.
+    """Estimate the shapes and q from the phase along each image, and the rest, if it is much of a period.
 
     Many periods tell the phase at every column, so that the start does not depend on the model.
     """
     sides = list(zip(heights, (True, False), bends, strict=False))
-    found = [column_phase(geometry, image, forward, bend, polynomial) for image, forward, bend in sides]
-    phases = [phase for phase, _ in found]
+    tracks = [column_phase(geometry, image, forward, bend, polynomial) for image, forward, bend in sides]
+    phases = [phase for phase, _ in tracks]
     q = sum(bend.q for bend in bends) / len(bends)
     if len(sides) == 2:
-        whole = found[0][1] & found[1][1]
+        whole = tracks[0][1] & tracks[1][1]
         phases[1] = phases[1] + _turns(geometry.place[whole], phases[0][whole] - phases[1][whole], q)
     count = 2 * len(sides)
 
-    def left(x: Floats) -> Floats:
+    def residuals(x: Floats) -> Floats:
         if min(BranchShape.at(x[i : i + 2]).least_slope() for i in range(0, count, 2)) < 0.1:
             return np.full(len(sides) * geometry.columns, 1e3)
         columns = [Columns.of(geometry, side[1], x[2 * i : 2 * i + 2]) for i, side in enumerate(sides)]
@@ -189,8 +201,8 @@ def _tracked(
         return np.concatenate([phase - x[count] * column.x - x[count + 1] for phase, column in pairs])
 
     start = [*np.concatenate([bend.shape.coordinates for bend in bends]), q, float(phases[0][0])]
-    best: Floats = least_squares(left, start, x_scale=[*[0.05, 0.1] * len(sides), 1.0, 0.3]).x
-    off = left(best)
+    best: Floats = least_squares(residuals, start, x_scale=[*[0.05, 0.1] * len(sides), 1.0, 0.3]).x
+    off = residuals(best)
     if float(np.sqrt(np.mean(off**2))) < _PHASE_TOLERANCE:
         off = np.zeros_like(off)
     first, second = np.split(off / best[count], 2) if len(sides) == 2 else (off / best[count], np.zeros_like(off))
@@ -198,7 +210,7 @@ def _tracked(
 
 
 def _turns(place: Floats, apart: Floats, q: float) -> int:
-    """The whole number of periods between the phases of trace and retrace: they meet where the drive turns.
+    """Return the whole number of periods between the phases of trace and retrace: they meet where the drive turns.
 
     Raises ``Unphysical`` where one number does as well as another.
     """
@@ -208,9 +220,9 @@ def _turns(place: Floats, apart: Floats, q: float) -> int:
     reach = int(np.ceil(0.3 * q)) + 1
     tried = []
     for turns in range(centre - reach, centre + reach + 1):
-        left = apart - turns
-        left = left - across @ (across.T @ left)
-        tried.append((float(np.sqrt(np.mean(left**2))), turns))
+        misfit = apart - turns
+        misfit = misfit - across @ (across.T @ misfit)
+        tried.append((float(np.sqrt(np.mean(misfit**2))), turns))
     tried.sort()
     if tried[1][0] < _MIN_MISFIT_RATIO * tried[0][0]:
         raise Unphysical(
@@ -234,8 +246,8 @@ def _part_of(state: FitState, model: PeriodicModel, other: Spot, polynomial: Flo
 def _multiples(model: PeriodicModel, parameters: Floats) -> Floats:
     """(n, 2): q and s of the harmonics of the first base vector."""
     n = np.arange(1, 41)[:, None]
-    found: Floats = n * np.array([model.q(parameters)[0], model.s(parameters)[0, 0]])
-    return found
+    start: Floats = n * np.array([model.q(parameters)[0], model.s(parameters)[0, 0]])
+    return start
 
 
 def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:

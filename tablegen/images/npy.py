@@ -10,7 +10,13 @@ AnyArray = np.ndarray[tuple[int, ...], Any]  # of any type of element
 
 
 def npy_array(content: bytes) -> tuple[AnyArray, int]:
-    """The array, without a copy, and how many bytes follow it. Raises ``ValueError`` with what is wrong."""
+    """Return the array, without a copy, and how many bytes follow it.
+
+    Raises
+    ------
+    ValueError
+        If the content is no .npy file; the message has the reason.
+    """
     file = BytesIO(content)
     try:
         version = np.lib.format.read_magic(file)
@@ -21,11 +27,11 @@ def npy_array(content: bytes) -> tuple[AnyArray, int]:
         shape, by_columns, kind = read_header(file)
         if kind.hasobject or kind.itemsize == 0 or len(shape) > 3 or min(shape, default=0) < 0:
             raise ValueError("no array of numbers in up to three dimensions")
-        left = len(content) - file.tell() - prod(shape) * kind.itemsize
-        if left < 0:
+        remaining = len(content) - file.tell() - prod(shape) * kind.itemsize
+        if remaining < 0:
             raise ValueError(f"{len(content) - file.tell()} bytes are fewer than those of {prod(shape)} values")
         flat = np.frombuffer(content, kind, prod(shape), file.tell())
-        return flat.reshape(shape, order="F" if by_columns else "C"), left
+        return flat.reshape(shape, order="F" if by_columns else "C"), remaining
     except Exception as error:  # the header is read by the parser of Python, which raises whatever it meets
         why = str(error).splitlines()
         raise ValueError(

@@ -3,6 +3,8 @@
 Each check raises ``Unphysical``, whose message says what to do. Names are those of the images: "trace", "retrace".
 """
 
+from typing import Literal
+
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
@@ -86,16 +88,17 @@ def check_periods(periods: float, span: float, columns: int) -> None:
         )
 
 
-def check_size(found_nm: float, said_nm: float, said_by: str) -> None:
-    """The size by the sample's constant against the one that was said, by ``said_by``.
+def check_size(measured_nm: float, stated_nm: float, stated_by: str, side: Literal["line", "frame"] = "line") -> None:
+    """Check the size by the sample's constant against the one stated by ``stated_by``.
 
     A constant of another direction of a lattice is wrong by the root of two or of three, an alias by more.
     """
-    ratio = found_nm / said_nm
+    ratio = measured_nm / stated_nm
+    long = "long" if side == "line" else "high"
     if not 1.0 / _MAX_SIZE_RATIO < ratio < _MAX_SIZE_RATIO:
         raise Unphysical(
-            f"the line is {found_nm:.4g} nm long by the sample's constant, and {said_nm:.4g} nm by "
-            f"{said_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
+            f"the {side} is {measured_nm:.4g} nm {long} by the sample's constant, and {stated_nm:.4g} nm by "
+            f"{stated_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
             f"two pixels?"
         )
 
@@ -114,14 +117,14 @@ def _match(one: Floats, other: Floats) -> float:
     """Median over strips of the best correlation of one's strip with the other's columns near by."""
     columns = one.shape[1]
     width, reach = max(columns // _STRIPS, 8), max(round(_REACH * columns), 2)
-    found = []
+    lags = []
     for start in range(0, columns - width + 1, width):
         strip = _plain(one[:, start : start + width])
         best = -1.0
         for at in range(max(start - reach, 0), min(start + reach, columns - width) + 1):
             best = max(best, float(np.mean(strip * _plain(other[:, at : at + width]))))
-        found.append(best)
-    return float(np.median(found))
+        lags.append(best)
+    return float(np.median(lags))
 
 
 def _plain(strip: Floats) -> Floats:

@@ -13,7 +13,7 @@ from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measure
 from tablegen.images.model_start import begin, check_signs, grown, prepared
 from tablegen.images.pair_checks import MIN_PERIODS
 from tablegen.images.periodic_model import FitState, PeriodicModel
-from tablegen.images.position_errors import LeftInBins, covariance, loud_rows, pixel_noise
+from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
 from tablegen.numerics.arrays import Bools, Floats
 
 _MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
@@ -51,11 +51,15 @@ def fit_pair(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> ImageFit:
-    """Both branches from heights in any unit, rows x columns, rows in the order of time.
+    """Fit both branches to heights in any unit, rows x columns, rows in the order of time.
 
     Columns are evenly spread in time over ``window`` of each sweep; the retrace is stored with left on the left, or
     ``retrace_mirrored`` in the order of time. Columns show the sample ``delay_pixels`` late, as of a feedback.
-    Raises ``Unphysical``.
+
+    Raises
+    ------
+    Unphysical
+        If the images do not support the fit.
     """
     geometry, heights = prepared(
         trace, np.ascontiguousarray(retrace[:, ::-1]) if retrace_mirrored else retrace, turn, window, delay_pixels
@@ -74,7 +78,9 @@ def _carrying(model: PeriodicModel, state: FitState) -> float:
 
 def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
     """Whether it is a fit at all."""
-    shares = [1.0 - float(np.mean(left**2)) / float(np.mean(image**2)) for (_, image), left in _both(model, state)]
+    shares = [
+        1.0 - float(np.mean(residual**2)) / float(np.mean(image**2)) for (_, image), residual in _both(model, state)
+    ]
     if min(shares) < _MIN_EXPLAINED_VARIANCE:
         name = "trace" if shares[0] < shares[1] else "retrace"
         raise Unphysical(
@@ -89,7 +95,7 @@ def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
 
 
 def _both(model: PeriodicModel, state: FitState) -> list[tuple[tuple[bool, Floats], Floats]]:
-    return list(zip(model.images, state.left, strict=True))
+    return list(zip(model.images, state.residuals, strict=True))
 
 
 def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -> ImageFit:
@@ -103,10 +109,10 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
             f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
         )
     shapes = np.arange(len(free)) < 4
-    found, widened = covariance(model, state, free, shapes, misfit, clean)
-    if float(np.sqrt(np.max(np.diag(found)[[0, 2]]))) > _MAX_SHAPE_ERROR:
+    matrix, widened = covariance(model, state, free, shapes, misfit, clean)
+    if float(np.sqrt(np.max(np.diag(matrix)[[0, 2]]))) > _MAX_SHAPE_ERROR:
         raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
-    forward, backward = (measured_branch(x[i : i + 2], found[i : i + 2, i : i + 2]) for i in (0, 2))
+    forward, backward = (measured_branch(x[i : i + 2], matrix[i : i + 2, i : i + 2]) for i in (0, 2))
     line = np.linspace(0.0, 1.0, 201)
     lagging = [BranchShape.at(x[i : i + 2]) for i in (0, 2)]
     apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
@@ -114,7 +120,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
     slope = max(float(np.max(model.columns(x, side).steep)) for side in (True, False))
     span = geometry.window[1] - geometry.window[0]
     bent = model.s(x)[0, 1:] @ model.y_powers[2:]
-    drawn = np.concatenate([image - left for (_, image), left in _both(model, state)])
+    drawn = np.concatenate([image - rest for (_, image), rest in _both(model, state)])
     return ImageFit(
         turn=Estimate(geometry.turn),
         v_scan=v_scan,
@@ -139,15 +145,15 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
 def _positions(
     model: PeriodicModel, state: FitState
 ) -> tuple[Floats, tuple[float, float], tuple[Curve, ...], float, list[Floats]]:
-    """The position error of each twentieth of the window, what it does to scaling, and curves.
+    """Return the position error of each twentieth of the window, its effect on scaling, and curves.
 
-    Then by how much it is larger than noise would have it, at least 1, and what is left of the images without it.
+    Then the factor by which it is larger than noise explains, at least 1, and the images less the model.
     """
     geometry = model.geometry
     residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0
     span = geometry.window[1] - geometry.window[0]
-    for forward, left, steep in zip((True, False), state.left, state.steepness, strict=True):
-        binned = LeftInBins.of(geometry, left, steep)
+    for forward, rest, steep in zip((True, False), state.residuals, state.steepness, strict=True):
+        binned = BinnedResidual.of(geometry, rest, steep)
         clean.append(binned.clean)
         columns = model.columns(state.parameters, forward)
         place = binned.place

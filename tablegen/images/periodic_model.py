@@ -63,7 +63,7 @@ class Geometry:
         return rows - (rows @ self.parabola) @ self.parabola.T
 
     def sweep(self, forward: bool) -> Floats:
-        """The drive along the sweep, 0..1, that each column shows."""
+        """Return the drive along the sweep, 0..1, that each column shows: shape (columns,)."""
         low, high = self.window
         way = self.place if forward else 1.0 - self.place
         return np.clip(way - self.delay * (high - low) / self.columns, 0.0, 1.0)
@@ -83,6 +83,7 @@ class Columns:
 
     @classmethod
     def of(cls, geometry: Geometry, forward: bool, shape: Floats) -> "Columns":
+        """Return the columns of one direction, for a branch of these coordinates, (2,)."""
         branch = BranchShape.at(shape)
         u = geometry.sweep(forward)
         tau = branch.inverse(u)
@@ -103,7 +104,7 @@ class FitState:
 
     parameters: Floats
     amplitudes: Complexes
-    left: tuple[Floats, ...]
+    residuals: tuple[Floats, ...]
     steepness: tuple[Floats, ...]  # d height / dx of each image, levelled
     cost: float
     hessian: Floats
@@ -170,19 +171,19 @@ class PeriodicModel:
         terms = self._terms(parameters, amplitudes)
         hessian = np.zeros((terms[0].shape[0],) * 2)
         scores = np.zeros((self.geometry.rows, len(hessian)))
-        left, steepness = [], []
+        residuals, steepness = [], []
         for (forward, heights), column in zip(self.images, columns, strict=True):
             coefficients = terms[0] if forward else terms[1]
             drawn = (rows[0].T * amplitudes) @ column[0]
-            left.append(heights - np.real(drawn))
+            residuals.append(heights - np.real(drawn))
             waves = 2j * pi * (self.spots @ self.q(parameters))
             steepness.append(np.real((rows[0].T * (amplitudes * waves)) @ column[0]))
             r, c, places = self._laid_out(rows, column)
             first, second = _products(r, c, places)
             hessian += _gram(coefficients, (first, second))
-            scores += _scores(coefficients, (r, c, places), left[-1])
-        cost = 0.5 * sum(float(np.vdot(image, image)) for image in left)
-        return FitState(parameters, amplitudes, tuple(left), tuple(steepness), cost, hessian, scores)
+            scores += _scores(coefficients, (r, c, places), residuals[-1])
+        cost = 0.5 * sum(float(np.vdot(image, image)) for image in residuals)
+        return FitState(parameters, amplitudes, tuple(residuals), tuple(steepness), cost, hessian, scores)
 
     def columns(self, parameters: Floats, forward: bool) -> Columns:
         """Where the columns of a direction are, ``off`` and ripples with it."""
@@ -193,11 +194,11 @@ class PeriodicModel:
         return replace(column, x=column.x + self.off[at] + more)
 
     def with_spots(self, spots: Sequence[tuple[int, ...]]) -> "PeriodicModel":
-        """The same of other spots."""
+        """Return the same model with other spots."""
         return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples, self.row_off)
 
     def with_offsets(self, off: tuple[Floats, Floats], row_off: Floats) -> "PeriodicModel":
-        """The same with other ``off`` and ``row_off``."""
+        """Return the same model with other ``off`` and ``row_off``."""
         spots = [tuple(spot) for spot in self.spots.tolist()]
         return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
 
@@ -208,35 +209,35 @@ class PeriodicModel:
         """
         other = self.with_spots([tuple(one) for one in np.eye(self.bases, dtype=np.int64).tolist()])
         row = np.conj(other._rows(state.parameters)[0])
-        found = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
+        waves = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
         for forward, heights in self.images:
-            found += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
-        return found
+            waves += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
+        return waves
 
     def phase_slopes(self, state: FitState) -> list[Floats]:
         """Of each image what more phase of each base vector does, in heights a period: (bases, rows, columns)."""
         rows = self._rows(state.parameters)[0]
-        found = []
+        derivatives = []
         for forward, _ in self.images:
             column = self._columns(state.parameters, forward)[0]
             waves = 2j * pi * state.amplitudes[:, None] * self.spots
-            found.append(np.stack([np.real((rows.T * wave) @ column) for wave in waves.T]))
-        return found
+            derivatives.append(np.stack([np.real((rows.T * wave) @ column) for wave in waves.T]))
+        return derivatives
 
     def divided(self, state: FitState, part: int) -> "tuple[PeriodicModel, FitState]":
-        """The same with base waves of one ``part`` of these."""
+        """Return the same model with base waves of one ``part`` of these."""
         spots = list(map(tuple, (self.spots * part).tolist()))
         parameters = state.parameters.copy()
         parameters[BASES : self.rippled_from] /= part
         model = PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples)
         return model, replace(state, parameters=parameters)
 
-    def scores_of(self, state: FitState, left: Sequence[Floats]) -> Floats:
-        """``FitState.scores`` were this left of each image."""
+    def scores_of(self, state: FitState, residuals: Sequence[Floats]) -> Floats:
+        """Return ``FitState.scores`` for other residuals of each image."""
         forward_terms, backward_terms = self._terms(state.parameters, state.amplitudes)
         rows = self._rows(state.parameters)
         scores = np.zeros((self.geometry.rows, len(forward_terms)))
-        for (forward, _), image in zip(self.images, left, strict=True):
+        for (forward, _), image in zip(self.images, residuals, strict=True):
             laid = self._laid_out(rows, self._columns(state.parameters, forward))
             scores += _scores(forward_terms if forward else backward_terms, laid, image)
         return scores
@@ -271,7 +272,7 @@ class PeriodicModel:
         )
 
     def _terms(self, parameters: Floats, amplitudes: Complexes) -> tuple[Complexes, Complexes]:
-        """What each parameter does to a forward and a backward image: (parameters, terms)."""
+        """Return the effect of each parameter on a forward and a backward image: (parameters, terms)."""
         count, order = len(self.spots), self.order
         tables = []
         waves = 2j * pi * amplitudes
@@ -304,19 +305,22 @@ class PeriodicModel:
         total = np.zeros(len(spots), dtype=np.complex128)
         power = np.zeros(len(spots))
         row = other._rows(state.parameters)[0]
-        for (forward, _), left in zip(self.images, state.left, strict=True):
+        for (forward, _), residual in zip(self.images, state.residuals, strict=True):
             column = other._columns(state.parameters, forward)[0]
-            total += np.sum(np.conj(row) * (np.conj(column) @ left.T), axis=1)
+            total += np.sum(np.conj(row) * (np.conj(column) @ residual.T), axis=1)
             power += np.sum(np.abs(column) ** 2, axis=1) * self.geometry.rows
         pixels = self.geometry.rows * self.geometry.columns * len(self.images)
-        found: Floats = 2.0 * np.abs(total) / np.sqrt(np.maximum(power, 1e-6 * pixels) * pixels)
-        return found
+        amplitudes: Floats = 2.0 * np.abs(total) / np.sqrt(np.maximum(power, 1e-6 * pixels) * pixels)
+        return amplitudes
 
 
 def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
-    """Levenberg and Marquardt's way to the least squares; parameters that are not ``free`` stay.
+    """Minimise the sum of squares by Levenberg and Marquardt; parameters that are not ``free`` stay.
 
-    Raises ``Unphysical`` where it finds none.
+    Raises
+    ------
+    Unphysical
+        If no minimum is found.
     """
     state = model.at(start)
     joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
@@ -347,7 +351,7 @@ def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
 def _products(
     rows: Complexes, columns: Complexes, places: tuple[Ints, Ints] | None = None
 ) -> tuple[Complexes, Complexes]:
-    """Sums over pixels of conj(F_m) F_n and of F_m F_n, for F = row part times column part."""
+    """Sum over pixels conj(F_m) F_n and F_m F_n, for F = row part times column part."""
     row, column = (np.conj(rows) @ rows.T, rows @ rows.T), (np.conj(columns) @ columns.T, columns @ columns.T)
     if places is not None:
         at, across = np.ix_(places[0], places[0]), np.ix_(places[1], places[1])
@@ -355,11 +359,13 @@ def _products(
     return row[0] * column[0], row[1] * column[1]
 
 
-def _scores(coefficients: Complexes, laid_out: tuple[Complexes, Complexes, tuple[Ints, Ints]], left: Floats) -> Floats:
+def _scores(
+    coefficients: Complexes, laid_out: tuple[Complexes, Complexes, tuple[Ints, Ints]], residual: Floats
+) -> Floats:
     """For each row, the residual times each parameter's derivative, summed: (rows, parameters)."""
     row, column, (at, across) = laid_out
-    found: Floats = np.real(coefficients @ ((column @ left.T)[across] * row[at])).T
-    return found
+    scores: Floats = np.real(coefficients @ ((column @ residual.T)[across] * row[at])).T
+    return scores
 
 
 def _gram(coefficients: Complexes, products: tuple[Complexes, Complexes]) -> Floats:

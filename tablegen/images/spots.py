@@ -45,10 +45,16 @@ class Bend:
 
 
 def strongest(geometry: Geometry, heights: Floats) -> Spot:
-    """The strongest spot of a levelled forward image. Raises ``Unphysical`` where none stands out."""
+    """Find the strongest spot of a levelled forward image, (rows, columns).
+
+    Raises
+    ------
+    Unphysical
+        If no spot stands out.
+    """
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     best = (0.0, 0, 0, 0.0, 1.0)
-    kept = np.zeros((1, 1))
+    best_power = np.zeros((1, 1))
     for shape in np.arange(-6, 7) * _COARSE_STEP:
         straight, span = _straightened(geometry, heights, BranchShape.at(np.array([shape, 0.0])))
         power = np.abs(np.fft.rfft2(weight * straight)) ** 2
@@ -58,16 +64,18 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
         row, column = divmod(int(np.argmax(power * np.arange(power.shape[1]))), power.shape[1])
         if power[row, column] * column > best[0]:
             best = (float(power[row, column]) * column, row, column, float(shape), span)
-            kept = power
+            best_power = power
     _, row, column, sharpest, span = best
     # A rough surface has spectrum all around; held against what lies beside it, none of that stands out. The median,
     # as the mean of what is random, does not see another spot of a lattice.
     beside = np.concatenate([np.arange(3, 13), -np.arange(3, 13)])
-    near = kept[np.ix_((row + beside) % geometry.rows, np.arange(max(column - 2, 0), min(column + 3, kept.shape[1])))]
-    if not kept[row, column] > _MIN_SPOT_POWER * max(float(np.mean(kept)), 1.44 * float(np.median(near))):
+    near = best_power[
+        np.ix_((row + beside) % geometry.rows, np.arange(max(column - 2, 0), min(column + 3, best_power.shape[1])))
+    ]
+    if not best_power[row, column] > _MIN_SPOT_POWER * max(float(np.mean(best_power)), 1.44 * float(np.median(near))):
         raise Unphysical("no period stands out in the trace; a grating or a lattice is needed, and its contrast")
     count = geometry.rows
-    peak = np.log(np.maximum(kept[[(row - 1) % count, row, (row + 1) % count], column], 1e-300))
+    peak = np.log(np.maximum(best_power[[(row - 1) % count, row, (row + 1) % count], column], 1e-300))
     bend = float(peak[0] - 2.0 * peak[1] + peak[2])
     s = row + (0.5 * float(peak[0] - peak[2]) / bend if bend < 0.0 else 0.0)
     q = column / span
@@ -79,7 +87,7 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
 
 
 def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, around: float | None = None) -> Bend:
-    """The branch with which a spot of this s is sharpest in a levelled image.
+    """Return the branch with which a spot of this s is sharpest in a levelled image.
 
     Its first coordinate is near ``around``, or any.
     """
@@ -114,27 +122,25 @@ def row_polynomial(
     geometry: Geometry, heights: Floats, bend: Bend, spot: Spot, order: int, smoothed: float = 0.01
 ) -> Floats:
     """s_1, s_2, ... of a forward image: the phase of the spot along the rows, ``smoothed`` over a part of the frame."""
-    tau = _inverse(bend.shape.coordinates, geometry.sweep(True))
-    assert tau is not None
+    tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(True)))
     seen = (heights @ np.exp(-2j * np.pi * bend.q * tau)) * np.exp(-2j * np.pi * spot.s * geometry.y)
     box = np.ones(max(round(smoothed * geometry.rows), 1) | 1)
     smooth = np.convolve(np.convolve(seen, box, "same"), box, "same")
     phase = np.unwrap(np.angle(smooth)) / (2.0 * np.pi)
-    found = np.polynomial.polynomial.polyfit(geometry.y, phase, order, w=np.abs(smooth))[1:]
-    found[0] += spot.s
-    return np.asarray(found, dtype=np.float64)
+    coefficients = np.polynomial.polynomial.polyfit(geometry.y, phase, order, w=np.abs(smooth))[1:]
+    coefficients[0] += spot.s
+    return np.asarray(coefficients, dtype=np.float64)
 
 
 def column_phase(
     geometry: Geometry, heights: Floats, forward: bool, bend: Bend, polynomial: Floats
 ) -> tuple[Floats, Bools]:
-    """A spot's phase along a levelled image, in periods: of every column the mean over one period; and where it is.
+    """Return a spot's phase along a levelled image, in periods, and where it is known: each (columns,).
 
-    Over a whole period of x the harmonics, and the spot's other half, cancel. Within half a period of the ends the
-    phase is that of the last whole one.
+    Of every column it is the mean over one period. Over a whole period of x the harmonics, and the spot's other half,
+    cancel. Within half a period of the ends the phase is that of the last whole one.
     """
-    tau = _inverse(bend.shape.coordinates, geometry.sweep(forward))
-    assert tau is not None
+    tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(forward)))
     x = tau if forward else 1.0 - tau
     turns = np.polynomial.polynomial.polyval(geometry.y, np.append(0.0, polynomial))
     seen = (np.exp(-2j * np.pi * turns) @ heights) * np.exp(-2j * np.pi * bend.q * x)
@@ -147,13 +153,13 @@ def column_phase(
 
 
 def _straightened(geometry: Geometry, heights: Floats, branch: BranchShape) -> tuple[Floats, float]:
-    """A forward image at even steps of x, and how much of the line they span."""
+    """Resample a forward image at even steps of x; return it, and how much of the line they span."""
     low, high = (float(edge) for edge in branch.inverse(geometry.place[[0, -1]]))
     count = geometry.columns
     at = (branch.value(np.linspace(low, high, count)) - geometry.place[0]) / (geometry.place[1] - geometry.place[0])
-    left = np.clip(at.astype(np.int64), 0, count - 2)
-    part = at - left
-    return heights[:, left] * (1.0 - part) + heights[:, left + 1] * part, (high - low) * count / (count - 1)
+    before = np.clip(at.astype(np.int64), 0, count - 2)
+    part = at - before
+    return heights[:, before] * (1.0 - part) + heights[:, before + 1] * part, (high - low) * count / (count - 1)
 
 
 @lru_cache(maxsize=1)
@@ -171,15 +177,25 @@ def _inverse(coordinates: Floats, u: Floats) -> Floats | None:
     return np.interp(u, value, tau)
 
 
+def _required(tau: Floats | None) -> Floats:
+    """Raise ``Unphysical`` where the branch that fits best runs backwards: no scanner has such a branch."""
+    if tau is None:
+        raise Unphysical(
+            "the branch that fits best runs backwards; are rows that jump, steps or debris in the image? Crop it, or "
+            "choose another --channel"
+        )
+    return tau
+
+
 def second_base(
-    geometry: Geometry, left: Floats, shape: Floats, known: Floats, amplitude: float, order: int
+    geometry: Geometry, heights: Floats, shape: Floats, known: Floats, amplitude: float, order: int
 ) -> tuple[Spot, Floats] | None:
     """Another spot in what the first and its harmonics, ``known`` as rows of q and s, leave of a forward image.
 
     With its polynomial in the rows; None where no spot has a tenth of ``amplitude``.
     """
     branch = BranchShape.at(shape)
-    straight, span = _straightened(geometry, left, branch)
+    straight, span = _straightened(geometry, heights, branch)
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     power = np.abs(np.fft.rfft2(weight * straight)) ** 2
     q, s = np.arange(power.shape[1]) / span, np.arange(geometry.rows)
@@ -195,4 +211,4 @@ def second_base(
         return None
     spot = Spot(float(q[column]), float(row if row <= geometry.rows / 2 else row - geometry.rows), float(shape[0]))
     bend = Bend(spot.q, branch, 0.0)
-    return spot, row_polynomial(geometry, left, bend, spot, order, _MIN_SIDE_DISTANCE)
+    return spot, row_polynomial(geometry, heights, bend, spot, order, _MIN_SIDE_DISTANCE)

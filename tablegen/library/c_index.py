@@ -60,7 +60,7 @@ def _template(name: str) -> str:
 
 
 def _told(entry: Entry) -> str:
-    """What differs, for a comment."""
+    """Return what differs, for a comment."""
     from tablegen.emit.templates import comment_safe
 
     return comment_safe(", ".join(f"{key} = {value}" for key, value in entry.settings.items()))[:200]

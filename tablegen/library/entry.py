@@ -60,7 +60,7 @@ class Entry(Struct, frozen=True, kw_only=True):
         return self.x, self.y
 
     def described(self) -> dict[str, Any]:
-        """What the index shows of it."""
+        """Return what the index shows of the entry."""
         record: dict[str, Any] = msgspec.to_builtins(self)
         return {key: value for key, value in record.items() if key not in ("library", "inputs", "files", "formats")}
 
@@ -76,7 +76,7 @@ def make_entry(
     inputs: str,
     files: Mapping[str, bytes],
 ) -> Entry:
-    """The entry of a build; ``errors`` are the largest error in LSB and the scaling error in percent, by axis."""
+    """Make the entry of a build; ``errors`` are the largest error in LSB and the scaling error in percent, by axis."""
 
     def axis(one: AxisContent) -> AxisEntry:
         program, output = one.program, one.program.output
@@ -122,7 +122,7 @@ def entry_file(entry: Entry) -> bytes:
 
 
 def read_record(folder: Path) -> bytes | None:
-    """The content of ``program.json`` in the folder of a program; None where it cannot be read."""
+    """Read ``program.json`` in the folder of a program; None where it cannot be read."""
     try:
         return read_bytes(folder / RECORD, BUILD_FILE)
     except OSError:
@@ -130,7 +130,7 @@ def read_record(folder: Path) -> bytes | None:
 
 
 def parse_entry(record: bytes | None, folder: Path) -> Entry | None:
-    """The entry in a record of the program in ``folder``; None for one that no sweep has written there."""
+    """Parse the record of the program in ``folder``; None for one that no sweep has written there."""
     if record is None:
         return None
     try:
@@ -147,13 +147,13 @@ def is_whole(folder: Path, entry: Entry) -> bool:
 
 
 def changed_files(folder: Path, entry: Entry) -> list[str]:
-    """The files of a program that are missing or not as they were written."""
-    found = []
+    """List the files of a program that are missing or not as they were written."""
+    changed = []
     for name, digest in entry.files.items():
         try:
             same = file_sha256(folder / name, BUILD_FILE) == digest
         except OSError:
             same = False
         if not same:
-            found.append(name)
-    return found
+            changed.append(name)
+    return changed

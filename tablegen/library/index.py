@@ -38,15 +38,15 @@ def make_index(
     formats: Sequence[str],
     content: Callable[[str, str], bytes],
 ) -> Index:
-    """The index of programs, numbered as they come, and the runtime of their formats.
+    """Make the index of programs, numbered as they come, and the runtime of their formats.
 
     ``failed`` are the scans that could not be built, as the index shows them; ``content`` of the name of a program and
     that of a file is what the file holds, and may raise ``OSError``.
     """
-    wanted = chosen(formats)
-    names = {each.name for each in wanted}
+    chosen_formats = chosen(formats)
+    names = {each.name for each in chosen_formats}
     runtime: dict[str, bytes] = {}
-    for each in wanted:
+    for each in chosen_formats:
         runtime |= runtime_files(each)
     files, notes = dict(runtime), []
     if entries and "c" in names:
@@ -77,17 +77,17 @@ def make_index(
 
 
 def listed_files(folder: Path) -> dict[str, str]:
-    """The files that the index in a directory lists, with their digests; nothing where there is none of ours.
+    """Read the files that the index in a directory lists, with their digests; nothing without an index of tablegen.
 
     Only names that an index of that library can list are among them, whatever else stands in it.
     """
     try:
-        found = read_json(read_bytes(folder / INDEX, BUILD_FILE))
+        record = read_json(read_bytes(folder / INDEX, BUILD_FILE))
     except (OSError, ValueError):
         return {}
-    if not isinstance(found, dict) or not {"tablegen", "library", "programs", "files"} <= found.keys():
+    if not isinstance(record, dict) or not {"tablegen", "library", "programs", "files"} <= record.keys():
         return {}
-    library, files = found["library"], found["files"]
+    library, files = record["library"], record["files"]
     if not isinstance(library, str) or why_not_a_name(library) is not None or not isinstance(files, dict):
         return {}
     own = [name for name in files if name.startswith(f"{library}_library") or of_the_runtime(name)]

@@ -55,17 +55,17 @@ def verilog_index(library: str, entries: Sequence[Entry], content: Contents, ver
 
 
 def _constants(entries: Sequence[Entry]) -> dict[str, int]:
-    """The parameters of a ``dac_sequencer`` that plays all of them."""
-    found = {"PROGRAMS": len(entries), "DAC_BITS": entries[0].x.dac_bits}
+    """Return the parameters of a ``dac_sequencer`` that plays all programs."""
+    constants = {"PROGRAMS": len(entries), "DAC_BITS": entries[0].x.dac_bits}
     for letter, axes in (("X", [entry.x for entry in entries]), ("Y", [entry.y for entry in entries])):
-        found |= {
+        constants |= {
             f"{letter}_INTERPOLATED": DEGREES["cubic"] if axes[0].cubic else int(axes[0].interpolated),
             f"{letter}_INDEX_BITS": max(_index_bits(axis) for axis in axes),
             f"{letter}_WORD_BITS": axes[0].table_bits,
         }
-    found |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
-    found["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
-    return found
+    constants |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
+    constants["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
+    return constants
 
 
 def _index_bits(axis: AxisEntry) -> int:
@@ -81,7 +81,7 @@ def _memory(entries: Sequence[Entry], content: Contents, fourier: bool) -> bytes
 
 
 def _record(entry: Entry, content: Contents, fourier: bool) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
-    """A record as words."""
+    """Return a record as words."""
     kind = "_fourier" if fourier else ""
     program = _words(content(entry.name, f"{entry.name}_program.mem"), 32)
     axes = [
@@ -97,6 +97,6 @@ def _record(entry: Entry, content: Contents, fourier: bool) -> "np.ndarray[tuple
 
 
 def _words(memory: bytes, bits: int) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
-    """The words of a memory file, sign-extended to 32 bits."""
+    """Read the words of a memory file, sign-extended to 32 bits."""
     words = np.array([int(word, 16) for word in memory.split()], dtype=np.int64)
     return (words - ((words >> (bits - 1)) << bits)).astype(np.uint32)

@@ -12,7 +12,7 @@ from tablegen.manifest.read import read_build
 
 @contextmanager
 def whole_build(folder: Path) -> Iterator[Path]:
-    """The directory of a build as it is; of a program of a library a copy, while this lasts, with the runtime in it.
+    """Yield the directory of a build; of a program of a library a temporary copy with the runtime in it.
 
     Nothing is taken from beside the folder but what its manifest lists. Raises ``NotABuild``, and ``OSError`` where
     nothing can be written.

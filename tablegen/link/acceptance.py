@@ -39,7 +39,7 @@ Finding = tuple[Reason, int]  # a reason and its detail
 def first_objection(
     contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | None, order: int = 0
 ) -> Finding | None:
-    """The first check that a program fails, in the order of the protocol; None where it passes all of them.
+    """Return the first check that a program fails, in the order of the protocol; None where it passes all of them.
 
     ``x`` and ``y`` are the limits of the device, ``playing`` what it plays now (None: nothing yet), ``order`` the
     highest order of shaping that it has.

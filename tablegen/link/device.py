@@ -124,9 +124,13 @@ class Device:
         return None if self._uploader is None else self._uploader.state
 
     def status(self) -> DeviceStatus:
-        """What it does now."""
+        """Ask the device for its status."""
         payload = self._session.ask(Request.STATUS, b"", DeviceStatus.LAYOUT.size, self._until(None))
         return self._session.status_of(payload)
+
+    def needs_key(self) -> bool:
+        """Return whether uploads carry a tag; raises ``Refused`` if they do and no key was given. Sends nothing."""
+        return self._session.needs_key(Request.COMMIT)
 
     def upload(
         self,
@@ -173,7 +177,7 @@ class Device:
         return result
 
     def upload_time_s(self, image: "ProgramImage") -> float:
-        """What is allowed for an upload by default, in seconds: many times what it takes, and two long lines.
+        """Return the default time for an upload, in seconds: many times what it takes, and two long lines.
 
         Answers that come late, through a long way or a slow line, add to it, each by at most 5 s and all of them by at
         most an hour. A line counts as 10 minutes at most, whatever rate the device announces.
@@ -188,7 +192,7 @@ class Device:
         return _UPLOAD_MARGIN_S + _UPLOAD_TIME_FACTOR * (size * byte_s(exchange.transport.baud) + late_s)
 
     def readback(self, *, timeout_s: float | None = None) -> bytes:
-        """The image of the scan that plays, as bytes.
+        """Read back the image of the scan that plays, as bytes.
 
         Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
         """
@@ -229,7 +233,7 @@ class Device:
         return int.from_bytes(payload[:_GENERATION_BYTES], "little")
 
     def limits(self) -> Limits:
-        """The active limits of x and y."""
+        """Ask for the active limits of x and y."""
         size = 2 * AxisLimits.LAYOUT.size
         try:
             return self._limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
@@ -269,7 +273,7 @@ class Device:
         return self._session.act(kind, payload, answer_bytes, self._until(None), tagged=not plain)
 
     def _until(self, timeout_s: float | None) -> float:
-        """A deadline. That of a request leaves time for several tries through a long way."""
+        """Return a deadline. That of a request leaves time for several tries on a slow connection."""
         if timeout_s is None:
             timeout_s = self._timeout_s + _MAX_TRIES * self._late_s()
         return self._session.now() + timeout_s

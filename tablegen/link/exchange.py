@@ -59,7 +59,7 @@ class Exchange:
         self.session = self._random.randrange(1, 1 << 32)
 
     def now(self) -> float:
-        """The clock of the port."""
+        """Return the time by the clock of the port."""
         return self.transport.now()
 
     def seq(self) -> int:
@@ -98,7 +98,7 @@ class Exchange:
         return found
 
     def _answer(self, frame: Frame) -> list[Answer]:
-        """An answer of this session; nothing where it is another's, or an echo of a request."""
+        """Read an answer of this session; nothing where it is of another one, or an echo of a request."""
         if frame.session != self.session or not frame.type & ANSWER:
             return []
         answer = Answer(frame.type & ~ANSWER, frame.seq, frame.payload)

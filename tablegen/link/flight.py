@@ -49,7 +49,7 @@ class Flight:
         return any(s.kind == kind and of_round in (None, s.round) for s in self._on_way.values())
 
     def add(self, sent: Sent) -> None:
-        """It was sent; each wait in vain doubles the next."""
+        """Add a frame that was sent; each wait in vain doubles the next."""
         wait = sent.due - sent.at
         self._longest_wait = max(self._longest_wait, wait)
         sent.due = sent.at + back_off(wait, self.in_vain)
@@ -57,7 +57,7 @@ class Flight:
         self._on_way[sent.kind, sent.seq] = sent
 
     def take(self, key: Key, now: float) -> Sent | None:
-        """What an answer answers, be it late; None where it is nothing that was sent, or was answered already.
+        """Remove and return the frame of an answer, late ones too; None without one, or where it was answered already.
 
         A line keeps the order, so that what was sent before it and is not answered was lost.
         """
@@ -104,13 +104,13 @@ class Flight:
         return self.in_vain > 1 and now - self.heard_at > max(_MIN_SILENCE_S, _SILENCE_WAITS * self._longest_wait)
 
     def got_through(self) -> None:
-        """A frame has arrived; after twice as many as may be on their way, one more may."""
+        """Count a frame that has arrived; after twice as many as may be on their way, one more may."""
         self._through += 1
         if self._through >= 2 * self._allowed:
             self._through, self._allowed = 0, min(self._allowed + 1, self._most)
 
     def lost(self) -> None:
-        """A frame was lost: half as many may be on their way, so that buffers do not overflow again.
+        """Count a lost frame: half as many may be on their way, so that buffers do not overflow again.
 
         The second of two shows that the first was lost. Where nothing is heard at all, one remains.
         """

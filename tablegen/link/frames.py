@@ -33,7 +33,7 @@ class Frame:
 
 
 def decode(wire: bytes) -> Frame:
-    """The frame of what stood between two 0x00 on the wire.
+    """Decode a frame from the bytes between two 0x00 on the wire.
 
     Raises ``ValueError`` where it is none: damaged, too short or too long.
     """
@@ -90,7 +90,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(stuffed: bytes) -> bytes:
-    """What ``cobs_encode`` made this of, without the 0x00 that ended it.
+    """Decode bytes of ``cobs_encode``, without the 0x00 that ended them.
 
     Raises ``ValueError`` where a distance leads past the end.
     """

@@ -114,7 +114,7 @@ class _Struct:
 
     @classmethod
     def unpack(cls, payload: bytes) -> Self:
-        """What a payload says."""
+        """Read the fields of a payload."""
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for {cls.__name__}, which has {cls.LAYOUT.size}")
         return cls(*cls.LAYOUT.unpack_from(payload))
@@ -163,7 +163,7 @@ class AxisLimits(_Struct):
     max_jump: int
 
     def within(self, other: "AxisLimits") -> "AxisLimits":
-        """What both allow."""
+        """Return the limits that both allow."""
         return AxisLimits(
             max(self.code_min, other.code_min),
             min(self.code_max, other.code_max),
@@ -200,7 +200,7 @@ class DeviceInfo:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
-        """What the answer to HELLO begins with. Raises ``ValueError`` if it is too short."""
+        """Read the beginning of the answer to HELLO. Raises ``ValueError`` if it is too short."""
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a device")
         version, features, window, data, harmonics, shaping, degree, image, *parts, rate = cls.LAYOUT.unpack_from(
@@ -267,7 +267,7 @@ class DeviceStatus:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceStatus":
-        """What an answer says. Raises ``ValueError`` if it is too short, or of a state that there is not."""
+        """Read an answer. Raises ``ValueError`` if it is too short, or of an unknown state."""
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a status")
         state, upload, *numbers, counts, bad, digest = cls.LAYOUT.unpack_from(payload)
@@ -309,7 +309,7 @@ class ImageInfo:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "ImageInfo":
-        """What BEGIN says. Raises ``ValueError`` if it is too short."""
+        """Read the payload of BEGIN. Raises ``ValueError`` if it is too short."""
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for an image")
         digest, size, crc, x, y = cls.LAYOUT.unpack_from(payload)

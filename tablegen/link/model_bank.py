@@ -47,7 +47,7 @@ class Taken:
 
 
 def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
-    """What an image plays. Raises ``ValueError`` where it could not be played at all."""
+    """Return the program of an image. Raises ``ValueError`` where it cannot be played at all."""
     scan = contents.scan
     schedule = Schedule(
         ticks=scan("line_ticks"),
@@ -84,7 +84,7 @@ class Bank:
         self._stage_is_whole = True
 
     def begin(self, payload: bytes) -> bytes:
-        """The answer to BEGIN."""
+        """Return the answer to BEGIN."""
         info = ImageInfo.unpack(payload)
         held = self.held
         if (held is not None and held.state is not Upload.RECEIVING) or not self._player.writable:
@@ -104,7 +104,7 @@ class Bank:
         return struct.pack("<I", len(held.data))
 
     def data(self, payload: bytes) -> bytes:
-        """The answer to DATA."""
+        """Return the answer to DATA."""
         held = self.held
         if held is None:
             raise RequestRefused(Reason.UPLOAD)
@@ -138,7 +138,7 @@ class Bank:
             raise RequestRefused(Reason.LENGTH, size)
 
     def find(self, image_crc: int) -> Taken | Held:
-        """What a COMMIT means: the program that plays already, or a complete upload."""
+        """Find what a COMMIT means: the program that plays already, or a complete upload."""
         held, taken = self.held, self.taken
         if held is None:
             if taken is None or taken.info.image_crc != image_crc:
@@ -153,7 +153,7 @@ class Bank:
         return held
 
     def accept(self, held: Held, authentic: Callable[[bytes], None]) -> DualProgram:
-        """The program of an upload that passes every check. ``authentic`` raises if the tag is not the image's."""
+        """Check an upload, and return its program. ``authentic`` raises if the tag is not the image's."""
         image = bytes(held.data)
         if zlib.crc32(image) != held.info.image_crc:
             raise RequestRefused(Reason.IMAGE)
@@ -161,12 +161,12 @@ class Bank:
         contents = take_apart(image, held.info.x, held.info.y)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
-        if found := first_objection(contents, *self.limits, playing, self._info.shaping):
-            raise RequestRefused(*found)
+        if objection := first_objection(contents, *self.limits, playing, self._info.shaping):
+            raise RequestRefused(*objection)
         return program_of(contents, self._info.update_rate_hz)
 
     def take(self, held: Held) -> None:
-        """The sequencer has taken the program."""
+        """Make an upload the current one, once the sequencer has taken its program."""
         self.taken = Taken(held.info, bytes(held.data), self._player.swaps, self._player.swapped_at)
         self.held = None
         self._stage_is_whole = True
@@ -180,7 +180,7 @@ class Bank:
         return image[offset : offset + count]
 
     def limit(self, payload: bytes) -> bytes:
-        """The answer to LIMITS."""
+        """Return the answer to LIMITS."""
         if payload:
             size = AxisLimits.LAYOUT.size
             x, y = (AxisLimits.unpack(payload[at : at + size]) for at in (0, size))
@@ -189,6 +189,6 @@ class Bank:
 
 
 def _of_tables(taken: Taken) -> bytes:
-    """The image of the tables that play."""
+    """Return the image of the tables that play."""
     program = program_of(take_apart(taken.image, taken.info.x, taken.info.y))
     return make_image(program, taken.info.hash.hex()).data

@@ -65,7 +65,7 @@ class _AtWork:
 
 
 def tag(key: bytes, nonce: bytes, request: Frame, image: bytes | None = None) -> bytes:
-    """The 16 bytes that end the payload of ``request``, given without them; ``image`` is that of a COMMIT."""
+    """Compute the 16 bytes that end the payload of ``request``, given without them; ``image`` is that of a COMMIT."""
     header = struct.pack("<BBI", request.type, request.seq, request.session)
     digest = b"" if image is None else hashlib.blake2s(image).digest()
     message = nonce + header + request.payload + digest
@@ -160,7 +160,7 @@ class ModelDevice:
                 self._judge(frame)
 
     def transmit(self) -> bytes:
-        """What the host gets since the last call."""
+        """Return the bytes for the host since the last call."""
         sent = bytes(self._out)
         self._out.clear()
         return sent
@@ -179,7 +179,7 @@ class ModelDevice:
         self._settle()
 
     def status(self) -> DeviceStatus:
-        """What STATUS answers."""
+        """Return the answer to STATUS."""
         player, held, taken = self.player, self._bank.held, self._bank.taken
         known = bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else self._boot_hash
         return DeviceStatus(
@@ -251,7 +251,7 @@ class ModelDevice:
             raise RequestRefused(Reason.PAYLOAD)
 
     def _sizes(self, kind: Request) -> set[int]:
-        """What the payload of a request may have."""
+        """Return the sizes that the payload of a request may have."""
         plain = _PAYLOAD_BYTES.get(kind, 0)
         sizes = {plain, plain + TAG_BYTES} if self._key and kind in _TAGGED else {plain}
         if kind == Request.LIMITS:
@@ -305,7 +305,7 @@ class ModelDevice:
         return None
 
     def _check(self, commit: _AtWork, held: Held) -> None:
-        """The checks of an image, and its way into the idle bank."""
+        """Check an image, and bring it into the idle bank."""
         try:
             program = self._bank.accept(held, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:

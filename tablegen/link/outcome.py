@@ -43,7 +43,7 @@ class UploadState:
 def out_of_time(
     state: UploadState, upload: Upload | None, busy: bool, silence_s: float, slow_baud: int | None
 ) -> OutOfTime:
-    """The error when the time of an upload is over: what the device said last, and what to do.
+    """Return the error when the time of an upload is over: what the device said last, and what to do.
 
     ``upload`` is what the last STATUS said of this upload, None if there was none. ``busy``: another upload is in the
     way. ``silence_s`` is the time since the last answer.

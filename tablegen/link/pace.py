@@ -45,12 +45,12 @@ class Pace:
         self.late_s = 0.0  # the largest lateness, fading
 
     def forget(self) -> None:
-        """What is on its way will not be answered: the port is another one."""
+        """Forget all requests on their way: the port is another one, and they will not be answered."""
         self._marks.clear()
         self._line_free = 0.0
 
     def sent(self, key: tuple[int, int], now: float, baud: int | None, sizes: tuple[int, int], learn: bool) -> float:
-        """A request leaves; returns how long to wait for its answer.
+        """Note that a request leaves, and return how long to wait for its answer.
 
         ``key`` is its type and seq, ``sizes`` the bytes of the request on the wire and of the answer's payload.
         ``learn`` is false where the answer's time says nothing about the way.
@@ -65,7 +65,7 @@ class Pace:
         return _MARGIN * (way + self.late_s) + _DEVICE_DELAY_S
 
     def answered(self, key: tuple[int, int], now: float, answer_bytes: int) -> None:
-        """An answer of so many bytes of payload has come."""
+        """Note that an answer of so many bytes of payload has come."""
         mark = self._marks.pop(key, None)
         if mark is None:
             return
@@ -110,5 +110,5 @@ class Deadline:
 
 
 def back_off(wait_s: float, in_vain: int) -> float:
-    """The wait after so many in vain: twice as long each time, up to a second or 4 times the first."""
+    """Return the wait after so many in vain: twice as long each time, up to a second or 4 times the first."""
     return min(wait_s * 2.0 ** min(in_vain, 60), max(_MIN_BACK_OFF_S, _MAX_BACK_OFF * wait_s))

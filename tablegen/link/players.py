@@ -51,10 +51,10 @@ class Player(Protocol):
         """To be taken at the next line start, or on the next tick where no scan plays."""
 
     def withdraw(self) -> bool:
-        """What was committed and not taken is not to be."""
+        """Withdraw a program that was committed and is not yet taken."""
 
     def arm(self, frames: int) -> bool:
-        """The next trigger starts so many frames; 0 is without end."""
+        """Let the next trigger start so many frames; 0 is without end."""
 
     def trigger(self) -> bool:
         """Start at line 0."""
@@ -97,7 +97,7 @@ class _Queue:
         raise NotImplementedError
 
     def commit(self, program: DualProgram) -> bool:
-        """A program to be taken."""
+        """Commit a program, to be taken at the next start of a line."""
 
         def act() -> None:
             self._commits -= 1
@@ -179,7 +179,7 @@ class SequencerPlayer(_Queue):
         return self._commits == 0 and self.sequencer.idle is None
 
     def withdraw(self) -> bool:
-        """What waits is not to be taken."""
+        """Withdraw the program that waits."""
         return self._ask(self.sequencer.withdraw)
 
     def arm(self, frames: int) -> bool:
@@ -255,10 +255,12 @@ class LinePlayer(_Queue):
         return self._commits == 0 and self._waits is None
 
     def withdraw(self) -> bool:
-        """What waits is not to be taken."""
+        """Withdraw the program that waits."""
 
         def act() -> None:
             self._waits = None
+            if self.playing is None:
+                self._running = False
 
         return self._ask(act)
 
@@ -274,7 +276,7 @@ class LinePlayer(_Queue):
         """Start at line 0."""
 
         def act() -> None:
-            if self._armed and not self._running and self.playing is not None:
+            if self._armed and not self._running and (self.playing or self._waits) is not None:
                 self._armed, self._running = False, True
                 self._endless, self._frames_left = self._armed_frames == 0, self._armed_frames
                 self._tick = self.line = 0

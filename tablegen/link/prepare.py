@@ -41,13 +41,13 @@ class PreparedScan:
 
     @classmethod
     def of_plan(cls, plan: Plan) -> "PreparedScan":
-        """The scan of a plan."""
+        """Prepare the scan of a plan."""
         digest = content_hash(plan_record(plan))
         return cls(plan.name, digest, plan.program, plan.x.fourier.in_order, plan.y.fourier.in_order)
 
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
-        """The scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
+        """Prepare the scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
         stored = read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
@@ -61,7 +61,7 @@ class PreparedScan:
         return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
 
     def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> ProgramImage:
-        """The image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
+        """Make the image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
 
         Raises ``Unsuitable`` where an axis has no Fourier words that would render its table.
         """
@@ -76,7 +76,7 @@ class PreparedScan:
         return make_image(self.program, self.digest, chosen[0], chosen[1])
 
     def like(self, image: bytes) -> ProgramImage:
-        """The image that a device which plays this scan should hold, each axis in the form that this one has."""
+        """Make the image that a device which plays this scan should hold, each axis in the form that this one has."""
         x, y = harmonics_of(image)
         return make_image(self.program, self.digest, self.x_fourier if x else None, self.y_fourier if y else None)
 
@@ -116,56 +116,58 @@ def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Lim
 
 
 def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[str]:
-    found = []
+    reasons = []
     harmonics = harmonics_of(image.data)
     if any(harmonics) and not info.features & Feature.FOURIER:
-        found.append("the device does not support Fourier words; upload --as table")
+        reasons.append("the device does not support Fourier words; upload --as table")
     elif max(harmonics) > info.harmonics:
-        found.append(
+        reasons.append(
             f"{max(harmonics)} harmonics; the device supports at most {info.harmonics}: lower band_limit.harmonics, or "
             "upload --as table"
         )
     if not all(harmonics) and not info.features & Feature.TABLES:
-        found.append("the device does not support tables; upload --as fourier")
+        reasons.append("the device does not support tables; upload --as fourier")
     if len(image.data) > info.image_bytes:
-        found.append(
+        reasons.append(
             f"{len(image.data)} bytes; the device accepts {info.image_bytes}: upload --as fourier, or make the tables "
             "shorter"
         )
     if info.degree < SPLINE_DEGREE:
-        found += [
+        reasons += [
             f"{name}: a cubic table; the device plays none: build it with DAC_SPLINE=1 in C, "
             f"{name.upper()}_INTERPOLATED=3 in Verilog, or set table.mode"
             for name, axis, _ in scan.axes
             if axis.mode == "cubic"
         ]
-    return found
+    return reasons
 
 
 def _rate(scan: PreparedScan, info: DeviceInfo) -> list[str]:
-    wanted = float(scan.program.schedule.update_rate_hz)
-    if not info.update_rate_hz or abs(wanted - info.update_rate_hz) <= _RATE_TOLERANCE_HZ:
+    rate_hz = float(scan.program.schedule.update_rate_hz)
+    if not info.update_rate_hz or abs(rate_hz - info.update_rate_hz) <= _RATE_TOLERANCE_HZ:
         return []
     return [
-        f"built for {wanted:g} ticks a second; the device runs at {info.update_rate_hz}: each line would take "
-        f"{wanted / info.update_rate_hz:.4g} times as long; set dac.update_rate_hz, or allow it with --any-rate"
+        f"built for {rate_hz:g} ticks a second; the device runs at {info.update_rate_hz}: each line would take "
+        f"{rate_hz / info.update_rate_hz:.4g} times as long; set dac.update_rate_hz, or allow it with --any-rate"
     ]
 
 
 def _axis(axis: Program, shape: AxisShape, theirs: AxisShape) -> list[str]:
-    found = []
+    reasons = []
     if shape.word_bits != theirs.word_bits:
-        found.append(f"table words of {shape.word_bits} bits; the device has {theirs.word_bits}: set table.bits")
+        reasons.append(f"table words of {shape.word_bits} bits; the device has {theirs.word_bits}: set table.bits")
     if shape.dac_bits != theirs.dac_bits:
-        found.append(f"codes of {shape.dac_bits} bits; the device has {theirs.dac_bits}: set dac.bits")
+        reasons.append(f"codes of {shape.dac_bits} bits; the device has {theirs.dac_bits}: set dac.bits")
     if len(axis.words) > 1 << theirs.index_bits:
-        found.append(f"a table of {len(axis.words)} words; the device holds {1 << theirs.index_bits}: set table.length")
+        reasons.append(
+            f"a table of {len(axis.words)} words; the device holds {1 << theirs.index_bits}: set table.length"
+        )
     ours = _converter(axis.output)
     if theirs.converter and ours != _converter_of(theirs):
-        found.append(
+        reasons.append(
             f"converter words {ours}; the device sends {_converter_of(theirs)}: set dac.coding, word_bits and align"
         )
-    return found
+    return reasons
 
 
 def _converter(output: Output) -> str:
@@ -180,6 +182,6 @@ def _converter_of(shape: AxisShape) -> str:
 
 
 def _described(word_bits: int, dac_bits: int, twos_complement: bool, left: bool) -> str:
-    """A code that fills its word is aligned to both sides."""
+    """Describe the format of a code; one that fills its word is aligned to both sides."""
     side = "" if word_bits == dac_bits else ", left-aligned" if left else ", right-aligned"
     return f"of {word_bits} bits, {'twos-complement' if twos_complement else 'offset-binary'}{side}"

@@ -33,7 +33,7 @@ class ProgramImage:
 def make_image(
     program: DualProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
 ) -> ProgramImage:
-    """The image of a program of the plan with this SHA-256 (64 hexadecimal digits).
+    """Make the image of a program of the plan with this SHA-256 (64 hexadecimal digits).
 
     Where Fourier words are given, int64 of shape (2 H + 1,) in the order of devices, they go in place of the table.
     """
@@ -48,13 +48,13 @@ def make_image(
 
 
 def shape_of(axis: Program) -> AxisShape:
-    """The shape of the table of an axis."""
+    """Return the shape of the table of an axis."""
     index_bits = axis.index_bits + (CUBIC if axis.mode == "cubic" else 0)
     return AxisShape(index_bits, axis.bits, axis.output.dac_bits)
 
 
 def _bytes(words: Ints, size: int) -> bytes:
-    """The low bytes of two's complement words, the lowest first."""
+    """Return the low bytes of two's complement words, the lowest first."""
     return words.astype("<i8").view(np.uint8).reshape(-1, 8)[:, :size].tobytes()
 
 
@@ -77,19 +77,19 @@ class Contents:
     y: Ints
 
     def scan(self, name: str) -> int:
-        """A word of the page of the scan by its name in ``tablegen.device.registers.SCAN_WORDS``."""
+        """Return a word of the page of the scan by its name in ``tablegen.device.registers.SCAN_WORDS``."""
         return self.words[SCAN_WORDS.index(name)]
 
     def axis(self, page: int, name: str) -> int:
-        """A word of the page of x (1) or y (2) by its name in ``AXIS_WORDS``."""
+        """Return a word of the page of x (1) or y (2) by its name in ``AXIS_WORDS``."""
         return self.words[page * PAGE_WORDS + AXIS_WORDS.index(name)]
 
     def signed(self, page: int, name: str) -> int:
-        """The same as a signed number."""
+        """Return the word of ``axis`` as a signed number."""
         return _signed(self.axis(page, name))
 
     def offset_word(self, page: int) -> int:
-        """The offset of an axis, from its two parts."""
+        """Return the offset of an axis, from its two parts."""
         return (self.signed(page, "offset_high") << OFFSET_LOW_BITS) + self.axis(page, "offset_low")
 
     def shaping(self, page: int) -> Shaping:
@@ -97,7 +97,7 @@ class Contents:
         return Shaping.of_word(self.axis(page, "shaping"))
 
     def program(self, page: int) -> Program:
-        """What x (1) or y (2) plays, with the table rendered where Fourier words came. Its converter is a plain one.
+        """Return the program of x (1) or y (2), with tables rendered from Fourier words. Its converter is a plain one.
 
         Its output is not shaped where the word of shaping says none. Raises ``ValueError`` where it could not be played
         at all.
@@ -146,7 +146,7 @@ def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int
 
 
 def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
-    """An image of tables of these shapes.
+    """Take apart an image of tables of these shapes.
 
     Raises ``ValueError`` where its length is not what its program words say.
     """

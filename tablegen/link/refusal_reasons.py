@@ -47,7 +47,7 @@ def refused(
     contents: "Contents | None" = None,
     limits: Limits | None = None,
 ) -> Refused:
-    """The error for a refusal; what is known of the device and of the scan makes it more precise."""
+    """Return the error for a refusal; what is known of the device and of the scan makes it more precise."""
     names = [known.name for known in Request if known == request]
     asked = names[0] if names else f"request {request}"
     sentence = explain(reason, detail, info, contents, limits)
@@ -56,7 +56,7 @@ def refused(
 
 
 def keyless(request: Request) -> Refused:
-    """The error where a device has a key and the host has none; nothing was sent."""
+    """Return the error where a device has a key and the host has none; nothing was sent."""
     why = f"the device has a key, and refuses {request.name} without it; give the key of this device (--key-file FILE)"
     return Refused(request, Reason.KEY, 0, why)
 
@@ -68,7 +68,7 @@ def explain(
     contents: "Contents | None" = None,
     limits: Limits | None = None,
 ) -> str:
-    """What a refusal means, and what to do.
+    """Explain what a refusal means, and what to do.
 
     ``info``, the active ``limits`` of x and y, and the ``contents`` of what was uploaded are used where they are given.
     """
@@ -191,7 +191,7 @@ def _shape(page: int, contents: "Contents") -> "AxisShape":
 
 
 def _value(page: int, index: int, contents: "Contents | None") -> str:
-    """The word itself, where it was sent as it is."""
+    """Return the word itself, where it was sent as it is."""
     if contents is None or contents.axis(page, "harmonics"):
         return ""
     words = contents.x if page == 1 else contents.y

@@ -54,7 +54,7 @@ class LinkSession:
         self._heard = False
 
     def now(self) -> float:
-        """The clock of the port."""
+        """Return the time by the clock of the port."""
         return self.exchange.now()
 
     def close(self) -> None:
@@ -112,7 +112,7 @@ class LinkSession:
                 why = LinkLost(f"the link is lost: {error}")
 
     def _hello_patiently(self, deadline: float) -> None:
-        """Some devices restart when their port is opened; to open it again would not help them."""
+        """Repeat HELLO: some devices restart when their port is opened, and opening it again would not help."""
         while True:
             try:
                 return self.hello(deadline)
@@ -121,7 +121,7 @@ class LinkSession:
                     raise
 
     def ask(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
-        """A request that does not act: the payload of its answer."""
+        """Send a request that does not act, and return the payload of its answer."""
         for _ in range(_MAX_RESTARTS):
             try:
                 return self._repeat(kind, None, payload, answer_bytes, deadline)
@@ -136,7 +136,7 @@ class LinkSession:
         raise self.contested()
 
     def act(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float, tagged: bool = True) -> bytes:
-        """A request that acts, with a tag where the device wants one; it is carried out once."""
+        """Send a request that acts, with a tag where the device needs one; it is carried out once."""
         number, body = self.exchange.number(), None
         last: LinkError = self.contested()
         for _ in range(_MAX_RESTARTS):
@@ -160,7 +160,7 @@ class LinkSession:
         raise last
 
     def tag(self, kind: Request, number: int, payload: bytes, deadline: float) -> bytes:
-        """The tag of a request, after a CHALLENGE; nothing for a device without a key."""
+        """Return the tag of a request, after a CHALLENGE; nothing for a device without a key."""
         if not self.needs_key(kind):
             return b""
         nonce = self.ask(Request.CHALLENGE, b"", NONCE_BYTES, deadline)
@@ -183,11 +183,11 @@ class LinkSession:
         return hashlib.blake2s(message, key=self.key, digest_size=TAG_BYTES).digest()
 
     def contested(self) -> LinkError:
-        """The error where sessions do not last."""
+        """Return the error where sessions do not last."""
         return LinkLost("another program uses the device, or the device resets repeatedly; close the other program")
 
     def silent(self) -> LinkError:
-        """The error where nobody answers."""
+        """Return the error where nobody answers."""
         if self._heard and self.exchange.noise:
             return Silent(
                 "the device no longer answers, and bytes come that are not its frames: does its console write to the "

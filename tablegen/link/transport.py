@@ -23,7 +23,7 @@ class Transport(Protocol):
         """Pass on bytes; may return before they have left."""
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come, at once if there is something; b"" when nothing came for ``timeout_s`` seconds."""
+        """Read what has come, at once if there is something; b"" when nothing came for ``timeout_s`` seconds."""
 
     def close(self) -> None:
         """Give the port back. It can be called twice."""
@@ -41,7 +41,7 @@ def byte_s(baud: int | None) -> float:
 
 
 def open_port(url: str, baud: int = 115200) -> Transport:
-    """A port by pyserial: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, or any other URL of it.
+    """Open a port of pyserial: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, or any other URL of it.
 
     Raises ``NoPort`` where it cannot be opened, ``SerialMissing`` without pyserial.
     """
@@ -89,12 +89,14 @@ class SerialTransport:
         self._name = name
 
     def write(self, data: bytes) -> None:
+        """Pass on bytes. Raises ``LinkLost`` where the port is gone or takes none."""
         try:
             self._port.write(data)
         except Exception as error:  # a port that vanishes raises OSError, TypeError and others
             raise self._lost(error) from None
 
     def read(self, timeout_s: float) -> bytes:
+        """Read what has come within ``timeout_s`` seconds. Raises ``LinkLost`` where the port is gone."""
         end = self.now() + timeout_s
         received = bytearray()
         try:
@@ -111,10 +113,12 @@ class SerialTransport:
             raise self._lost(error) from None
 
     def close(self) -> None:
+        """Give the port back. It can be called twice."""
         with suppress(Exception):  # it may have gone already
             self._port.close()
 
     def now(self) -> float:
+        """Return seconds of a clock that never goes back."""
         return time.monotonic()
 
     def _lost(self, error: Exception) -> LinkLost:

@@ -127,7 +127,7 @@ class Uploader:
         return self._committed and same and (before.hash, before.generation) != (status.hash, status.generation)
 
     def _count(self, reason: int, error: LinkError) -> None:
-        """Some things may happen by chance, but not for ever."""
+        """Count an error that may happen by chance, but not without end."""
         self._anew[reason] = self._anew.get(reason, 0) + 1
         if self._anew[reason] > (_MAX_KEY_RESTARTS if reason == Reason.KEY else _MAX_RESTARTS):
             raise error
@@ -197,7 +197,7 @@ class Uploader:
         self._repeat_commit(again=False)
 
     def _repeat_commit(self, again: bool = True) -> None:
-        """The same bytes: a device that is at work, or is done, does not act again."""
+        """Send the same COMMIT again: a device that is at work, or is done, does not act twice."""
         assert self._commit is not None
         self._committed = True
         if not again:
@@ -214,7 +214,7 @@ class Uploader:
         return min(times)
 
     def _overdue(self, now: float) -> None:
-        """What is not answered in time is taken for lost, until its answer comes."""
+        """Take requests without an answer in time for lost, until their answers come."""
         for sent in self._flight.overdue(now):
             if sent.kind in (Request.COMMIT, Request.STATUS):
                 self._poll_at = now

@@ -32,15 +32,15 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
 
     Each axis is compared in the form in which the device holds it, words or Fourier words.
     """
-    wanted = scan.like(image)
-    expected = take_apart(wanted.data, wanted.info.x, wanted.info.y)
-    found = []
-    ours, theirs = _words(wanted.data), _words(image)
+    image_expected = scan.like(image)
+    expected = take_apart(image_expected.data, image_expected.info.x, image_expected.info.y)
+    differing = []
+    ours, theirs = _words(image_expected.data), _words(image)
     for index, word in enumerate(ours):
         there = theirs[index] if index < len(theirs) else None
         if there != word:
             name = _name(index)
-            found.append(
+            differing.append(
                 Difference(name, 4 * index, _shown(name, word), None if there is None else _shown(name, there))
             )
     at = PROGRAM_BYTES
@@ -51,11 +51,11 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
         for index, word in enumerate(words.tolist()):
             other = there_words[index] if index < len(there_words) else None
             if other != word:
-                found.append(Difference(f"{axis}: {what} word {index}", at + size * index, word, other))
+                differing.append(Difference(f"{axis}: {what} word {index}", at + size * index, word, other))
         at += size * len(words)
     if len(image) > at:
-        found.append(Difference("after the last word", at, 0, len(image) - at))
-    return found
+        differing.append(Difference("after the last word", at, 0, len(image) - at))
+    return differing
 
 
 def _words(data: bytes) -> list[int]:

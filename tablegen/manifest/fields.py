@@ -167,6 +167,14 @@ class ManifestFigure(Struct):
     uncertainty: float | None = None
 
 
+class ManifestStroke(Struct):
+    """The branches at the stroke that is played, and its size over that of the line."""
+
+    forward: ManifestBranch
+    backward: ManifestBranch
+    size: Annotated[float, Meta(gt=0.0, le=1.0)]
+
+
 class ManifestExpected(Struct):
     """What the scanner should do with the line, by an operator or by the laws of the scanner file."""
 
@@ -176,6 +184,7 @@ class ManifestExpected(Struct):
     mismatch_percent: ManifestFigure | None = None
     size_percent: ManifestFigure | None = None
     distance_percent: float | None = None
+    stroke: ManifestStroke | None = None
 
 
 class ManifestResponse(Struct):
@@ -230,6 +239,15 @@ class ManifestShaped(Struct):
     rounded: ManifestRounded
 
 
+class ManifestPosition(Struct):
+    """What the held codes of an unshaped axis leave in its position, behind the response of the scanner."""
+
+    passage: ManifestPassage
+    max_error_lsb: float
+    rms_error_lsb: float
+    scaling_error_percent: dict[str, float]
+
+
 class ManifestCertificate(Struct):
     """What the build promised of an axis."""
 
@@ -250,6 +268,7 @@ class ManifestCertificate(Struct):
     expected: ManifestExpected | None = None
     peak_acceleration: float | None = None
     shaped: ManifestShaped | None = None
+    position: ManifestPosition | None = None
 
 
 class ManifestAxis(Struct):
@@ -301,7 +320,7 @@ class ManifestAxis(Struct):
         )
 
     def asked(self, k: Ints) -> Floats:
-        """The codes, unrounded, that the float waveform asks for at ticks k in [0, ticks) of the period.
+        """Compute the unrounded codes of the float waveform at ticks k in [0, ticks) of the period.
 
         V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
         phases, in none of the ways in which the build does it.
@@ -319,7 +338,7 @@ class ManifestAxis(Struct):
         return self._codes_of(w)[which.reshape(-1)]
 
     def _whole_period(self, period: int) -> Floats:
-        """w of every advance: the angle of each is the sum of one of a few far apart and one of a few that follow."""
+        """Compute w of every advance: each angle is the sum of one of a few far apart and one of a few that follow."""
         step = isqrt(period) + 1
         a, b = np.array(self.fourier.a), np.array(self.fourier.b)
         far, near = self._angles(np.arange(0, period, step), period), self._angles(np.arange(step), period)

@@ -70,7 +70,7 @@ class StoredBuild(Struct, frozen=True, eq=False, dict=True):
         return tuple(self.manifest.formats or DEFAULT_FORMATS)
 
     def runtime(self, *suffixes: str) -> list[str]:
-        """The files of the build that are parts of a sequencer, by the ends of their names."""
+        """List the files of the build that are parts of a sequencer, by the ends of their names."""
         return sorted(name for name in self.manifest.files if name.startswith("dac_") and name.endswith(suffixes))
 
 
@@ -162,7 +162,7 @@ def _wrong_names(manifest: Manifest) -> list[str]:
 
 
 def _hash(plain: dict[str, Any]) -> str:
-    """The hash of the plan: of everything but version, hash, files and certificates."""
+    """Compute the hash of the plan: of everything but version, hash, files and certificates."""
     record = {key: value for key, value in plain.items() if key not in ("tablegen", "hash", "formats", "files")}
     record["axes"] = {
         axis: {key: value for key, value in content.items() if key != "certificate"}

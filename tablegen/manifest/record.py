@@ -30,11 +30,11 @@ def plan_record(plan: Plan) -> dict[str, Any]:
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
-    """A certificate as JSON-ready data, its figures to six significant digits."""
+    """Return a certificate as JSON-ready data, its figures to six significant digits."""
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__struct_fields__
-        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped")
+        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped", "position")
     }
     if certificate.peak_acceleration is not None:
         record["peak_acceleration"] = _bound(certificate.peak_acceleration)
@@ -46,11 +46,19 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         record["expected"] = _expected(certificate.expected)
     if certificate.shaped is not None:
         record["shaped"] = _shaped(certificate.shaped)
+    if certificate.position is not None:
+        position = certificate.position
+        record["position"] = {
+            "passage": _passage(position.passage),
+            "max_error_lsb": _bound(position.max_error_lsb),
+            "rms_error_lsb": _figure(position.rms_error_lsb),
+            "scaling_error_percent": {side: _figure(value) for side, value in position.scaling.items()},
+        }
     return record
 
 
 def _passage(passage: Passage) -> dict[str, Any]:
-    """What applies of it; all points of a measured response."""
+    """Return the fields of a passage that apply; all points of a measured response."""
     response = passage.response
     if response is None:
         return {key: value for key, value in asdict(passage).items() if value is not None}
@@ -79,7 +87,7 @@ def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
 
 
 def _expected(expectation: Expectation) -> dict[str, Any]:
-    """What is known of it."""
+    """Return the known figures of an expectation."""
 
     def pair(figure: Figure) -> dict[str, Any]:
         return {"value": _figure(figure.value), "uncertainty": _figure(figure.uncertainty)}
@@ -91,6 +99,15 @@ def _expected(expectation: Expectation) -> dict[str, Any]:
     for name, figure in (("mismatch", expectation.mismatch), ("size", expectation.size)):
         if figure is not None:
             record[f"{name}_percent"] = pair(figure)
+    if expectation.stroke is not None:
+        stroke = expectation.stroke
+        record["stroke"] = {
+            **{
+                side: dict(zip(("beta", "u_peak"), getattr(stroke, side), strict=True))
+                for side in ("forward", "backward")
+            },
+            "size": stroke.size,
+        }
     if expectation.distance is not None:
         record["distance_percent"] = _figure(expectation.distance)
     return record
@@ -132,27 +149,29 @@ def _sequence(schedule: Schedule) -> dict[str, Any]:
 
 
 def _layer(line: LinePlan) -> dict[str, Any]:
-    """What `tablegen refine` learnt; nothing without a layer, so that such a build keeps its hash."""
+    """Return the layer that `tablegen refine` learnt; nothing without one, so that such a build keeps its hash."""
     if line.layer is None:
         return {}
     return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
 
 
 def _followed(line: LinePlan) -> dict[str, Any]:
-    """What the piezo is to follow, where the played series does not tell; and what the boost limit left of it."""
+    """Return the target of the piezo, where the played series does not tell it, and what the boost limit left of it."""
     response = line.drive.response
     if response is None:
         return {}
     target = {"a0": line.target.a0, "a": line.target.a.tolist(), "b": line.target.b.tolist()}
-    held = np.array(line.held_harmonics, dtype=np.float64)
-    asked, given = response.inverse(held * float(line.rate)), _capped(line, held)
+    limited = np.array(line.held_harmonics, dtype=np.float64)
+    inverse, applied = response.inverse(limited * float(line.rate)), _capped(line, limited)
     # The phase is kept, so that the ratio is real.
-    factors = np.sqrt((given[0] ** 2 + given[1] ** 2) / (asked[0] ** 2 + asked[1] ** 2)) if len(held) else held
+    factors = (
+        np.sqrt((applied[0] ** 2 + applied[1] ** 2) / (inverse[0] ** 2 + inverse[1] ** 2)) if len(limited) else limited
+    )
     return {"target": target, "held_factors": factors.tolist()}
 
 
 def _capped(line: LinePlan, harmonics: Floats) -> tuple[Floats, Floats]:
-    """What these harmonics are multiplied by in place of the inverse response."""
+    """Return what these harmonics are multiplied by in place of the inverse response."""
     assert line.drive.response is not None
     return capped_inverse(line.drive.response, harmonics * float(line.rate), line.drive.max_boost_db)[:2]
 
@@ -165,10 +184,10 @@ def _resonance(line: LinePlan) -> dict[str, Any]:
 
 
 def _asked_table(line: LinePlan) -> dict[str, Any]:
-    """What was asked of a table that the build chose; nothing of one that was written."""
-    if line.asked_table is None:
+    """Return the request of a table that the build chose; nothing for one that was written."""
+    if line.table_request is None:
         return {}
-    return {"asked": {"max_error_lsb": line.asked_table.max_error_lsb, "free": list(line.asked_table.free)}}
+    return {"asked": {"max_error_lsb": line.table_request.max_error_lsb, "free": list(line.table_request.free)}}
 
 
 def _shaping(shaping: Shaping) -> dict[str, Any]:

@@ -30,7 +30,7 @@ def manifest_file(
     certificates: dict[str, Certificate],
     files: Mapping[str, bytes],
 ) -> bytes:
-    """The plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
+    """Write the plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
 
     ``formats`` stand in it unless they are those that a build has by default. ``require_readable`` belongs before the
     disk.

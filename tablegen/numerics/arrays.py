@@ -13,17 +13,17 @@ Bools: TypeAlias = np.ndarray[Shape, np.dtype[np.bool_]]
 Complexes: TypeAlias = np.ndarray[Shape, np.dtype[np.complex128]]
 FloatsLike: TypeAlias = float | Sequence[float] | np.ndarray[Shape, np.dtype[np.floating]] | Ints
 
-_BLOCK = 1 << 15  # values that are summed together, in the cache
+_BLOCK = 1 << 15  # values that are summed at a time, so that they fit the cache
 
 
 def freeze(*arrays: np.ndarray[Shape, np.dtype[np.generic]]) -> None:
-    """Make arrays read-only: what a plan holds cannot change any more."""
+    """Make arrays read-only, so that the contents of a plan cannot change."""
     for array in arrays:
         array.setflags(write=False)
 
 
 def tree_sum(values: Floats) -> Floats:
-    """Sum along the last axis by halving, an order that every machine shares."""
+    """Sum along the last axis, in pairs at half the length, an order that every machine shares."""
     rows = max(_BLOCK // max(values.shape[-1], 1), 1)
     flat = values.reshape(-1, values.shape[-1])
     if len(flat) <= rows:
@@ -47,7 +47,7 @@ def _tree_sum(values: Floats) -> Floats:
 
 
 def tree_sum_down(values: Floats) -> Floats:
-    """As ``tree_sum``, of which it has every bit, but along the first axis: several times as fast with many columns."""
+    """Sum along the first axis with every bit of ``tree_sum``: several times as fast with many columns."""
     count = len(values)
     half = (1 << max(count - 1, 0).bit_length()) // 2
     if not half:
@@ -63,7 +63,7 @@ def tree_sum_down(values: Floats) -> Floats:
 
 
 def folded_sum(values: Floats) -> Floats:
-    """As ``tree_sum``, in another order that every machine shares, and in place: ``values`` is written over."""
+    """Sum along the last axis in another fixed order than ``tree_sum``, in place: ``values`` is overwritten."""
     count = values.shape[-1]
     while count > 1:
         half = (count + 1) // 2
@@ -73,23 +73,23 @@ def folded_sum(values: Floats) -> Floats:
 
 
 def merged(*ascending: Ints) -> Ints:
-    """The values of ascending arrays, each once, ascending. numpy hashes for its union, which is far slower here."""
+    """Return the values of ascending arrays, each once, ascending; numpy's union hashes, which is far slower here."""
     values = np.concatenate(ascending)
     values.sort(kind="stable")
     return values[np.append(True, values[1:] != values[:-1])] if len(values) else values
 
 
 def distinct(k: Ints, count: int) -> Ints:
-    """The values of ``k``, each once, ascending; 0 <= k < count."""
+    """Return the values of ``k``, each once, ascending; 0 <= k < count."""
     if count > 4 * len(k):
         return np.unique(k)
-    there = np.zeros(count, dtype=np.bool_)  # takes no sorting
-    there[k] = True
-    return np.flatnonzero(there)
+    present = np.zeros(count, dtype=np.bool_)  # faster than sorting
+    present[k] = True
+    return np.flatnonzero(present)
 
 
 def multiples(k: Ints, count: int, most: int) -> Iterator[Ints]:
-    """n k modulo count for n = 1..most, in one array that is written over; 0 <= k < count."""
+    """Yield n k modulo count for n = 1..most, in one array that is overwritten; 0 <= k < count."""
     at, step = np.zeros(k.shape, dtype=np.uint64), k.astype(np.uint64)
     less = np.empty_like(at)
     for _ in range(most):

@@ -1,4 +1,4 @@
-"""exp and log10 of single numbers, correctly rounded.
+"""Correctly rounded exp and log10 of single numbers.
 
 The C library's differ in the last place between versions and processors; the decimal module's do not.
 """
@@ -9,10 +9,10 @@ _CONTEXT = Context(prec=40)
 
 
 def exp(x: float) -> float:
-    """e to the power x."""
+    """Return e to the power x."""
     return float(Decimal(x).exp(_CONTEXT))
 
 
 def log10(x: float) -> float:
-    """Decimal logarithm of x > 0."""
+    """Return the decimal logarithm of x > 0."""
     return float(Decimal(x).log10(_CONTEXT))

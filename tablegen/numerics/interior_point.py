@@ -1,4 +1,4 @@
-"""The least bound that linear maps can be held within: an interior point method in basic operations of a fixed order.
+"""Least common bound of linear maps: an interior point method in basic operations of a fixed order.
 
 Minimise v over y and v subject to |R y - f| <= h + r v for the rows R of every part. It is the predictor and corrector
 of Mehrotra (SIAM J. Optim. 2, 575, 1992) for the upper and the lower side of each row, with slacks s and multipliers l:
@@ -26,18 +26,18 @@ class Rows(Protocol):
     """A linear map of unknowns (n,) to (m,)."""
 
     def times(self, y: Floats) -> Floats:
-        """R y."""
+        """Return R y, (m,)."""
 
     def transposed(self, z: Floats) -> Floats:
-        """R^T z."""
+        """Return R^T z, (n,)."""
 
     def gram(self, diagonal: Floats) -> Floats:
-        """R^T diag R, (n, n)."""
+        """Return R^T diag R, (n, n)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Within:
-    """|R y - target| <= fixed + share v; ``target`` is (m,)."""
+class Bounded:
+    """The constraint |R y - target| <= fixed + share v; ``target`` is (m,)."""
 
     rows: Rows
     target: Floats
@@ -46,8 +46,8 @@ class Within:
 
 
 @dataclass(frozen=True, eq=False)
-class Least:
-    """The unknowns, the bound that they keep, and one that none keeps, up to the residual of the last step."""
+class Minimum:
+    """The unknowns, the bound that they keep, and a lower bound of all, up to the residual of the last step."""
 
     y: Floats
     bound: float
@@ -57,27 +57,29 @@ class Least:
 
 
 def least_bound(
-    parts: Sequence[Within], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
-) -> Least:
+    parts: Sequence[Bounded], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
+) -> Minimum:
     """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``."""
     state = _State(parts, start)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what contradicts itself ends so
+    with np.errstate(
+        over="ignore", divide="ignore", invalid="ignore"
+    ):  # overflow is the end of contradictory constraints
         return _least(state, gap, reached)
 
 
-def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Least:
+def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Minimum:
     for step in range(_MOST_STEPS + 1):
-        kept, below = state.bounds()
-        done = state.inside and (reached(kept) or (state.dual and kept - below <= gap * kept))
+        bound, below = state.bounds()
+        done = state.inside and (reached(bound) or (state.dual and bound - below <= gap * bound))
         if done or step == _MOST_STEPS or not state.advance():
-            return Least(state.y, kept, below, step, done)
+            return Minimum(state.y, bound, below, step, done)
     raise AssertionError("the last step returns")  # pragma: no cover
 
 
 class _Stack:
     """The rows of all parts, one above the other."""
 
-    def __init__(self, parts: Sequence[Within]) -> None:
+    def __init__(self, parts: Sequence[Bounded]) -> None:
         self._rows = [part.rows for part in parts]
         self._ends = [len(part.target) for part in parts]
         self.target = np.concatenate([part.target for part in parts])
@@ -109,15 +111,15 @@ class _Stack:
 
 
 class _State:
-    """y and v; slacks and multipliers of both sides of each row, upper and lower, (2, m)."""
+    """The iterate y and v; slacks and multipliers of both sides of each row, upper and lower, (2, m)."""
 
-    def __init__(self, parts: Sequence[Within], start: Floats) -> None:
+    def __init__(self, parts: Sequence[Bounded], start: Floats) -> None:
         self._rows, self.y = _Stack(parts), np.array(start, dtype=np.float64)
         self._far = self._rows.times(self.y) - self._rows.target
         moves = self._rows.share > 0.0
         need = (np.abs(self._far[moves]) - self._rows.fixed[moves]) / self._rows.share[moves]
         self.v = 1.1 * max(float(np.max(need)), 1e-12)
-        # What is outside its bound gets a slack of its own; the lack is made good on the way.
+        # A row outside its bound gets a slack of its own; the steps remove the difference.
         self._slack = np.maximum(self._room(), 1e-3 * self._widths())
         weight = 1.0 / self._slack
         self._multiplier = weight / _sum(self._rows.share * weight)
@@ -130,12 +132,12 @@ class _State:
 
     @property
     def inside(self) -> bool:
-        """Whether every row keeps its bound."""
+        """True if every row keeps its bound."""
         return bool(np.all(np.abs(self._room() - self._slack) <= _FEASIBLE * self._widths()))
 
     @property
     def dual(self) -> bool:
-        """Whether the multipliers prove that there is no lower bound than ``bounds`` says."""
+        """True if the multipliers prove the lower bound of ``bounds``."""
         y, v = self._residual()
         return max(float(np.max(np.abs(y))), abs(v)) < _FEASIBLE_DUAL
 
@@ -144,11 +146,11 @@ class _State:
         return -self._rows.transposed(one[0] - one[1]), _sum(self._rows.share * one) - 1.0
 
     def bounds(self) -> tuple[float, float]:
-        """v, and v less the gap."""
+        """Return v, and v less the gap."""
         return self.v, self.v - _sum(self._slack * self._multiplier)
 
     def advance(self) -> bool:
-        """One predictor and corrector; False where it goes no further in working precision."""
+        """Take one step of predictor and corrector; return False where working precision is exhausted."""
         rows, slack, one, size = self._rows, self._slack, self._multiplier, len(self.y)
         weight = one / slack
         matrix = np.zeros((size + 1, size + 1))
@@ -164,7 +166,7 @@ class _State:
         lack, residual = self._room() - slack, self._residual()
 
         def step(complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-            """Of (y, v), of the rows, of slacks and of multipliers, where their products change by ``complement``."""
+            """Return the steps of (y, v), rows, slacks and multipliers that change their products by ``complement``."""
             pull = (complement - one * lack) / slack
             right = np.append(residual[0] - rows.transposed(pull[0] - pull[1]), residual[1] + _sum(rows.share * pull))
             solution = factor.solve(right)
@@ -177,7 +179,7 @@ class _State:
         _, _, slacks, ones = step(-products)
         ahead, up = _reach(slack, slacks), _reach(one, ones)
         after = _sum((slack + ahead * slacks) * (one + up * ones)) / products.size
-        if not (mean > 0.0 and isfinite(after)):  # what contradicts itself has no other end
+        if not (mean > 0.0 and isfinite(after)):  # contradictory constraints end here
             return False
         ratio = after / mean
         solution, moved, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
@@ -195,6 +197,6 @@ def _sum(values: Floats) -> float:
 
 
 def _reach(values: Floats, steps: Floats) -> float:
-    """How much of the steps can be taken until a value is 0; at most 1."""
+    """Return which share of the steps can be taken until a value is 0; at most 1."""
     shrinking = steps < 0.0
     return min(1.0, float(np.min(values[shrinking] / -steps[shrinking], initial=1.0)))

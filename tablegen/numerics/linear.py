@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.numerics.arrays import Floats
 
-_BLOCK = 1 << 16  # products that are worked out together, in the cache
+_BLOCK = 1 << 16  # products that are computed at a time, so that they fit the cache
 _TOGETHER = 8  # columns from which those before them are taken at once: fewer and longer steps, each sum in its order
 
 
@@ -14,8 +14,12 @@ class Cholesky:
     """The factor L of A = L L^T for a symmetric positive definite A of shape (n, n).
 
     An element of a column is that of A, less the products of all columns before it, one after the other, over the root
-    of the pivot. Raises ``ArithmeticError`` where a pivot is not positive, that is where A is singular to working
-    precision.
+    of the pivot.
+
+    Raises
+    ------
+    ArithmeticError
+        If a pivot is not positive, that is if A is singular to working precision.
     """
 
     def __init__(self, matrix: Floats) -> None:
@@ -41,7 +45,7 @@ class Cholesky:
         self._columns = columns
 
     def solve(self, right: Floats) -> Floats:
-        """x with A x = right; right has shape (n,)."""
+        """Return x with A x = right; both have shape (n,)."""
         x = np.array(right, dtype=np.float64)
         begins = range(0, len(x), _TOGETHER)
         for begin in begins:
@@ -54,14 +58,14 @@ class Cholesky:
 
 
 def _eliminate(x: Floats, columns: Floats) -> None:
-    """Solve for the first of x, one after the other, and take their columns from the rest; columns (some, all of x)."""
+    """Solve for the first of x in order, and subtract their columns from the rest; columns (some, all of x)."""
     count = len(columns)
-    near, found = columns[:, :count].tolist(), x[:count].tolist()
+    near, solution = columns[:, :count].tolist(), x[:count].tolist()
     for j, column in enumerate(near):
-        found[j] = value = found[j] / column[j]
+        solution[j] = value = solution[j] / column[j]
         for i in range(j + 1, count):
-            found[i] -= value * column[i]
-    x[:count] = found
+            solution[i] -= value * column[i]
+    x[:count] = solution
     terms = np.empty((count + 1, len(x) - count))
     terms[0] = x[count:]
     np.multiply(columns[:, count:], x[:count, None], out=terms[1:])

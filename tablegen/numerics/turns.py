@@ -16,7 +16,7 @@ _Real = TypeVar("_Real", float, Floats)
 # Taylor series about 0: at pi/4 the first omitted terms are 4e-20 (sine) and 8e-21 (cosine).
 _SINE_TERMS = 9
 _COSINE_TERMS = 10
-_BLOCK = 1 << 13  # angles that are worked out together, in the cache
+_BLOCK = 1 << 13  # angles that are computed at a time, so that they fit the cache
 
 
 def _reciprocal_factorials(first: int, terms: int) -> list[float]:
@@ -70,7 +70,7 @@ def _sine_and_cosine(x: Floats) -> tuple[Floats, Floats]:
 
 
 def sine_and_cosine_of(turns: float) -> tuple[float, float]:
-    """As ``sine_and_cosine``, of which it has every bit, for one finite number: some times as fast."""
+    """Return (sin(2 pi turns), cos(2 pi turns)) of one number: the bits of ``sine_and_cosine``, but faster."""
     x = turns - round(turns) + 0.0  # no -0, as an array has none
     quadrant = round(4.0 * x)
     angle = (x - 0.25 * quadrant) * tau
@@ -82,24 +82,24 @@ def sine_and_cosine_of(turns: float) -> tuple[float, float]:
 
 
 def sine(turns: FloatsLike) -> Floats:
-    """sin(2 pi turns)."""
+    """Return sin(2 pi turns), of the argument's shape."""
     return sine_and_cosine(turns)[0]
 
 
 def cosine(turns: FloatsLike) -> Floats:
-    """cos(2 pi turns)."""
+    """Return cos(2 pi turns), of the argument's shape."""
     return sine_and_cosine(turns)[1]
 
 
 def sinc(y: FloatsLike) -> Floats:
-    """sin(pi y) / (pi y), exactly 1 at y = 0 and exactly 0 at every other whole y."""
+    """Return sin(pi y) / (pi y), exactly 1 at y = 0 and exactly 0 at every other whole y, of the argument's shape."""
     x = np.asarray(y, dtype=np.float64)
     safe = np.where(x == 0.0, 1.0, x)
     return np.where(x == 0.0, 1.0, sine(0.5 * safe) / (pi * safe))
 
 
 def spherical_bessel_1(y: FloatsLike) -> Floats:
-    """j1(pi y) = (sin(pi y) - pi y cos(pi y)) / (pi y)^2, by its series where the difference would cancel."""
+    """Return j1(pi y) = (sin(pi y) - pi y cos(pi y)) / (pi y)^2, by its series where the difference would cancel."""
     x = np.asarray(y, dtype=np.float64)
     small = np.abs(x) < 0.3
     safe = np.where(small, 1.0, x) * pi

@@ -1,19 +1,24 @@
-"""The scaling error that a waveform may have for the sake of less acceleration: as asked, or what does not show."""
+"""The scaling error that a waveform may keep in exchange for less acceleration: as requested, or below what shows."""
 
 from tablegen.config.schema import BandLimit, Limits
 from tablegen.waveform.error_allowance import AllowedError
 
 CHORD = 0.05  # share of the line over which the certificate measures emitted integers
-_UNLIMITED_PERCENT = 1.0  # the error that nobody is told of
+_UNLIMITED_PERCENT = 1.0  # the error that is not reported
 MOST_HARMONICS = 256  # a search among more takes many seconds
 
 
 def allowed_error(limit: BandLimit, limits: Limits, codes: float, counts_turns: bool) -> AllowedError | None:
-    """The error of one axis whose drive is ``codes`` of the converter from w = 0 to 1; None asks for no error.
+    """Return the scaling error that one axis may keep; None where none is allowed.
 
-    Where neither harmonics nor an error are asked for it is what rounding to codes leaves: up to half a code at
+    Where neither harmonics nor an error are requested it is what rounding to codes leaves: up to half a code at
     either end of a chord, with either sign. It is then at most half of what the limits of the scan leave. This holds
     for models that count with the turns of the waveform (``counts_turns``): rounder turns move a line by the others.
+
+    Parameters
+    ----------
+    codes
+        Codes of the converter that the drive spans from w = 0 to 1.
     """
     if limit.max_scaling_error_percent is not None:
         return AllowedError(limit.max_scaling_error_percent, True)
@@ -25,6 +30,6 @@ def allowed_error(limit: BandLimit, limits: Limits, codes: float, counts_turns: 
 
 
 def chosen_by_build(limit: BandLimit) -> bool:
-    """Whether the build finds the number: the fewest, or an error is asked for without any limit of the band."""
+    """Return True if the build finds the number of harmonics: the fewest, or an error without any limit of the band."""
     alone = limit.harmonics is None and limit.cutoff_hz is None
     return limit.harmonics == "fewest" or (alone and limit.max_scaling_error_percent is not None)

@@ -13,20 +13,20 @@ from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.drive import Drive
 from tablegen.planning.feasibility import Feasibility
 from tablegen.planning.shaping_choice import chosen_shaping
-from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
+from tablegen.planning.table_choice import TableRequest, choose, possible_shapes, table_request, written_shape
 from tablegen.planning.table_maker import TableMaker
 from tablegen.planning.timing import AxisTiming
 from tablegen.waveform.series import FourierSeries
 
 
 class AxisTable(Struct, frozen=True, eq=False):
-    """The integers of one axis, and what was asked of a table that the build chose."""
+    """The integers of one axis, and the request for its table where the build chose it."""
 
     converter: Converter
     scale: float
     fourier: FourierWords
     program: Program
-    asked: TableChoice | None
+    request: TableRequest | None
 
 
 def make_table(
@@ -39,7 +39,7 @@ def make_table(
     problems: Problems,
 ) -> AxisTable | None:
     """Quantise a waveform; None where ``problems`` grew: converter, amplifier, driver or table cannot hold it."""
-    before = len(problems.found)
+    before = len(problems.entries)
     scan: FastAxis = getattr(setup.scan, axis)
     hardware = setup.hardware(axis)
     converter = Converter.of(hardware.dac, hardware.amplifier)
@@ -53,28 +53,28 @@ def make_table(
         hold=timing.hold,
         output=make_output(hardware.dac, converter, drive.driver, park_v, shaping),
     )
-    feasible.check_words(maker.as_asked)
-    feasible.check_range(drive, converter, *maker.as_asked.reach, shaping)
-    asked = asked_of(scan.table, setup.scan.limits, shaping.order > 0)
+    feasible.check_words(maker.original)
+    feasible.check_range(drive, converter, *maker.original.reach, shaping)
+    request = table_request(scan.table, setup.scan.limits, shaping.order > 0)
     shape = written_shape(scan.table, timing.period)
-    if asked is not None and len(problems.found) == before:
-        shape = _chosen(setup, axis, timing, asked, shape, maker, drive, converter, feasible, problems)
+    if request is not None and len(problems.entries) == before:
+        shape = _chosen(setup, axis, timing, request, shape, maker, drive, converter, feasible, problems)
     stored = maker.stored(shape)
-    if shape.mode == "cubic" and len(problems.found) == before:
+    if shape.mode == "cubic" and len(problems.entries) == before:
         feasible.check_words(stored)
         feasible.check_gain(maker.gain(shape)[0])
     max_step = feasible.max_step(drive, converter, stored, float(timing.rate), timing.period, shape, shaping)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
-    table = maker.limited(max_step).made(shape)
-    return AxisTable(converter, table.scale, table.fourier, table.program, asked)
+    table = maker.limited(max_step).quantise(shape)
+    return AxisTable(converter, table.scale, table.fourier, table.program, request)
 
 
 def _chosen(
     setup: Setup,
     axis: str,
     timing: AxisTiming,
-    asked: TableChoice,
+    request: TableRequest,
     shape: TableShape,
     maker: TableMaker,
     drive: Drive,
@@ -82,13 +82,13 @@ def _chosen(
     feasible: Feasibility,
     problems: Problems,
 ) -> TableShape:
-    """Return the table of least memory that keeps the error asked for; ``shape`` where none does."""
+    """Return the table of least memory that keeps the requested error; ``shape`` where none does."""
     from tablegen.planning.table_search import TableSearch  # here: most tables are written
 
     table = getattr(setup.scan, axis).table
     key = f"{axis}.table.{'mode' if table.max_error_lsb is None else 'max_error_lsb'}"
     with problems.at(setup.scan_file, key):
-        possible = possible_shapes(table, timing.period, maker.series.harmonics)
-        shapes = feasible.fitting(possible, drive, converter, maker)
-        return choose(TableSearch(maker), shapes, asked.max_error_lsb)
+        candidates = possible_shapes(table, timing.period, maker.series.harmonics)
+        shapes = feasible.fitting(candidates, drive, converter, maker)
+        return choose(TableSearch(maker), shapes, request.max_error_lsb)
     return shape

@@ -15,19 +15,23 @@ from tablegen.waveform.window_fit import fit_window
 def band_limited(
     shape: LineShape, limit: BandLimit, harmonics: int, layer: FourierSeries | None = None
 ) -> FourierSeries:
-    """The line waveform in harmonics 1..``harmonics``.
+    """Return the line waveform in harmonics 1..``harmonics``.
 
     ``truncate`` keeps the Fourier coefficients as they are and rings; ``lanczos`` multiplies them by sigma factors
     sinc(n / (H + 1)); ``window`` is straight inside the imaging window and leaves the turnarounds free.
     A model that makes the whole waveform itself has done all this. A ``layer`` is added: inside the window to what is
     fitted, otherwise to the coefficients as it is.
-    Raises ``Unphysical`` where the fit cannot stay inside [0, 1].
+
+    Raises
+    ------
+    Unphysical
+        If the fit cannot stay inside [0, 1].
     """
     if shape.waveform is not None:
         return shape.waveform if layer is None else shape.waveform.plus(layer)
     if limit.method == "window":
-        asked = shape if layer is None else RefinedShape(shape, layer)
-        return fit_window(asked, harmonics, limit.window, limit.directions == "both")
+        target = shape if layer is None else RefinedShape(shape, layer)
+        return fit_window(target, harmonics, limit.window, limit.directions == "both")
     from tablegen.waveform.closed_form import fourier_series  # here: most scans have a window
 
     series = fourier_series(shape, harmonics)
@@ -37,20 +41,27 @@ def band_limited(
     return series if layer is None else series.plus(layer)
 
 
-def gently_limited(
+def minimum_acceleration_line(
     shape: LineShape, limit: BandLimit, harmonics: int, layer: FourierSeries | None, allowed: AllowedError
 ) -> tuple[FourierSeries, float | None]:
-    """The line of least acceleration that keeps an error, and that error in percent.
+    """Return the line of minimum acceleration that keeps an error, and that error in percent.
 
-    One that is not firm, and that the harmonics cannot keep, is given up: then it is ``band_limited``, and None.
-    Raises ``Unreachable`` where a firm one cannot be kept.
+    An allowance that is not firm is dropped where the harmonics cannot keep it: the result is then ``band_limited`` and
+    None.
+
+    Raises
+    ------
+    Unreachable
+        If a firm error cannot be kept.
     """
     if shape.waveform is None:
         from tablegen.planning.enough_harmonics import straightness  # here: most lines are fitted to their window
-        from tablegen.waveform.minimum_acceleration import gentlest
+        from tablegen.waveform.minimum_acceleration import minimum_acceleration_series
 
         try:
-            return gentlest(straightness(shape, limit, layer), harmonics, allowed.percent), allowed.percent
+            return minimum_acceleration_series(
+                straightness(shape, limit, layer), harmonics, allowed.percent
+            ), allowed.percent
         except Unphysical:
             if allowed.firm:
                 raise

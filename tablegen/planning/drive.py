@@ -27,9 +27,9 @@ class Drive(Struct, frozen=True, eq=False):
     """The voltages at the piezo, and every factor that went into them.
 
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
-    peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` is the line that
-    the model makes at another normalised scan voltage, None where it makes none; ``model_files`` has the files that the
-    model names, and their SHA-256. ``allowed`` is the scaling error that may be left for less acceleration.
+    peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` returns the line
+    that the model makes at another normalised scan voltage, None where it makes none; ``model_files`` has the files
+    that the model names, and their SHA-256. ``allowed`` is the scaling error that may be left for less acceleration.
     """
 
     driver: Driver
@@ -55,7 +55,7 @@ class Drive(Struct, frozen=True, eq=False):
 
     @property
     def resting(self) -> bool:
-        """Whether the axis stays at its offset: w is 1/2 throughout, and the line has no size."""
+        """True if the axis stays at its offset: w is 1/2 throughout, and the line has no size."""
         return self.size_nm == 0.0
 
     @property
@@ -65,21 +65,21 @@ class Drive(Struct, frozen=True, eq=False):
 
     @property
     def forward(self) -> AppliedBranch:
-        """The residual that is applied on the way there."""
+        """The residual that is applied in the forward direction."""
         return self.shape.peaks[0]
 
     @property
     def backward(self) -> AppliedBranch:
-        """And on the way back."""
+        """The residual that is applied in the backward direction."""
         return self.shape.peaks[1]
 
     @property
     def v_amplitude(self) -> float:
-        """m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
+        """The amplitude m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
         return self.m * self.g * self.v_scan
 
     def v_amplitude_at(self, v_offset: float) -> float:
-        """What ``v_amplitude`` would be at another offset voltage."""
+        """Return ``v_amplitude`` in V at another offset voltage."""
         return self.offset_law.factor(self.driver.p(v_offset)) * self.g * self.v_scan
 
 
@@ -88,8 +88,12 @@ def make_drive(
 ) -> Drive | None:
     """Ask the model of the piezo for the line of one axis ("x" or "y").
 
-    ``harmonics`` is the highest that a model may use which makes the whole waveform itself. None where the model
-    refuses; why goes to ``problems``.
+    Returns None where the model refuses; the reason goes to ``problems``.
+
+    Parameters
+    ----------
+    harmonics
+        The highest harmonic for a model that makes the whole waveform itself.
     """
     scan: FastAxis = getattr(setup.scan, axis)
     low, high = scan.band_limit.window
@@ -113,10 +117,10 @@ def make_drive(
         folder=setup.scanner_folder,
         allowed=voltages.allowed,
     )
-    before = len(problems.found)
+    before = len(problems.entries)
     places = ModelProblems(axis, setup.scan_file, setup.scanner_file, problems)
     shape = models.line_of(hysteresis, request, places)
-    if len(problems.found) > before or shape is None:
+    if len(problems.entries) > before or shape is None:
         return None
     return Drive(
         driver=driver,
@@ -145,7 +149,7 @@ def make_drive(
     )
 
 
-# Functions of a module, not of a call: a plan that travels to another process takes them along.
+# Functions of the module rather than closures, so that a plan can be pickled for another process.
 def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
     return law.factor(driver.p(driver.volts(share)))
 
@@ -153,4 +157,4 @@ def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
 def _line_at(hysteresis: Hysteresis, request: LineRequest, v: float) -> LineShape | None:
     problems = Problems()
     shape = models.line_of(hysteresis, replace(request, v=v), ModelProblems.without_files(request.axis, problems))
-    return None if problems.found else shape
+    return None if problems.entries else shape

@@ -1,9 +1,9 @@
 """The worst error of a program over every tick of its period, the same whole number on every machine.
 
-Of a shaped axis it is that of what shaping rounds, before it does: what a table is to blame for.
+For a shaped axis it is the error before the rounding that is shaped, which is the part that the table causes.
 
-It is what the certificate measures, from sums in a fixed order, rounded to 2^-16 of a code: what decides which table is
-emitted must not depend on the last bits of a transform.
+It is what the certificate measures, from sums in a fixed order, rounded to 2^-16 of a code: the choice of the emitted
+table must not depend on the last bits of a transform.
 """
 
 import numpy as np
@@ -19,12 +19,12 @@ from tablegen.waveform.sampler import Sampler, slow_grid
 from tablegen.waveform.series import values
 
 FRACTION_BITS = 16
-_SOME_TICKS = 1 << 12
-_CHUNK_TICKS = 1 << 20  # that are worked out together, for the sake of memory
+_SAMPLE_TICKS = 1 << 12
+_CHUNK_TICKS = 1 << 20  # computed at a time, to bound memory
 
 
-class AskedCodes:
-    """What a line asks for at its ticks, and by how much a program misses that; errors are in 2^-16 of a code."""
+class IdealCodes:
+    """The unrounded codes of a waveform at its ticks, and the errors of programs against them, in 2^-16 of a code."""
 
     def __init__(self, maker: TableMaker) -> None:
         self._maker = maker
@@ -36,9 +36,9 @@ class AskedCodes:
             return values(t, (series, 1), (series, 2))
 
         self._extremes = extreme_ticks(grid, slope_and_bend, ticks)
-        count = min(period, _SOME_TICKS)
-        self._some = np.arange(count, dtype=np.int64) * period // count * maker.hold
-        self._some_codes = self._at(self._some)
+        count = min(period, _SAMPLE_TICKS)
+        self._sample = np.arange(count, dtype=np.int64) * period // count * maker.hold
+        self._sample_codes = self._at(self._sample)
 
     def _at(self, k: Ints) -> Ints:
         maker = self._maker
@@ -47,11 +47,11 @@ class AskedCodes:
         return round_half_up(codes * float(1 << FRACTION_BITS))
 
     def least_error(self, program: Program) -> int:
-        """The worst of some ticks: the worst error is at least this."""
-        return _largest(_played(program, self._some), self._some_codes)
+        """Return the worst error over a sample of ticks, a lower bound of ``worst_error``."""
+        return _largest(_played(program, self._sample), self._sample_codes)
 
     def worst_error(self, program: Program) -> int:
-        """The worst of all ticks."""
+        """Return the worst error over all ticks."""
         runs = None if program.output.shaping.order else long_runs(program)
         if runs is not None:
             runs = runs.split_at(self._extremes)
@@ -65,7 +65,7 @@ class AskedCodes:
 
 
 def _played(program: Program, k: Ints) -> Ints:
-    """What a program plays at ticks k, in 2^-16 of a code; of a shaped one before the code is rounded."""
+    """Return what a program plays at ticks k, in 2^-16 of a code; for a shaped one before the code is rounded."""
     output = program.output
     if not output.shaping.order:
         return program.codes(k) << FRACTION_BITS
@@ -74,6 +74,6 @@ def _played(program: Program, k: Ints) -> Ints:
     return fine << (FRACTION_BITS - bits) if bits <= FRACTION_BITS else shift_round(fine, bits - FRACTION_BITS)
 
 
-def _largest(played: Ints, asked: Ints) -> int:
-    """The largest difference from what was asked for."""
-    return int(np.max(np.abs(played - asked)))
+def _largest(played: Ints, ideal: Ints) -> int:
+    """Return the largest distance from the ideal codes."""
+    return int(np.max(np.abs(played - ideal)))

@@ -1,4 +1,4 @@
-"""How many harmonics an allowed scaling error takes, where the build finds that; and what to say of too few."""
+"""The number of harmonics that an allowed scaling error needs, and the remedies where there are too few."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from tablegen.waveform.series import FourierSeries
 
 
 def straightness(shape: LineShape, limit: BandLimit, layer: FourierSeries | None = None) -> Straightness:
-    """Where a line has to be straight."""
-    asked = shape if layer is None else RefinedShape(shape, layer)
-    return Straightness(shape, asked, limit.window, limit.directions == "both")
+    """Return where a line has to be straight."""
+    target = shape if layer is None else RefinedShape(shape, layer)
+    return Straightness(shape, target, limit.window, limit.directions == "both")
 
 
 def plain_line(turn: float) -> LineShape:
-    """A straight line, which a model is near."""
+    """Return a straight line, which the line of every model is near."""
     return LineShape(turn, BranchShape(), BranchShape())
 
 
@@ -35,24 +35,30 @@ class EnoughHarmonics:
     most: int
 
     def of(self, straight: Straightness, allowed: AllowedError) -> int:
-        """So many keep the error. Raises ``Unphysical`` where ``most`` do not."""
-        percent, found = allowed.percent, None
+        """Return how many harmonics keep the error.
+
+        Raises
+        ------
+        Unphysical
+            If ``most`` harmonics do not keep it.
+        """
+        percent, count = allowed.percent, None
         if self.limit.harmonics == "fewest":
-            found = fewest_harmonics(straight, percent, self.least, self.most)
+            count = fewest_harmonics(straight, percent, self.least, self.most)
         elif keeps(straight, self.usual, percent):
-            found = self.usual
+            count = self.usual
         elif self.usual < self.most:
-            found = fewest_harmonics(straight, percent, self.usual + 1, self.most)
-        if found is None:
+            count = fewest_harmonics(straight, percent, self.usual + 1, self.most)
+        if count is None:
             if straight.up_to_its_turns:
                 raise Unphysical("an end of the line is imaged, where it turns; image a narrower window")
             least = least_percent(straight, self.most)
             raise Unphysical(f"{self.most} harmonics, the most there can be here, {_leave(least)}")
-        return found
+        return count
 
 
 def keeps(straight: Straightness, harmonics: int, percent: float) -> bool:
-    """Whether so many harmonics keep an error."""
+    """Return True if that many harmonics keep an error."""
     try:
         return least_percent(straight, harmonics, percent) <= percent
     except Unphysical:
@@ -62,11 +68,17 @@ def keeps(straight: Straightness, harmonics: int, percent: float) -> bool:
 def with_remedies(
     reason: Unreachable, straight: Straightness, percent: float, harmonics: int, most: int, named: Callable[[int], str]
 ) -> Unphysical:
-    """What to say where so many harmonics do not keep an error; ``named`` is how the scan file asks for more."""
+    """Return the reason why that many harmonics do not keep an error, with the remedies.
+
+    Parameters
+    ----------
+    named
+        Returns how the scan file asks for a number of harmonics.
+    """
     if reason.least_percent is None:
         return reason
-    enough = fewest_harmonics(straight, percent, harmonics + 1, most) if harmonics < most else None
-    more = "" if enough is None else f", or take {named(enough)}"
+    needed = fewest_harmonics(straight, percent, harmonics + 1, most) if harmonics < most else None
+    more = "" if needed is None else f", or take {named(needed)}"
     return Unphysical(f"{harmonics} harmonics {_leave(reason.least_percent)}{more}")
 
 

@@ -1,6 +1,6 @@
-"""Contradictions between what is asked and what the driver, the converter, the amplifier and the table can do.
+"""Contradictions between a request and what the driver, the converter, the amplifier and the table can do.
 
-Each is reported at its key, with by how much and with what would fit.
+Each is reported at its key, with its size and with what would fit.
 """
 
 from fractions import Fraction
@@ -38,7 +38,7 @@ _LONGEST = max(MOST_LENGTH.values())
 
 
 class Feasibility:
-    """The checks of one axis ("x" or "y"); what they find goes to ``problems``."""
+    """The checks of one axis ("x" or "y"); they report to ``problems``."""
 
     def __init__(self, setup: Setup, axis: str, problems: Problems) -> None:
         self._setup = setup
@@ -52,14 +52,14 @@ class Feasibility:
         self._problems.add(self._setup.scan_file, key, why)
 
     def _add_hardware(self, key: str, why: str) -> None:
-        """At a key such as "amplifier.gain", wherever the one of this axis stands."""
+        """Add a problem at a key such as "amplifier.gain", in the file that defines it for this axis."""
         self._problems.note(self._setup.hardware_problem(self._axis, key, why))
 
     def _named(self, key: str) -> str:
         return self._setup.named(self._axis, key)
 
     def harmonics(self, rate: Fraction, period: int) -> int:
-        """The highest harmonic to play of a rate in Hz, where the table advances ``period`` times a period."""
+        """Return the highest harmonic to play, for a rate in Hz and a table that advances ``period`` times a period."""
         limit = self._scan.band_limit
         key = f"{self._axis}.band_limit.harmonics"
         harmonics = limit.harmonics if isinstance(limit.harmonics, int) else DEFAULT_HARMONICS
@@ -89,7 +89,7 @@ class Feasibility:
         return harmonics
 
     def most_harmonics(self, period: int) -> int:
-        """The most that the build chooses where it finds the number; at least 1."""
+        """Return the most harmonics that the build may choose itself; at least 1."""
         carried = min((period - 1) // 2, MOST_HARMONICS)
         if self._scan.table.mode != "direct":
             carried = min(carried, self._longest_table // 2 - 1)
@@ -104,13 +104,13 @@ class Feasibility:
         return _LONGEST if table.chosen_by_build else DEFAULT_LENGTH.get(table.mode or "", _LONGEST)
 
     def _carried(self, harmonics: int, rate: Fraction) -> str:
-        """Which cutoff passes so many, where one was asked for."""
+        """Return which cutoff passes that many harmonics, where the scan gives a cutoff."""
         if self._scan.band_limit.cutoff_hz is None:
             return ""
         return f", which {at_most(float((harmonics + 1) * rate) * (1 - 1e-9), 6)} Hz pass"
 
     def check_table(self, period: int) -> None:
-        """A ``direct`` table has a word for each of ``period`` advances."""
+        """Check that a ``direct`` table has a word for each of ``period`` advances."""
         table = self._scan.table
         if table.mode != "direct":
             return
@@ -127,9 +127,9 @@ class Feasibility:
             )
 
     def check_range(self, drive: Drive, converter: Converter, low: float, high: float, shaping: Shaping) -> None:
-        """The drive, for w from ``low`` to ``high``, has to stay inside the driver and inside the converter.
+        """Check that the drive, for w from ``low`` to ``high``, stays inside the driver and inside the converter.
 
-        And what shaping adds to its codes too.
+        What shaping adds to the codes counts as well.
         """
         self._check_park(drive.driver, converter)
         down, up = drive.v_amplitude * (0.5 - low), drive.v_amplitude * (high - 0.5)
@@ -165,19 +165,19 @@ class Feasibility:
             self._check_room(drive, converter, ends, shaping)
 
     def _check_room(self, drive: Drive, converter: Converter, ends: list[float], shaping: Shaping) -> None:
-        """No code of shaping may be clamped: the clamp would keep what the next codes are to make up for."""
+        """Check that no shaped code is clamped: a clamp would drop the remainder that the next codes make up for."""
         first, last = code_limits(converter, drive.driver)
-        room, there = shaping.excess, min(ends[0] - first, last - ends[1])
-        if there >= room:
+        room, available = shaping.excess, min(ends[0] - first, last - ends[1])
+        if available >= room:
             return
         self._add_shaping(
-            f"moves codes by up to {room:g}, and the {self._axis} drive comes to {max(there, 0.0):.3g} codes of an end "
-            f"of converter or driver; an order that moves them less, a line that is smaller by "
-            f"{at_least((room - there) * abs(converter.v_per_code))} V at that end, or shaping = 'off' would fit"
+            f"moves codes by up to {room:g}, and the {self._axis} drive comes to {max(available, 0.0):.3g} codes of an "
+            f"end of converter or driver; an order that moves them less, a line that is smaller by "
+            f"{at_least((room - available) * abs(converter.v_per_code))} V at that end, or shaping = 'off' would fit"
         )
 
     def _add_shaping(self, why: str) -> None:
-        """At the key of shaping, with its value."""
+        """Add a problem at the key of shaping, with its value."""
         self._add_hardware("dac.shaping", f"'{self._hardware.dac.shaping}' {why}")
 
     @property
@@ -185,7 +185,7 @@ class Feasibility:
         return f"{self._axis}.{'size_v' if self._scan.size_v is not None else 'size_nm'}"
 
     def _check_park(self, driver: Driver, converter: Converter) -> None:
-        """The park voltage has to be one that the driver and the converter reach."""
+        """Check that the driver and the converter reach the park voltage."""
         park_v, key = self._scan.park_v, f"{self._axis}.park_v"
         if park_v is None:
             return
@@ -198,7 +198,7 @@ class Feasibility:
             self._add(key, f"{park_v:.6g} V is outside the {reach[0]:.6g}..{reach[1]:.6g} V that the converter reaches")
 
     def _size_that_fits(self, drive: Drive, down: float, up: float) -> str:
-        """The largest scan at this offset, as its key counts it."""
+        """Return the largest scan at this offset, in the unit of its key."""
         share = min((drive.v_offset - drive.driver.v_min) / down, (drive.driver.v_max - drive.v_offset) / up)
         if share < 1e-3:
             return "at this one nothing"
@@ -220,7 +220,7 @@ class Feasibility:
         shape: TableShape,
         shaping: Shaping,
     ) -> int:
-        """The slew guard in codes a tick: the amplifier's slew rate, or twice the steepest step of the line."""
+        """Return the slew guard in codes a tick: the amplifier's slew rate, or twice the steepest step of the line."""
         slope = drive.v_amplitude * stored.series.peak_slope()
         v_per_code = abs(converter.v_per_code)
         words = _word_codes(drive, converter, stored.largest, period, shape)
@@ -230,11 +230,11 @@ class Feasibility:
         if slew is None:
             return min(2 * steepest, allowed)
         update_rate = self._hardware.dac.update_rate_hz
-        asked = slope * rate_hz
-        if steepest <= allowed and (self._steps or asked <= slew):
+        requested = slope * rate_hz
+        if steepest <= allowed and (self._steps or requested <= slew):
             return allowed
-        if rounded <= allowed and (self._steps or asked <= slew):
-            self._refuse_step(shaping, rounded, allowed, slew, v_per_code, asked / update_rate / v_per_code + words)
+        if rounded <= allowed and (self._steps or requested <= slew):
+            self._refuse_step(shaping, rounded, allowed, slew, v_per_code, requested / update_rate / v_per_code + words)
             return allowed
         finer = "" if words < 0.5 else f", more {self._axis}.table.bits"
         if self._steps:
@@ -243,9 +243,9 @@ class Feasibility:
                 f"the y axis steps by up to {steepest} codes in one tick, {slew:.6g} V/s allow {allowed}; "
                 f"use motion = 'ramp'",
             )
-        elif allowed <= 1.0 + words and asked < 0.9 * slew:
+        elif allowed <= 1.0 + words and requested < 0.9 * slew:
             # Room to round both sides, and for the line rate, which moves a little with it.
-            fits = at_most(0.95 * (slew - asked) / ((3.0 + words) * v_per_code))
+            fits = at_most(0.95 * (slew - requested) / ((3.0 + words) * v_per_code))
             self._add_hardware(
                 "amplifier.max_slew_v_per_s",
                 f"{slew:.6g} V/s are {slew / update_rate / v_per_code:.3g} codes of the {self._axis} axis in a tick, "
@@ -254,11 +254,11 @@ class Feasibility:
             )
         else:
             usable = (allowed - 1.0 - words) * v_per_code * update_rate if allowed > 1.0 + words else 0.5 * slew
-            times = asked / min(slew, usable)
+            times = requested / min(slew, usable)
             line_nm = drive.size_law.size_nm(drive.v_scan_normalised / times)
             what = (
-                f"slews at {asked:.6g} V/s, {asked / slew:.4g} times the amplifier's {slew:.6g} V/s"
-                if asked > slew
+                f"slews at {requested:.6g} V/s, {requested / slew:.4g} times the amplifier's {slew:.6g} V/s"
+                if requested > slew
                 else f"steps by up to {steepest} codes a tick with rounding, {slew:.6g} V/s allow {allowed}"
             )
             key, slower = self._slower(times)
@@ -269,7 +269,7 @@ class Feasibility:
     def _refuse_step(
         self, shaping: Shaping, rounded: int, allowed: int, slew: float, v_per_code: float, codes: float
     ) -> None:
-        """The amplifier carries the line, and not what shaping adds; ``codes`` is the steepest step, unrounded."""
+        """Report that the amplifier carries the line but not what shaping adds; ``codes`` is the unrounded step."""
         update_rate = self._hardware.dac.update_rate_hz
         slower = update_rate * (slew / update_rate / v_per_code - codes) / (shaping.step_excess + 3.0)
         self._add_shaping(
@@ -281,10 +281,14 @@ class Feasibility:
     def fitting(
         self, shapes: list[TableShape], drive: Drive, converter: Converter, maker: TableMaker
     ) -> list[TableShape]:
-        """The tables that a device holds, with their gain, and whose steps the amplifier follows.
+        """Return the tables that a device holds, with their gain, and whose steps the amplifier follows.
 
-        If it follows those of none, all that a device holds, so that this is told of one of them. Raises
-        ``Unphysical`` where a device holds none.
+        If it follows none of them, return all that a device holds, so that the steps of one of them are reported.
+
+        Raises
+        ------
+        Unphysical
+            If a device holds none of the tables.
         """
         slew, allowed = self._hardware.amplifier.max_slew_v_per_s, self._allowed_step(converter)
 
@@ -294,19 +298,19 @@ class Feasibility:
             steepest = _steepest(drive, converter, stored.series, maker.phase.ticks, words)
             return slew is None or steepest + maker.output.shaping.step_excess <= allowed
 
-        held = [shape for shape in shapes if _holds(maker, shape)]
-        if not held:
-            raise Unphysical("no device holds a table of these words and this waveform; leave out what is given of it")
-        return [shape for shape in held if follows(shape)] or held
+        storable = [shape for shape in shapes if _holds(maker, shape)]
+        if not storable:
+            raise Unphysical("no device holds a table of these words and this waveform; leave out its keys")
+        return [shape for shape in storable if follows(shape)] or storable
 
     def _allowed_step(self, converter: Converter) -> int:
-        """Codes that the amplifier follows in a tick; all, if its slew rate is not known."""
+        """Return how many codes the amplifier follows in a tick; all, if its slew rate is not known."""
         last = (1 << converter.bits) - 1
         slew, v_per_code = self._hardware.amplifier.max_slew_v_per_s, abs(converter.v_per_code)
         return last if slew is None else min(floor(slew / self._hardware.dac.update_rate_hz / v_per_code), last)
 
     def check_words(self, stored: StoredWave) -> None:
-        """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs."""
+        """Check that the accumulator of the device holds the sum of all Fourier words, whatever their signs."""
         series, largest, sums = stored.series, stored.largest, _sums(stored.series)
         if sums[-1] >= _FULL * largest:
             fits = int(np.searchsorted(sums, 0.99 * ACCUMULATOR_LIMIT * largest))
@@ -317,7 +321,7 @@ class Feasibility:
             )
 
     def check_gain(self, gain_word: int) -> None:
-        """The words of a spline exceed the waveform by more, the fewer they are; the gain has to make up for it."""
+        """Check that the gain makes up for the words of a spline, which exceed the waveform more the fewer they are."""
         if abs(gain_word) >= _GAINS:
             self._add(
                 f"{self._axis}.table.length",
@@ -325,13 +329,13 @@ class Feasibility:
             )
 
     def _slower(self, times: float) -> tuple[str, str]:
-        """The key that sets the line rate, and what it would be for a rate lower by a factor."""
+        """Return the key that sets the line rate, and its value for a rate lower by a factor."""
         timing = self._setup.scan.timing
         if timing.ticks_per_line is not None:
             return "timing.ticks_per_line", f"{ceil(times * timing.ticks_per_line)} ticks_per_line"
         if timing.ticks_per_pixel is not None:
             return "timing.ticks_per_pixel", f"{ceil(times * timing.ticks_per_pixel)} ticks_per_pixel"
-        written, factor = self._setup.scan_file.as_said("timing.line_rate_hz")
+        written, factor = self._setup.scan_file.written_key("timing.line_rate_hz")
         slower = at_most(factor * timing.line_rate_hz / times, 5)
         if factor == 1.0:
             return "timing.line_rate_hz", f"{slower} Hz"
@@ -339,7 +343,7 @@ class Feasibility:
 
 
 def _word_codes(drive: Drive, converter: Converter, largest: float, period: int, shape: TableShape) -> float:
-    """Codes that a step can be off since the words of the table are rounded."""
+    """Return by how many codes a step can be off since the words of the table are rounded."""
     full_scale = 0.51 * drive.v_amplitude / abs(converter.v_per_code) * largest + 2.0 ** (converter.bits - 17)
     share = 1.0 if shape.mode == "direct" else min(1.0, shape.length / period)
     # Of two samples: each is within half a unit, and of a spline, which rounds at each degree, within a whole one.
@@ -348,32 +352,31 @@ def _word_codes(drive: Drive, converter: Converter, largest: float, period: int,
 
 
 def _holds(maker: TableMaker, shape: TableShape) -> bool:
-    """Whether accumulator and gain of a device are wide enough."""
+    """Return True if accumulator and gain of a device are wide enough."""
     stored = maker.stored(shape)
     return bool(_sums(stored.series)[-1] < _FULL * stored.largest) and abs(maker.gain(shape)[0]) < _GAINS
 
 
 def _sums(series: FourierSeries) -> Floats:
-    """What the Fourier words add up to, harmonic by harmonic, whatever their signs."""
+    """Return the cumulative sums of the sizes of the Fourier words, harmonic by harmonic."""
     sums: Floats = abs(2.0 * series.a0 - 1.0) + 2.0 * np.cumsum(np.abs(series.a) + np.abs(series.b))
     return sums
 
 
 def _steepest(drive: Drive, converter: Converter, series: FourierSeries, period: int, words: float) -> int:
-    """The steepest step in codes: its chord is never steeper than the steepest slope, and rounding adds to it."""
+    """Return the steepest step in codes: no chord is steeper than the steepest slope, and rounding adds to it."""
     return ceil(drive.v_amplitude * series.peak_slope() / abs(converter.v_per_code) / period + words) + 1
 
 
 def _amplifier_that_fits(dac: AxisDac, amplifier: AxisAmplifier, bottom: float, top: float) -> str:
-    """The amplifier that spreads the converter over a drive, and no further."""
+    """Return the amplifier that spreads the converter over a drive, and no further."""
     gain = copysign(float(at_least(1.0001 * (top - bottom) / (dac.highest_v - dac.v_min))), amplifier.gain)
     bias_v = 0.5 * (bottom + top) - gain * 0.5 * (dac.v_min + dac.highest_v)
     return f"a gain of {gain:g} with a bias_v of {bias_v:.6g} V"
 
 
 def _offsets_that_fit(drive: Drive, low: float, high: float) -> str:
-    """At which offsets the drive stays inside the driver; its amplitude changes with the offset by (1)."""
-
+    """Return the offsets at which the drive stays inside the driver; its amplitude changes with the offset by (1)."""
     driver = drive.driver
 
     def fits(v_offset: float) -> bool:
@@ -381,8 +384,8 @@ def _offsets_that_fit(drive: Drive, low: float, high: float) -> str:
         return driver.v_min + amplitude * (0.5 - low) <= v_offset <= driver.v_max - amplitude * (high - 0.5)
 
     grid = [driver.v_min + driver.span * i / 1000 for i in range(1001)]
-    good = [v for v in grid if fits(v)]
-    if not good:
+    feasible = [v for v in grid if fits(v)]
+    if not feasible:
         least = min(drive.v_amplitude_at(v) for v in grid) * (high - low)
         return (
             f"it takes at least {at_least(least)} V, so that no offset fits"

@@ -46,7 +46,7 @@ class HarmonicChoice:
         return self.usual
 
     def for_drive(self, drive: Drive, straight: int) -> int:
-        """Return the highest harmonic for the shape of a drive, where ``straight`` would do for a straight line."""
+        """Return the highest harmonic for the shape of a drive, where ``straight`` is enough for a straight line."""
         if drive.allowed is not None and drive.shape.waveform is None and chosen_by_build(self._limit):
             from tablegen.planning.enough_harmonics import straightness
 
@@ -55,7 +55,7 @@ class HarmonicChoice:
         return straight
 
     def with_advice(self, drive: Drive, harmonics: int, layer: FourierSeries | None, reason: Unphysical) -> Unphysical:
-        """Return the reason why so many harmonics do not keep the allowed error, with what would."""
+        """Return the reason why that many harmonics do not keep the allowed error, with the number that does."""
         from tablegen.planning.enough_harmonics import straightness, with_remedies
         from tablegen.waveform.minimum_acceleration import Unreachable
 

@@ -11,12 +11,29 @@ from tablegen.numerics.driver import Driver
 
 
 def size_law_of(size: Size, driver: Driver) -> SizeLaw:
-    """The law of a scanner file. Raises ``Unphysical``."""
+    """Return the size law of a scanner file, (6)-(12).
+
+    Raises
+    ------
+    Unphysical
+        If the calibrated size is beyond the driver's range.
+    """
     return SizeLaw.calibrated(size.k_nm_per_v, driver.span, size.beta, size.base_nm, size.v_threshold)
 
 
 def offset_surface(offset: Offset, driver: Driver, size: SizeLaw) -> OffsetSurface:
-    """m of a scanner file over offset and size; ``size`` serves points with ``size_v`` alone. Raises ``Unphysical``."""
+    """Return m of (1) of a scanner file over offset and size.
+
+    Parameters
+    ----------
+    size
+        The size law, needed for points with ``size_v``.
+
+    Raises
+    ------
+    Unphysical
+        If the points do not determine m, or it is not above 0.
+    """
     if offset.sizes is not None:
         entries = sorted(offset.sizes, key=lambda entry: entry.size_v)
         laws = [(entry.size_v / driver.span, OffsetLaw.from_ends(entry.m_minus, entry.m_plus)) for entry in entries]
@@ -33,7 +50,13 @@ def offset_surface(offset: Offset, driver: Driver, size: SizeLaw) -> OffsetSurfa
 
 
 def dynamics_of(resonance: Resonance, folder: Path) -> Response:
-    """The dynamics of a scanner file in ``folder``. Raises ``Unphysical``."""
+    """Return the dynamics of a scanner file in ``folder``.
+
+    Raises
+    ------
+    Unphysical
+        If the response file cannot be read.
+    """
     if resonance.response is None:
         assert resonance.frequency_hz is not None
         assert resonance.quality is not None
@@ -44,5 +67,5 @@ def dynamics_of(resonance: Resonance, folder: Path) -> Response:
 
 
 def outside_driver(volts: float, driver: Driver) -> str:
-    """Say that a voltage is outside the driver's range, and by how much."""
+    """Return a message that a voltage is outside the driver's range, and by how much."""
     return f"{volts:.6g} V is outside the driver's {driver}, by {driver.beyond(volts, volts):.4g} V"

@@ -1,4 +1,4 @@
-"""From a checked configuration to integers: the immutable plan that everything downstream reads."""
+"""Build the plan: quantise a validated configuration into the immutable integers that everything downstream reads."""
 
 from fractions import Fraction
 from typing import Literal
@@ -20,7 +20,7 @@ from tablegen.planning.drive import Drive, make_drive
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.harmonic_choice import HarmonicChoice
 from tablegen.planning.settling import settle_lines
-from tablegen.planning.table_choice import TableChoice
+from tablegen.planning.table_choice import TableRequest
 from tablegen.planning.timing import AxisTiming, make_schedule
 from tablegen.planning.voltages import axis_voltages
 from tablegen.planning.waveforms import make_waveforms
@@ -28,14 +28,15 @@ from tablegen.waveform.series import FourierSeries
 
 
 class LinePlan(Struct, frozen=True, eq=False):
-    """One axis: what was asked for in volts, the waveform, and the integers that play it.
+    """One axis: the request in volts, the waveform, and the integers that play it.
 
     ``target`` is the band-limited w that the piezo is to follow. ``drive_series`` is the w that has to arrive at the
-    piezo for that: each harmonic divided by the dynamics; ``held_harmonics`` are those at which the boost limit held
-    that back. ``series`` is the w that is played, ahead of that by the converter's hold: the code of advance k of N is
-    that of ``series`` at k / N. ``layer`` is what of the target was learnt from a measurement, and lies over the
-    model's shape. ``kept_percent`` is the scaling error for which the target has the least acceleration, None where it
-    has another band limit. ``asked_table`` is what was asked of a table that the build chose, None where it is written.
+    piezo for that: each harmonic divided by the dynamics; ``held_harmonics`` are those that the boost limit reduces.
+    ``series`` is the w that is played, ahead of that by the half tick of the converter's zero-order hold: the code of
+    advance k of N is that of ``series`` at k / N. ``layer`` is the part of the target that was learnt from a
+    measurement, added to the model's shape. ``kept_percent`` is the scaling error for which the target has minimum
+    acceleration, None where it has another band limit. ``table_request`` is the request for a
+    table that the build chose, None where the scan file gives the table.
     """
 
     axis: Literal["x", "y"]
@@ -53,7 +54,7 @@ class LinePlan(Struct, frozen=True, eq=False):
     program: Program
     layer: FourierSeries | None = None
     kept_percent: float | None = None
-    asked_table: TableChoice | None = None
+    table_request: TableRequest | None = None
 
     def __repr__(self) -> str:
         table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
@@ -64,25 +65,35 @@ class LinePlan(Struct, frozen=True, eq=False):
 
     @property
     def described(self) -> FourierSeries:
-        """The target without the layer: what the scanner's model describes."""
+        """The target without the layer: the part that the scanner's model describes."""
         return self.target if self.layer is None else self.target.less(self.layer)
 
     def float_codes(self, w: Floats) -> Floats:
-        """The codes, unrounded, that values of w ask for: V(t) = V_offset + m g V_scan (w - 1/2)."""
+        """Return the unrounded codes of values of w: V(t) = V_offset + m g V_scan (w - 1/2).
+
+        Parameters
+        ----------
+        w
+            Normalised waveform, any shape.
+
+        Returns
+        -------
+        Codes of the shape of ``w``.
+        """
         return self.converter.code(self.drive.v_offset) + self.codes_per_unit * (w - 0.5)
 
     @property
     def codes_per_unit(self) -> float:
-        """Codes that w = 0 and w = 1 are apart; negative where the amplifier or the codes are inverted."""
+        """The distance in codes of w = 1 from w = 0; negative where the amplifier or the codes are inverted."""
         return self.drive.v_amplitude / self.converter.v_per_code
 
     def codes(self, start: int, stop: int) -> Ints:
-        """The emitted codes at ticks [start, stop) since the program began."""
+        """Return the emitted codes at ticks [start, stop) since the program began, shape (stop - start,)."""
         return self.program.played(start, stop)
 
 
 class Plan(Struct, frozen=True, eq=False):
-    """A whole build: both axes and the one schedule they share."""
+    """A whole build: both axes and their common schedule."""
 
     name: str
     scanner: str
@@ -105,19 +116,22 @@ class Plan(Struct, frozen=True, eq=False):
 
     @property
     def moving(self) -> tuple[LinePlan, ...]:
-        """The axes that move: of a line scan x alone."""
+        """The axes that move; x alone for a line scan."""
         return tuple(line for line in self.lines if not line.drive.resting)
 
     @property
     def program(self) -> DualProgram:
-        """What a bank of the device holds of it: the programs of both axes and their schedule."""
+        """The content of a bank of the device: the programs of both axes and their schedule."""
         return DualProgram(self.x.program, self.y.program, self.schedule)
 
 
 def make_plan(setup: Setup) -> Plan:
     """Compensate, shape and quantise a scan.
 
-    Raises ``Rejected`` with every contradiction that was found on both axes.
+    Raises
+    ------
+    Rejected
+        With every contradiction on both axes.
     """
     problems = Problems()
     schedule = make_schedule(setup, problems)
@@ -149,25 +163,23 @@ def make_plan(setup: Setup) -> Plan:
 
 def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, problems: Problems) -> LinePlan | None:
     """Plan one axis: clock, voltages, harmonics, shape, waveform, table; None where ``problems`` grew."""
-    before = len(problems.found)
+    before = len(problems.entries)
     timing = AxisTiming.of(setup, axis, schedule)
     feasible = Feasibility(setup, axis, problems)
     choice = HarmonicChoice(setup, axis, timing.rate, timing.period, feasible, problems)
     feasible.check_table(timing.period)
 
     voltages = axis_voltages(setup, axis, float(timing.rate), problems)
-    if voltages is None:
-        return None
     straight = choice.for_straight_line(voltages.allowed)
     drive = make_drive(setup, axis, float(timing.rate), voltages, straight, problems)
-    if drive is None or len(problems.found) > before:
+    if drive is None or len(problems.entries) > before:
         return None
     harmonics = choice.for_drive(drive, straight)
     waveforms = make_waveforms(setup, axis, timing, drive, choice, harmonics, problems)
     if waveforms is None:
         return None
     table = make_table(setup, axis, timing, drive, waveforms.series, feasible, problems)
-    if table is None or len(problems.found) > before:
+    if table is None or len(problems.entries) > before:
         return None
     return LinePlan(
         axis=axis,
@@ -185,12 +197,11 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         program=table.program,
         layer=waveforms.layer,
         kept_percent=waveforms.kept_percent,
-        asked_table=table.asked,
+        table_request=table.request,
     )
 
 
 def _examine(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> None:
-    """Examine one axis at the rate asked for, where there is no schedule: its problems are reported in the same run."""
+    """Check one axis at the requested rate where there is no schedule, to report its problems in the same run."""
     voltages = axis_voltages(setup, axis, rate_hz, problems)
-    if voltages is not None:
-        make_drive(setup, axis, rate_hz, voltages, DEFAULT_HARMONICS, problems)
+    make_drive(setup, axis, rate_hz, voltages, DEFAULT_HARMONICS, problems)

@@ -8,7 +8,7 @@ from tablegen.planning.table_maker import TableMaker
 
 
 def maker_of(line: LinePlan) -> TableMaker:
-    """What makes the tables of a planned axis."""
+    """Return the maker of the tables of a planned axis."""
     return TableMaker(
         series=line.series,
         amplitude=0.5 * line.codes_per_unit,
@@ -20,11 +20,11 @@ def maker_of(line: LinePlan) -> TableMaker:
 
 
 def with_table(line: LinePlan, shape: TableShape) -> LinePlan:
-    """The axis with a table of that shape; its limits, the slew guard too, stay as they are."""
-    made = maker_of(line).made(shape)
-    return replace(line, program=made.program, fourier=made.fourier, scale=made.scale)
+    """Return the axis with a table of another shape; its limits, the slew guard too, stay as they are."""
+    table = maker_of(line).quantise(shape)
+    return replace(line, program=table.program, fourier=table.fourier, scale=table.scale)
 
 
 def shape_of(line: LinePlan) -> TableShape:
-    """The shape of the table that an axis has."""
+    """Return the shape of the table of an axis."""
     return TableShape(line.program.mode, len(line.program.words), line.program.bits)

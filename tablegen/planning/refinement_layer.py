@@ -1,4 +1,4 @@
-"""The layer that `tablegen refine` learnt: whether it belongs to the scan that is built, and its series."""
+"""The layer that `tablegen refine` learnt: the check that it belongs to the scan that is built, and its series."""
 
 import hashlib
 import json
@@ -24,31 +24,31 @@ WINDOW_REACH = 0.02  # share of the line beyond the measured window
 
 
 def model_digest(setup: Setup, axis: str, drive: Drive) -> str:
-    """What the layer lies over: 16 hexadecimal digits of hysteresis and dynamics as the scanner file has them.
+    """Return 16 hexadecimal digits of hysteresis and dynamics in the scanner file: what the layer was learnt over.
 
-    And of the converter's hold, since builds undo it: layers from before may have learnt it.
+    The converter's hold is part of it, since builds undo it: layers of earlier versions may have learnt it.
     """
     scanner: ScannerAxis = getattr(setup.scanner, axis)
-    below = ["hold", *(_given(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance))]
+    parts = ["hold", *(_without_unset(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance))]
     if scanner.hysteresis is not None:
-        below += scanner.hysteresis.contents(setup.scanner_folder)
+        parts += scanner.hysteresis.contents(setup.scanner_folder)
     if isinstance(drive.response, Measured):  # the content of the file that it names
-        below += [drive.response.f_hz.tolist(), drive.response.gain.tolist(), drive.response.phase_turns.tolist()]
-    plain = json.dumps(below, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+        parts += [drive.response.f_hz.tolist(), drive.response.gain.tolist(), drive.response.phase_turns.tolist()]
+    plain = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(plain.encode("ascii")).hexdigest()[:16]
 
 
-def _given(value: Any) -> Any:
-    """Without the keys that are not given: those that a later version adds then change nothing."""
+def _without_unset(value: Any) -> Any:
+    """Return a value without the keys that are not set: keys that a later version adds then change nothing."""
     if isinstance(value, dict):
-        return {key: _given(item) for key, item in value.items() if item is not None}
-    return [_given(item) for item in value] if isinstance(value, list) else value
+        return {key: _without_unset(item) for key, item in value.items() if item is not None}
+    return [_without_unset(item) for item in value] if isinstance(value, list) else value
 
 
 def learnt_layer(
     setup: Setup, axis: str, drive: Drive, rate_hz: float, harmonics: int, problems: Problems
 ) -> FourierSeries | None:
-    """The layer of one axis; None where the scan file has none, or where ``problems`` grew."""
+    """Return the layer of one axis; None where the scan file has none, or where ``problems`` grew."""
     scan: FastAxis = getattr(setup.scan, axis)
     refinement = scan.refinement
     if refinement is None:
@@ -70,7 +70,7 @@ def _remedy(axis: str) -> str:
 
 
 def _faults(learnt: Refinement, scan: FastAxis, drive: Drive, rate_hz: float, span: float) -> list[tuple[str, str]]:
-    """By which keys the scan is another one than that at which the layer was learnt."""
+    """Return the keys by which the scan differs from the one at which the layer was learnt, each with the reason."""
     faults = []
     if abs(drive.v_amplitude - learnt.v_amplitude) > AMPLITUDE_REACH * learnt.v_amplitude:
         by = 100.0 * (drive.v_amplitude / learnt.v_amplitude - 1.0)

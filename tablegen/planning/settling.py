@@ -1,4 +1,4 @@
-"""How many lines a scan has to settle after a change, by the operators of its axes."""
+"""The number of lines that a scan needs to settle after a change, by the operators of its axes."""
 
 from msgspec import Struct
 
@@ -14,13 +14,13 @@ BOUND = 0.005  # of the line, by which the image may drift in a frame; a pixel w
 
 
 class Settling(Struct, frozen=True):
-    """Of one axis, after a change of offset by ``offset_v`` and after a smaller scan.
+    """The settling of one axis after a change of offset by ``offset_v``, and after a smaller scan.
 
     ``lines`` are enough for the image to drift by no more than ``bound_nm`` in the next frame after either, or
     ``MOST_LINES`` + 1. ``drift_nm`` is that of a frame without them, after the change of offset, ``size_drift_nm``
-    after that of the size, and ``late_nm`` that of the frame after ``lines``, the larger of both. Of that
-    ``extrapolated_nm`` come of creep slower than a period of the slowest trace, ``slowest_s``. ``memory_nm`` is by how
-    much hysteresis bends the first period.
+    after that of the size, and ``late_nm`` that of the frame after ``lines``, the larger of both. The part
+    ``extrapolated_nm`` of it comes from creep slower than a period of the slowest trace, ``slowest_s``. ``memory_nm``
+    is by how much hysteresis bends the first period.
     """
 
     lines: int
@@ -35,7 +35,7 @@ class Settling(Struct, frozen=True):
 
 
 def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
-    """What the operator of an axis says; None without one."""
+    """Return the settling by the operator of an axis; None without one."""
     transients = drive.shape.transients
     if transients is None:
         return None
@@ -67,38 +67,39 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
 
 
 def settle_lines(setup: Setup, drives: dict[str, Drive], schedule: Schedule, problems: Problems) -> int:
-    """As the scan file has them, or as many as the slower axis needs, at most ``MOST_LINES``.
+    """Return the settling lines of the scan file, or as many as the slower axis needs, at most ``MOST_LINES``.
 
-    An axis without an operator is not known, and does not count.
+    The settling of an axis without an operator is not known; such an axis is ignored.
     """
-    asked = setup.scan.timing.settle_lines
-    if asked != "auto":
-        return asked
-    found = [one for axis, drive in drives.items() if (one := settling(axis, drive, schedule)) is not None]
-    if not found:
+    written = setup.scan.timing.settle_lines
+    if written != "auto":
+        return written
+    settlings = [one for axis, drive in drives.items() if (one := settling(axis, drive, schedule)) is not None]
+    if not settlings:
         problems.add(
             setup.scan_file,
             "timing.settle_lines",
             "'auto' needs an operator of x or of y, and there is none; run `tablegen calibrate operator`, or give a "
             "number of lines",
         )
-    return min(max((one.lines for one in found), default=0), MOST_LINES)
+    return min(max((one.lines for one in settlings), default=0), MOST_LINES)
 
 
-def settling_text(found: Settling) -> list[str]:
-    """For the terminal and the emitted files."""
-    lines = f"in {found.lines} lines" if found.lines <= MOST_LINES else f"in more than {MOST_LINES} lines"
+def settling_text(settled: Settling) -> list[str]:
+    """Return the lines of text for the terminal and the emitted files."""
+    lines = f"in {settled.lines} lines" if settled.lines <= MOST_LINES else f"in more than {MOST_LINES} lines"
     out = [
-        f"{lines} after a change of offset of {found.offset_v:.4g} V; drifts {found.drift_nm:.3g} nm in the first frame"
+        f"{lines} after a change of offset of {settled.offset_v:.4g} V; "
+        f"drifts {settled.drift_nm:.3g} nm in the first frame"
     ]
-    if found.size_drift_nm >= _SHOWN_NM:
-        out.append(f"drifts {found.size_drift_nm:.3g} nm after half the size")
-    if found.memory_nm >= _SHOWN_NM:
-        out.append(f"hysteresis bends the first sweep by up to {found.memory_nm:.3g} nm")
-    if found.extrapolated_nm >= _SHOWN_NM:
-        share = 100.0 * found.extrapolated_nm / found.late_nm
+    if settled.size_drift_nm >= _SHOWN_NM:
+        out.append(f"drifts {settled.size_drift_nm:.3g} nm after half the size")
+    if settled.memory_nm >= _SHOWN_NM:
+        out.append(f"hysteresis bends the first sweep by up to {settled.memory_nm:.3g} nm")
+    if settled.extrapolated_nm >= _SHOWN_NM:
+        share = 100.0 * settled.extrapolated_nm / settled.late_nm
         out.append(
-            f"after {min(found.lines, MOST_LINES)} lines drifts {found.late_nm:.3g} nm, {share:.2g} % of it slower "
-            f"than the slowest trace, {found.slowest_s:.3g} s: extrapolated"
+            f"after {min(settled.lines, MOST_LINES)} lines drifts {settled.late_nm:.3g} nm, {share:.2g} % of it slower "
+            f"than the slowest trace, {settled.slowest_s:.3g} s: extrapolated"
         )
     return out

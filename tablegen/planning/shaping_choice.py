@@ -1,7 +1,7 @@
-"""Which shaping an axis gets: what ``dac.shaping`` names, or the one that its response passes least of.
+"""The choice of the shaping of an axis: the one that ``dac.shaping`` names, or the one that leaves the least error.
 
 The error of a rounding is taken as white; behind the noise filter and the response it leaves a mean square that is a
-sum over frequencies. Everything is made from basic operations, since the choice decides emitted codes.
+sum over frequencies. Only basic operations are used, since the choice decides emitted codes.
 """
 
 from itertools import pairwise
@@ -24,9 +24,9 @@ _WIDER = 4.0
 
 
 def chosen_shaping(setup: Setup, axis: str, drive: Drive, problems: Problems) -> Shaping:
-    """The shaping of one axis ("x" or "y"); off, and a problem, where it needs a response that is not known.
+    """Return the shaping of one axis ("x" or "y"); off, and a problem, where it needs a response that is not known.
 
-    An axis at rest is not shaped: its code would change for ever to hold a place between two.
+    An axis at rest is not shaped: its code would change for ever to represent a value between two codes.
     """
     dac = setup.hardware(axis).dac
     if drive.resting:
@@ -48,12 +48,12 @@ def chosen_shaping(setup: Setup, axis: str, drive: Drive, problems: Problems) ->
 
 
 def best_shaping(response: Response, update_rate_hz: float) -> Shaping:
-    """The order and the zero that leave the least mean square behind a response; the lowest order of equal ones."""
-    power, c = _passed(response, update_rate_hz)
+    """Return the order and the zero that leave the least mean square behind a response; the lowest of equal orders."""
+    power, c = _transmitted(response, update_rate_hz)
     # |1 - z^-1|^2 = 2 - 2 cos, and |1 - a z^-1 + z^-2|^2 = (2 cos - a)^2 on the unit circle.
     at_rest = power * (2.0 - 2.0 * c)
 
-    def left(shaping: Shaping) -> float:
+    def mean_square(shaping: Shaping) -> float:
         if shaping.order == 1:
             return float(tree_sum(at_rest))
         if shaping.order == 2:
@@ -61,13 +61,14 @@ def best_shaping(response: Response, update_rate_hz: float) -> Shaping:
         pair = 2.0 * c - shaping.zero / (1 << ZERO_BITS)
         return float(tree_sum(at_rest * (pair * pair)))
 
-    return min(_CANDIDATES, key=left)
+    return min(_CANDIDATES, key=mean_square)
 
 
-def _passed(response: Response, update_rate_hz: float) -> tuple[Floats, Floats]:
-    """Power that a response passes at frequencies up to half the update rate, by their share; and cos of their angle.
+def _transmitted(response: Response, update_rate_hz: float) -> tuple[Floats, Floats]:
+    """Return the power that a response passes at frequencies up to half the update rate, and the cosine of their angle.
 
-    Stretches are short about the resonance, so that none is missed. What is not known is not passed.
+    The power is weighted by the width of its stretch; stretches are short about the resonance, so as not to miss it.
+    Frequencies at which the response is not known count as not passed.
     """
     highest = min(0.5 * update_rate_hz, response.highest_hz)
     edges = {0.0, highest}

@@ -1,4 +1,4 @@
-"""Which table an axis gets: the one that is written, or the least memory that keeps an error."""
+"""The choice of the table of an axis: the one that is written, or the least memory that keeps an error."""
 
 from typing import TYPE_CHECKING, cast
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from tablegen.planning.table_search import TableSearch
 
 # A code is rounded by up to 1/2 LSB whatever the table is. With as much again for the table, what is played is one of
-# the two codes that what was asked for lies between.
+# the two codes next to the ideal one.
 DEFAULT_ERROR_LSB = 1.0
 # Of shaped output the table's own error, before the rounding that is shaped: little beside what shaping leaves.
 DEFAULT_SHAPED_ERROR_LSB = 0.01
 
 
-class TableChoice(Struct, frozen=True):
-    """What was asked of a table that the build chose: the worst error, and the keys that were free.
+class TableRequest(Struct, frozen=True):
+    """The request for a table that the build chooses: the worst error, and the keys that are free.
 
-    Of ``shaped`` output it is the error before the rounding.
+    For ``shaped`` output it is the error before the rounding.
     """
 
     max_error_lsb: float
@@ -35,17 +35,17 @@ class TableChoice(Struct, frozen=True):
         return f"the least memory within {self.max_error_lsb:g} LSB{' before the rounding' if self.shaped else ''}"
 
 
-def asked_of(table: Table, limits: Limits, shaped: bool) -> TableChoice | None:
-    """What is asked of a table; None where it is written as it is."""
+def table_request(table: Table, limits: Limits, shaped: bool) -> TableRequest | None:
+    """Return the request for a table; None where the scan file gives the whole table."""
     if not table.chosen_by_build:
         return None
-    given = {"mode": table.mode not in (None, "auto"), "length": table.length, "bits": table.bits}
-    free = tuple(key for key, value in given.items() if not value)
-    return TableChoice(allowed_lsb(table, limits, shaped), free, shaped)
+    written = {"mode": table.mode not in (None, "auto"), "length": table.length, "bits": table.bits}
+    free = tuple(key for key, value in written.items() if not value)
+    return TableRequest(allowed_lsb(table, limits, shaped), free, shaped)
 
 
 def allowed_lsb(table: Table, limits: Limits, shaped: bool) -> float:
-    """The worst error of a table that the build chooses; of shaped output before the rounding."""
+    """Return the worst error of a table that the build chooses, in LSB; for shaped output before the rounding."""
     if table.max_error_lsb is not None:
         return table.max_error_lsb
     if shaped:
@@ -54,31 +54,31 @@ def allowed_lsb(table: Table, limits: Limits, shaped: bool) -> float:
 
 
 def written_shape(table: Table, period: int) -> TableShape:
-    """The shape that is written, or its defaults, for ``period`` advances."""
+    """Return the shape that is written, or its defaults, for ``period`` advances."""
     mode = cast(Mode, "interpolated" if table.mode in (None, "auto") else table.mode)
     length = period if mode == "direct" else table.length or DEFAULT_LENGTH[mode]
     return TableShape(mode, length, table.bits or DEFAULT_BITS)
 
 
 def possible_shapes(table: Table, period: int, harmonics: int) -> list[TableShape]:
-    """Every shape that carries the harmonics, with what is given of a table."""
+    """Return every shape that carries the harmonics and agrees with the keys of a table."""
     modes = MODES if table.mode in (None, "auto") else (cast(Mode, table.mode),)
     return [
         TableShape(mode, length, bits)
         for mode in modes
-        for length in _lengths(table, mode, period, harmonics, asked=len(modes) == 1)
+        for length in _lengths(table, mode, period, harmonics, only_mode=len(modes) == 1)
         for bits in (range(LEAST_BITS, MOST_BITS[mode] + 1) if table.bits is None else (table.bits,))
         if bits <= MOST_BITS[mode]
     ]
 
 
-def _lengths(table: Table, mode: Mode, period: int, harmonics: int, asked: bool) -> list[int]:
-    """Powers of two that carry the harmonics; in ``direct`` mode a word for each advance.
+def _lengths(table: Table, mode: Mode, period: int, harmonics: int, only_mode: bool) -> list[int]:
+    """Return powers of two that carry the harmonics; in ``direct`` mode a word for each advance.
 
-    So many not every device can address, unless that mode was ``asked`` for.
+    Not every device can address as many as ``direct`` takes: such a table counts only if it is the ``only_mode``.
     """
     if mode == "direct":
-        fits = table.length in (None, period) and (asked or LEAST_LENGTH <= period <= MOST_LENGTH[mode])
+        fits = table.length in (None, period) and (only_mode or LEAST_LENGTH <= period <= MOST_LENGTH[mode])
         return [period] if fits else []
     powers = range(MOST_LENGTH[mode].bit_length())
     lengths = [1 << power for power in powers] if table.length is None else [table.length]
@@ -86,12 +86,18 @@ def _lengths(table: Table, mode: Mode, period: int, harmonics: int, asked: bool)
 
 
 def choose(search: "TableSearch", shapes: list[TableShape], max_error_lsb: float) -> TableShape:
-    """The least memory that keeps an error. Raises ``Unphysical`` with the least error of any table."""
-    found = search.smallest(shapes, max_error_lsb)
-    if found is None:
+    """Return the table of least memory that keeps an error.
+
+    Raises
+    ------
+    Unphysical
+        If no table keeps it; the message has the least error of any table.
+    """
+    smallest = search.smallest(shapes, max_error_lsb)
+    if smallest is None:
         best = search.best(shapes)
         raise Unphysical(
             f"no table keeps {max_error_lsb:g} LSB; the best, {best.shape}, errs by up to "
             f"{at_least(best.max_error_lsb, 4)} LSB; allow that much"
         )
-    return found
+    return smallest

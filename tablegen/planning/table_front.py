@@ -1,4 +1,4 @@
-"""Which tables an axis could have, and which of them are worth having."""
+"""The tables that an axis could have, and the Pareto front of memory and error among them."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from tablegen.planning.other_table import maker_of, shape_of
 from tablegen.planning.table_choice import allowed_lsb, choose, possible_shapes
 from tablegen.planning.table_search import TableSearch
 
-_TIMES = 8.0  # an error that is so many times what is asked is of no use
+_TIMES = 8.0  # tables with more than this multiple of the allowed error are not listed
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,20 @@ class TableFront:
 
 
 def table_front(setup: Setup, line: LinePlan) -> TableFront:
-    """The tables of a planned axis. Raises ``Unphysical`` where none keeps the error that its scan file asks for."""
+    """Return the tables of a planned axis.
+
+    Raises
+    ------
+    Unphysical
+        If no table keeps the error that its scan file requests.
+    """
     scan: FastAxis = getattr(setup.scan, line.axis)
     maker, feasible = maker_of(line), Feasibility(setup, line.axis, Problems())
-    possible = possible_shapes(Table(), line.program.phase.ticks, line.series.harmonics)
-    shapes = feasible.fitting(possible, line.drive, line.converter, maker)
+    candidates = possible_shapes(Table(), line.program.phase.ticks, line.series.harmonics)
+    shapes = feasible.fitting(candidates, line.drive, line.converter, maker)
     search, most = TableSearch(maker), allowed_lsb(scan.table, setup.scan.limits, line.program.output.shaping.order > 0)
-    found = {one.shape for one in search.front(shapes, _TIMES * most)}
+    listed = {one.shape for one in search.front(shapes, _TIMES * most)}
     chosen = choose(search, shapes, most)
     rendered = search.smallest((shape for shape in shapes if shape.mode != "direct"), most)
-    found |= {chosen, shape_of(line)}
-    return TableFront(most, tuple(sorted(found, key=lambda one: one.order)), chosen, rendered, shape_of(line))
+    listed |= {chosen, shape_of(line)}
+    return TableFront(most, tuple(sorted(listed, key=lambda one: one.order)), chosen, rendered, shape_of(line))

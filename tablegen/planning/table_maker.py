@@ -1,4 +1,4 @@
-"""From a waveform and the shape of a table to the integers that play it."""
+"""Quantise a waveform into the integers of a table of given shape."""
 
 from functools import cached_property
 from math import ceil
@@ -20,8 +20,8 @@ from tablegen.waveform.series import FourierSeries
 _PEAK_GRID = 1024
 
 
-class MadeTable(Struct, frozen=True, eq=False):
-    """A program with its table, the Fourier words that the table comes from, and what both are scaled by."""
+class QuantisedTable(Struct, frozen=True, eq=False):
+    """A program with its table, the Fourier words of the table, and the scale of both."""
 
     program: Program
     fourier: FourierWords
@@ -35,7 +35,7 @@ class StoredWave(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def reach(self) -> tuple[float, float]:
-        """Its least and its greatest value."""
+        """The least and the greatest value of the waveform."""
         w = self.series.on_grid(32 * self.series.harmonics)
         return float(np.min(w)), float(np.max(w))
 
@@ -46,10 +46,10 @@ class StoredWave(Struct, frozen=True, eq=False, dict=True):
 
 
 class TableMaker(Struct, frozen=True, eq=False):
-    """One axis but for its table: what is the same for every shape of it.
+    """One axis without its table: what is the same for every shape of table.
 
     ``amplitude`` is in codes for 2 w - 1 = 1, negative where the axis is inverted; ``offset`` the code of w = 1/2,
-    unrounded. ``output`` has the limits, whatever its gain is.
+    unrounded. ``output`` has the limits; its gain is not used.
     """
 
     series: FourierSeries
@@ -61,12 +61,12 @@ class TableMaker(Struct, frozen=True, eq=False):
     _stored: dict[int, StoredWave] = field(default_factory=dict)  # by the words of a spline, 0 for the waveform itself
 
     @property
-    def as_asked(self) -> StoredWave:
+    def original(self) -> StoredWave:
         """The waveform itself."""
         return self._stored_by(0)
 
     def stored(self, shape: TableShape) -> StoredWave:
-        """What the words of a shape are values of: the waveform, or the spline that is nearest to it."""
+        """Return the wave whose values the words of a shape are: the waveform, or the spline nearest to it."""
         return self._stored_by(shape.length if shape.mode == "cubic" else 0)
 
     def _stored_by(self, length: int) -> StoredWave:
@@ -76,19 +76,19 @@ class TableMaker(Struct, frozen=True, eq=False):
         return self._stored[length]
 
     def gain(self, shape: TableShape) -> tuple[int, float]:
-        """The gain word of a shape, and what its table is scaled by."""
+        """Return the gain word of a shape, and the scale of its table."""
         peak = ceil(self.stored(shape).largest * _PEAK_GRID) / _PEAK_GRID
         return fit_gain(sample_gain(shape.mode) * self.amplitude, peak, shape.bits, self.output.dac_bits)
 
-    def made(self, shape: TableShape) -> MadeTable:
-        """The table of a shape."""
+    def quantise(self, shape: TableShape) -> QuantisedTable:
+        """Return the table of a shape."""
         gain_word, scale = self.gain(shape)
         stored = self.stored(shape).series
         fourier = encode(stored.a0, stored.a, stored.b, scale)
         words = synthesize(fourier, shape.length, shape.bits)
         output = scaled_output(self.output, self.offset, shape.bits, gain_word)
-        return MadeTable(Program(self.phase, self.hold, shape.mode, shape.bits, words, output), fourier, scale)
+        return QuantisedTable(Program(self.phase, self.hold, shape.mode, shape.bits, words, output), fourier, scale)
 
     def limited(self, max_step: int) -> "TableMaker":
-        """With another slew guard, in codes a tick."""
+        """Return the maker with another slew guard, in codes a tick."""
         return replace(self, output=replace(self.output, max_step=max_step))

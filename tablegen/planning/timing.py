@@ -1,4 +1,4 @@
-"""A scan laid out in ticks: the line from the rate that was asked for, its imaging windows, its pixels.
+"""A scan laid out in ticks: the line from the requested rate, its imaging windows, its pixels.
 
 All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/10, not the float beside it.
 """
@@ -22,10 +22,10 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     """Lay a scan out in ticks; None where ``problems`` grew."""
     scan = setup.scan
     timing = scan.timing
-    before = len(problems.found)
+    before = len(problems.entries)
     rate = exact(setup.hardware("x").dac.update_rate_hz)
     ticks = _line_ticks(setup, rate, problems)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
     low, high = (exact(edge) for edge in scan.x.band_limit.window)
     both = scan.x.band_limit.directions == "both"
@@ -35,7 +35,7 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     up, down = (Window(*lines) for lines in inside)
     _check_pixels(setup, rate, ticks, forward, backward, problems)
     _check_lines(setup, up, down, problems)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
     return Schedule(
         ticks=ticks,
@@ -54,7 +54,7 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
 
 
 def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
-    """Ticks of a line: as given, or so that pixels are whole ticks, or the nearest to the line rate."""
+    """Return the ticks of a line: as given, or so that pixels are whole ticks, or the nearest to the line rate."""
     timing, file = setup.scan.timing, setup.scan_file
     share = _width(setup.scan.x) * exact(setup.scan.x.turn)
     key = "timing.line_rate_hz"
@@ -62,9 +62,9 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
         ticks, key = timing.ticks_per_line, "timing.ticks_per_line"
     elif timing.ticks_per_pixel is not None:
         key = "timing.ticks_per_pixel"
-        wanted = timing.pixels * timing.ticks_per_pixel / share
-        ticks = round(wanted)
-        if wanted.denominator != 1 and ticks <= MAXIMUM_LINE_TICKS:
+        ideal = timing.pixels * timing.ticks_per_pixel / share
+        ticks = round(ideal)
+        if ideal.denominator != 1 and ticks <= MAXIMUM_LINE_TICKS:
             # Whole are the multiples of the numerator of the share, less what the ticks of a pixel have of it.
             step = share.numerator // gcd(share.numerator, timing.ticks_per_pixel)
             pixels = step * max(1, round(Fraction(timing.pixels, step)))
@@ -73,7 +73,7 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
                 file,
                 key,
                 f"{timing.pixels} pixels of {timing.ticks_per_pixel} ticks in {float(share):g} of the line make "
-                f"{float(wanted):.7g} ticks a line, which is not whole; {fits} x.turn or the window",
+                f"{float(ideal):.7g} ticks a line, which is not whole; {fits} x.turn or the window",
             )
     else:
         ticks = floor(rate / exact(timing.line_rate_hz) + Fraction(1, 2))
@@ -87,7 +87,7 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
             fits = "take more of them" if ticks < 8 else f"at most {most} fit" if most else "take fewer pixels"
         problems.add(file, key, f"a line of {shown} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
     elif ticks * timing.lines > MAXIMUM_TICKS:
-        what = "lines" if file.as_said("timing.lines")[0] == "timing.lines" else "line periods"
+        what = "lines" if file.written_key("timing.lines")[0] == "timing.lines" else "line periods"
         problems.add(
             file,
             "timing.lines",
@@ -100,7 +100,7 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
 def _check_pixels(
     setup: Setup, rate: Fraction, ticks: int, forward: Window, backward: Window, problems: Problems
 ) -> None:
-    """A pixel takes at least a tick, in every direction that images."""
+    """Check that a pixel takes at least a tick, in every direction that images."""
     timing, x = setup.scan.timing, setup.scan.x
     sides = [("forward", forward, exact(x.turn), "a larger x.turn")]
     if x.band_limit.directions == "both":
@@ -118,7 +118,7 @@ def _check_pixels(
 
 
 def _check_lines(setup: Setup, up: Window, down: Window, problems: Problems) -> None:
-    """At least one line of a frame lies inside the window, in every direction that images."""
+    """Check that at least one line of a frame lies inside the window, in every direction that images."""
     lines, both = setup.scan.timing.lines, setup.scan.y.band_limit.directions == "both"
     if up.count < 1:
         problems.add(
@@ -136,7 +136,7 @@ def _check_lines(setup: Setup, up: Window, down: Window, problems: Problems) -> 
 
 
 def _longer_line(timing: Timing, rate: Fraction, ticks: int, needed: int) -> str:
-    """How to ask for a line of at least ``needed`` ticks in place of ``ticks``."""
+    """Return how to ask for a line of at least ``needed`` ticks in place of ``ticks``."""
     if needed > MAXIMUM_LINE_TICKS:
         return "no line is long enough for so many"
     if timing.ticks_per_line is not None:
@@ -152,7 +152,7 @@ def _width(axis: FastAxis) -> Fraction:
 
 
 class AxisTiming(Struct, frozen=True):
-    """The clock of one axis: its rate in Hz as asked for and as it is, and how its waveform is advanced.
+    """The clock of one axis: its requested and its actual rate in Hz, and how its waveform is advanced.
 
     A period of the waveform has ``period`` advances of ``hold`` ticks each: 1, or a line for a slow axis in steps.
     """

@@ -51,14 +51,15 @@ class Voltages(Struct, frozen=True, eq=False):
 
     @property
     def v_amplitude(self) -> float:
-        """m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
+        """The amplitude m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
         return self.m * self.g * self.v * self.driver.span
 
 
-def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> Voltages | None:
-    """Apply (1)-(12) and (23) to one axis ("x" or "y") at its rate in Hz; None where there is no size law.
+def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> Voltages:
+    """Apply (1)-(12) and (23) to one axis ("x" or "y") at its rate in Hz.
 
-    What contradicts the calibration goes to ``problems``, at its key.
+    What contradicts the calibration goes to ``problems``, at its key. A linear size law stands for one that is refused,
+    so that the rest is examined too.
     """
     scan: FastAxis = getattr(setup.scan, axis)
     scanner: ScannerAxis = getattr(setup.scanner, axis)
@@ -81,7 +82,7 @@ def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -
         with problems.at(scanner_file, key):
             response = dynamics_of(scanner.resonance, setup.scanner_folder)
     if size_law is None:
-        return None
+        size_law = SizeLaw(scanner.size.k_nm_per_v * driver.span, 0.0, 1.0)
 
     p, offset_law = driver.p(v_offset), surface.at(v)
     m = offset_law.factor(p)
@@ -111,7 +112,7 @@ def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -
 
 
 def _offset_surface(setup: Setup, axis: str, size_law: SizeLaw | None, problems: Problems) -> OffsetSurface:
-    """m of (1) over offset and size; 1 everywhere where it is not calibrated."""
+    """Return m of (1) over offset and size; 1 everywhere where it is not calibrated."""
     offset: Offset | None = getattr(setup.scanner, axis).offset
     surface = OffsetSurface.everywhere(OffsetLaw())
     if offset is not None and size_law is not None:
@@ -123,7 +124,7 @@ def _offset_surface(setup: Setup, axis: str, size_law: SizeLaw | None, problems:
 
 
 def _check_points(setup: Setup, axis: str, offset: Offset, problems: Problems) -> None:
-    """No point can have been measured where the driver does not reach."""
+    """Check that every point was measured inside the driver's range."""
     driver = setup.scanner.driver
     for i, point in enumerate(offset.points or []):
         if driver.beyond(point.offset_v, point.offset_v) > 0.0:
@@ -138,7 +139,7 @@ def _check_points(setup: Setup, axis: str, offset: Offset, problems: Problems) -
 
 
 def _offset_voltage(setup: Setup, axis: str, surface: OffsetSurface, problems: Problems) -> float:
-    """V_offset: as written, or of a position in nm by the integral of the local slope, or the middle of the driver."""
+    """Return V_offset: as written, from a position in nm by the integral of the local slope, or the driver's middle."""
     scan: FastAxis = getattr(setup.scan, axis)
     driver = setup.scanner.driver
     v_offset = driver.middle

@@ -18,9 +18,9 @@ _ROUNDING = 1e-12  # of the line: places that are the same may differ so in thei
 def line_windows(
     turn: Fraction, low: Fraction, high: Fraction, both: bool, ticks: int, pixels: int
 ) -> tuple[Window, Window]:
-    """Trace and retrace of the part ``low``..``high`` of a line that turns at ``turn``; the second may be empty.
+    """Return trace and retrace of the part ``low``..``high`` of a line that turns at ``turn``; the second may be empty.
 
-    Each has the nearest whole number of ticks. The trace is put within a tick of where it was asked for, and the
+    Each has the nearest whole number of ticks. The trace is put within a tick of its ideal place, and the
     retrace where its pixels are at those of the trace, on average over the line, or as near to it as the trace and the
     end of the line allow; of all such, the nearest pair.
     """
@@ -29,37 +29,43 @@ def line_windows(
     if not both:
         counts[1] = 0
     centres = [_centre(count, pixels) for count in counts]
-    asked = turn * middle * ticks - centres[0]
+    ideal_first = turn * middle * ticks - centres[0]
     last = ticks - counts[0] - counts[1]
     if not both:
-        return Window(min(max(_nearest(asked), 0), last), counts[0]), Window(0, 0)
-    found = []
-    for first in range(max(floor(asked) - 1, 0), min(ceil(asked) + 1, last) + 1):
+        return Window(min(max(_nearest(ideal_first), 0), last), counts[0]), Window(0, 0)
+    pairs = []
+    for first in range(max(floor(ideal_first) - 1, 0), min(ceil(ideal_first) + 1, last) + 1):
         place = (first + centres[0]) / turn  # of the trace's pixels, in ticks of a line that were all forward
-        wanted = ticks - place * (1 - turn) - centres[1]
-        back = min(max(floor(wanted + _HALF), first + counts[0]), ticks - counts[1])
-        if abs(first - asked) <= 1:
-            found.append((abs(back - wanted), abs(first - asked), first, back))
-    _, _, first, back = min(found, default=(0, 0, min(max(_nearest(asked), 0), last), ticks - counts[1]))
+        ideal_back = ticks - place * (1 - turn) - centres[1]
+        back = min(max(floor(ideal_back + _HALF), first + counts[0]), ticks - counts[1])
+        if abs(first - ideal_first) <= 1:
+            pairs.append((abs(back - ideal_back), abs(first - ideal_first), first, back))
+    _, _, first, back = min(pairs, default=(0, 0, min(max(_nearest(ideal_first), 0), last), ticks - counts[1]))
     return Window(first, counts[0]), Window(back, counts[1])
 
 
 def pixel_places(schedule: Schedule, turn: float) -> tuple[Floats, Floats]:
-    """Where the pixels of trace and retrace are on the line, 0..1, ascending; the second is empty without a retrace."""
+    """Return where the pixels of trace and retrace are on the line.
+
+    Returns
+    -------
+    forward, backward
+        Places in 0..1, ascending, shape (pixels,); ``backward`` is empty without a retrace.
+    """
     forward = _middles(schedule.forward, schedule.pixels) / (turn * schedule.ticks)
     backward = (schedule.ticks - _middles(schedule.backward, schedule.pixels)) / ((1.0 - turn) * schedule.ticks)
     return forward, backward[::-1]
 
 
 def retrace_mismatch(schedule: Schedule, turn: float) -> float:
-    """The largest distance between a pixel's places in trace and retrace, as a share of the line, from ticks alone."""
+    """Return the largest distance between a pixel's places in trace and retrace, as a share of the line."""
     forward, backward = pixel_places(schedule, turn)
     worst = float(np.max(np.abs(forward - backward))) if len(backward) == len(forward) else 0.0
     return worst if worst > _ROUNDING else 0.0
 
 
 def matching_lines(turn: Fraction, low: Fraction, high: Fraction, ticks: int, pixels: int, most: int) -> list[int]:
-    """Ticks of the nearest lines, below and above, whose pixels are whole ticks and match; those up to ``most``."""
+    """Return the ticks of the nearest lines, up to ``most``, whose pixels match and are whole ticks."""
     shares = [share * (high - low) / pixels for share in (turn, 1 - turn)]
     edges = [] if turn == _HALF else [share * low for share in (turn, 1 - turn)]
     step = lcm(*(share.denominator for share in shares + edges))
@@ -68,12 +74,12 @@ def matching_lines(turn: Fraction, low: Fraction, high: Fraction, ticks: int, pi
 
 
 def _nearest(value: Fraction) -> int:
-    """The nearest whole number, ties down: two halves of a line then never overlap."""
+    """Return the nearest whole number, ties down: two halves of a line then never overlap."""
     return ceil(value - _HALF)
 
 
 def _centre(count: int, pixels: int) -> Fraction:
-    """Ticks from the beginning of a window to the mean of its pixels' middles.
+    """Return the ticks from the beginning of a window to the mean of its pixels' middles.
 
     Pixel p begins at the tick ceil(p count / pixels): the mean of these is late by what the rounding takes.
     """
@@ -81,7 +87,7 @@ def _centre(count: int, pixels: int) -> Fraction:
 
 
 def _middles(window: Window, pixels: int) -> Floats:
-    """The middle of each pixel's ticks; empty where the window holds no tick for each."""
+    """Return the middle of each pixel's ticks; empty where the window has fewer ticks than pixels."""
     if window.count < pixels:
         return np.zeros(0)
     edges = np.append(pixel_starts(window, pixels), window.stop)

@@ -44,15 +44,15 @@ class Bound:
     dynamics: bool
 
 
-def left_of_error(gain: float, ratio: Complex) -> Floats:
-    """What a round leaves of an error, for true gains over modelled ones."""
+def remaining_error(gain: float, ratio: Complex) -> Floats:
+    """Return the share of an error that a round leaves, for true gains over modelled ones, of their shape."""
     return np.abs(1.0 - gain * ratio)
 
 
 def bound(line: LinePlan, gain: float, used: int) -> Bound:
-    """The bound of one axis at a learning gain, for ``used`` harmonics, or as many of them as it allows."""
+    """Compute the bound of one axis at a learning gain, for ``used`` harmonics, or as many as it allows."""
     n = np.arange(1.0, line.target.harmonics + 1.0)
-    worst = np.max(left_of_error(gain, plausible_ratios(line, n * float(line.rate))), axis=0)
+    worst = np.max(remaining_error(gain, plausible_ratios(line, n * float(line.rate))), axis=0)
     beyond = np.flatnonzero(worst > MAX_ERROR_LEFT)
     most = int(beyond[0]) if len(beyond) else line.target.harmonics
     used = min(used, most)
@@ -70,9 +70,18 @@ def bound(line: LinePlan, gain: float, used: int) -> Bound:
 
 
 def plausible_ratios(line: LinePlan, f_hz: Floats) -> Complex:
-    """True gains over modelled ones, shape (scanners, frequencies), for scanners that the file may describe wrongly.
+    """Return true gains over modelled ones for scanners that the file may describe wrongly.
 
     Without dynamics in the file there is one, whose ratio is 1: of the others nothing is known.
+
+    Parameters
+    ----------
+    f_hz
+        Frequencies in Hz, shape (frequencies,).
+
+    Returns
+    -------
+    Ratios, shape (scanners, frequencies).
     """
     response = line.drive.response
     if response is None:
@@ -94,5 +103,5 @@ def plausible_ratios(line: LinePlan, f_hz: Floats) -> Complex:
 
 def _inverse(response: Response, f_hz: Floats) -> Complex:
     real, imaginary = response.inverse(f_hz)
-    found: Complex = real + 1j * imaginary
-    return found
+    gain: Complex = real + 1j * imaginary
+    return gain

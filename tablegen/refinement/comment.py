@@ -7,27 +7,27 @@ from tablegen.refinement.image_round import ImageRound, MismatchRound
 from tablegen.refinement.round import Round, TraceRound, worst_scaling
 
 
-def provenance(found: Round, sources: Sequence[Source], stopped: bool = False) -> str:
-    """The line of the comment that says what a round rests on, or why the layer before it was kept; no date."""
-    lesson = found.lesson
-    said = []
+def provenance(learnt_round: Round, sources: Sequence[Source], stopped: bool = False) -> str:
+    """Format the comment on what a round rests on, or why the layer before it was kept; no date."""
+    update = learnt_round.update
+    facts = []
     for source in sources:
         name = source.name if source.name.isprintable() else ascii(source.name)
-        said.append(f"{name}, sha256 {source.sha256}")
-    if isinstance(found, TraceRound):
-        said.append(f"{found.displacement.periods:.4g} periods")
-    if isinstance(found, ImageRound):
-        said.append(f"{found.periods:.4g} periods in the line")
-    if isinstance(found, MismatchRound):
-        said.append("trace against retrace")
+        facts.append(f"{name}, sha256 {source.sha256}")
+    if isinstance(learnt_round, TraceRound):
+        facts.append(f"{learnt_round.displacement.periods:.4g} periods")
+    if isinstance(learnt_round, ImageRound):
+        facts.append(f"{learnt_round.periods:.4g} periods in the line")
+    if isinstance(learnt_round, MismatchRound):
+        facts.append("trace against retrace")
     return ", ".join(
         [
-            *said,
-            f"residual {lesson.before.rms_percent:.3g} % rms",
+            *facts,
+            f"residual {update.before.rms_percent:.3g} % rms",
             *(
-                [f"scaling error {worst_scaling(lesson):.3g} %, larger than before: the layer before it was kept"]
+                [f"scaling error {worst_scaling(update):.3g} %, larger than before: the layer before it was kept"]
                 if stopped
-                else [f"harmonics to {lesson.harmonics}", f"gain {found.bound.gain:g}"]
+                else [f"harmonics to {update.harmonics}", f"gain {learnt_round.bound.gain:g}"]
             ),
         ]
     )

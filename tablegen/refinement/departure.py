@@ -38,7 +38,7 @@ class Imaged:
 
 
 def imaged(line: LinePlan, share: Floats) -> Imaged:
-    """The points at shares 0..1 of the window."""
+    """Return the points at shares 0..1 of the window."""
     (low, high), turn, shape = line.band_limit.window, line.drive.turn, line.drive.shape
     x = low + (high - low) * share
     sides: tuple[str, ...] = ("forward",)
@@ -63,8 +63,11 @@ def asked_position(line: LinePlan, times: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Departure:
-    """What is left: ``error`` is reached less asked at the points, in lines; ``size_nm`` of the best line, negative
-    where the sensor counts the other way."""
+    """Departure of the reached line from the requested one.
+
+    ``error`` is reached less requested at the points, in lines; ``size_nm`` of the best line, negative where the sensor
+    counts the other way.
+    """
 
     points: Imaged
     error: Floats
@@ -84,33 +87,36 @@ class Departure:
     @property
     def scaling_percent(self) -> dict[str, float]:
         """Scaling error of each direction, peak to peak, by chords of 1/20 of the line as the paper's lattices are."""
-        found = {}
+        scaling = {}
         reached = self.points.by_side(self.points.asked + self.error)
         for side, x in self.points.by_side(self.points.position).items():
             k = min(max(round(CHORD / float(x[1] - x[0])), 1), len(x) - 2)
             slope = (reached[side][k:] - reached[side][:-k]) / (x[k:] - x[:-k])
             middle = 0.5 * (x[k:] + x[:-k])
-            found[side] = 100.0 * float(np.ptp(slope)) / float(np.interp(0.5, middle, slope))
-        return found
+            scaling[side] = 100.0 * float(np.ptp(slope)) / float(np.interp(0.5, middle, slope))
+        return scaling
 
     def moved(self, by: Floats) -> "Departure":
-        """The same with the drive raised by so much at each point, by the model's slope."""
+        """Return the departure with the drive raised at each point, by the model's slope; ``by`` is (points,)."""
         return _straightened(self.points, self.points.asked + self.error + by / self.points.steepness, self.size_nm)
 
 
 def departure(line: LinePlan, measured: LineMeasurement, share: Floats | None = None) -> Departure:
     """Compare a measured period with what the plan asks for, at shares of the window or evenly over it.
 
-    Raises ``Unphysical`` where the two have nothing to do with each other.
+    Raises
+    ------
+    Unphysical
+        If the two have nothing to do with each other.
     """
     points = imaged(line, np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share)
-    found = _straightened(points, measured.value(points.times), 1.0)
-    if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _MAX_DEPARTURE:
+    best = _straightened(points, measured.value(points.times), 1.0)
+    if not abs(best.size_nm) > 0.0 or best.rms_percent > 100.0 * _MAX_DEPARTURE:
         raise Unphysical(
-            f"the displacement is {found.rms_percent:.3g} % of the line away from this scan; is it another axis, "
+            f"the displacement is {best.rms_percent:.3g} % of the line away from this scan; is it another axis, "
             f"or is time 0 no line start?"
         )
-    return found
+    return best
 
 
 def _straightened(points: Imaged, reached: Floats, unit_nm: float) -> Departure:
@@ -121,6 +127,6 @@ def _straightened(points: Imaged, reached: Floats, unit_nm: float) -> Departure:
 
 
 def straight_line(asked: Floats) -> Floats:
-    """The matrix, shape (2, points), that takes values to the origin and the size of their best line over ``asked``."""
-    found: Floats = np.linalg.pinv(np.column_stack([np.ones_like(asked), asked]))
-    return found
+    """Return the matrix from values to the origin and the size of their best line over ``asked``: (2, points)."""
+    matrix: Floats = np.linalg.pinv(np.column_stack([np.ones_like(asked), asked]))
+    return matrix

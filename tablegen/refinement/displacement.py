@@ -45,15 +45,15 @@ class Displacement:
         return self.series.value(times)
 
     def basis(self, times: Floats) -> Floats:
-        """(times, coefficients): from (a0, a, b) to the displacement."""
+        """Return the matrix from (a0, a, b) to the displacement: (times, coefficients)."""
         return harmonic_basis(times, self.series.harmonics)
 
     def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """The coefficients of the displacement less what was asked for, in nm; ``asked`` takes times to the line."""
+        """Return the coefficients of the displacement less the line ``asked`` at times, in nm."""
         times = (np.arange(_GRID) + 0.5) / _GRID
         series = np.concatenate([[0.0], self.series.a, self.series.b])
-        found: Floats = series - size_nm * (2.0 / _GRID) * (self.basis(times).T @ asked(times))
-        return found
+        coefficients: Floats = series - size_nm * (2.0 / _GRID) * (self.basis(times).T @ asked(times))
+        return coefficients
 
     @property
     def groups(self) -> list[list[int]]:
@@ -63,7 +63,7 @@ class Displacement:
 
 
 def harmonic_basis(times: Floats, harmonics: int) -> Floats:
-    """(times, 2 harmonics + 1): 1, cosines, sines."""
+    """Return 1, cosines and sines at times in periods: (times, 2 harmonics + 1)."""
     angle = 2.0 * pi * np.outer(times, np.arange(1, harmonics + 1))
     basis: Floats = np.column_stack([np.ones(len(times)), np.cos(angle), np.sin(angle)])
     return basis
@@ -127,21 +127,22 @@ def fit_displacement(
         )
     inverse = np.linalg.inv(normal)
     c = inverse @ right
-    left, drift = np.empty(len(t)), []
+    residual, drift = np.empty(len(t)), []
     for rows in parts:
         b = basis(rows)
-        left[rows] = (measured[rows] - middle) / height - c @ b
+        residual[rows] = (measured[rows] - middle) / height - c @ b
         there = c[1 + 2 * count :] @ b[1 + 2 * count :]
         drift += [float(np.min(there)), float(np.max(there))]
-    correlated = correlation_length(left)
+    correlated = correlation_length(residual)
     freedom = max(len(t) / correlated - len(c), 1.0)
     covariance: Floats = np.array(
-        inverse[: 1 + 2 * count, : 1 + 2 * count] * float(float(left @ left) / freedom * height**2), dtype=np.float64
+        inverse[: 1 + 2 * count, : 1 + 2 * count] * float(float(residual @ residual) / freedom * height**2),
+        dtype=np.float64,
     )
     scaled: Floats = height * c[: 1 + 2 * count]
     series = FourierSeries(middle + float(scaled[0]), scaled[1 : count + 1].copy(), scaled[count + 1 :].copy())
-    noise = height * float(np.sqrt(left @ left / max(len(t) - len(c), 1)))
-    distance = np.abs(left)
+    noise = height * float(np.sqrt(residual @ residual / max(len(t) - len(c), 1)))
+    distance = np.abs(residual)
     farthest = int(np.argmax(distance))  # it pulls the fit, and the others seem off too
     most = float(distance[farthest])
     stands_out = most > max(_OUTLIER_SIGMAS * 1.4826 * float(np.median(distance, overwrite_input=True)), 1e-6)

@@ -57,8 +57,9 @@ class FreeRowsState:
 
 @dataclass(frozen=True, eq=False)
 class FreeRowsFit:
-    """The least squares: ``covariance`` of (modes, q), from what rows say by themselves, so that noise may have any
-    spectrum along a line.
+    """Least-squares fit of free rows.
+
+    ``covariance`` is of (modes, q), from each row by itself, so that noise may have any spectrum along a line.
 
     ``lags`` are how much of ``r_b`` the images show, each with its standard error: from trace to retrace, and along the
     line. Both are 1 where rows and columns are in the order of time. ``left`` of the images, of unit variance;
@@ -98,7 +99,13 @@ class FreeRows:
         self._centre = float(np.mean(modes.asked))
 
     def fit(self, start: FreeRowsState) -> FreeRowsFit:
-        """From a start within a fraction of a period. Raises ``Unphysical`` where it does not settle."""
+        """Fit from a start within a fraction of a period.
+
+        Raises
+        ------
+        Unphysical
+            If the fit does not converge.
+        """
         state = start
         weights = np.ones(self.geometry.rows)
         cost = self._cost(state, weights)
@@ -150,8 +157,8 @@ class FreeRows:
         """(spots, rows, 2 columns)."""
         x = self.positions(state) - self._centre
         phase = state.rows[rows, None, :] + x[:, None] * state.q + pace[rows, None, :] * self.modes.time[:, None]
-        found: Complexes = np.exp(2j * pi * np.moveaxis(phase @ self.spots.T, -1, 0))
-        return found
+        waves: Complexes = np.exp(2j * pi * np.moveaxis(phase @ self.spots.T, -1, 0))
+        return waves
 
     def _drawn(self, state: FreeRowsState, rows: slice, pace: Floats) -> Floats:
         waves = self._waves(state, rows, pace)
@@ -166,8 +173,8 @@ class FreeRows:
                 halves.append(half - (half @ parabola) @ parabola.T)
             else:
                 halves.append(half - parabola @ (parabola.T @ half))
-        found: Floats = np.concatenate(halves, axis=1)
-        return found
+        levelled_values: Floats = np.concatenate(halves, axis=1)
+        return levelled_values
 
     def _chunks(self, state: FreeRowsState, lag: bool = False) -> Iterator[_Chunk]:
         """With ``lag`` the last two derivatives are those by factors of what goes on in a line."""
@@ -189,14 +196,14 @@ class FreeRows:
             parts += [np.moveaxis(np.real(waves), 0, -1), np.moveaxis(-np.imag(waves), 0, -1)]
             if lag:
                 parts.append(np.sum(slopes * pace[rows, None, :], axis=-1, keepdims=True) * self._times())
-            left = self.heights[rows] - self._levelled(np.real(np.tensordot(state.amplitudes, waves, 1)))
+            residual = self.heights[rows] - self._levelled(np.real(np.tensordot(state.amplitudes, waves, 1)))
             derivatives = self._levelled(np.concatenate(parts, axis=-1))
-            yield _Chunk(rows, derivatives, self._levelled(slopes), left)
+            yield _Chunk(rows, derivatives, self._levelled(slopes), residual)
 
     def _solved(self, state: FreeRowsState, weights: Floats) -> tuple[Floats, Callable[[Floats], Floats]]:
-        """The step of the parameters, and what it does to the rows' phases."""
+        """Return the step of the parameters, and the function from a step to the rows' phases."""
         count = self._count(state)
-        normal, right, kept = np.zeros((count, count)), np.zeros(count), []
+        normal, right, blocks = np.zeros((count, count)), np.zeros(count), []
         for chunk in self._chunks(state):
             weight = weights[chunk.rows]
             basis, triangle = np.linalg.qr(chunk.across)
@@ -206,11 +213,11 @@ class FreeRows:
             flat = (np.sqrt(weight)[:, None, None] * free).reshape(-1, free.shape[-1])
             normal += flat.T @ flat
             right += np.einsum("i,ijp,ij->p", weight, free, chunk.left, optimize=True)
-            kept.append((_inverted(triangle), on_rows, seen))
+            blocks.append((_inverted(triangle), on_rows, seen))
         step = _pseudo_inverse(normal) @ right
 
-        def of_rows(taken: Floats) -> Floats:
-            return np.concatenate([(back @ (seen - on @ taken)[:, :, None])[:, :, 0] for back, on, seen in kept])
+        def of_rows(applied: Floats) -> Floats:
+            return np.concatenate([(back @ (seen - on @ applied)[:, :, None])[:, :, 0] for back, on, seen in blocks])
 
         return step, of_rows
 
@@ -218,12 +225,12 @@ class FreeRows:
         self, state: FreeRowsState, step: Floats, rows: Callable[[Floats], Floats], size: float
     ) -> FreeRowsState:
         modes, waves, spots = len(state.modes), len(state.q), len(state.amplitudes)
-        taken = size * step
-        a = taken[modes + waves :]
+        applied = size * step
+        a = applied[modes + waves :]
         return replace(
             state,
-            modes=state.modes + taken[:modes],
-            q=state.q + taken[modes : modes + waves],
+            modes=state.modes + applied[:modes],
+            q=state.q + applied[modes : modes + waves],
             amplitudes=state.amplitudes + a[:spots] + 1j * a[spots:],
             rows=state.rows + size * rows(step),
         )
@@ -239,10 +246,10 @@ class FreeRows:
         """1, and less where a row leaves far more than the others."""
         power = np.sqrt(np.mean(self._left(state) ** 2, axis=1))
         usual = _LOUD_ROWS * float(np.median(power))
-        found: Floats = (
+        weights: Floats = (
             np.minimum(1.0, (usual / np.maximum(power, 1e-300)) ** 2) if usual > 0.0 else np.ones(len(power))
         )
-        return found
+        return weights
 
     def _result(self, state: FreeRowsState, weights: Floats) -> FreeRowsFit:
         count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 2,) * 2)
@@ -262,10 +269,10 @@ class FreeRows:
         late = by_row @ _pseudo_inverse(whole)[:, -2:]
         errors = np.sqrt(np.diag(_spread(late, len(whole)))).tolist()
         first, second = zip((1.0 + np.sum(late, axis=0)).tolist(), errors, strict=True)
-        left = self._left(state)
+        residual = self._left(state)
         images = np.split(self.heights, 2, axis=1)
-        both = np.split(left, 2, axis=1)
-        noise = float(np.mean(left**2))
+        both = np.split(residual, 2, axis=1)
+        noise = float(np.mean(residual**2))
         explained = [
             1.0 - float(np.mean(one**2)) / float(np.mean(image**2)) for image, one in zip(images, both, strict=True)
         ]
@@ -281,7 +288,7 @@ class FreeRows:
 
 
 def _spread(influence: Floats, parameters: int) -> Floats:
-    """The covariance of what rows, each by itself, say."""
+    """Return the covariance of the parameters from each row by itself."""
     rows = len(influence)
     centred = influence - np.mean(influence, axis=0)
     return np.asarray(centred.T @ centred * (rows / max(rows - 0.5 * parameters, 1.0)), dtype=np.float64)

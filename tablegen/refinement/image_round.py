@@ -16,9 +16,9 @@ from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
-from tablegen.refinement.learning import Lesson, learn
+from tablegen.refinement.learning import LayerUpdate, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
-from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_lesson
+from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_layer_update
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
 
@@ -32,8 +32,10 @@ _MIN_PIXELS_PER_PERIOD = 4.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ImageRound(Round):
-    """What trace and retrace say; ``size`` is x's, where the constant of the sample is known, and
-    ``asked_nm`` what x was to have."""
+    """Round learnt from trace and retrace.
+
+    ``size`` is x's, where the constant of the sample is known, and ``asked_nm`` the requested size of x.
+    """
 
     frames: tuple[LatticeLine, ...]
     measured: WindowLine
@@ -73,17 +75,17 @@ def refine_images(
     frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     size = None if sample is None else _size(plan, frames, sample)
-    lesson = learn(line, measured, options.gain, limits.used)
-    refinement, changed = with_lesson(setup, line, lesson)
+    update = learn(line, measured, options.gain, limits.used)
+    refinement, changed = with_layer_update(setup, line, update)
     return ImageRound(
         line=line,
         bound=limits,
-        lesson=lesson,
+        update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, lesson),
-        **stop(setup, line, lesson),
-        remarks=(*_size_remarks(plan, size), *_remarks(line, frames, lesson)),
+        worse=why_worse(setup, axis, update),
+        **stop(setup, line, update),
+        remarks=(*_size_remarks(plan, size), *_remarks(line, frames, update)),
         frames=frames,
         measured=measured,
         size=size,
@@ -93,13 +95,13 @@ def refine_images(
 
 def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> LatticeLine:
     _check_shape(plan, trace)
-    found = lattice_line(plan, trace, retrace, images)
-    _check(found)
-    return found
+    line = lattice_line(plan, trace, retrace, images)
+    _check(line)
+    return line
 
 
 def _check_shape(plan: Plan, trace: Floats) -> None:
-    """A column is a pixel of the imaging window."""
+    """Check that a column is a pixel of the imaging window."""
     if plan.x.band_limit.directions != "both":
         raise Unphysical("this scan images forward only; a retrace image says nothing of it: image both directions")
     columns, pixels = trace.shape[-1], plan.schedule.pixels
@@ -139,56 +141,57 @@ def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> Lin
     x, y = plan.x, plan.y
     low, high = y.band_limit.window
     aspect = y.drive.size_nm * (high - low) / x.drive.size_nm
-    found = [size_of_line(frame, sample.cell, sample.grating, aspect) for frame in frames]
-    value = float(np.mean([one.nm.value for one in found]))
-    error = float(np.sqrt(np.mean([one.nm.standard_error**2 for one in found]) / len(found)))
+    sizes = [size_of_line(frame, sample.cell, sample.grating, aspect) for frame in frames]
+    value = float(np.mean([one.nm.value for one in sizes]))
+    error = float(np.sqrt(np.mean([one.nm.standard_error**2 for one in sizes]) / len(sizes)))
     check_size(value, x.drive.size_nm, "the scan file")
-    return replace(found[0], nm=Estimate(value, float(np.hypot(error, found[0].shared * value))))
+    return replace(sizes[0], nm=Estimate(value, float(np.hypot(error, sizes[0].shared * value))))
 
 
 def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
     if size is None:
         return []
-    asked, found, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
-    if abs(found / asked - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / asked):
+    requested, nm, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
+    if abs(nm / requested - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / requested):
         return []
     return [
         spoils(
-            f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
-            f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
-            f"corrects it at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here",
-            100.0 * abs(found / asked - 1.0),
+            f"the line of x is {nm:.5g} nm where the scan file asks for {requested:.5g} nm "
+            f"({100.0 * (nm / requested - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
+            f"corrects it at every size, or ask for {requested * requested / nm:.5g} nm to have {requested:.5g} nm "
+            f"here",
+            100.0 * abs(nm / requested - 1.0),
         )
     ]
 
 
-def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[Remark, ...]:
-    found = [text for frame in frames[:1] for text in _remarks_of(frame)]
+def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate) -> tuple[Remark, ...]:
+    texts = [text for frame in frames[:1] for text in _remarks_of(frame)]
     if line.axis == "y" and len(frames) == 1:
-        found.append(
+        texts.append(
             spoils(
                 "a drift that becomes faster or slower counts as an error of y; give two frames that follow each "
                 "other, which tell it"
             )
         )
-    return tuple(found + _learning_remarks(lesson))
+    return tuple(texts + _learning_remarks(update))
 
 
 def _remarks_of(seen: LatticeLine) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     fit, geometry = seen.fit, seen.geometry
     explained = min(fit.explained)
     if explained < _LITTLE_EXPLAINED:
-        found.append(
+        remarks.append(
             Remark(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
         )
     span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
-        found.append(
+        remarks.append(
             Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
         )
     if seen.start.apart > _FAR_APART:
-        found.append(
+        remarks.append(
             spoils(
                 f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be "
                 f"taken for the next one; calibrate first, or take a sample of a longer period"
@@ -196,8 +199,8 @@ def _remarks_of(seen: LatticeLine) -> list[Remark]:
         )
     if fit.loud:
         shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
-        found.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
-    return found
+        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
+    return remarks
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -232,36 +235,36 @@ def refine_mismatch(
         _check_shape(plan, trace)
     frames = tuple(mismatch(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames])
-    lesson = learn(plan.x, measured, options.gain, limits.used)
-    refinement, changed = with_lesson(setup, plan.x, lesson, "mismatch")
+    update = learn(plan.x, measured, options.gain, limits.used)
+    refinement, changed = with_layer_update(setup, plan.x, update, "mismatch")
     remarks = [
         spoils(
             "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
             "share stays, and is in none of these figures"
         ),
-        *_learning_remarks(lesson),
+        *_learning_remarks(update),
     ]
     return MismatchRound(
         line=plan.x,
         bound=limits,
-        lesson=lesson,
+        update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, lesson, "mismatch"),
-        **stop(setup, plan.x, lesson, "mismatch"),
+        worse=why_worse(setup, axis, update, "mismatch"),
+        **stop(setup, plan.x, update, "mismatch"),
         remarks=tuple(remarks),
         frames=frames,
         measured=measured,
     )
 
 
-def _learning_remarks(lesson: Lesson) -> list[Remark]:
-    found: list[Remark] = []
-    if lesson.harmonics == 0:
-        found.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
-    elif finished(lesson):
-        found.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
-    return [*found, Remark("images do not show that the build of this scan file was running")]
+def _learning_remarks(update: LayerUpdate) -> list[Remark]:
+    remarks: list[Remark] = []
+    if update.harmonics == 0:
+        remarks.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
+    elif finished(update):
+        remarks.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
+    return [*remarks, Remark("images do not show that the build of this scan file was running")]
 
 
 def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:

@@ -66,15 +66,21 @@ class LatticeLine:
         """Of q_1, s_1, q_2, s_2; that of rows by their scatter about a line, and drift is in that."""
         count = len(self.fit.state.q)
         phases, y = self.fit.phases.phase, self.geometry.y
-        left = phases - np.column_stack([y, np.ones_like(y)]) @ np.polyfit(y, phases, 1)
-        found = np.zeros((2 * count, 2 * count))
-        found[::2, ::2] = self.fit.covariance[-count:, -count:]
-        found[1::2, 1::2] = np.diag(np.mean(left**2, axis=0) / float(y @ y))
-        return found
+        residuals = phases - np.column_stack([y, np.ones_like(y)]) @ np.polyfit(y, phases, 1)
+        matrix = np.zeros((2 * count, 2 * count))
+        matrix[::2, ::2] = self.fit.covariance[-count:, -count:]
+        matrix[1::2, 1::2] = np.diag(np.mean(residuals**2, axis=0) / float(y @ y))
+        return matrix
 
 
 def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
-    """x from heights, rows x columns, rows in the order of time, left on the left. Raises ``Unphysical``."""
+    """Fit x from heights, rows x columns, rows in the order of time, left on the left.
+
+    Raises
+    ------
+    Unphysical
+        If the images show no lattice or grating, or not the same one.
+    """
     line = plan.x
     turn, window = line.drive.turn, line.band_limit.window
     if options.retrace_mirrored:
@@ -100,11 +106,11 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     model = FreeRows(geometry, heights, start.spots, finer, moves)
     fit = model.fit(replace(start.state, modes=error))
     count = len(finer.values)
-    asked = partial(asked_position, line)
-    found = WindowLine(
-        asked, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
+    requested = partial(asked_position, line)
+    window_line = WindowLine(
+        requested, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
     )
-    return LatticeLine(geometry, model, fit, found, start)
+    return LatticeLine(geometry, model, fit, window_line, start)
 
 
 def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:

@@ -34,9 +34,14 @@ class LatticeStart:
 def lattice_start(
     geometry: Geometry, heights: list[Floats], modes: ColumnModes, moves: bool, advice: str
 ) -> LatticeStart:
-    """The waves of levelled images of unit variance. Raises ``Unphysical`` where there is no period, or not the same.
+    """Estimate the waves of levelled images of unit variance, each (rows, columns).
 
     Trace and retrace are taken to be less than half a period apart, since a compensated scan is nearly straight.
+
+    Raises
+    ------
+    Unphysical
+        If there is no period, or not the same in both images.
     """
     spot = strongest(geometry, heights[0])
     forward, backward, turned = (
@@ -70,15 +75,15 @@ def _tracked(
     geometry: Geometry, heights: list[Floats], modes: ColumnModes, straight: Bend, polynomial: Floats, moves: bool
 ) -> tuple[float, Floats, float]:
     """q, the smoothest modes, and how far trace and retrace are apart, from the phase along each image."""
-    found = [
+    tracks = [
         column_phase(geometry, image, side, straight, polynomial)
         for image, side in zip(heights, (True, False), strict=True)
     ]
-    phase, whole = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    phase, whole = (np.concatenate(parts) for parts in zip(*tracks, strict=True))
     if moves:
         phase = phase - polynomial[0] / geometry.rows * modes.time
     first, second = np.split(phase, 2)
-    inside = found[0][1] & found[1][1]
+    inside = tracks[0][1] & tracks[1][1]
     turns = round(float(np.median((first - second)[inside])))
     second = second + turns
     phase = np.concatenate([first, second])

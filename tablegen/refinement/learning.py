@@ -24,7 +24,7 @@ _AKAIKE_COST = 4.0  # cost of the two numbers of a harmonic, after Akaike: the n
 
 
 @dataclass(frozen=True, eq=False)
-class Lesson:
+class LayerUpdate:
     """What a round learns: ``layer`` is the new one, ``change`` by how much it differs from the one that was played.
 
     ``before`` was measured, ``after`` is what the model predicts. ``harmonics`` is 0 where nothing stands out of the
@@ -41,12 +41,17 @@ class Lesson:
     chord_noise_percent: float
 
 
-def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int) -> Lesson:
+def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int) -> LayerUpdate:
     """Learn harmonics 1..``harmonics`` at most from a period of the running scan, at a gain in (0, 2).
 
     The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
     is fitted by harmonics, the gentlest of those that fit, after what noise explains of each harmonic of the error was
-    taken off. Raises ``Unphysical`` where the displacement is not that of the scan.
+    taken off.
+
+    Raises
+    ------
+    Unphysical
+        If the displacement is not that of the scan.
     """
     before = departure(line, measured)
     nodes = 4 * max(harmonics, measured.detail) + 32
@@ -61,12 +66,12 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
     fits = _fits(points.times, harmonics)
     spread = [fit @ (gain * points.steepness[:, None] * errors) for fit in fits]
     stands_out = _stands_out([fit @ noisy for fit in fits], [s @ measured.covariance @ s.T for s in spread])
-    kept = harmonics if stands_out else 0
+    learnt = harmonics if stands_out else 0
     noise_part = _noise_share(line, measured, seen.size_nm)
     lacking = noisy + gain * points.steepness * (errors @ noise_part)
     # The mean is not learnt: no sensor sees an origin.
-    c = fits[-1] @ lacking if kept else np.zeros(1)
-    change = FourierSeries(0.0, c[1 : kept + 1].copy(), c[kept + 1 :].copy())
+    c = fits[-1] @ lacking if learnt else np.zeros(1)
+    change = FourierSeries(0.0, c[1 : learnt + 1].copy(), c[learnt + 1 :].copy())
     old = line.layer if line.layer is not None else FourierSeries(0.0, np.zeros(0), np.zeros(0))
     whole = old.plus(change)
     layer = FourierSeries(0.0, np.round(whole.a, DIGITS), np.round(whole.b, DIGITS))
@@ -74,7 +79,7 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
     noise = np.sqrt(np.mean(np.sum((errors @ measured.covariance) * errors, axis=1)))
     chords = _chords(line, before, measured) / seen.size_nm
     chord_noise = np.sqrt(np.mean(np.sum((chords @ measured.covariance) * chords, axis=1)))
-    return Lesson(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
+    return LayerUpdate(layer, change, learnt, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
 
 
 def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Floats:
@@ -82,8 +87,8 @@ def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Float
     x = seen.points.by_side(seen.points.position)["forward"]
     middle = np.linspace(float(x[0]) + 0.5 * CHORD, float(x[-1]) - 0.5 * CHORD, 41)
     ends = [measured.basis(line.drive.turn * (middle + by)) for by in (-0.5 * CHORD, 0.5 * CHORD)]
-    found: Floats = (ends[1] - ends[0]) / CHORD
-    return found
+    slopes: Floats = (ends[1] - ends[0]) / CHORD
+    return slopes
 
 
 def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
@@ -101,7 +106,7 @@ def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
 
 
 def _noise_share(line: LinePlan, measured: LineMeasurement, size_nm: float) -> Floats:
-    """What of the coefficients of the displacement less what was asked, in nm, its noise explains.
+    """Return the part of the coefficients of the position error, in nm, that its noise explains.
 
     The error of a harmonic is taken for Gaussian, with a variance of its own. The likeliest variance is what chi
     squared of cosine and sine exceeds 2 by, which noise alone has on average; the mean of the error is then
@@ -113,8 +118,8 @@ def _noise_share(line: LinePlan, measured: LineMeasurement, size_nm: float) -> F
     for group in measured.groups:
         explained = float(error[group] @ np.linalg.solve(measured.covariance[np.ix_(group, group)], error[group]))
         share[group] = min(len(group) / explained, 1.0) if explained > 0.0 else 1.0
-    found: Floats = share * error
-    return found
+    noise: Floats = share * error
+    return noise
 
 
 def _fits(times: Floats, harmonics: int) -> list[Floats]:
@@ -122,9 +127,9 @@ def _fits(times: Floats, harmonics: int) -> list[Floats]:
     none, ones = np.zeros(len(times)), np.ones(len(times))
     normal, _ = normal_equations(times, none, none, ones, none, harmonics, _SMOOTHNESS)
     basis = harmonic_basis(times, harmonics)
-    found = []
+    fits = []
     for count in range(1, harmonics + 1):
         first = np.r_[0 : count + 1, harmonics + 1 : harmonics + 1 + count]
         fit = np.linalg.solve(normal[np.ix_(first, first)], basis[:, first].T / len(times))
-        found.append(np.asarray(fit, dtype=np.float64))
-    return found
+        fits.append(np.asarray(fit, dtype=np.float64))
+    return fits

@@ -25,7 +25,7 @@ class LineMeasurement(Protocol):
         """Where the piezo was, in nm, at times in periods, in the imaged windows."""
 
     def basis(self, times: Floats) -> Floats:
-        """(times, coefficients): from the coefficients to that."""
+        """Return the matrix from the coefficients to the displacement: (times, coefficients)."""
 
     def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """The coefficients of what was reached less what was asked for, in nm; ``asked`` takes times to the line."""
+        """Return the coefficients of the reached line less the line ``asked`` at times, in nm."""

@@ -46,11 +46,16 @@ def phase_by_trigger(line: LinePlan, time_s: Floats, period_s: float | None, del
 
 
 def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: float) -> Phase:
-    """Period and start of the drive at the piezo (V), by fitting the waveform that the plan's codes make there.
+    """Fit period and start of the drive at the piezo (V) by the waveform that the plan's codes make there.
 
     What the converter holds is that waveform, with ripple at the update rate: a code stands for the middle of its tick,
     and periods are counted from the beginning of tick 0, as by a trigger. ``delay_s`` is that of the sensor against the
-    drive. Raises ``Unphysical`` where the drive is not that of the plan.
+    drive.
+
+    Raises
+    ------
+    Unphysical
+        If the drive is not that of the plan.
     """
     nominal = 1.0 / float(line.rate)
     _check_times(time_s, nominal)
@@ -126,7 +131,7 @@ def _step(
 
 
 def _parts(samples: int) -> list[slice]:
-    """A long trace in parts that fit into memory with their derivatives."""
+    """Split a long trace into parts that fit into memory with their derivatives."""
     return [slice(first, first + _MOST_AT_ONCE) for first in range(0, samples, _MOST_AT_ONCE)]
 
 
@@ -203,7 +208,7 @@ def _averaged(turns: Floats, left: Floats) -> float:
 
 
 def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
-    """The drive has to have the layer of the file in it: a trace of an older build would be learnt twice."""
+    """Check that the drive has the layer of the file: a trace of an older build would be learnt twice."""
     if line.layer is None:
         return
     low, high = line.band_limit.window

@@ -41,7 +41,13 @@ class SweepMismatch:
 
 
 def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> SweepMismatch:
-    """What trace and retrace of x differ by, half in each. Raises ``Unphysical`` where they are not of one scan."""
+    """Measure the mismatch of trace and retrace of x, half in each.
+
+    Raises
+    ------
+    Unphysical
+        If the two images are not of one scan.
+    """
     line = plan.x
     window = line.band_limit.window
     if options.retrace_mirrored:
@@ -68,11 +74,11 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
         smooth = [spline_filter(gaussian_filter(image, blur), order=3) for image in images]
         for _ in range(_STEPS):
             half = polynomials @ coefficients[:count]
-            found = [
+            shifted_images = [
                 _laid(image, np.interp(grid - sign * half, at_columns, np.arange(geometry.columns)))
                 for image, at_columns, sign in zip(smooth, asked, (1.0, -1.0), strict=True)
             ]
-            apart, slope = found[0] - found[1], 0.5 * (found[0] + found[1])
+            apart, slope = shifted_images[0] - shifted_images[1], 0.5 * (shifted_images[0] + shifted_images[1])
             steep = 2.0 * np.gradient(slope, grid, axis=1)[_EDGE:-_EDGE, _EDGE:-_EDGE]
             inner = apart[_EDGE:-_EDGE, _EDGE:-_EDGE]
             basis = polynomials[_EDGE:-_EDGE]
@@ -84,7 +90,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
             if float(np.max(np.abs(polynomials @ step))) * geometry.columns < _SETTLED:
                 break
         influence = scores @ inverse
-        one, other = (image[_EDGE:-_EDGE, _EDGE:-_EDGE].ravel() for image in found)
+        one, other = (image[_EDGE:-_EDGE, _EDGE:-_EDGE].ravel() for image in shifted_images)
         match = float(np.corrcoef(one, other)[0, 1])
     _check(geometry, polynomials @ coefficients, match, grid)
     scale = np.maximum(np.sqrt(np.mean(influence**2, axis=0)), 1e-300)
@@ -103,12 +109,12 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
 
 
 def _laid(spline: Floats, columns: Floats) -> Floats:
-    """An image's rows at fractions of columns; it comes as coefficients of splines."""
+    """Evaluate an image's rows at fractions of columns; it comes as coefficients of splines."""
     rows = np.broadcast_to(np.arange(spline.shape[0])[:, None], (spline.shape[0], len(columns)))
-    found: Floats = map_coordinates(
+    shifted: Floats = map_coordinates(
         spline, [rows, np.broadcast_to(columns, rows.shape)], order=3, mode="nearest", prefilter=False
     )
-    return found
+    return shifted
 
 
 def _check(geometry: Geometry, half: Floats, match: float, grid: Floats) -> None:

@@ -18,7 +18,7 @@ from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.refinement_layer import model_digest
 from tablegen.refinement.bound import Bound, bound
 from tablegen.refinement.displacement import Displacement, fit_displacement
-from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, Lesson, learn
+from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, LayerUpdate, learn
 from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
 
 _FINISHED_RATIO = 0.9  # share of the residual that a round would leave; above it the rest is noise
@@ -49,7 +49,7 @@ class Round:
 
     line: LinePlan
     bound: Bound
-    lesson: Lesson
+    update: LayerUpdate
     refinement: Refinement | None
     setup: Setup
     worse: str
@@ -73,8 +73,8 @@ class TraceRound(Round):
     @property
     def recorded(self) -> str:
         """Periods and samples."""
-        found = self.displacement
-        return f"{found.periods:.4g} periods of {self.phase.period_s:.6g} s, {found.samples} samples"
+        displacement = self.displacement
+        return f"{displacement.periods:.4g} periods of {self.phase.period_s:.6g} s, {displacement.samples} samples"
 
 
 def refine(
@@ -100,17 +100,17 @@ def refine(
     measured = fit_displacement(
         phase.turns, displacement_nm, line.target.harmonics, options.settle_periods, options.drift_order
     )
-    lesson = learn(line, measured, options.gain, min(limits.used, measured.series.harmonics))
-    refinement, changed = with_lesson(setup, line, lesson)
+    update = learn(line, measured, options.gain, min(limits.used, measured.series.harmonics))
+    refinement, changed = with_layer_update(setup, line, update)
     return TraceRound(
         line=line,
         bound=limits,
-        lesson=lesson,
+        update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, lesson),
-        **stop(setup, line, lesson),
-        remarks=_remarks(line, measured, lesson, phase, time_s),
+        worse=why_worse(setup, axis, update),
+        **stop(setup, line, update),
+        remarks=_remarks(line, measured, update, phase, time_s),
         phase=phase,
         displacement=measured,
     )
@@ -119,23 +119,29 @@ def refine(
 BeforeOf = Literal["line", "mismatch"]
 
 
-def with_lesson(
-    setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | None = None
+def with_layer_update(
+    setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf | None = None
 ) -> tuple[Refinement | None, Setup]:
-    """The new layer, if there is one, and the scan with it. Raises ``Rejected`` where that cannot be built."""
-    if not lesson.layer.harmonics:
+    """Build the new layer, if there is one, and the scan with it.
+
+    Raises
+    ------
+    Rejected
+        If the scan with the layer cannot be built.
+    """
+    if not update.layer.harmonics:
         return None, setup
-    refinement = msgspec.structs.replace(_refinement(setup, line, lesson), before_of=before_of)
+    refinement = msgspec.structs.replace(_refinement(setup, line, update), before_of=before_of)
     changed = with_refinement(setup, line.axis, refinement)
     make_plan(changed)  # what is written can be built
     return refinement, changed
 
 
-def _refinement(setup: Setup, line: LinePlan, lesson: Lesson) -> Refinement:
-    """The new layer, and the scan at which it was learnt."""
+def _refinement(setup: Setup, line: LinePlan, update: LayerUpdate) -> Refinement:
+    """Build the new layer, and the scan at which it was learnt."""
     return Refinement(
-        a=lesson.layer.a.tolist(),
-        b=lesson.layer.b.tolist(),
+        a=update.layer.a.tolist(),
+        b=update.layer.b.tolist(),
         v_amplitude=_short(line.drive.v_amplitude),
         v_offset=_short(line.drive.v_offset),
         rate_hz=_short(float(line.rate)),
@@ -143,21 +149,27 @@ def _refinement(setup: Setup, line: LinePlan, lesson: Lesson) -> Refinement:
         window=line.band_limit.window,
         directions=line.band_limit.directions,
         model=model_digest(setup, line.axis, line.drive),
-        before_percent=float(f"{lesson.before.rms_percent:.3g}"),
-        before_scaling_percent=float(f"{min(worst_scaling(lesson), _MOST_SCALING):.3g}"),
+        before_percent=float(f"{update.before.rms_percent:.3g}"),
+        before_scaling_percent=float(f"{min(worst_scaling(update), _MOST_SCALING):.3g}"),
         previous_a=None if line.layer is None else line.layer.a.tolist(),
         previous_b=None if line.layer is None else line.layer.b.tolist(),
     )
 
 
 def with_refinement(setup: Setup, axis: str, refinement: Refinement | None) -> Setup:
-    """The scan with another layer on one axis."""
+    """Return the scan with another layer on one axis."""
     changed: Any = msgspec.structs.replace(getattr(setup.scan, axis), refinement=refinement)
     return replace(setup, scan=msgspec.structs.replace(setup.scan, **{axis: changed}))
 
 
 def allowed(line: LinePlan, options: Options) -> Bound:
-    """The bound for what was asked for. Raises ``Unphysical`` where that might not converge."""
+    """Compute the bound for the requested gain and harmonics.
+
+    Raises
+    ------
+    Unphysical
+        If learning might not converge.
+    """
     asked = options.harmonics
     limits = bound(line, options.gain, min(DEFAULT_HARMONICS, line.target.harmonics) if asked is None else asked)
     if asked is not None and asked > line.target.harmonics:
@@ -171,7 +183,7 @@ def allowed(line: LinePlan, options: Options) -> Bound:
     return limits
 
 
-def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | None = None) -> str:
+def why_worse(setup: Setup, axis: str, update: LayerUpdate, before_of: BeforeOf | None = None) -> str:
     """Whether the layer that was played made things worse, against the measurement before it; empty where not.
 
     Only measurements of the same are compared.
@@ -184,8 +196,8 @@ def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | Non
         )
     if played is None or played.before_percent is None or played.before_of != before_of:
         return ""
-    before, now = played.before_percent, lesson.before.rms_percent
-    if np.hypot(1.05 * before, 3.0 * lesson.noise_percent) >= now:
+    before, now = played.before_percent, update.before.rms_percent
+    if np.hypot(1.05 * before, 3.0 * update.noise_percent) >= now:
         return ""
     return (
         f"the residual grew from {before:.3g} % to {now:.3g} % rms since the last round: the loop does not converge, "
@@ -194,7 +206,7 @@ def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | Non
     )
 
 
-def stop(setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | None = None) -> dict[str, Any]:
+def stop(setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf | None = None) -> dict[str, Any]:
     """Fields of a round where the scaling error rose with the layer that was played; empty where it did not.
 
     What the noise of the measurement and the converter's rounding do to chords is no rise.
@@ -202,9 +214,9 @@ def stop(setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | Non
     played: Refinement | None = getattr(setup.scan, line.axis).refinement
     if played is None or played.before_scaling_percent is None or played.before_of != before_of:
         return {}
-    before, now = played.before_scaling_percent, worst_scaling(lesson)
+    before, now = played.before_scaling_percent, worst_scaling(update)
     rounding = 200.0 / (CHORD * abs(line.codes_per_unit))
-    if now <= float(np.hypot(1.05 * before, np.hypot(_CHORD_NOISES * lesson.chord_noise_percent, rounding))):
+    if now <= float(np.hypot(1.05 * before, np.hypot(_CHORD_NOISES * update.chord_noise_percent, rounding))):
         return {}
     rose = f"the scaling error rose from {before:.3g} % to {now:.3g} % since the last round"
     if played.previous_a is None or played.previous_b is None:
@@ -216,40 +228,40 @@ def stop(setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | Non
     return {"stopped": f"{rose}: the layer of that round is the best, and is kept", "best": best}
 
 
-def worst_scaling(lesson: Lesson) -> float:
-    """The measured scaling error of the worse direction, percent, peak to peak."""
-    return max(lesson.before.scaling_percent.values())
+def worst_scaling(update: LayerUpdate) -> float:
+    """Return the measured scaling error of the worse direction, percent, peak to peak."""
+    return max(update.before.scaling_percent.values())
 
 
 def _remarks(
-    line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phase, time_s: Floats
+    line: LinePlan, measured: Displacement, update: LayerUpdate, phase: Phase, time_s: Floats
 ) -> tuple[Remark, ...]:
-    found: list[Remark] = []
-    size = abs(lesson.before.size_nm)
+    remarks: list[Remark] = []
+    size = abs(update.before.size_nm)
     by = size / line.drive.size_nm - 1.0
     if abs(by) > _SIZE_NOTE_LIMIT:
-        found.append(
+        remarks.append(
             spoils(
                 f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
                 f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining",
                 100.0 * abs(by),
             )
         )
-    if lesson.before.size_nm < 0.0:
+    if update.before.size_nm < 0.0:
         doubt = "; if the sensor counts upwards, time 0 is where the line turns, and this is not to be learnt"
         turned = "the displacement falls where the drive rises; its sign was inverted"
-        found.append(spoils(turned + doubt) if phase.drive is None else Remark(turned))
+        remarks.append(spoils(turned + doubt) if phase.drive is None else Remark(turned))
     if measured.stray is not None:
         at = float(time_s[measured.stray])
-        found.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))
-    if lesson.harmonics == 0:
-        found.append(
+        remarks.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))
+    if update.harmonics == 0:
+        remarks.append(
             Remark("the error is within the noise of the sensor: there is nothing more to learn from this trace")
         )
-    elif finished(lesson):
-        found.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
+    elif finished(update):
+        remarks.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
     if measured.correlated > 3.0:
-        found.append(
+        remarks.append(
             Remark(
                 f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, "
                 f"hum or what the harmonics leave; standard errors were widened "
@@ -257,15 +269,15 @@ def _remarks(
             )
         )
     if measured.periods < 1.99:
-        found.append(Remark("drift cannot be determined from a single period; record several"))
+        remarks.append(Remark("drift cannot be determined from a single period; record several"))
     if phase.drive is None:
-        found.append(Remark("without drive_v it is not checked that the trace belongs to this build"))
-    return tuple(found)
+        remarks.append(Remark("without drive_v it is not checked that the trace belongs to this build"))
+    return tuple(remarks)
 
 
-def finished(lesson: Lesson) -> bool:
+def finished(update: LayerUpdate) -> bool:
     """Whether most of what is left is noise."""
-    return lesson.after.rms_percent > _FINISHED_RATIO * lesson.before.rms_percent
+    return update.after.rms_percent > _FINISHED_RATIO * update.before.rms_percent
 
 
 def _short(value: float) -> float:

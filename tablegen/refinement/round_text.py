@@ -13,19 +13,19 @@ from tablegen.refinement.round import Round, TraceRound
 
 def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]:
     """Lines of text."""
-    lesson = found.lesson
+    update = found.update
     lines = [
         f"{name}, {found.line.axis}: {_what(found, sources)}",
         "",
         "                        residual [% of the line]   scaling error",
         "direction                    rms      largest      [% peak to peak]",
     ]
-    for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
+    for label, departure in (("measured", update.before), ("predicted", update.after)):
         for side, (rms, largest) in departure.residual_percent.items():
             scaling = departure.scaling_percent[side]
             lines.append(f"{side:<9}  {label:<11}  {rms:8.4f}     {largest:8.4f}      {scaling:8.3f}")
     lines += [
-        f"its noise{'':<14}{lesson.noise_percent:8.4f}{'':<20}{lesson.chord_noise_percent:8.3f} rms of a chord",
+        f"its noise{'':<14}{update.noise_percent:8.4f}{'':<20}{update.chord_noise_percent:8.3f} rms of a chord",
         "",
         *_size(found),
         *_learnt(found),
@@ -54,12 +54,12 @@ def _size(found: Round) -> list[str]:
 
 
 def _learnt(found: Round) -> list[str]:
-    lesson = found.lesson
-    if not lesson.harmonics:
+    update = found.update
+    if not update.harmonics:
         return ["learnt: nothing"]
-    change, layer = (100.0 * float(np.max(np.abs(s.on_grid(1024)))) for s in (lesson.change, lesson.layer))
+    change, layer = (100.0 * float(np.max(np.abs(s.on_grid(1024)))) for s in (update.change, update.layer))
     return [
-        f"learnt: harmonics 1 to {lesson.harmonics} of {found.bound.used}, up to {change:.3g} % of the line; "
+        f"learnt: harmonics 1 to {update.harmonics} of {found.bound.used}, up to {change:.3g} % of the line; "
         f"the layer is now up to {layer:.3g} %"
     ]
 
@@ -83,7 +83,7 @@ def _bound(found: Round) -> list[str]:
 
 def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[str, Any]:
     """The same as plain data, for JSON."""
-    line, lesson, b = found.line, found.lesson, found.bound
+    line, update, b = found.line, found.update, found.bound
 
     def errors(departure: Departure) -> dict[str, Any]:
         sides = departure.residual_percent
@@ -103,9 +103,9 @@ def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[st
         "scan": name,
         "axis": line.axis,
         **_measurement(found, sources),
-        "measured": errors(lesson.before),
-        "predicted": errors(lesson.after),
-        "harmonics": lesson.harmonics,
+        "measured": errors(update.before),
+        "predicted": errors(update.after),
+        "harmonics": update.harmonics,
         "bound": {
             "gain": b.gain,
             "harmonics": b.harmonics,
@@ -116,7 +116,7 @@ def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[st
             "delay_s": b.delay_s,
             "dynamics_known": b.dynamics,
         },
-        "layer": {"a": lesson.layer.a.tolist(), "b": lesson.layer.b.tolist()},
+        "layer": {"a": update.layer.a.tolist(), "b": update.layer.b.tolist()},
         "worse": found.worse or None,
         "stopped": found.stopped or None,
         "remarks": list(found.remarks),
@@ -126,7 +126,7 @@ def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[st
 def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
     """What differs between a trace and images."""
     plain = [{"name": source.name, "sha256": source.sha256} for source in sources]
-    line, lesson = found.line, found.lesson
+    line, update = found.line, found.update
     if isinstance(found, TraceRound):
         measured = found.displacement
         return {
@@ -135,9 +135,9 @@ def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
             "periods": measured.periods,
             "samples": measured.samples,
             "left_out": measured.left_out,
-            "size_nm": abs(lesson.before.size_nm),
+            "size_nm": abs(update.before.size_nm),
             "asked_nm": line.drive.size_nm,
-            "noise": {"reading_nm": measured.noise_nm, "position_percent": lesson.noise_percent},
+            "noise": {"reading_nm": measured.noise_nm, "position_percent": update.noise_percent},
             "drift_nm": measured.drift_nm,
         }
     if isinstance(found, ImageRound | MismatchRound):
@@ -146,7 +146,7 @@ def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
             "images": [{"trace": trace, "retrace": retrace} for trace, retrace in zip(*[iter(plain)] * 2, strict=True)],
             "rows": geometry.rows,
             "columns": geometry.columns,
-            "noise": {"position_percent": lesson.noise_percent},
+            "noise": {"position_percent": update.noise_percent},
         }
     if isinstance(found, MismatchRound):
         return {**shared, "mismatch": True, "match": min(frame.match for frame in found.frames)}

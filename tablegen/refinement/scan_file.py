@@ -18,10 +18,14 @@ _ROUND_MARK = re.compile(r"# refine (\d+): ")
 
 
 def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], provenance: str) -> str:
-    """The text with ``[AXIS.refinement]`` put in; ``name`` is what messages call it.
+    """Put ``[AXIS.refinement]`` into the text of a scan file; messages call the file ``name``.
 
-    ``provenance`` becomes a line of the comment above the table, below those of earlier rounds, numbered. Raises
-    ``Rejected`` where the text is no TOML or cannot be edited in place.
+    ``provenance`` becomes a line of the comment above the table, below those of earlier rounds, numbered.
+
+    Raises
+    ------
+    Rejected
+        If the text is no TOML or cannot be edited in place.
     """
     parse_toml(text, name)
     windows = "\r\n" in text
@@ -42,7 +46,7 @@ def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], prove
 
 
 def rounds_of(text: str, name: str, axis: str) -> list[str]:
-    """The provenance of each round of ``[AXIS.refinement]``, which the text has, oldest first."""
+    """Return the provenance of each round of ``[AXIS.refinement]``, which the text has, oldest first."""
     rows = text.split("\n")
     at = first = parse_toml(text, name)[1].line_of(f"{axis}.{KEY}") - 1
     while first > 0 and _ROUND_MARK.match(rows[first - 1]):
@@ -51,7 +55,7 @@ def rounds_of(text: str, name: str, axis: str) -> list[str]:
 
 
 def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
-    """The text with the values of the table, which may be there."""
+    """Put the values of the table into the text, which may have the table already."""
     document = tomlkit.parse(text)
     parent: Any = document[axis]
     if KEY in parent:
@@ -91,7 +95,7 @@ def _rows(values: Sequence[float]) -> Array:
 
 
 def _commented(text: str, at: int, provenance: str) -> str:
-    """The text with a line more in the comment above row ``at``, that of the table."""
+    """Add a line to the comment above row ``at``, that of the table."""
     rows = text.split("\n")
     last = _ROUND_MARK.match(rows[at - 1]) if at > 0 else None
     rows.insert(at, f"# refine {int(last[1]) + 1 if last else 1}: {provenance}")

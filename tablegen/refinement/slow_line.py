@@ -20,11 +20,16 @@ _SAME_WAVES = 0.2  # how far waves of two frames may be from whole numbers of ea
 
 
 def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
-    """y over the lines of its way up, which the rows are, from the phases of the waves in each.
+    """Fit y over the lines of its way up, which the rows are, from the phases of the waves in each.
 
-    ``frames`` follow each other without a pause. What the scanner does it does in each of them; what changes from one
-    to the next is drift, of which the rate may change evenly. One frame does not tell that change from an error of y.
-    With two waves a shift along x is told from one along y; with one it is not. Raises ``Unphysical``.
+    ``frames`` follow each other without a pause. Errors of the scanner are the same in each of them; what changes from
+    one to the next is drift, whose rate may change evenly. One frame does not separate that change from an error of y.
+    Two waves separate a shift along x from one along y; one does not.
+
+    Raises
+    ------
+    Unphysical
+        If rows are missing, y has too few periods, or the frames show different samples.
     """
     line, schedule = plan.y, plan.schedule
     rows, q = frames[0].geometry.rows, frames[0].fit.state.q
@@ -34,12 +39,12 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
             f"the whole frame: do not crop it, and leave out the lines of the flyback"
         )
     times = (schedule.up.first + np.arange(rows) + 0.5) / schedule.lines
-    asked = asked_position(line, times)
+    requested = asked_position(line, times)
     phases, covariance = _without_drift(frames, times)
-    straight = np.column_stack([np.ones(rows), asked])
+    straight = np.column_stack([np.ones(rows), requested])
     c = np.linalg.lstsq(straight, phases, rcond=None)[0]
     s = c[1]  # periods in the whole frame, of each wave
-    span = float(np.ptp(asked))
+    span = float(np.ptp(requested))
     most = float(np.max(np.abs(s))) * span
     if most < _MIN_PERIODS:
         raise Unphysical(
@@ -90,12 +95,12 @@ def _without_drift(frames: Sequence[LatticeLine], times: Floats) -> tuple[Floats
 
 
 def _same_waves(first: LatticeLine, other: LatticeLine) -> Floats:
-    """The waves of another frame in those of the first, in whole numbers."""
+    """Express the waves of another frame in those of the first, in whole numbers."""
     one, two = (np.column_stack([f.fit.state.q, _across_rows(f)])[:, : len(f.fit.state.q)] for f in (first, other))
     if one.shape == two.shape:
-        found: Floats = two @ np.linalg.inv(one)
-        whole = np.rint(found)
-        if float(np.max(np.abs(found - whole))) < _SAME_WAVES and abs(float(np.linalg.det(whole))) > 0.5:
+        numbers: Floats = two @ np.linalg.inv(one)
+        whole = np.rint(numbers)
+        if float(np.max(np.abs(numbers - whole))) < _SAME_WAVES and abs(float(np.linalg.det(whole))) > 0.5:
             return whole
     raise Unphysical("the images do not show one sample; give frames that follow each other")
 

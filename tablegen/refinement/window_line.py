@@ -41,31 +41,31 @@ class WindowLine:
         return self.line_covariance * self.unit_nm**2
 
     def basis(self, times: Floats) -> Floats:
-        """(times, coefficients)."""
+        """Return the matrix from coefficients to the line: (times, coefficients)."""
         forward = times % 1.0 <= self.turn
         place = np.where(forward, times % 1.0 / self.turn, (1.0 - times % 1.0) / (1.0 - self.turn))
         return error_modes(place, forward, self.window, self.degree, self.parts).T
 
     def value(self, times: Floats) -> Floats:
         """Where the piezo was, in nm, at times in periods."""
-        found: Floats = self.unit_nm * (self.asked(times) + self.basis(times) @ self.coefficients)
-        return found
+        position: Floats = self.unit_nm * (self.asked(times) + self.basis(times) @ self.coefficients)
+        return position
 
     def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """The coefficients of what was reached less what was asked for, in nm."""
+        """Return the coefficients of the reached line less the requested one, in nm."""
         return self.unit_nm * self.coefficients
 
     @property
     def groups(self) -> list[list[int]]:
         """Coefficients that are noise or not together: those of a degree."""
-        found: dict[int, list[int]] = {}
+        modes_by_degree: dict[int, list[int]] = {}
         for i, degree in enumerate(mode_degrees(self.degree, self.parts)):
-            found.setdefault(degree, []).append(i)
-        return list(found.values())
+            modes_by_degree.setdefault(degree, []).append(i)
+        return list(modes_by_degree.values())
 
 
 def mode_degrees(degree: int, parts: Parts) -> list[int]:
-    """The degree of each mode. Origin and size of both directions together are no error."""
+    """Return the degree of each mode. Origin and size of both directions together are no error."""
     together = [] if parts == "difference" else list(range(2, degree + 1))
     return together if parts == "forward" else [*together, *range(degree + 1)]
 
@@ -84,10 +84,10 @@ def error_modes(
 
 
 def averaged(lines: Sequence[WindowLine]) -> WindowLine:
-    """The same line seen several times, each time with its own noise."""
+    """Average the same line measured several times, each time with its own noise."""
     degree = min(line.degree for line in lines)
-    kept = [[i for i, d in enumerate(mode_degrees(line.degree, line.parts)) if d <= degree] for line in lines]
-    pairs = list(zip(lines, kept, strict=True))
+    modes = [[i for i, d in enumerate(mode_degrees(line.degree, line.parts)) if d <= degree] for line in lines]
+    pairs = list(zip(lines, modes, strict=True))
     mean = np.mean([line.coefficients[i] for line, i in pairs], axis=0)
     covariance = np.mean([line.line_covariance[np.ix_(i, i)] for line, i in pairs], axis=0) / len(lines)
     return replace(lines[0], degree=degree, coefficients=mean, line_covariance=covariance)

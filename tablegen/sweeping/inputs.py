@@ -22,7 +22,7 @@ class Inputs:
         self._tool = cache(_tool_digest)
 
     def digest(self, setup: Setup, values: dict[str, Any], formats: Sequence[str]) -> str:
-        """The digest of a setup, of the values of its scan file, and of what makes these formats.
+        """Compute the digest of a setup, of the values of its scan file, and of the files that make these formats.
 
         Raises ``OSError`` where a file that it names cannot be read.
         """
@@ -40,7 +40,7 @@ class Inputs:
 
 
 def _tool_digest(formats: tuple[str, ...]) -> str:
-    """The digest of the files that make these formats: the same wherever, and however, tablegen is installed."""
+    """Compute the digest of the files that make these formats: the same wherever tablegen is installed."""
     installed = set(records(PACKAGE.parent))  # which differs between two installations of one version
     paths = [path for path in deciding_files(formats) if path not in installed and path.exists()]
     return hashlib.sha256("\n".join(sorted(f"{file_sha256(path)} {path.name}" for path in paths)).encode()).hexdigest()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build
-from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.interruption import ENDINGS, defer_signals
 from tablegen.base.reading import holds
 from tablegen.config.load import Setup
 from tablegen.config.names import of_the_runtime
@@ -71,7 +71,7 @@ def make(job: Job) -> Made:
     files[RECORD] = entry_file(entry)
     if job.only_check:
         return _compared(job, entry, files)
-    with held(*ENDINGS) as came:
+    with defer_signals(*ENDINGS) as came:
         changed = write_files(job.folder, files, lambda: outdated_files(job.folder, files))
         WrittenRecords().note(files[RECORD])
     if came:

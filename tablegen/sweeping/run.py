@@ -11,7 +11,7 @@ import numpy as np
 from tablegen.api.build import BrokenLimit
 from tablegen.api.result import Result
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.interruption import ENDINGS, defer_signals
 from tablegen.base.reading import BUILD_FILE, file_sha256, holds, read_bytes
 from tablegen.base.workers import results
 from tablegen.charts.picture_file import PlottedCharts
@@ -135,7 +135,7 @@ class ScanLibrary(Result):
 def state(
     sweep: ScanLibrary, variant: Variant, formats: Sequence[str] | None, inputs: Inputs, written: WrittenRecords
 ) -> Entry | tuple[Any, str]:
-    """The entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
+    """Return the entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
 
     Its record has to be one that a sweep of this user has written, whatever else stands in the directory. Raises
     ``Rejected``.
@@ -150,11 +150,11 @@ def state(
 
 
 def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> tuple[Any, str]:
-    """The setup of a scan, and the digest of its inputs. Raises ``Rejected``."""
+    """Load the setup of a scan, and compute the digest of its inputs. Raises ``Rejected``."""
     setup = variant.setup
-    wanted = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
+    names = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
     try:
-        return setup, inputs.digest(setup, variant.values, wanted)
+        return setup, inputs.digest(setup, variant.values, names)
     except UnknownFormat as error:
         raise Rejected([Problem("formats", 0, "", str(error))]) from None
     except OSError:
@@ -218,25 +218,25 @@ def _current(sweep: ScanLibrary, variant: Variant, entry: Entry, strict: bool) -
     sweep.current.append(variant.name)
 
 
-def _note(sweep: ScanLibrary, variant: Variant, found: "Made | Exception", only_check: bool) -> None:
-    """What a worker has said of a program."""
-    match found:
+def _note(sweep: ScanLibrary, variant: Variant, result: "Made | Exception", only_check: bool) -> None:
+    """Note the result of a worker for a program."""
+    match result:
         case Made():
-            sweep.entries[variant.name] = found.entry
-            (sweep.built if found.different else sweep.current).append(variant.name)
+            sweep.entries[variant.name] = result.entry
+            (sweep.built if result.different else sweep.current).append(variant.name)
             if only_check:
-                sweep.different += [f"{variant.name}/{name}" for name in found.different]
-                _note_leftovers(sweep, [f"{variant.name}/{name}" for name in found.leftovers], only_check)
-                sweep.memories |= {(variant.name, name): text for name, text in found.memories.items()}
+                sweep.different += [f"{variant.name}/{name}" for name in result.different]
+                _note_leftovers(sweep, [f"{variant.name}/{name}" for name in result.leftovers], only_check)
+                sweep.memories |= {(variant.name, name): text for name, text in result.memories.items()}
         case CannotWrite():
-            raise found
+            raise result
         case Doubtful():
-            sweep.failed.append(Failed(variant, "limit", found.warnings))
+            sweep.failed.append(Failed(variant, "limit", result.warnings))
         case Rejected():
-            kind: Kind = "limit" if isinstance(found, BrokenLimit) else "wrong input"
-            sweep.failed.append(Failed(variant, kind, list(map(str, found.problems))))
+            kind: Kind = "limit" if isinstance(result, BrokenLimit) else "wrong input"
+            sweep.failed.append(Failed(variant, kind, list(map(str, result.problems))))
         case Exception():
-            sweep.failed.append(Failed(variant, "error", [f"{type(found).__name__}: {found}"]))
+            sweep.failed.append(Failed(variant, "error", [f"{type(result).__name__}: {result}"]))
 
 
 def _note_leftovers(sweep: ScanLibrary, names: Sequence[str], only_check: bool) -> None:
@@ -257,8 +257,8 @@ def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> Non
     ]
 
     def content(program: str, name: str) -> bytes:
-        made = sweep.memories.get((program, name))
-        return read_bytes(sweep.folder / program / name, BUILD_FILE) if made is None else made
+        memory = sweep.memories.get((program, name))
+        return read_bytes(sweep.folder / program / name, BUILD_FILE) if memory is None else memory
 
     index = make_index(sweep.library, entries, failed, formats, content)
     sweep.notes += index.notes
@@ -273,7 +273,7 @@ def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> Non
         return
     for entry in dropped:
         _remove_program(sweep, entry)
-    with held(*ENDINGS) as came:
+    with defer_signals(*ENDINGS) as came:
         write_files(sweep.folder, index.files, outdated)
     if came:
         raise KeyboardInterrupt
@@ -291,9 +291,9 @@ def _dropped(sweep: ScanLibrary) -> tuple[list[Entry], list[str]]:
 
     Folders without a build are passed over.
     """
-    wanted = {variant.name for variant in sweep.variants}
+    names = {variant.name for variant in sweep.variants}
     try:
-        folders = sorted(path for path in sweep.folder.iterdir() if path.name not in wanted and path.is_dir())
+        folders = sorted(path for path in sweep.folder.iterdir() if path.name not in names and path.is_dir())
     except OSError:
         return [], []
     dropped, others = [], []

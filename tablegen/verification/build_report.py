@@ -126,7 +126,7 @@ def verify_build(
     checks += watch.timed(_file_checks(folder, stored, content, known, other_version))
     checks += watch.timed(_format_checks(folder, content, known))
     progress("measuring the certificate")
-    certificates = check_certificates(stored, same)
+    certificates = check_certificates(stored, same, folder)
     checks += watch.timed(certificates.checks)
     outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
     checks += watch.timed(outcome.checks)
@@ -157,7 +157,7 @@ class Stopwatch:
         return monotonic() - self._begun
 
     def timed(self, checks: list[Check]) -> list[Check]:
-        """These checks, with the seconds since the last call."""
+        """Return these checks with the seconds since the last call."""
         now, last = monotonic(), self._last
         self._last = now
         return [replace(check, seconds=(now - last) / len(checks)) for check in checks]
@@ -177,7 +177,7 @@ def _manifest_checks(folder: Path, stored: StoredBuild) -> list[Check]:
 def _file_checks(
     folder: Path, stored: StoredBuild, content: Content, formats: list[Format], other_version: bool
 ) -> list[Check]:
-    """The files that a build has, their digests, and those that are the same in every build of a version."""
+    """Check the files of a build: presence, digests, and those that every build of a version shares."""
     files, version = stored.manifest.files, stored.manifest.tablegen
     same = version == __version__
     written: Written = []
@@ -205,25 +205,25 @@ def _file_checks(
 
 
 def _format_checks(folder: Path, content: Content, formats: list[Format]) -> list[Check]:
-    """What each format of the build finds in its files."""
+    """Return the checks that each format of the build makes of its files."""
     checks = []
     for one in formats:
         try:
-            found = one.check(folder, content)
+            comparisons = one.check(folder, content)
         except Unphysical as error:  # no build has such a manifest
-            found = [Comparison("files", "0 files", [str(error)])]
-        checks += [differing_check(f"{one.name} {it.subject}", "manifest", it.compared, it.wrong) for it in found]
+            comparisons = [Comparison("files", "0 files", [str(error)])]
+        checks += [differing_check(f"{one.name} {it.subject}", "manifest", it.compared, it.wrong) for it in comparisons]
     return checks
 
 
 def differing_check(subject: str, against: str, compared: str, wrong: list[str]) -> Check:
-    """The check of many things that are all to be equal; ``wrong`` are those that are not."""
+    """Return a check that many things are equal; ``wrong`` lists those that differ."""
     failure = f"{subject}: {some(wrong)}" if wrong else None
     return Check(subject, against, compared, f"{len(wrong)} differ", "0", failure)
 
 
 def _coverage(stored: StoredBuild, outcome: Outcome) -> list[str]:
-    """What the ticks did not suffice for."""
+    """List what the played ticks were too few to exercise."""
     session = outcome.session
     assert session is not None
     needed = needed_ticks(stored.program)

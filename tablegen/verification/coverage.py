@@ -7,7 +7,7 @@ from tablegen.verification.play.placement import Placement
 
 _ALWAYS = {
     "dac_sequencer", "dac_fit", "dac_bank", "dac_scan", "dac_markers", "dac_window", "dac_pixels", "dac_register",
-    "dac_verdict", "dac_faults", "dac_coding", "dac_spi", "dac_axi_stream", "dac_boot",
+    "dac_verdict", "dac_faults", "dac_whole", "dac_whole_table", "dac_coding", "dac_spi", "dac_axi_stream", "dac_boot",
 }  # fmt: skip
 _PIPELINED = {"dac_axis", "dac_output", "dac_offset", "dac_slew", "dac_delay"}
 _RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}
@@ -16,7 +16,7 @@ _LINES = {"dac_phase", "dac_table", "dac_interpolator"}
 
 
 def played_modules(placement: Placement, programs: Sequence[Program]) -> set[str]:
-    """The Verilog modules that a session of programs of x and y elaborates."""
+    """Return the Verilog modules that a session of programs of x and y elaborates."""
     modes = {program.mode for program in programs}
     played = set(_ALWAYS) | (_RENDERER if placement.fourier else set())
     if placement.shaping:
@@ -33,7 +33,7 @@ def played_modules(placement: Placement, programs: Sequence[Program]) -> set[str
 
 
 def unplayed_verilog(files: Iterable[str], placements: Sequence[Placement], programs: Sequence[Program]) -> list[str]:
-    """The files of a runtime, and the options of its sequencer, that no session of these placements plays."""
+    """List the files of a runtime, and the options of its sequencer, that no session of these placements plays."""
     played = set().union(*(played_modules(placement, programs) for placement in placements))
     unplayed = sorted(name for name in files if name.removesuffix(".v") not in played)
     options = [
@@ -52,5 +52,5 @@ def unplayed_verilog(files: Iterable[str], placements: Sequence[Placement], prog
 
 
 def unplayed_c(files: Iterable[str], fourier: bool) -> list[str]:
-    """The C files of a runtime that no session plays: the link, and what renders tables unless it is to."""
+    """List the C files of a runtime that no session plays: the link, and rendering unless ``fourier``."""
     return sorted(name for name in files if name.startswith("dac_link") or (name == "dac_fourier.c" and not fourier))

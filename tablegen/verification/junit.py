@@ -43,5 +43,5 @@ def junit(name: str, checks: Sequence[Check], seconds: float = 0.0, manifest_sha
 
 
 def _plain(text: str) -> str:
-    """What XML can hold."""
+    """Replace the characters that XML cannot hold."""
     return _NOT_XML.sub("?", text)

@@ -14,25 +14,30 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from tablegen.base.interruption import deliver, held
+from tablegen.base.interruption import defer_signals, deliver
 from tablegen.verification.failures import SimulationFailed, ToolMissing
 
 _JOB, _OUTCOME, _LOG = "job.json", "outcome.json", "worker.log"
 
 
 def run(folder: Path, module: str, job: Mapping[str, Any]) -> dict[str, Any]:
-    """What ``play_job(folder, job)`` of a module returns, called in a process of its own; both are plain data.
+    """Run ``play_job(folder, job)`` of a module in a process of its own; ``job`` and the result are plain data.
 
-    Raises ``ToolMissing`` and ``SimulationFailed`` as it does.
+    Raises
+    ------
+    ToolMissing
+        If the job needs a tool that is not installed.
+    SimulationFailed
+        If the job raises it, or its process ends.
     """
     return run_all(module, [(folder, job)])[0]
 
 
 def run_all(module: str, jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """The same for several jobs at once, each with a folder of its own; the first that fails is raised."""
+    """Run several jobs at once, each in a folder of its own; raise the exception of the first that fails."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
-        with held(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
+        with defer_signals(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
             for folder, job in jobs:
                 processes.append(_started(folder, module, job))
         deliver(came)
@@ -43,7 +48,7 @@ def run_all(module: str, jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> list
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)  # all that it started, whether it ended or was interrupted
             process.wait()
-    return [_found(folder) for folder, _ in jobs]
+    return [_outcome_of(folder) for folder, _ in jobs]
 
 
 def _started(folder: Path, module: str, job: Mapping[str, Any]) -> subprocess.Popen[bytes]:
@@ -63,23 +68,23 @@ def _started(folder: Path, module: str, job: Mapping[str, Any]) -> subprocess.Po
         )
 
 
-def _found(folder: Path) -> dict[str, Any]:
+def _outcome_of(folder: Path) -> dict[str, Any]:
     outcome = folder / _OUTCOME
     if not outcome.is_file():
         raise SimulationFailed((folder / _LOG).read_text("utf-8", "replace").strip() or "the simulation was killed")
-    found = json.loads(outcome.read_text("utf-8"))
-    if "missing" in found:
-        raise ToolMissing(found["missing"])
-    if "failed" in found:
-        raise SimulationFailed(found["failed"])
-    status: dict[str, Any] = found["status"]
+    answer = json.loads(outcome.read_text("utf-8"))
+    if "missing" in answer:
+        raise ToolMissing(answer["missing"])
+    if "failed" in answer:
+        raise SimulationFailed(answer["failed"])
+    status: dict[str, Any] = answer["status"]
     return status
 
 
 def _work(folder: Path) -> dict[str, Any]:
-    wanted = json.loads((folder / _JOB).read_text("utf-8"))
+    request = json.loads((folder / _JOB).read_text("utf-8"))
     try:
-        return {"status": import_module(wanted["module"]).play_job(folder, wanted["job"])}
+        return {"status": import_module(request["module"]).play_job(folder, request["job"])}
     except ToolMissing as error:
         return {"missing": str(error)}
     except SimulationFailed as error:

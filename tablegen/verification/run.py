@@ -75,13 +75,25 @@ def verify(
 
 
 def default_target(folder: Path) -> TargetName:
-    """What is played of a build unless something else is asked for. Raises ``NotABuild``."""
+    """Return the target that a build is verified on by default.
+
+    Raises
+    ------
+    NotABuild
+        If the folder has no readable manifest.
+    """
     formats = read_build(folder).formats
     return "verilog" if "verilog" in formats else "c" if "c" in formats else "files"
 
 
 def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
-    """Clocks in which the Verilog of a build renders its tables once. Raises ``NotABuild``."""
+    """Return the clocks in which the Verilog of a build renders its tables once.
+
+    Raises
+    ------
+    NotABuild
+        If the folder has no readable manifest.
+    """
     from tablegen.verification.play.placement import Placement
 
     stored, placement = read_build(folder), Placement(axis, fourier=True)
@@ -100,7 +112,7 @@ def _target(
     fourier: bool,
     as_usual: bool,
 ) -> tuple[Target, int]:
-    """What plays, and how many ticks of it are soon over; ``as_usual`` a long frame is played apart."""
+    """Return the target, and how many ticks it plays quickly; ``as_usual`` a long frame is played apart."""
     if name == "files":
         return FilesTarget(), DEFAULT_TICKS[name]
     if name != "verilog":

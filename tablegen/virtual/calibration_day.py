@@ -16,7 +16,14 @@ from msgspec.structs import replace
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.frequency import fit_frequency
 from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.calibration.laws.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, apparent_of, sizes_of
+from tablegen.calibration.laws.image_sizes import (
+    Acquisition,
+    ImageSizes,
+    KnownSample,
+    SampleImage,
+    apparent_of,
+    sizes_of,
+)
 from tablegen.calibration.laws.images import Pair, fit_images
 from tablegen.calibration.laws.offset_sizes import fit_offset_sizes
 from tablegen.calibration.laws.resonance import ResonanceFit, fit_resonance
@@ -77,7 +84,12 @@ def calibrate(
     sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. ``offset_sizes`` are the
     scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. With
     ``sizes_from_images`` size and offset are fitted to such images too, drifting and tilted, and not to sizes with
-    ``noise``. Raises ``Unphysical``.
+    ``noise``.
+
+    Raises
+    ------
+    Unphysical
+        If a fit fails.
     """
     axes: dict[str, ScannerAxis] = {}
     fits: dict[str, dict[str, Fit]] = {}
@@ -141,7 +153,7 @@ class _Day:
         return fits
 
     def scanner_axis(self, fits: dict[str, Fit], points: bool) -> ScannerAxis:
-        """The axis of a scanner file with these parameters, as ``tablegen calibrate --write`` would put them."""
+        """Return the axis of a scanner file with these parameters, as ``tablegen calibrate --write`` writes them."""
         changes = {kind: change(fit, (), points) for kind, fit in fits.items()}
         branches = list(changes["hysteresis"].branches)
         resonance = None
@@ -162,7 +174,7 @@ class _Day:
         """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
         k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
         law = SizeLaw.calibrated(k, self._driver.span, beta, size.base_nm, threshold)
-        found = []
+        groups = []
         for share in sizes:
             room = min(1.0, OFFSET_ROOM * (1.0 - share) / (OFFSETS[-1] - OFFSETS[0])) if len(sizes) > 1 else 1.0
             volts = [self._driver.volts(0.5 + room * (offset - 0.5)) for offset in OFFSETS]
@@ -170,14 +182,14 @@ class _Day:
             if self._imaged:
                 taken = self._images([(size_v, offset) for offset in volts])
                 nm, errors = apparent_of(taken, law, self._driver, SAMPLES_SEEN)
-                found.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
+                groups.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
                 continue
             seen = apparent_sizes(
                 self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
             )
             unknown = np.zeros(len(volts))
-            found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
-        offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*found, strict=True))
+            groups.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
+        offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*groups, strict=True))
         known = errors if self._imaged else None
         return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._driver, law, known)
 
@@ -195,7 +207,7 @@ class _Day:
                 shared=taken.shared,
             )
         nominal = [share * self._driver.span * size.k_nm_per_v for share in SIZES]
-        found = actual_sizes(
+        sizes = actual_sizes(
             self._axis,
             nominal,
             size.k_nm_per_v,
@@ -205,7 +217,7 @@ class _Day:
             turn=self._turn,
         )
         return fit_size(
-            found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._driver, size.base_nm, None, "relative"
+            sizes["nominal_nm"] / size.k_nm_per_v, sizes["actual_nm"], self._driver, size.base_nm, None, "relative"
         )
 
     def _images(self, scans: Sequence[tuple[float, float]]) -> ImageSizes:
@@ -213,7 +225,7 @@ class _Day:
 
         The sample drifts by a share of the line and lies on a slope.
         """
-        taken = []
+        images = []
         for volts, offset in scans:
             sample = hexagonal(LATTICE_NM) if volts <= SMALL_IMAGE * self._driver.span else grating(GRATING_NM)
             random = np.random.default_rng(self._next())
@@ -229,8 +241,8 @@ class _Day:
                 drift=drift,
                 seed=self._next(),
             )
-            taken.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
-        return sizes_of(taken, self._driver, SAMPLES_SEEN, Taking(turn=self._turn))
+            images.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
+        return sizes_of(images, self._driver, SAMPLES_SEEN, Acquisition(turn=self._turn))
 
     def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
         traces = []
@@ -239,14 +251,14 @@ class _Day:
             rate = self._rate_at(volts)
             size_nm = volts * self._before.size.k_nm_per_v
             sensor = Sensor(noise_nm=self._noise * size_nm, seed=self._next())
-            found = sensor_trace(
+            trace = sensor_trace(
                 self._axis, volts, self._driver.middle, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
             )
-            traces.append(Trace(f"{volts:g} V", found["time_s"], found["drive_v"], found["displacement_nm"]))
+            traces.append(Trace(f"{volts:g} V", trace["time_s"], trace["drive_v"], trace["displacement_nm"]))
         return traces
 
     def _imaged_hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
-        """The same from images: of a lattice where the line is short, of a grating where it is long."""
+        """Fit hysteresis from images: of a lattice where the line is short, of a grating where it is long."""
         pairs = []
         for share in amplitudes:
             volts = share * self._driver.span
@@ -258,7 +270,7 @@ class _Day:
         return fit_images(pairs, self._driver, turn=self._turn)
 
     def _rate_at(self, volts: float) -> float:
-        """The rate, in Hz, with the scan's tip velocity, and no faster than the scan, as the paper does."""
+        """Return the rate in Hz with the scan's tip velocity, and no faster than the scan, as the paper does."""
         return self._rate_hz * min(self._scan_v / volts, 1.0)
 
     def _gains(self) -> dict[str, Floats]:
@@ -269,8 +281,8 @@ class _Day:
     def _resonance(self, before: Resonance) -> ResonanceFit:
         near = before.frequency_hz or 1e4
         f = near * np.geomspace(0.2, 3.0, 200)
-        found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
-        return fit_resonance(found["frequency_hz"], found["gain"], found["phase_deg"])
+        response = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
+        return fit_resonance(response["frequency_hz"], response["gain"], response["phase_deg"])
 
     def _next(self) -> int:
         self._seed += 1
@@ -278,7 +290,7 @@ class _Day:
 
 
 def _tilted(sample: Surface, slope: Floats) -> Surface:
-    """The sample on a plane."""
+    """Put the sample on a plane."""
     return lambda x, y: sample(x, y) + slope[0] * x + slope[1] * y
 
 

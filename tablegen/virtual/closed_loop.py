@@ -30,7 +30,7 @@ def with_scan(
     rate_hz: float | None = None,
     band_limit: BandLimit | None = None,
 ) -> Setup:
-    """The same scan with another fast axis: a size, and what else is given; without a refinement."""
+    """Return the same scan with another fast axis: a size, and what else is given; without a refinement."""
     scan = setup.scan
     x = msgspec.structs.replace(
         scan.x,
@@ -48,7 +48,7 @@ def with_scan(
 
 
 def uncorrected(setup: Setup) -> Setup:
-    """The same scan on a scanner file that knows k of x alone, as controllers without correction do."""
+    """Return the scan on a scanner file that knows k of x alone, as controllers without correction do."""
     x: ScannerAxis = setup.scanner.x
     size = msgspec.structs.replace(x.size, beta=0.0)
     return replace(
@@ -58,7 +58,13 @@ def uncorrected(setup: Setup) -> Setup:
 
 
 def play_x(setup: Setup, scanner: VirtualScanner) -> AxisRun:
-    """The fast axis of a scan. Raises ``Rejected``."""
+    """Simulate the fast axis of a scan.
+
+    Raises
+    ------
+    Rejected
+        If the scan cannot be built.
+    """
     return run_line(make_plan(setup).x, scanner.x)
 
 

@@ -53,21 +53,19 @@ class Lag:
         count = len(POINTS)
         ways = [(0, range(count - 1), 1), (1, range(count - 1, 0, -1), -1)]
         for direction, places, step in ways + ways:
-            at, kept = solutions[direction], exp(-(self.fall if direction else self.rise) / (count - 1))
+            at, decay = solutions[direction], exp(-(self.fall if direction else self.rise) / (count - 1))
             for n in places:
-                low[n + step] = min(low[n + step], at[n + step] + (low[n] - at[n]) * kept)
-                high[n + step] = max(high[n + step], at[n + step] + (high[n] - at[n]) * kept)
+                low[n + step] = min(low[n + step], at[n + step] + (low[n] - at[n]) * decay)
+                high[n + step] = max(high[n + step], at[n + step] + (high[n] - at[n]) * decay)
         return low, high
 
     def after(self, z: float, turned: float, drive: FloatsLike, up: bool) -> Floats:
-        """The lag in nm at drives of a branch that left the drive ``turned`` with a lag of ``z``."""
+        """Return the lag in nm at drives of a branch that left the drive ``turned`` with a lag of ``z``."""
         rate, solution = (self.rise, self.towards[0]) if up else (self.fall, self.towards[1])
         away = z - float(np.polynomial.polynomial.polyval(turned, solution))
         drive = np.asarray(drive, dtype=np.float64)
-        found: Floats = np.polynomial.polynomial.polyval(drive, solution) + away * np.exp(
-            -rate * np.abs(drive - turned)
-        )
-        return found
+        lag: Floats = np.polynomial.polynomial.polyval(drive, solution) + away * np.exp(-rate * np.abs(drive - turned))
+        return lag
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +108,7 @@ class Duhem:
         return Lags(0.0, tuple(float(lag.balance(0.0)) for lag in self.lags))
 
     def least_slope(self) -> float:
-        """The least slope of a branch after any history, in nm per full drive, or less."""
+        """Return the least slope of a branch after any history, in nm per full drive, or less."""
         polyval = np.polynomial.polynomial.polyval
         rising = falling = polyval(POINTS, powers_of(self.reversible))
         for lag in self.lags:
@@ -161,7 +159,7 @@ def _branches(drive: Floats, at: float) -> Iterator[tuple[int, int, float, bool]
 
 
 def _relaxed(bernstein: tuple[float, ...], rate: float) -> Floats:
-    """s + s'/rate + s''/rate^2 + ..., which solves p' = rate (p - s)."""
+    """Return s + s'/rate + s''/rate^2 + ..., which solves p' = rate (p - s)."""
     term = powers_of(bernstein)
     out = term.copy()
     for count in range(len(term) - 1, 0, -1):

@@ -36,7 +36,7 @@ def sensor_trace(
     turn: float = 0.5,
     sensor: Sensor | None = None,
 ) -> dict[str, Floats]:
-    """``time_s``, ``drive_v``, ``displacement_nm`` of a triangle that begins after a long rest at its lowest voltage.
+    """Simulate ``time_s``, ``drive_v``, ``displacement_nm`` of a triangle after a long rest at its lowest voltage.
 
     ``samples`` a period; the first period is not settled, and creep drifts through all of them.
     """

@@ -32,14 +32,14 @@ def grating(pitch_nm: float, angle_deg: float = 3.0) -> Surface:
 
     def height(x: Floats, y: Floats) -> Floats:
         wave = np.sin(2.0 * np.pi * (x * c + y * s) / pitch_nm)
-        found: Floats = np.tanh(_STEEPNESS * (wave + _DUTY))
-        return found
+        heights: Floats = np.tanh(_STEEPNESS * (wave + _DUTY))
+        return heights
 
     return height
 
 
 def hexagonal(constant_nm: float, angle_deg: float = 7.0) -> Surface:
-    """A hexagonal lattice, its three waves of different heights as molecules without symmetry have them."""
+    """Return a hexagonal lattice, its three waves of different heights as of molecules without symmetry."""
     pitch = constant_nm * np.sqrt(3.0) / 2.0
 
     def height(x: Floats, y: Floats) -> Floats:
@@ -53,7 +53,7 @@ def hexagonal(constant_nm: float, angle_deg: float = 7.0) -> Surface:
 
 
 def rough(grain_nm: float, seed: int = 0) -> Surface:
-    """A surface without a period: waves of random directions and phases, none shorter than ``grain_nm``."""
+    """Return a surface without a period: random waves, none shorter than ``grain_nm``."""
     random = np.random.default_rng(seed)
     length = grain_nm * 8.0 ** random.random(_ROUGH_WAVES)
     angle, phase = 2.0 * np.pi * random.random((2, _ROUGH_WAVES))
@@ -149,7 +149,7 @@ def running_frame(
     pixels: int | None = None,
     down: bool = False,
 ) -> FrameImages:
-    """A settled frame of the emitted integers of a build.
+    """Simulate a settled frame of the emitted integers of a build.
 
     Columns are ``pixels`` (those of the scan file, if not given), evenly in time within x's imaging window of each
     sweep. Lines are those of the frame that lie in y's imaging window on its way up, or on its way ``down``.
@@ -181,7 +181,7 @@ def triangle_frame(
     turn: tuple[float, float] = (0.5, 0.5),
     window: tuple[float, float] = (0.0, 1.0),
 ) -> FrameImages:
-    """A settled frame of a triangle on each axis, x then y, uncompensated: ``lines`` on y's way up.
+    """Simulate a settled frame of an uncompensated triangle on each axis, x then y: ``lines`` on y's way up.
 
     Columns are ``pixels``, evenly in time within ``window`` of each sweep of x. A frame takes lines / turn[1] lines.
     """
@@ -239,7 +239,7 @@ def _frame(
     numbers: np.typing.NDArray[np.int64],
     lines: int,
 ) -> FrameImages:
-    """The lines of these numbers, of a frame of ``lines``."""
+    """Simulate the lines of these numbers, of a frame of ``lines``."""
     random = np.random.default_rng(conditions.seed)
     shown = []
     for column in columns:

@@ -62,7 +62,7 @@ class LineError:
 
 
 def about_window_line(error: LineError, directions: Sequence[str] = ("forward", "backward")) -> LineError:
-    """The same about the straight line that fits the imaged windows best, one line for all ``directions``.
+    """Return the error about the straight line that fits the imaged windows of all ``directions`` best.
 
     Where turnarounds are rounded, the ends of the line are not imaged and need not be where the ends of a straight line
     would be. What an image shows is the departure from this line, and its slope is the size of the image.
@@ -81,7 +81,7 @@ def about_window_line(error: LineError, directions: Sequence[str] = ("forward", 
 
 
 def ideal_triangle(ticks: int, turn: float, first: float = 0.0) -> Floats:
-    """The ideal position at every tick of a period, equation (14); ``first`` is when the first one is, in ticks."""
+    """Return the ideal position at every tick of a period, (14); ``first`` is when the first one is, in ticks."""
     t = (np.arange(ticks) + first) / ticks
     return np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
 
@@ -102,12 +102,12 @@ def line_error(
     triangle. The displacement's extremes are taken for those of ``ideal``: those of a triangle are the line's ends.
     """
     ticks = len(displacement_nm)
-    asked = ideal_triangle(ticks, turn, first) if ideal is None else ideal
+    intended = ideal_triangle(ticks, turn, first) if ideal is None else ideal
     low, high = float(np.min(displacement_nm)), float(np.max(displacement_nm))
-    size = (high - low) / (float(np.max(asked)) - float(np.min(asked)))
+    size = (high - low) / (float(np.max(intended)) - float(np.min(intended)))
     if not size > 0.0:
         raise ValueError("the displacement does not move")
-    reached = (displacement_nm - low) / size + float(np.min(asked))
+    reached = (displacement_nm - low) / size + float(np.min(intended))
     x = np.linspace(0.0, 1.0, POINTS)
     times = (np.arange(ticks) + first) / ticks
 

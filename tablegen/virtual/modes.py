@@ -35,11 +35,11 @@ class Modes:
         return out
 
     def faster(self, times: float) -> "Modes":
-        """The same at frequencies that are all so many times as high."""
+        """Return the modes with all frequencies multiplied by ``times``."""
         return Modes(self.direct, tuple(p * times for p in self.poles), tuple(r * times for r in self.residues))
 
     def settled(self, drive: Floats, tick_s: float) -> Floats:
-        """The periodic response to one period of a drive."""
+        """Return the periodic response to one period of a drive, shape (ticks,)."""
         if not self.poles:
             return self.direct * drive
         # The response of each recursion, taken at the harmonics of the period: the steady state without waiting for it.
@@ -53,7 +53,7 @@ class Modes:
         return np.fft.irfft(np.fft.rfft(drive) * factor, len(drive))
 
     def follow(self, drive: Floats, tick_s: float, at_rest: float | None = None) -> Floats:
-        """The response to a drive that follows a long rest at ``at_rest``, or at its own first value."""
+        """Return the response to a drive that follows a long rest at ``at_rest``, or at its own first value."""
         if not self.poles:
             return self.direct * drive
         change, weight, kept, at_once = self._held(tick_s)
@@ -77,8 +77,11 @@ class Modes:
         return (blocks @ kernel + carried).reshape(-1)[:ticks]
 
     def _held(self, tick_s: float) -> tuple[Complex, Complex, Complex, Complex]:
-        """For each term over a tick: the share by which its state changes, and the weight of the drive held; and in the
-        mean over the tick the share of the state that it began with, and of the drive held."""
+        """Return the weights of each term over a tick.
+
+        They are the share by which its state changes, and the weight of the drive held; and in the mean over the tick
+        the share of the state that it began with, and of the drive held.
+        """
         p, r = np.array(self.poles, dtype=np.complex128), np.array(self.residues, dtype=np.complex128)
         change = np.expm1(p * tick_s)
         kept = change / (p * tick_s)
@@ -92,7 +95,7 @@ def low_pass(bandwidth_hz: float) -> Modes:
 
 
 def second_order(frequency_hz: float, quality: float) -> Modes:
-    """A resonance: 1 / (1 - r^2 + i r / Q) with r = f / frequency_hz; ``quality`` above 0.5."""
+    """Return a resonance: 1 / (1 - r^2 + i r / Q) with r = f / frequency_hz; ``quality`` above 0.5."""
     w = 2.0 * pi * frequency_hz
     damped = w * sqrt(1.0 - 0.25 / quality**2)
     pole = complex(-0.5 * w / quality, damped)
@@ -106,7 +109,7 @@ def side_by_side(first: Modes, second: Modes, share: float) -> Modes:
 
 
 def delayed(held: Floats, ticks: float, before: float | None = None) -> Floats:
-    """A held drive that comes late, as its mean over each tick: periodic, or after a long rest at ``before``."""
+    """Delay a held drive, as its mean over each tick: periodic, or after a long rest at ``before``."""
     whole = int(ticks)
     part = ticks - whole
     if before is None:

@@ -10,10 +10,10 @@ LABEL = "simulation on the scanner file's own operator"
 
 
 def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]:
-    """A table for the terminal; ``without`` are the axes that have no operator."""
-    asked = " and ".join(f"{run.nominal_nm:g} nm in {run.axis}" for run in runs)
+    """Format a table for the terminal; ``without`` are the axes that have no operator."""
+    sizes = " and ".join(f"{run.nominal_nm:g} nm in {run.axis}" for run in runs)
     lines = [
-        f"{name}: {LABEL}; {asked} asked for",
+        f"{name}: {LABEL}; {sizes} asked for",
         f"mean (worst) of {SEEDS} scanners that depart from the operator at random, by its own uncertainty",
     ]
     for run in runs:
@@ -51,13 +51,13 @@ def _row(axis: str, row: OwnRow) -> str:
     start = f"{axis:<4}  {_called(row):<18}"
     if not row.errors:
         return f"{start}none: {row.rejected}"
-    found = row.summary()
+    summary = row.summary()
     cells = []
     for name in MEASURES:
-        if name not in found:
+        if name not in summary:
             cells.append("-")
             continue
-        mean, worst = found[name]
+        mean, worst = summary[name]
         sign = "+" if name == "size" else ""
         cells.append(f"{mean:{sign}.3f} ({worst:{sign}.3f})")
     return (start + "".join(f"{cell:<18}" for cell in cells)).rstrip()
@@ -68,7 +68,7 @@ def _called(row: OwnRow) -> str:
 
 
 def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str, Any]:
-    """The same for JSON: by axis and correction; ``null`` where a correction cannot be played, and why."""
+    """Return the report for JSON: by axis and correction; ``null`` where one cannot be played, and why."""
 
     def row(one: OwnRow) -> dict[str, Any]:
         return {

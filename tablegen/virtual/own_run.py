@@ -63,12 +63,12 @@ class OwnRun:
 
 
 def own_axes(setup: Setup) -> tuple[str, ...]:
-    """The axes of which the scanner file has an operator."""
+    """Return the axes of which the scanner file has an operator."""
     return tuple(name for name in ("x", "y") if isinstance(_table(setup, name), OperatorModel))
 
 
 def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda _: None) -> list[OwnRun]:
-    """Every axis with an operator, with the models that the scanner file allows; without the scan file's refinement.
+    """Simulate every axis with an operator, with the models that the scanner file allows; without refinement.
 
     Raises ``Rejected`` where the scan cannot be built with the operator, and ``Unphysical`` where a departure makes a
     branch run backwards.
@@ -89,8 +89,8 @@ def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda
 def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], object]) -> OwnRun:
     table = _table(setup, name)
     assert isinstance(table, OperatorModel)
-    found = operator_line(line)
-    operator, centre = found.operator, line.drive.driver.share(line.drive.v_offset)
+    line_of_model = operator_line(line)
+    operator, centre = line_of_model.operator, line.drive.driver.share(line.drive.v_offset)
     plants = [OwnAxis.departing(line, (seed, k)) for k in range(SEEDS)]
     rows = []
     for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):
@@ -139,9 +139,9 @@ def _table(setup: Setup, name: str) -> Hysteresis | None:
 
 
 def _laws(table: OperatorModel) -> str:
-    """The most detailed of the other models that the branches of the table serve; empty without branches."""
+    """Return the most detailed other model for the branches of the table; empty without branches."""
     served = [kind for kind in models.own() if kind.model() != models.UNCOMPENSATED and kind.order < table.order]
-    found: Any = max(
+    richest: Any = max(
         (kind for kind in served if kind.like(table) is not None), key=lambda kind: kind.order, default=None
     )
-    return "" if found is None or not table.branches else str(found.model())
+    return "" if richest is None or not table.branches else str(richest.model())

@@ -57,16 +57,19 @@ class OwnAxis:
 
     @classmethod
     def departing(cls, line: LinePlan, seed: tuple[int, ...]) -> "OwnAxis":
-        """An axis that departs from the operator of a line, and whose sensitivity does from the law of offsets."""
+        """Return an axis that departs from the operator of a line, with another law of offsets."""
         shape = operator_line(line)
         axis = cls.of(line, departing(shape.operator, seed))
         share = shape.between * float(np.random.default_rng((*seed, 1)).standard_normal())
         return replace(axis, factor=axis.factor * (1.0 + share))
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Where the axis is, in the middle of each tick, in a period that has been held tick by tick for ever.
+        """Return the settled position in the middle of each tick of a period.
 
-        Raises ``Unphysical`` where a departing branch would run backwards.
+        Raises
+        ------
+        Unphysical
+            If a departing branch would run backwards.
         """
         u = self.driver.share(volts)
         loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
@@ -75,13 +78,13 @@ class OwnAxis:
 
 
 def operator_line(line: LinePlan) -> OperatorLine:
-    """What the model made of a line that was found on an operator."""
+    """Return the model's solution of a line that was computed on an operator."""
     assert isinstance(line.drive.shape, OperatorLine)
     return line.drive.shape
 
 
 def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
-    """The operator with branches and sizes that are wrong, near each trace, by what it was missed by when left out.
+    """Return the operator with branches and sizes wrong by each trace's residual when it was left out.
 
     By the median of all traces at least: one alone may be met by chance.
     """

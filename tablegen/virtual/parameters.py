@@ -47,7 +47,13 @@ class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     lags: Annotated[list[LagTruth], Meta(max_length=4, description="duhem: lags that add up")] = []
 
     def operator(self) -> Preisach | Duhem:
-        """The operator. Raises ``ValueError`` where a branch could run backwards."""
+        """Return the operator.
+
+        Raises
+        ------
+        ValueError
+            If a branch could run backwards.
+        """
         if self.family == "preisach":
             return Preisach(tuple(self.reversible_nm), tuple(map(tuple, self.density_nm)))
         lags = (Lag(one.rise, one.fall, tuple(one.below_nm), tuple(one.above_nm)) for one in self.lags)
@@ -115,7 +121,10 @@ class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 def load_truth(source: str | Path = "default") -> Truth:
     """Read a virtual scanner: the name of one of ``BUILT_IN``, or a file.
 
-    Raises ``Rejected`` with every fault of the file.
+    Raises
+    ------
+    Rejected
+        If the file is faulty; the message has every fault.
     """
     path = Path(str(files("tablegen.virtual") / f"{source}.toml")) if source in BUILT_IN else Path(source)
     values, document = read_toml(path, str(path))

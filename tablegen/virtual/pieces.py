@@ -13,7 +13,13 @@ _SATURATION_TOLERANCE = 1e-9
 
 
 def normalised(drive: Floats) -> Floats:
-    """A drive of 0..1, without the last bits of a voltage. Raises ``ValueError`` for any other."""
+    """Round a drive of 0..1 beyond the last bits of a voltage.
+
+    Raises
+    ------
+    ValueError
+        If the drive is outside 0..1.
+    """
     drive = np.asarray(drive, dtype=np.float64)
     if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _SATURATION_TOLERANCE:
         raise ValueError(f"a drive of {drive.min():g}..{drive.max():g} leaves 0..1, for which the operator is made")
@@ -37,7 +43,7 @@ def one_minus(n: int) -> Floats:
 
 
 def powers_of(bernstein: Sequence[float]) -> Floats:
-    """The polynomial with these Bernstein coefficients over 0..1, as coefficients of 1, x, x^2, ..."""
+    """Convert Bernstein coefficients over 0..1 to coefficients of 1, x, x^2, ..."""
     n = len(bernstein) - 1
     out = np.zeros(n + 1)
     for i, weight in enumerate(bernstein):

@@ -37,7 +37,7 @@ class PlayedDrive:
 
 
 def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
-    """What an undisturbed period of one axis puts out: a line of x, a frame of y.
+    """Return what an undisturbed period of one axis puts out: a line of x, a frame of y.
 
     Of a shaped axis it is the first period since the program began. Where one is too long, its ``volts`` are those that
     shaped codes have in the mean of the ticks that one stands for.
@@ -58,7 +58,7 @@ def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
 
 
 def intended(line: LinePlan, drive: PlayedDrive) -> Floats:
-    """The position, 0..1, that the scan file's model asks for in the middle of each tick: rounded where it turns."""
+    """Return the position, 0..1, that the model asks for in the middle of each tick: rounded where it turns."""
     shape, t = line.drive.shape, drive.turns
     w = Sampler(line.described, 2 * len(t)).at(2 * np.arange(len(t), dtype=np.int64) + 1)
     return np.where(t <= shape.turn, shape.forward.inverse(w), 1.0 - shape.backward.inverse(1.0 - w))

@@ -128,7 +128,7 @@ def _monomials(n: int, i: int, j: int) -> Floats:
 
 
 def _twice_integrated(density: Floats) -> Floats:
-    """The integral of a density over beta <= b <= a <= alpha."""
+    """Integrate a density over beta <= b <= a <= alpha."""
     n = len(density) - 1
     out = np.zeros((n + 3, n + 3))
     for p in range(n + 1):

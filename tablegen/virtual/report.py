@@ -28,7 +28,7 @@ class SimulationStage:
 
 
 def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str]:
-    """A table for the terminal."""
+    """Format a table for the terminal."""
     first = next(run for stage in stages for run in stage.runs)
     lines = [
         f"{name}: {LABEL} ({truth.name!r}); "
@@ -55,19 +55,19 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
 
 
 def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
-    """What the scanner file's own models leave in the image, the worst first; of the last stage that was played."""
+    """Return what the scanner file's own models leave in the last stage's image, the worst first."""
     played = [stage for stage in stages if stage.runs]
-    found = []
+    findings = []
     for run in played[-1].runs if played else ():
         for one in (getattr(run, axis) for axis in run.asked):
-            left = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
-            side = max(left, key=lambda name: left[name])
-            text = f"the {run.model} model leaves {left[side]:.2g} % of the line of {one.axis}, {side}"
-            found.append(Finding("spoils" if left[side] > _LARGE_PERCENT else "expect", left[side], text))
+            residuals = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
+            side = max(residuals, key=lambda name: residuals[name])
+            text = f"the {run.model} model leaves {residuals[side]:.2g} % of the line of {one.axis}, {side}"
+            findings.append(Finding("spoils" if residuals[side] > _LARGE_PERCENT else "expect", residuals[side], text))
             by = one.size_error_percent
             if abs(by) > _LARGE_PERCENT:
-                found.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
-    return worst_first(found)
+                findings.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
+    return worst_first(findings)
 
 
 def _rows(axis: str, run: Run) -> list[str]:
@@ -92,7 +92,7 @@ def _range(branch: BranchError) -> str:
 
 
 def data(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> dict[str, Any]:
-    """The same as plain data, for JSON, by stage and model."""
+    """Return the report as plain data, for JSON, by stage and model."""
 
     def branch(one: BranchError, imaged: BranchError) -> dict[str, Any]:
         peak, at = one.peak

@@ -19,7 +19,7 @@ def running_trace(
     clock: float = 0.0,
     delay_s: float = 0.0,
 ) -> dict[str, Floats]:
-    """``time_s``, ``drive_v``, ``displacement_nm`` of the emitted integers, played for ever before.
+    """Simulate ``time_s``, ``drive_v``, ``displacement_nm`` of the emitted integers, settled.
 
     ``samples`` a period, of ``periods`` from ``start`` (in periods) on; time 0 is the line start before the record. The
     recorder averages over a tick about each of them, its clock is fast by ``clock``, and the sensor is late by

@@ -33,7 +33,7 @@ class ScaledAxis(VirtualAxis):
 
 
 def scaled_to(scanner: VirtualScanner, file: Scanner) -> tuple[VirtualScanner, str]:
-    """The scanner in the drive range of a scanner file, and with its nm per V at ``base_nm``; and what was done.
+    """Scale the scanner to the drive range of a file, and to its nm per V at ``base_nm``; describe the changes.
 
     Its resonance goes to that of the file if that is more than a factor of 2 away; other frequencies stay. A scanner
     that goes as far as the file says within 5 % in both axes, over the same range, and whose resonances stay, is
@@ -57,8 +57,8 @@ def _scaled(axis: VirtualAxis, file: ScannerAxis, driver: Driver) -> ScaledAxis:
     share = min(file.size.base_nm / (file.size.k_nm_per_v * driver.span), 1.0)
     drive = 0.5 + share * (ideal_triangle(_TICKS, 0.5) - 0.5)
     moved = float(np.ptp(axis.hysteresis.settled(drive)))
-    kept: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
-    return ScaledAxis(**{**kept, "driver": driver}, times=file.size.k_nm_per_v * share * driver.span / moved)
+    attributes: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
+    return ScaledAxis(**{**attributes, "driver": driver}, times=file.size.k_nm_per_v * share * driver.span / moved)
 
 
 def _faster(axis: VirtualAxis, file: ScannerAxis) -> float | None:

@@ -79,7 +79,7 @@ class VirtualAxis:
         return self.resonance.settled(self.creep.settled(moved, tick_s), tick_s)
 
     def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
-        """The same of a drive that begins after a long rest at its first voltage.
+        """Return the response to a drive that begins after a long rest at its first voltage.
 
         Without a memory the sensitivity is that at ``mean_v``, by default the mean of this drive, and does not change
         meanwhile. A memory begins with ``mean_v``, by default the first voltage.
@@ -100,7 +100,7 @@ class VirtualAxis:
         return self.resonance.follow(crept, tick_s, at_rest * float(self.creep.response(0.0).real))
 
     def response(self, f_hz: FloatsLike) -> npt.NDArray[np.complex128]:
-        """The linear part of the response to small signals, hysteresis aside: amplifier, creep, resonance."""
+        """Return the linear response to small signals, hysteresis aside: amplifier, creep, resonance."""
         late = np.exp(-2j * pi * self.dead_time_s * np.asarray(f_hz, dtype=np.float64))
         linear = self.amplifier.response(f_hz) * self.creep.response(f_hz) * self.resonance.response(f_hz)
         return np.asarray(late * linear, dtype=np.complex128)
@@ -117,7 +117,7 @@ class VirtualAxis:
         return sensitivity(self.sensitivity, self.driver.p(np.asarray(mean_v, dtype=np.float64)))
 
     def _normalised(self, volts: Floats) -> Floats:
-        """The drive, 0..1; the operator is made for no other.
+        """Normalise the drive to 0..1; the operator is made for no other.
 
         Rounded, since the last bits of a level that the amplifier holds would else be turning points.
         """
@@ -138,5 +138,5 @@ class VirtualScanner:
 
     @classmethod
     def of(cls, truth: Truth) -> "VirtualScanner":
-        """The scanner of a file."""
+        """Return the scanner of a file."""
         return cls(truth.name, *(VirtualAxis.of(axis, truth.v_max, truth.amplifier) for axis in (truth.x, truth.y)))

@@ -16,6 +16,6 @@ class Sensor:
     seed: int = 0
 
     def read(self, displacement_nm: Floats, time_s: Floats) -> Floats:
-        """Readings of a displacement at times in s."""
+        """Return readings of a displacement at times in s, shape (samples,)."""
         noise = np.random.default_rng(self.seed).standard_normal(displacement_nm.shape)
         return displacement_nm + self.drift_nm_per_s * time_s + self.noise_nm * noise

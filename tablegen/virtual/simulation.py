@@ -65,14 +65,14 @@ def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
 
 
 def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS) -> list[AxisRun]:
-    """The same line on several axes, at no more ticks than that of a period."""
+    """Play the same line on several axes, at no more ticks than that of a period."""
     drive = played(line, most_ticks)
-    asked = intended(line, drive)
-    return [_axis_run(line, drive, asked, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
+    requested = intended(line, drive)
+    return [_axis_run(line, drive, requested, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
 
 
-def _axis_run(line: LinePlan, drive: PlayedDrive, asked: Floats, displacement: Floats) -> AxisRun:
-    error = line_error(displacement, line.drive.turn, line.band_limit.window, asked, 0.5)
+def _axis_run(line: LinePlan, drive: PlayedDrive, requested: Floats, displacement: Floats) -> AxisRun:
+    error = line_error(displacement, line.drive.turn, line.band_limit.window, requested, 0.5)
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
     return AxisRun(
         axis=line.axis,
@@ -88,7 +88,7 @@ def _axis_run(line: LinePlan, drive: PlayedDrive, asked: Floats, displacement: F
 
 
 def with_model(setup: Setup, model: str) -> Setup:
-    """The same scan with another hysteresis model on both axes; one that has no parameters for it keeps its own.
+    """Return the scan with another hysteresis model on both axes, unless an axis has no parameters for it.
 
     A refinement was learnt over the scanner file's own model, and stays on axes that keep it.
     """
@@ -112,16 +112,21 @@ def models_of(setup: Setup) -> tuple[str, ...]:
     """
     both = (setup.scanner.x.hysteresis, setup.scanner.y.hysteresis)
     calibrated = [h for h in both if h is not None and h.calibrated]
-    found: set[type[Hysteresis]] = {models.get(models.UNCOMPENSATED), *map(type, calibrated)}
+    kinds: set[type[Hysteresis]] = {models.get(models.UNCOMPENSATED), *map(type, calibrated)}
     if calibrated:
-        found |= {kind for kind in models.own() if all(kind.like(h) is not None for h in calibrated)}
-    return tuple(kind.model() for kind in sorted(found, key=lambda kind: (kind.order, kind.model())))
+        kinds |= {kind for kind in models.own() if all(kind.like(h) is not None for h in calibrated)}
+    return tuple(kind.model() for kind in sorted(kinds, key=lambda kind: (kind.order, kind.model())))
 
 
 def simulate(setup: Setup, scanner: VirtualScanner, model: str) -> Run:
     """Plan a scan with a hysteresis model, and play it on both axes.
 
-    Raises ``Rejected`` where it cannot be played so, and ``ValueError`` where it leaves the virtual scanner's range.
+    Raises
+    ------
+    Rejected
+        If the scan cannot be played so.
+    ValueError
+        If it leaves the virtual scanner's range.
     """
     plan = make_plan(with_model(setup, model))
     asked = tuple(

@@ -15,10 +15,10 @@ from tablegen.waveform.series import FourierSeries
 
 
 class SweepMoments(Protocol):
-    """A branch that knows its moments."""
+    """A branch with moments in closed form."""
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part at y."""
+        """Return real and imaginary part of the moments at y, each of the shape of ``y``."""
 
 
 class TwoSweeps(Protocol):
@@ -26,7 +26,7 @@ class TwoSweeps(Protocol):
 
     @property
     def turn(self) -> float:
-        """Where it turns, in periods."""
+        """The time at which it turns, in periods."""
 
     @property
     def forward(self) -> SweepMoments:
@@ -34,11 +34,11 @@ class TwoSweeps(Protocol):
 
     @property
     def backward(self) -> SweepMoments:
-        """The branch behind it, as 1 - u."""
+        """The branch after the turn, as 1 - u."""
 
 
 def fourier_series(shape: TwoSweeps, harmonics: int) -> FourierSeries:
-    """The first ``harmonics`` coefficients of a line waveform, w in [0, 1]."""
+    """Return the first ``harmonics`` coefficients of a line waveform, w in [0, 1]."""
     n = np.arange(harmonics + 1, dtype=np.float64)
     turn = shape.turn
     forward = shape.forward.moments(n * turn)

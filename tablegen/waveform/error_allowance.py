@@ -1,4 +1,4 @@
-"""What a waveform may err by for the sake of less acceleration."""
+"""The error that a waveform may have in exchange for less acceleration."""
 
 from msgspec import Struct
 

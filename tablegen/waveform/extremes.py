@@ -1,4 +1,4 @@
-"""Where a waveform turns: between its extremes it is monotonic, so that what follows it in steps errs most there."""
+"""The extremes of a waveform: it is monotonic between them, so that what follows it in steps errs most there."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,14 +9,19 @@ from tablegen.waveform.series import FourierSeries
 
 
 def extreme_points(series: FourierSeries) -> int:
-    """Points of a grid that is fine enough to see every extreme."""
+    """Return how many points a grid needs to resolve every extreme."""
     return 64 * series.harmonics
 
 
 def extreme_ticks(w: Floats, slope_and_bend: Callable[[Floats], Sequence[Floats]], ticks: int) -> Ints:
-    """The ticks before and behind each extreme, ascending, of a period of ``ticks``.
+    """Return the ticks before and behind each extreme of a period of ``ticks``, ascending.
 
-    ``w`` is the waveform on a grid of ``extreme_points``, ``slope_and_bend`` its first two derivatives at times.
+    Parameters
+    ----------
+    w
+        The waveform on a grid of ``extreme_points``, shape (points,).
+    slope_and_bend
+        Returns the first two derivatives at times in periods.
     """
     points = len(w)
     turning = (w - np.roll(w, 1)) * (np.roll(w, -1) - w) <= 0.0

@@ -16,7 +16,7 @@ from tablegen.waveform.series import FourierSeries
 
 
 class HarmonicRows:
-    """``weight`` times derivative 0, 1 or 2 at ``times`` (periods); both (m,). The series has ``harmonics``."""
+    """Rows ``weight`` times derivative 0, 1 or 2 at ``times`` (periods); both (m,). The series has ``harmonics``."""
 
     def __init__(self, times: Floats, weight: Floats, harmonics: int, derivative: int) -> None:
         n = np.arange(2 * harmonics + 1, dtype=np.float64)
@@ -32,7 +32,7 @@ class HarmonicRows:
         self._apart, self._sign, self._together = np.abs(minus), np.sign(minus), order[:, None] + order[None, :]
 
     def times(self, y: Floats) -> Floats:
-        """The rows applied to unknowns (2 H + 1,): (m,)."""
+        """Return the rows applied to unknowns: y of shape (2 H + 1,), the result (m,)."""
         c, s = self._by_time
         h = self._harmonics
         p = self._factor * y[: h + 1]
@@ -43,7 +43,7 @@ class HarmonicRows:
         return sign * self._weight * folded_sum(c * p + s * q)
 
     def transposed(self, z: Floats) -> Floats:
-        """The transposed map of (m,): (2 H + 1,)."""
+        """Return the transposed rows applied to z: z of shape (m,), the result (2 H + 1,)."""
         low = slice(0, self._harmonics + 1)
         z = self._weight * z
         cosines, sines = folded_sum(self._c[low] * z), folded_sum(self._s[low] * z)
@@ -54,7 +54,7 @@ class HarmonicRows:
         return np.concatenate([self._factor * cosines, (self._factor * sines)[1:]])
 
     def gram(self, diagonal: Floats) -> Floats:
-        """B^T diag(diagonal) B, (2 H + 1, 2 H + 1)."""
+        """Return the matrix B^T diag(diagonal) B: ``diagonal`` of shape (m,), the result (2 H + 1, 2 H + 1)."""
         weight = diagonal * self._weight * self._weight
         cosines, sines = folded_sum(self._c * weight), folded_sum(self._s * weight)
         near, far = cosines[self._apart], cosines[self._together]
@@ -74,13 +74,13 @@ class HarmonicRows:
 
 
 def unknowns(series: FourierSeries) -> Floats:
-    """y of a series."""
+    """Return the unknowns y of a series, shape (2 H + 1,)."""
     rate = tau * np.arange(1, series.harmonics + 1)
     return np.concatenate([[series.a0], rate * rate * series.a, rate * rate * series.b])
 
 
 def series_of(y: Floats) -> FourierSeries:
-    """The series of unknowns y."""
+    """Return the series of unknowns y, shape (2 H + 1,)."""
     harmonics = len(y) // 2
     rate = tau * np.arange(1, harmonics + 1)
     return FourierSeries(float(y[0]), y[1 : harmonics + 1] / (rate * rate), y[harmonics + 1 :] / (rate * rate))

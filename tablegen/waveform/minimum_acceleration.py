@@ -17,7 +17,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Floats
-from tablegen.numerics.interior_point import Least, Within, least_bound
+from tablegen.numerics.interior_point import Bounded, Minimum, least_bound
 from tablegen.numerics.turns import cosine
 from tablegen.waveform.harmonic_rows import HarmonicRows, series_of, unknowns
 from tablegen.waveform.refined import WaveformShape
@@ -30,7 +30,7 @@ _NODES_PER_WAVE = 14  # in a window, of the highest harmonic
 _ACCELERATIONS_PER_WAVE = 12
 _RANGE_PER_WAVE, _LEAST_RANGE = 8, 512
 _PLACES = 17  # of a window at which the position is held
-_TIGHT = 0.94  # what is asked of the nodes, so that it holds between them
+_TIGHT = 0.94  # share of the bound imposed at the nodes, so that it holds between them
 _TRIALS = 4
 _RANGE_MARGIN = 1e-3
 _CERTIFICATE_POINTS = 16, 513  # of a window: so many a harmonic, and so many more
@@ -38,57 +38,62 @@ _CERTIFICATE_POINTS = 16, 513  # of a window: so many a harmonic, and so many mo
 
 @dataclass(frozen=True)
 class Straightness:
-    """Where a line of ``shape`` has to be straight: the ``window`` in normalised position, backward too if ``both``.
+    """The places where a line of ``shape`` has to be straight: the ``window`` in position, backward too if ``both``.
 
-    ``asked`` is what is followed there; slopes are measured in those of ``shape``.
+    ``target`` is what is followed there; slopes are measured in those of ``shape``.
     """
 
     shape: WaveformShape
-    asked: WaveformShape
+    target: WaveformShape
     window: tuple[float, float]
     both: bool
 
     @property
     def up_to_its_turns(self) -> bool:
-        """Whether an end of the line is imaged: within [0, 1] there is no room to turn."""
+        """True if an end of the line is imaged: within [0, 1] there is no room to turn."""
         return self.window[0] <= 0.0 or self.window[1] >= 1.0
 
     def times(self, x: Floats) -> list[Floats]:
-        """When the directions that image pass places x of the window, 0..1."""
+        """Return when each direction that images passes places x of the window, 0..1; each of the shape of x."""
         low, high = self.window
         place, turn = low + (high - low) * x, self.shape.turn
         forward = turn * place
         return [forward, turn + (1.0 - turn) * (1.0 - place)] if self.both else [forward]
 
     def error_percent(self, series: FourierSeries) -> float:
-        """Scaling error, percent: twice the largest deviation of a slope, on the grid of the certificate."""
+        """Return the scaling error in percent: twice the largest error of a slope on the grid of the certificate."""
         per_harmonic, more = _CERTIFICATE_POINTS
         count = per_harmonic * series.harmonics + more
         t = np.concatenate(self.times(np.arange(count) / (count - 1.0)))
         slope = values(t, (series, 1))[0]
-        return 200.0 * float(np.max(np.abs((slope - self.asked.slope(t)) / self.shape.slope(t))))
+        return 200.0 * float(np.max(np.abs((slope - self.target.slope(t)) / self.shape.slope(t))))
 
 
 class Unreachable(Unphysical):
-    """The harmonics cannot be as straight as asked; ``least_percent`` is what they can, None where nothing is known."""
+    """The harmonics cannot be as straight as requested; ``least_percent`` is their least error, None if not known."""
 
     def __init__(self, why: str, least_percent: float | None = None) -> None:
         super().__init__(why)
         self.least_percent = least_percent
 
 
-def gentlest(straight: Straightness, harmonics: int, percent: float) -> FourierSeries:
-    """The series of ``harmonics`` that keeps a scaling error of ``percent``, peak to peak, with the least acceleration.
+def minimum_acceleration_series(straight: Straightness, harmonics: int, percent: float) -> FourierSeries:
+    """Return the series of minimum acceleration that keeps a scaling error of ``percent``, peak to peak.
 
     Its peak acceleration is within some percent of the optimum, and never above that of ``fit_window`` where that is as
-    straight. Raises ``Unreachable`` where it does not go.
+    straight.
+
+    Raises
+    ------
+    Unreachable
+        If the harmonics cannot keep the error.
     """
     first = _window(straight, harmonics)
     error = straight.error_percent(first)
     try:
-        best = _gentlest(straight, harmonics, percent, first, error, held=False)
+        best = _minimum_acceleration(straight, harmonics, percent, first, error, hold_range=False)
         if not _in_range(best):
-            best = _gentlest(straight, harmonics, percent, first, error, held=True)
+            best = _minimum_acceleration(straight, harmonics, percent, first, error, hold_range=True)
     except Unreachable:
         if error > percent:
             raise
@@ -97,46 +102,49 @@ def gentlest(straight: Straightness, harmonics: int, percent: float) -> FourierS
 
 
 def least_percent(straight: Straightness, harmonics: int, enough: float = 0.0) -> float:
-    """The least scaling error, percent, that ``gentlest`` keeps for certain, or any below ``enough``.
+    """Return the least scaling error, percent, that is kept for certain, or any below ``enough``.
 
-    Raises ``Unreachable`` where the harmonics cannot stay in the range.
+    Raises
+    ------
+    Unreachable
+        If the harmonics cannot stay in the range.
     """
     first = _window(straight, harmonics)
-    programme = _Programme(straight, harmonics, held=False)
-    found = programme.straightest(first, enough)
-    if not _in_range(series_of(found.y)):
-        found = _Programme(straight, harmonics, held=True).straightest(first, enough)
-    return _promised(found.bound)
+    programme = _Programme(straight, harmonics, hold_range=False)
+    optimum = programme.straightest(first, enough)
+    if not _in_range(series_of(optimum.y)):
+        optimum = _Programme(straight, harmonics, hold_range=True).straightest(first, enough)
+    return _promised(optimum.bound)
 
 
 def fewest_harmonics(straight: Straightness, percent: float, first: int, most: int) -> int | None:
-    """The fewest harmonics from ``first`` to ``most`` that keep a scaling error of ``percent``; None if none do.
+    """Return the fewest harmonics from ``first`` to ``most`` that keep a scaling error of ``percent``; None if none do.
 
-    More harmonics are never less straight, so that the number is found by halves. None draw a line that is straight up
-    to where it turns.
+    More harmonics are never less straight, so that the number is found by bisection. No number of them draws a line
+    that is straight up to where it turns.
     """
     if straight.up_to_its_turns:
         return None
 
-    def reach(harmonics: int) -> bool:
+    def keeps(harmonics: int) -> bool:
         try:
             return least_percent(straight, harmonics, percent) <= percent
         except Unphysical:
             return False
 
     low, high = first - 1, first
-    while not reach(high):
+    while not keeps(high):
         if high >= most:
             return None
         low, high = high, min(2 * high, most)
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if reach(middle) else (middle, high)
+        low, high = (low, middle) if keeps(middle) else (middle, high)
     return high
 
 
 def _window(straight: Straightness, harmonics: int) -> FourierSeries:
-    return fit_window(straight.asked, harmonics, straight.window, straight.both)
+    return fit_window(straight.target, harmonics, straight.window, straight.both)
 
 
 def _in_range(series: FourierSeries) -> bool:
@@ -147,35 +155,35 @@ def _in_range(series: FourierSeries) -> bool:
 
 
 def _promised(bound: float) -> float:
-    """Percent that surely can be had, of a bound on slopes at the nodes that was reached within the gap."""
+    """Return the percent that can be promised for a bound on slopes at the nodes that was reached within the gap."""
     return 200.0 * 1.02 * bound / _TIGHT
 
 
-def _gentlest(
-    straight: Straightness, harmonics: int, percent: float, first: FourierSeries, error: float, held: bool
+def _minimum_acceleration(
+    straight: Straightness, harmonics: int, percent: float, first: FourierSeries, error: float, hold_range: bool
 ) -> FourierSeries:
-    programme = _Programme(straight, harmonics, held)
+    programme = _Programme(straight, harmonics, hold_range)
     share = _TIGHT
     start = first
-    if held or error > 0.9 * share * percent:
-        found = programme.straightest(first, percent)
-        if _promised(found.bound) > percent:
-            least = _promised(found.bound)
+    if hold_range or error > 0.9 * share * percent:
+        straightest = programme.straightest(first, percent)
+        if _promised(straightest.bound) > percent:
+            least = _promised(straightest.bound)
             raise Unreachable(f"{harmonics} harmonics leave at least {least:.3g} % in this window", least)
-        start = series_of(found.y)
+        start = series_of(straightest.y)
     for _ in range(_TRIALS):
-        series = series_of(programme.gentlest(start, share * percent / 200.0).y)
+        series = series_of(programme.minimise(start, share * percent / 200.0).y)
         error = straight.error_percent(series)
-        if error <= percent and (not held or _in_range(series)):
+        if error <= percent and (not hold_range or _in_range(series)):
             return series
         share *= min(0.99, 0.995 * percent / error)
     raise Unreachable(f"{harmonics} harmonics came to no waveform of {percent:g} % in this window; allow more")
 
 
 class _Programme:
-    """The rows of a line: slopes and places in its windows, accelerations outside, and all of the range if ``held``."""
+    """The rows of a line: slopes and places in its windows, accelerations outside, and the range if ``hold_range``."""
 
-    def __init__(self, straight: Straightness, harmonics: int, held: bool) -> None:
+    def __init__(self, straight: Straightness, harmonics: int, hold_range: bool) -> None:
         shape, turn = straight.shape, straight.shape.turn
         low, high = straight.window
         slope_times, place_times = [], []
@@ -186,33 +194,33 @@ class _Programme:
             place_times.append(straight.times(np.arange(_PLACES) / (_PLACES - 1.0))[side])
         t = np.concatenate(slope_times)
         slope = shape.slope(t)
-        self._slopes = HarmonicRows(t, 1.0 / slope, harmonics, 1), straight.asked.slope(t) / slope
+        self._slopes = HarmonicRows(t, 1.0 / slope, harmonics, 1), straight.target.slope(t) / slope
         # Position error over the line: (w - u) / u', in the line's own time, which a share of the period stretches.
         t = np.concatenate(place_times)
         steepness = np.abs(shape.slope(t)) * np.where(t <= turn, turn, 1.0 - turn)
-        self._places = HarmonicRows(t, 1.0 / steepness, harmonics, 0), straight.asked.value(t) / steepness
+        self._places = HarmonicRows(t, 1.0 / steepness, harmonics, 0), straight.target.value(t) / steepness
         count = _ACCELERATIONS_PER_WAVE * harmonics
         t = np.arange(count) / count
         place = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
         t = t[(place <= low) | (place >= high) | ((t > turn) & (not straight.both))]
         self._accelerations = HarmonicRows(t, np.ones(len(t)), harmonics, 2), np.zeros(len(t))
-        self._range: list[Within] = []
-        if held:
+        self._range: list[Bounded] = []
+        if hold_range:
             count = max(_RANGE_PER_WAVE * harmonics, _LEAST_RANGE)
             rows = HarmonicRows(np.arange(count) / count, np.ones(count), harmonics, 0)
-            self._range = [Within(rows, np.full(count, 0.5), 0.5 - _RANGE_MARGIN, 0.0)]
+            self._range = [Bounded(rows, np.full(count, 0.5), 0.5 - _RANGE_MARGIN, 0.0)]
 
-    def straightest(self, start: FourierSeries, percent: float) -> Least:
-        """The least bound on slopes; the first one by which ``percent`` surely can be had will do."""
-        parts = [Within(*self._slopes, 0.0, 1.0), Within(*self._places, 0.0, POSITION), *self._range]
+    def straightest(self, start: FourierSeries, percent: float) -> Minimum:
+        """Return the least bound on slopes, or the first one for which ``percent`` can be promised."""
+        parts = [Bounded(*self._slopes, 0.0, 1.0), Bounded(*self._places, 0.0, POSITION), *self._range]
         return least_bound(parts, unknowns(start), _GAP, lambda bound: _promised(bound) <= percent)
 
-    def gentlest(self, start: FourierSeries, half: float) -> Least:
-        """The least acceleration with slopes within ``half``."""
-        parts: Sequence[Within] = [
-            Within(*self._accelerations, 0.0, 1.0),
-            Within(*self._slopes, half, 0.0),
-            Within(*self._places, POSITION * half, 0.0),
+    def minimise(self, start: FourierSeries, half: float) -> Minimum:
+        """Return the least acceleration with slopes within ``half``."""
+        parts: Sequence[Bounded] = [
+            Bounded(*self._accelerations, 0.0, 1.0),
+            Bounded(*self._slopes, half, 0.0),
+            Bounded(*self._places, POSITION * half, 0.0),
             *self._range,
         ]
         return least_bound(parts, unknowns(start), _GAP)

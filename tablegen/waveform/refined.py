@@ -1,4 +1,4 @@
-"""What the drive is to follow: a shape of the model, or one with a layer over it that was learnt from a measurement."""
+"""The target of a drive: the shape of the model, or that shape with a layer learnt from a measurement."""
 
 from typing import Protocol
 
@@ -13,30 +13,30 @@ class WaveformShape(Protocol):
 
     @property
     def turn(self) -> float:
-        """Where it turns, in periods."""
+        """The time at which it turns, in periods."""
 
     def value(self, t: FloatsLike) -> Floats:
-        """w(t) with t in periods."""
+        """Return w(t) with t in periods, of the shape of ``t``."""
 
     def slope(self, t: FloatsLike) -> Floats:
-        """dw/dt per period."""
+        """Return dw/dt per period, of the shape of ``t``."""
 
 
 class RefinedShape(Struct, frozen=True):
-    """u(t) + r(t): the model's shape, and the layer, both dimensionless, t in periods."""
+    """The sum u(t) + r(t) of the model's shape and the layer, both dimensionless, t in periods."""
 
     model: WaveformShape
     layer: FourierSeries
 
     @property
     def turn(self) -> float:
-        """Where it turns, in periods."""
+        """The time at which it turns, in periods."""
         return self.model.turn
 
     def value(self, t: FloatsLike) -> Floats:
-        """w(t)."""
+        """Return w(t) with t in periods, of the shape of ``t``."""
         return self.model.value(t) + self.layer.value(t)
 
     def slope(self, t: FloatsLike) -> Floats:
-        """dw/dt per period."""
+        """Return dw/dt per period, of the shape of ``t``."""
         return self.model.slope(t) + self.layer.value(t, 1)

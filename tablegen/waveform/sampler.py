@@ -15,7 +15,7 @@ from tablegen.waveform.series import FourierSeries
 _TAYLOR_ORDER = 6
 # Half a block of the highest harmonic is then pi/64 of angle, and its seventh power over 7! is 1e-13.
 _BLOCKS_PER_HARMONIC = 64
-_CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
+_CHUNK_TICKS = 1 << 14  # ticks that are computed at a time, so that they fit the cache
 
 # Half a block of the highest harmonic is then pi/16 of angle: its eleventh power over 11! is 4e-16.
 _LONG_ORDER, _LONG_BLOCKS_PER_HARMONIC = 10, 16
@@ -30,9 +30,9 @@ Grid = Callable[[FourierSeries, int, int], Floats]
 
 
 def on_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
-    """w(k / count), or a derivative of it, for k in [0, count), by a transform.
+    """Return w(k / count), or a derivative of it, for k in [0, count), by a transform; shape (count,).
 
-    ``count`` is above twice the highest harmonic.
+    ``count`` has to be above twice the highest harmonic.
     """
     spectrum = _spectrum(series)
     if derivative:
@@ -42,14 +42,15 @@ def on_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
 
 
 def slow_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
-    """The same from sums in a fixed order: the same bits on every machine."""
+    """Return ``on_grid`` from sums in a fixed order: the same bits on every machine."""
     return series.on_grid(count, derivative)
 
 
 class Expansion:
-    """w and its first two derivatives at any times, to some units in the last place, in a time without harmonics in it.
+    """Evaluator of w and its first two derivatives at any times, to some units in the last place.
 
-    Taylor series about the centres of blocks, as in ``Sampler``, but to the precision of the numbers.
+    Taylor series about the centres of blocks, as in ``Sampler``, but to the precision of the numbers: the cost of a
+    time does not depend on the harmonics.
     """
 
     def __init__(self, series: FourierSeries) -> None:
@@ -63,7 +64,7 @@ class Expansion:
         self._terms: list[Floats] = list(np.fft.irfft(spectra, blocks))
 
     def at(self, t: Floats, *derivatives: int) -> list[Floats]:
-        """w, or these derivatives of it, at times in periods."""
+        """Return w, or these derivatives of it, at times in periods; each of the shape of ``t``."""
         nearest = np.rint(t * self._blocks)
         h = t - nearest / self._blocks
         block = nearest.astype(np.int64) & (self._blocks - 1)
@@ -72,7 +73,7 @@ class Expansion:
 
 
 def _derivative(near: list[Floats], h: Floats, order: int) -> Floats:
-    """The derivative of a polynomial in h with these coefficients, but for its highest terms, by Horner."""
+    """Return the derivative of a polynomial in h, without its highest terms, by Horner's rule."""
     total = np.zeros_like(h)
     for m in reversed(range(order, order + _LONG_ORDER + 1)):
         total *= h
@@ -81,7 +82,7 @@ def _derivative(near: list[Floats], h: Floats, order: int) -> Floats:
 
 
 class Sampler:
-    """w(k / count) for any k in [0, count); error below 1e-12.
+    """Evaluator of w(k / count) for any k in [0, count); error below 1e-12.
 
     Long periods are expanded into Taylor series about the centres of blocks: a few multiplications a tick, however
     many harmonics there are.
@@ -98,7 +99,7 @@ class Sampler:
         self._terms = [grid(series, blocks, m) / factorial(m) for m in range(_TAYLOR_ORDER + 1)]
 
     def at(self, k: Ints) -> Floats:
-        """w(k / count) for any k in [0, count)."""
+        """Return w(k / count) for any k in [0, count), of the shape of ``k``."""
         if not self._blocks:
             return self._samples[k]
         if len(k) <= _CHUNK_TICKS:

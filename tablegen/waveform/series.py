@@ -13,21 +13,21 @@ from tablegen.numerics.turns import sine_and_cosine
 
 _Real = TypeVar("_Real", float, Floats)
 
-_BLOCK = 1 << 12  # times that are worked out together
-_TURNED = 16  # harmonics from one whose sine is worked out to the next
+_BLOCK = 1 << 12  # times that are computed at a time
+_ROTATED = 16  # harmonics from one whose sine is computed to the next
 
-_KEPT = 1 << 17  # cosines of one grid that are kept for the next series on it, and as many sines: 2 MB
+_CACHED = 1 << 17  # cosines of one grid that are cached for the next series on it, and as many sines: 2 MB
 
 
 def _waves(count: int, harmonics: int) -> Iterator[tuple[Floats, Floats]]:
-    """Cosine and sine of 2 pi n k / count for k in [0, count / 4], for n = 1..harmonics; ``count`` is even."""
+    """Yield cosine and sine of 2 pi n k / count for k in [0, count / 4], for n = 1..harmonics; ``count`` is even."""
     s, c = sine_and_cosine(np.arange(count) / count)
     for at in multiples(np.arange(count // 4 + 1), count, harmonics):
         yield c.take(at, mode="clip"), s.take(at, mode="clip")
 
 
 @lru_cache(maxsize=4)  # both axes, in a plan and in its certificate
-def _kept_waves(count: int, harmonics: int) -> tuple[Floats, Floats]:
+def _cached_waves(count: int, harmonics: int) -> tuple[Floats, Floats]:
     cosines, sines = (np.empty((harmonics, count // 4 + 1)) for _ in "cs")
     for n, (c, s) in enumerate(_waves(count, harmonics)):
         cosines[n], sines[n] = c, s
@@ -35,14 +35,14 @@ def _kept_waves(count: int, harmonics: int) -> tuple[Floats, Floats]:
 
 
 def _sums(a0: float, a: Floats, b: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Values on a quarter of a grid, k in [0, count / 4]: at k, count - k, count / 2 + k and count / 2 - k.
+    """Return the values on a quarter of a grid, k in [0, count / 4]: at k, count - k, count / 2 + k and count / 2 - k.
 
     Each is the sum of its harmonics in order. At count - k the sines have the other sign, half a period on all odd
     harmonics, so that all four have the same products.
     """
     points = count // 4 + 1
-    if len(a) * points <= _KEPT:
-        cosines, sines = _kept_waves(count, len(a))
+    if len(a) * points <= _CACHED:
+        cosines, sines = _cached_waves(count, len(a))
         cosine_terms, sine_terms = cosines * a[:, None], sines * b[:, None]
         terms = cosine_terms + sine_terms, np.subtract(cosine_terms, sine_terms, out=cosine_terms)
         near = [np.add.reduce(part, axis=0, initial=a0) for part in terms]
@@ -75,15 +75,15 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def harmonics(self) -> int:
-        """H, the highest harmonic."""
+        """The highest harmonic H."""
         return len(self.a)
 
     def value(self, t: FloatsLike, derivative: int = 0) -> Floats:
-        """w, or its derivative with respect to t, at times in periods; of the shape of ``t``."""
+        """Return w, or its derivative with respect to t, at times in periods; of the shape of ``t``."""
         return values(t, (self, derivative))[0]
 
     def on_grid(self, count: int, derivative: int = 0) -> Floats:
-        """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
+        """Return ``value`` at k / count for k in [0, count), shape (count,), by one table of sines."""
         if count % 2:
             return self.on_grid(2 * count, derivative)[::2].copy()
         a, b = _differentiated(np.arange(1.0, self.harmonics + 1.0), self.a, self.b, derivative)
@@ -97,16 +97,16 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
-        """Harmonic n, or its derivative, where sine and cosine of 2 pi n t are s and c."""
+        """Return harmonic n, or its derivative, where sine and cosine of 2 pi n t are s and c; of their shape."""
         a, b = self._factors(n, derivative)
         return a * c + b * s
 
     def _factors(self, n: int, derivative: int) -> tuple[float, float]:
-        """Of the cosine and of the sine of harmonic n in a derivative."""
+        """Return the factors of the cosine and of the sine of harmonic n in a derivative."""
         return _differentiated(n, float(self.a[n - 1]), float(self.b[n - 1]), derivative)
 
     def peak_slope(self) -> float:
-        """max |w'| per period, on a grid of 32 points per period of the highest harmonic."""
+        """Return max |w'| per period, on a grid of 32 points per period of the highest harmonic."""
         return self._peak_slope
 
     @cached_property
@@ -114,11 +114,11 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return float(np.max(np.abs(self.on_grid(32 * self.harmonics, 1))))
 
     def peak_acceleration(self) -> float:
-        """max |w''| per period squared, on a grid of 32 points per period of the highest harmonic."""
+        """Return max |w''| per period squared, on a grid of 32 points per period of the highest harmonic."""
         return float(np.max(np.abs(self.on_grid(32 * self.harmonics, 2))))
 
     def plus(self, other: "FourierSeries") -> "FourierSeries":
-        """The sum of both, with the harmonics of the longer one."""
+        """Return the sum of two series, with the harmonics of the longer one."""
         count = max(self.harmonics, other.harmonics)
         a, b = np.zeros(count), np.zeros(count)
         for one in (self, other):
@@ -127,11 +127,11 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return FourierSeries(self.a0 + other.a0, a, b)
 
     def less(self, other: "FourierSeries") -> "FourierSeries":
-        """The difference."""
+        """Return the difference of two series, with the harmonics of the longer one."""
         return self.plus(FourierSeries(-other.a0, -other.a, -other.b))
 
     def times(self, real: Floats, imaginary: Floats) -> "FourierSeries":
-        """The series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
+        """Return the series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)
 
 
@@ -144,26 +144,33 @@ def _differentiated(n: _Real, a: _Real, b: _Real, derivative: int) -> tuple[_Rea
     return (factor * a, factor * b) if derivative else (a, b)
 
 
-def values(t: FloatsLike, *asked: tuple[FourierSeries, int]) -> tuple[Floats, ...]:
-    """Values of several series or of their derivatives at the same times, each of the shape of ``t``.
+def values(t: FloatsLike, *requests: tuple[FourierSeries, int]) -> tuple[Floats, ...]:
+    """Return the values of several series or of their derivatives at the same times, each of the shape of ``t``.
 
-    The sines are worked out once for all of them: each sixteenth harmonic by itself, and those that follow by turning
-    it on, which leaves some 16 units in the last place.
+    Each sixteenth harmonic has sines of its own; those that follow are rotated from it, which leaves some 16 units in
+    the last place.
+
+    Parameters
+    ----------
+    t
+        Times in periods.
+    requests
+        Each a series and the order of its derivative.
     """
     t = np.asarray(t, dtype=np.float64)
-    totals = tuple(np.full(t.shape, series.a0 if derivative == 0 else 0.0) for series, derivative in asked)
-    harmonics = max(series.harmonics for series, _ in asked)
+    totals = tuple(np.full(t.shape, series.a0 if derivative == 0 else 0.0) for series, derivative in requests)
+    harmonics = max(series.harmonics for series, _ in requests)
     for first in range(0, t.size, _BLOCK):  # a block stays in the cache through all harmonics
         block = t.reshape(-1)[first : first + _BLOCK]
         parts = [total.reshape(-1)[first : first + _BLOCK] for total in totals]
         first_s, first_c = sine_and_cosine(block)
         s, c = first_s, first_c
         for n in range(1, harmonics + 1):
-            if n % _TURNED == 0:
+            if n % _ROTATED == 0:
                 s, c = sine_and_cosine(n * block)
             elif n > 1:
                 s, c = s * first_c + c * first_s, c * first_c - s * first_s
-            for part, (series, derivative) in zip(parts, asked, strict=True):
+            for part, (series, derivative) in zip(parts, requests, strict=True):
                 if n <= series.harmonics:
                     part += series.term(n, derivative, s, c)
     return totals

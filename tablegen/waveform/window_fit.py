@@ -31,13 +31,16 @@ SMOOTHNESS = 1e-12
 # Where the fit would leave [0, 1] its extremes are held this far inside.
 _RANGE_MARGIN = 1e-3
 _MAX_RANGE_ROUNDS = 40
-_BLOCK = 1 << 17  # sines and cosines that are worked out together, and kept where they are all of a window: 2 MB
+_BLOCK = 1 << 17  # sines and cosines that are computed at a time, and cached where they are all of a window: 2 MB
 
 
 def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
     """Fit harmonics 1..``harmonics`` to the line inside ``window`` (normalised position) of the imaging branches.
 
-    Raises ``Unphysical`` where the range [0, 1] and the harmonics do not go together.
+    Raises
+    ------
+    Unphysical
+        If that many harmonics leave the range [0, 1].
     """
     times = _nodes(shape.turn, harmonics, window, both)
     return _fitted(times.tobytes(), shape.value(times).tobytes(), shape.slope(times).tobytes(), harmonics)
@@ -45,7 +48,7 @@ def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float]
 
 @lru_cache(maxsize=4)  # a sweep and the remedies of a warning change one axis, or what no waveform depends on
 def _fitted(at: bytes, values: bytes, slopes: bytes, harmonics: int) -> FourierSeries:
-    """The fit to values and slopes at times, which are all that it depends on; each is the bytes of float64."""
+    """Return the fit to values and slopes at times, which are all that it depends on; each is the bytes of float64."""
     times, value, slope = (np.frombuffer(each) for each in (at, values, slopes))
     slope_weight = 1.0 / (slope * slope)
     value_weight = np.full_like(times, VALUE_WEIGHT)
@@ -68,7 +71,7 @@ def _nodes(turn: float, harmonics: int, window: tuple[float, float], both: bool)
 
 @lru_cache(maxsize=4)  # for the harmonics of both axes
 def _chebyshev(count: int) -> Floats:
-    """The nodes of (0, 1)."""
+    """Return the Gauss-Chebyshev nodes of (0, 1)."""
     x = 0.5 - 0.5 * cosine((np.arange(count) + 0.5) / (2 * count))
     freeze(x)
     return x
@@ -83,10 +86,20 @@ def normal_equations(
     harmonics: int,
     smoothness: float,
 ) -> tuple[Floats, Floats]:
-    """Gram matrix and right side in the basis 1, cos 1..H, sin 1..H, of a fit to values and slopes at ``times``.
+    """Return Gram matrix and right side of a fit to values and slopes, in the basis 1, cos 1..H, sin 1..H.
 
     Products of two harmonics depend on the sum and the difference of their numbers alone, so that 4 H + 2 sums
     over the nodes give all (2 H + 1)^2 entries.
+
+    Parameters
+    ----------
+    times, value, slope, value_weight, slope_weight
+        Nodes in periods, what is fitted there, and its weights; each (m,).
+
+    Returns
+    -------
+    normal, right
+        Shapes (2 H + 1, 2 H + 1) and (2 H + 1,).
     """
     weights = (value_weight, slope_weight, value_weight * value, slope_weight * slope)
     by_value, by_slope, right_value, right_slope = _sums(times, weights, 2 * harmonics)
@@ -119,28 +132,28 @@ def normal_equations(
 
 
 def _sums(times: Floats, weights: Sequence[Floats], highest: int) -> list[tuple[Floats, Floats]]:
-    """Means over the times of cosine and of sine of harmonics 0..``highest``, times each of the weights."""
+    """Return the means over the times of cosine and of sine of harmonics 0..``highest``, times each of the weights."""
     count = len(times)
-    found = [(np.empty(highest + 1), np.empty(highest + 1)) for _ in weights]
+    sums = [(np.empty(highest + 1), np.empty(highest + 1)) for _ in weights]
     rows = max(_BLOCK // count, 1)
-    waves = _kept_waves if count * highest <= _BLOCK else _waves
+    waves = _cached_waves if count * highest <= _BLOCK else _waves
     for first in range(0, highest + 1, rows):
         block = slice(first, min(first + rows, highest + 1))
         s, c = waves(times.tobytes(), block.start, block.stop)
         products = np.empty_like(s)
-        for weight, (cosines, sines) in zip(weights, found, strict=True):
+        for weight, (cosines, sines) in zip(weights, sums, strict=True):
             cosines[block] = tree_sum_down(np.multiply(c, weight[:, None], out=products)) / count
             sines[block] = tree_sum_down(np.multiply(s, weight[:, None], out=products)) / count
-    return found
+    return sums
 
 
 def _waves(times: bytes, first: int, stop: int) -> tuple[Floats, Floats]:
-    """Sine and cosine of harmonics [first, stop) at times, each (times, harmonics)."""
+    """Return sine and cosine of harmonics [first, stop) at times, each (times, harmonics)."""
     n = np.arange(first, stop, dtype=np.float64)
     return sine_and_cosine(np.frombuffer(times)[:, None] * n[None, :])
 
 
-_kept_waves = lru_cache(maxsize=4)(_waves)  # in a batch the windows of both axes are often the same
+_cached_waves = lru_cache(maxsize=4)(_waves)  # in a batch the windows of both axes are often the same
 
 
 def _series(c: Floats, harmonics: int) -> FourierSeries:
@@ -148,10 +161,10 @@ def _series(c: Floats, harmonics: int) -> FourierSeries:
 
 
 def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeries:
-    """The minimiser of the same J with its extremes held inside [0, 1], by equality at those that would leave.
+    """Return the minimiser of the same J with its extremes held inside [0, 1], by equality at those that would leave.
 
     Active set on a grid of 32 points per period of the highest harmonic: add the worst offender of each excursion,
-    drop what holds nothing back, solve again. With Z = A^-1 C^T the constrained minimum is free + Z multiplier.
+    drop constraints that are not active, solve again. With Z = A^-1 C^T the constrained minimum is free + Z multiplier.
     """
     points = 32 * harmonics
     grid = np.arange(points) / points
@@ -164,9 +177,9 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
         swing = swing if attempt else (float(np.min(w)), float(np.max(w)))
         if float(np.min(w)) >= 0.0 and float(np.max(w)) <= 1.0:
             return _series(c, harmonics)
-        held = {point for point, _ in active}
+        active_points = {point for point, _ in active}
         for point in _excursions(w):
-            if point not in held:
+            if point not in active_points:
                 active.append((point, 1.0 - _RANGE_MARGIN if w[point] > 0.5 else _RANGE_MARGIN))
         if len(active) > harmonics:
             break
@@ -181,7 +194,7 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
 
 
 def _excursions(w: Floats) -> list[int]:
-    """The extreme point of every stretch outside [0, 1]; near neighbours are the same excursion."""
+    """Return the extreme point of every stretch outside [0, 1]; near neighbours are the same excursion."""
     beyond = np.maximum(w - 1.0, -w)
     peak = (beyond > 0.0) & (beyond >= np.roll(beyond, 1)) & (beyond > np.roll(beyond, -1))
     return [int(point) for point in np.flatnonzero(peak)]
@@ -195,7 +208,7 @@ def _basis(t: float, harmonics: int) -> Floats:
 def _hold(
     free: Floats, factor: Cholesky, active: list[tuple[int, float]], columns: dict[int, Floats]
 ) -> tuple[list[tuple[int, float]], Floats]:
-    """Solve with equality at the active points; points whose multiplier pulls outwards are let go."""
+    """Solve with equality at the active points, and release points whose multiplier pulls outwards."""
     while True:
         rows = np.stack([columns[point] for point, _ in active])
         responses = np.stack([factor.solve(row) for row in rows])

@@ -144,7 +144,7 @@ def test_refining_stops_where_the_scaling_error_rises_and_keeps_the_best_layer(
     text = scan.read_text("utf-8")
     said = tomllib.loads(text)["x"]["refinement"]
     assert said["before_scaling_percent"] == pytest.approx(
-        max(first.round.lesson.before.scaling_percent.values()), 0.01
+        max(first.round.update.before.scaling_percent.values()), 0.01
     )
     assert "previous_a" not in said, "no layer was played before"
     trace = laboratory.running_trace(scan, "x")
@@ -178,7 +178,7 @@ def test_refining_stops_where_the_scaling_error_rises_and_keeps_the_best_layer(
     kept = tomllib.loads(scan.read_text("utf-8"))["x"]["refinement"]
     assert (kept["a"], kept["b"], kept["best"]) == (best, best, True)
     assert "larger than before: the layer before it was kept" in scan.read_text("utf-8")
-    assert tomllib.loads(forced.decode())["x"]["refinement"]["a"] == second.round.lesson.layer.a.tolist()
+    assert tomllib.loads(forced.decode())["x"]["refinement"]["a"] == second.round.update.layer.a.tolist()
 
     again = tablegen.refine(scan, laboratory.running_trace(scan, "x"), axis="x")
     assert "is the best of its rounds" in again.refused

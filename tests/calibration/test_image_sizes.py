@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from replacing import replace
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking, sizes_of
+from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage, sizes_of
 from tablegen.fitting.estimate import Estimate
 from tablegen.fitting.least_squares import Solution, solve, with_errors
 from tablegen.images.fast_axis_line import fit_line
@@ -31,7 +31,7 @@ def shown(seen: Seen, noise: float = 0.0, seed: int = 0, alone: bool = False, v:
 
 
 def size(image: SampleImage, sample: KnownSample, **options: object) -> Estimate:
-    return sizes_of([image], V_MAX, sample, Taking(**options)).images[0].size.nm  # type: ignore[arg-type]
+    return sizes_of([image], V_MAX, sample, Acquisition(**options)).images[0].size.nm  # type: ignore[arg-type]
 
 
 def cell(a_nm: float, b_nm: float, gamma: float, angle: float, **options: float) -> Seen:
@@ -95,7 +95,7 @@ def test_the_angle_of_bars_is_taken_from_the_rows_or_given() -> None:
     assert 1e-3 < abs(rows.value / FULL_NM - 1.0) < 4e-3, "what 2 % of drift does at 8 degrees"
     assert abs(rows.value - FULL_NM) < 2.0 * rows.standard_error
     # A frame of another height than its pixels say.
-    low = sizes_of([image], V_MAX, KnownSample(None, Grating(pitch)), Taking(aspect=0.8)).images[0].size
+    low = sizes_of([image], V_MAX, KnownSample(None, Grating(pitch)), Acquisition(aspect=0.8)).images[0].size
     assert abs(low.nm.value - FULL_NM) < 2.0 * np.hypot(low.nm.standard_error, 2.0 * low.shared * FULL_NM)
     with pytest.raises(Unphysical, match=r"the rows show bars under 9.* degrees, and 25 were given"):
         size(image, KnownSample(None, Grating(pitch, Estimate(25.0, 0.5))))
@@ -190,18 +190,18 @@ def test_another_sample_than_said_is_refused() -> None:
 def test_another_size_than_said_and_an_alias_are_named() -> None:
     """Of three images one has another voltage, another pitch, or periods finer than two pixels."""
     right = [replace(shown(grating(16.0, pixels=128, lines=64), v=v), name=f"{v:g} V") for v in (40.0, 70.0, 100.0)]
-    sizes_of(right, V_MAX, BARS, Taking())
+    sizes_of(right, V_MAX, BARS, Acquisition())
     wrong_volts = [right[0], replace(right[1], v_scan=35.0), right[2]]
     fine = replace(shown(grating(128.0 + 22.0, 1.0, pixels=128, lines=64), v=70.0), name="70 V")
     for images in (wrong_volts, [right[0], replace(shown(grating(32.0, pixels=128, lines=64), v=70.0), name="70 V")]):
         with pytest.raises(Unphysical, match=r"nm per volt, and .*is each image of the voltage that was said"):
-            sizes_of(images, V_MAX, BARS, Taking())
+            sizes_of(images, V_MAX, BARS, Acquisition())
     with pytest.raises(Unphysical, match="70 V"):
-        sizes_of([right[0], fine, right[2]], V_MAX, BARS, Taking())
+        sizes_of([right[0], fine, right[2]], V_MAX, BARS, Acquisition())
     with pytest.raises(Unphysical, match="the image is that of 40 V"):
-        sizes_of([right[0], replace(right[0], v_scan=80.0, name="80 V")], V_MAX, BARS, Taking())
+        sizes_of([right[0], replace(right[0], v_scan=80.0, name="80 V")], V_MAX, BARS, Acquisition())
     with pytest.raises(Unphysical, match=r"outside the driver's 0..100 V"):
-        sizes_of([replace(right[2], v_offset=20.0)], V_MAX, BARS, Taking())
+        sizes_of([replace(right[2], v_offset=20.0)], V_MAX, BARS, Acquisition())
 
 
 def test_positions_are_right_where_the_branches_are_not_the_harmonic_ones() -> None:

@@ -161,6 +161,97 @@ def test_a_nanonis_scan_that_was_stopped_ends_with_its_last_whole_line(tmp_path:
     assert "1920 pixels are not finite" in why(empty, "Z forward")
 
 
+STOPPED = {
+    # name: content of 40 rows that are the first of 160, and the height in nm of 160
+    "lines.ibw": (ibw(ASYLUM, NOTE | {"ScanLines": "160"}), 250.0),
+    "down.ibw": (ibw(ASYLUM, NOTE | {"ScanLines": "160", "ScanDown": "1"}, turned=True), 250.0),
+    "scaled.ibw": (ibw(ASYLUM, NOTE, step_m=(5e-7 / 47, 2.5e-7 / 159)), 250.0),
+    "lines.spm": (spm({"Height": (T, R)}, aspect="48:160", of_scan="\\Lines: 160\r\n"), 500.0 * 160 / 48),
+    "grid.jpk": (jpk({"Height": (T, R)}, lines=160), 250.0),
+}
+
+
+@pytest.mark.parametrize("name", STOPPED)
+def test_the_height_of_a_stopped_scan_is_that_of_its_rows(name: str, tmp_path: Path) -> None:
+    content, height = STOPPED[name]
+    trace = read_image(put(tmp_path, name, content), "Height", "trace")
+    assert trace.heights.shape == T.shape
+    assert trace.width_nm == pytest.approx(500.0)
+    assert trace.height_nm == pytest.approx(height * 40 / 160)
+
+
+@pytest.mark.parametrize("steps", [39, 40])
+def test_n_or_n_minus_1_steps_of_a_wave_are_a_whole_scan(steps: int, tmp_path: Path) -> None:
+    path = put(tmp_path, "a.ibw", ibw(ASYLUM, NOTE, step_m=(5e-7 / 47, 2.5e-7 / steps)))
+    assert read_image(path, "HeightTrace").height_nm == pytest.approx(250.0)
+
+
+@pytest.mark.parametrize("down", [False, True])
+def test_rows_that_a_stopped_scan_lacks_are_left_out(down: bool, tmp_path: Path) -> None:
+    """NaN in an Igor wave; rows outside the valid ones of a Nanoscope image, which begin at the bottom."""
+    first = {label: np.where(np.arange(40)[:, None] < 35, heights, np.nan) for label, heights in ASYLUM.items()}
+    note = NOTE | {"ScanLines": "40", "ScanDown": str(int(down))}
+    igor = read_image(put(tmp_path, "a.ibw", ibw(first, note, turned=down)), "HeightTrace")
+    assert np.array_equal(igor.heights, ASYLUM["HeightTrace"][:35].astype("f4"))
+    assert igor.height_nm == pytest.approx(250.0 * 35 / 40)
+    valid = f"\\Valid data start Y: {5 if down else 0}\r\n\\Valid data len Y: 35\r\n"
+    content = spm({"Height": (T, R)}, frame="Down" if down else "Up", stored=4, aspect="48:40", of_image=valid)
+    bruker = read_image(put(tmp_path, "a.spm", content), "Height", "trace")
+    assert np.max(np.abs(bruker.heights - T[:35])) < 1e-6
+    assert bruker.height_nm == pytest.approx(500.0 * 35 / 48)
+
+
+@pytest.mark.parametrize("value", ["50", "-1", "x", "99999999"])
+def test_valid_rows_that_cannot_be_are_not_believed(value: str, tmp_path: Path) -> None:
+    valid = f"\\Valid data start Y: 0\r\n\\Valid data len Y: {value}\r\n"
+    image = read_image(put(tmp_path, "a.spm", spm({"Height": (T, R)}, of_image=valid)), "Height", "trace")
+    assert image.heights.shape == T.shape
+
+
+TURNED = {
+    "a.sxm": sxm(NANONIS, angle_deg=90.0),
+    "a.ibw": ibw(ASYLUM, NOTE | {"ScanAngle": "90"}),
+    "scan.spm": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 90\r\n"),
+    "image.001": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 0\r\n", of_image="\\Rotate Ang.: 90 deg\r\n"),
+    "a.jpk": jpk({"Height": (T, R)}, angle_deg=90.0),
+}
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_the_scan_angle_is_read(name: str, tmp_path: Path) -> None:
+    channels = channels_of(put(tmp_path, name, TURNED[name]))
+    assert [one.angle_deg for one in channels] == [pytest.approx(90.0)] * len(channels)
+    assert read_image(tmp_path / name, "0").angle_deg == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "angle"),
+    [
+        *(("ScanAngle", "90", 90.0), ("Scan angle", "-30 deg", -30.0), ("Rotate Ang.", "12.5 °", 12.5)),
+        *(("NanonisRecord::Scan_angle", "45°", 45.0), ("Scan angle", "unknown", None), ("Scan angle", " ", None)),
+        ("Phase angle", "90", None),
+    ],
+)
+def test_the_scan_angle_of_a_gwyddion_file_is_in_its_metadata(
+    key: str, text: str, angle: float | None, tmp_path: Path
+) -> None:
+    gwy(tmp_path / "a.gwy", {key: text}, Z=T)
+    assert read_image(tmp_path / "a.gwy").angle_deg == angle
+
+
+def test_without_an_angle_none_is_made_up(tmp_path: Path) -> None:
+    for name, content in (("a.ibw", ibw(ASYLUM, NOTE)), ("a.spm", spm({"Height": (T, R)})), ("a.npy", npy(T))):
+        assert channels_of(put(tmp_path, name, content))[0].angle_deg is None
+
+
+@pytest.mark.parametrize("preview", [("thumbnail", (64, 64)), ("thumbnail", (40, 48)), ("", (16, 16))])
+def test_a_preview_is_no_channel(preview: tuple[str, tuple[int, ...]], tmp_path: Path) -> None:
+    path = put(tmp_path, "a.jpk", jpk({"height": (T, R)}, preview=preview))
+    channels = channels_of(path)
+    assert [(one.number, one.title) for one in channels] == [(0, "height trace"), (1, "height retrace")]
+    assert {image.heights.shape for image in read_channels(path)} == {T.shape}
+
+
 @pytest.mark.parametrize(
     ("title", "signal", "direction"),
     [

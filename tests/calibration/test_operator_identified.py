@@ -56,7 +56,7 @@ def distance(one: OperatorFit, other: OperatorFit) -> tuple[float, float]:
 def test_noiseless_traces_of_an_operator_that_the_family_has_are_met() -> None:
     fit = fitted([periodic_line(one, V_MAX) for one in records(0.0)])
     assert fit.family == "plays"
-    assert max(errors.rms for errors in fit.left) < 0.005
+    assert max(errors.rms for errors in fit.in_fit) < 0.005
     # Not only between the traces: the piezo itself, at sizes that none has.
     for stroke in (0.2, 0.5, 0.8):
         truth = periodic_line(Trace("", *record(PLANT, 0.5, stroke, noise=0.0)), V_MAX)

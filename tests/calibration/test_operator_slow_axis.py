@@ -118,7 +118,14 @@ def scanned(folder: Path, plant: str, fit: OperatorFit, size_nm: float, frame_hz
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("protocol", [FRAMES, TURNED, QUICK], ids=["frames", "turned", "quick"])
+@pytest.mark.parametrize(
+    "protocol",
+    [
+        pytest.param(FRAMES, id="frames"),
+        pytest.param(TURNED, id="turned", marks=pytest.mark.rest),
+        pytest.param(QUICK, id="quick", marks=pytest.mark.rest),
+    ],
+)
 def test_y_at_half_a_hertz(plant: str, protocol: tuple[tuple[float, float, float], ...], tmp_path: Path) -> None:
     fit = identified(plant, protocol)
     for size_nm in (150.0, 500.0, 850.0):

@@ -192,8 +192,9 @@ def test_a_line_that_touches_its_own_guard_is_refused(tmp_path: Path) -> None:
     plan = make_plan(setup)
     output = replace(plan.x.program.output, max_step=20)
     tight = replace(plan, x=replace(plan.x, program=replace(plan.x.program, output=output)))
-    text = [str(p) for p in broken_limits(tight, certify(tight), setup.scan_file)]
-    assert len(text) == 1
+    problems = broken_limits(tight, certify(tight), setup.scan_file)
+    assert [(one.code, one.axis) for one in problems] == [("step-guard", "x")]
+    text = list(map(str, problems))
     assert "amplifier.max_slew_v_per_s: the x axis steps by 24 codes, above its guard of 20" in text[0]
 
 
@@ -209,8 +210,9 @@ def test_broken_limits_name_the_part_and_the_remedy(tmp_path: Path) -> None:
     edits = {"x.band_limit.method": '"truncate"', "limits.max_error_lsb": "0.7"}
     setup = setup_of(tmp_path, edits)
     plan = make_plan(setup)
-    text = [str(p) for p in broken_limits(plan, certify(plan), setup.scan_file)]
-    assert len(text) == 2
+    problems = broken_limits(plan, certify(plan), setup.scan_file)
+    assert [(one.code, one.axis) for one in problems] == [("scaling-error", "x"), ("converter-error", "y")]
+    text = list(map(str, problems))
     assert "limits.max_error_lsb: the y axis errs by up to 0.7406 LSB, above 0.7; lengthen or widen y.table" in text[1]
     assert "limits.max_scaling_error_percent: the x axis has a scaling error of " in text[0]
     assert "above 0.5 %; most of it is the band limit: more x.band_limit.harmonics" in text[0]

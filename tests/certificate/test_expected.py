@@ -31,6 +31,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.verification.checks.expectations import wrong_expectations
 from tablegen.verification.checks.scaling import ModelBranch
+from tablegen.verification.expected_figures import header_texts, wrong_texts
 from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.closed_loop import SHARP, play_x, with_scan
 from tablegen.virtual.parameters import load_truth
@@ -178,6 +179,15 @@ TAMPERINGS: dict[str, Change] = {
 }
 
 
+FIGURES: dict[str, Change] = {  # which no other number of the directory gives, but its headers say
+    "an rms": lambda e: e["rms_percent"]["forward"].update(value=3.0 * e["rms_percent"]["forward"]["value"] + 0.01),
+    "an uncertainty": lambda e: e["scaling_percent"]["backward"].update(uncertainty=0.5),
+    "a mismatch": lambda e: e["mismatch_percent"].update(value=0.9 * e["mismatch_percent"]["value"] - 0.01),
+    "a size": lambda e: e["size_percent"].update(value=-e["size_percent"]["value"] - 0.1),
+    "a distance": lambda e: e.update(distance_percent=0.5),
+}
+
+
 def test_what_no_build_states_is_found(tmp_path: Path) -> None:
     path, out = with_operator(tmp_path), tmp_path / "out"
     assert run("build", path, "-o", out).status == 0
@@ -190,6 +200,18 @@ def test_what_no_build_states_is_found(tmp_path: Path) -> None:
 
     assert wrong_expectations(axis_with(lambda e: None)) == []
     assert [what for what, change in TAMPERINGS.items() if not wrong_expectations(axis_with(change))] == []
+
+    texts = header_texts(out, read_build(out))
+    assert sorted(texts) == ["annexin_200nm.h", "annexin_200nm.vh"]
+    assert wrong_texts("x", axis_with(lambda e: None), texts) == []
+    others = {**FIGURES, "nothing": lambda e: e["mismatch_percent"].update(value=1e-9, uncertainty=None)}
+    assert [what for what, change in others.items() if len(wrong_texts("x", axis_with(change), texts)) < 2] == []
+    manifest = json.loads(plain)
+    FIGURES["an rms"](manifest["axes"]["x"]["certificate"]["expected"])
+    (out / "manifest.json").write_text(json.dumps(manifest), "ascii")
+    outcome = run("verify", out, "--target", "files")
+    assert outcome.status == 5
+    assert "axes.x.certificate.expected is not what annexin_200nm.h says in its comment" in outcome.out + outcome.err
 
 
 def warned(path: Path) -> list[str]:
@@ -255,6 +277,7 @@ def test_a_limit_does_not_count_the_uncertainty_and_counts_the_size(tmp_path: Pa
     assert broken_limits(plan, certificates, setup.scan_file) == []
     off = replace(certificates["x"], expected=replace(expected, size=Figure(-0.9, 0.1)))
     (problem,) = broken_limits(plan, {"x": off}, setup.scan_file)
+    assert (problem.code, problem.axis) == ("expected-size-error", "x")
     assert re.search(
         r"expected to have a size error of -0\.9 %, above 0\.8 %: -0\.9 % by its operator, [+-]0", str(problem)
     )

@@ -135,7 +135,9 @@ def test_the_small_scan_is_worse_than_none_and_says_so(tmp_path: Path) -> None:
     setup = setup_of(tmp_path, {**FREE, **SMALL})
     plan = make_plan(setup)
     certificates = certify(plan)
-    by_axis = sorted(warned(setup), key=lambda text: "the y axis" in text)  # the worse one comes first
+    problems = scan_warnings(setup, plan, certificates)
+    assert sorted((one.code, one.axis) for one in problems) == [("scaling-error", "x"), ("scaling-error", "y")]
+    by_axis = sorted(map(str, problems), key=lambda text: "the y axis" in text)  # the worse one comes first
     for text, certificate in zip(by_axis, certificates.values(), strict=True):
         span = certificate.highest_code - certificate.lowest_code + 1
         assert re.search(r"above 1 % and above the [12](\.\d+)? % of the uncompensated line; ", text)

@@ -106,7 +106,52 @@ def test_the_same_as_data(lab: Path) -> None:
         "line_rate_hz": pytest.approx(2.0),
         "frames": 1,
         "first_row": "bottom",
+        "scan_angle_deg": 0.0,
     }
+
+
+def test_an_angle_other_than_0_has_a_column(lab: Path) -> None:
+    turned = {"HeightTrace": np.eye(40), "HeightRetrace": np.eye(40)}
+    (lab / "turned.ibw").write_bytes(ibw(turned, NOTE | {"ScanAngle": "90"}))
+    lines = run("channels", "turned.ibw").out.splitlines()
+    assert lines[1].endswith("first row  angle [deg]")
+    assert [line.split()[-2:] for line in lines[2:]] == [["bottom", "90"]] * 2
+    (file,) = json.loads(run("channels", "--json", "turned.ibw").out)
+    assert [one["scan_angle_deg"] for one in file["channels"]] == [90.0, 90.0]
+
+
+@pytest.mark.parametrize(
+    ("angle", "axis", "said"),
+    [
+        ("90", "x", "the fast axis was y, not x; give --axis y, or scan at 0 degrees"),
+        ("-90", "x", "the fast axis was y, not x; give --axis y, or scan at 0 degrees"),
+        ("30", "x", "a line moved both piezos; scan at 0 degrees for --axis x"),
+        ("30", "y", "a line moved both piezos; scan at 90 degrees for --axis y"),
+        ("180", "x", "which exchanges trace and retrace; scan at 0 degrees"),
+        ("180", "y", "the fast axis was x, not y; give --axis x, or scan at 90 degrees"),
+    ],
+)
+def test_branches_of_another_axis_are_refused(angle: str, axis: str, said: str, lab: Path) -> None:
+    pair = {"HeightTrace": np.load(lab / "t.npy"), "HeightRetrace": np.load(lab / "r.npy")}
+    (lab / "turned.ibw").write_bytes(ibw(pair, NOTE | {"ScanAngle": angle}))
+    (lab / "s.toml").write_text('name = "s"\nv_max = 100.0\n')
+    words = ("--axis", axis, "--scanner", "s.toml", "--write", "--pair", "100", "turned.ibw")
+    outcome = run("calibrate", "images", *words)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"turned.ibw: scan angle {angle} degrees: ")
+    assert said in outcome.err
+    assert (lab / "s.toml").read_text() == 'name = "s"\nv_max = 100.0\n'
+
+
+def test_branches_of_the_axis_that_was_fast_are_fitted_and_the_angle_is_said(lab: Path) -> None:
+    pair = {"HeightTrace": np.load(lab / "t.npy"), "HeightRetrace": np.load(lab / "r.npy")}
+    (lab / "turned.ibw").write_bytes(ibw(pair, NOTE | {"ScanAngle": "90"}))
+    words = ("--axis", "y", "--v-max", "100", "--no-plot", "--pair", "100", "turned.ibw")
+    outcome = run("calibrate", "images", *words)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "note: turned.ibw: scan angle 90 degrees: the fast axis was y, as --axis y; " in outcome.out
+    remarks = json.loads(run("calibrate", "images", *words, "--json").out)["remarks"]
+    assert any("scan angle 90 degrees" in text for text in remarks)
 
 
 def test_a_damaged_file_and_a_missing_library(lab: Path, monkeypatch: pytest.MonkeyPatch) -> None:

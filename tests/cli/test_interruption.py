@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tablegen.base.interruption import deliver, held
+from tablegen.base.interruption import defer_signals, deliver
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def heard() -> Iterator[list[int]]:
 
 
 def test_what_comes_inside_waits_and_is_delivered(heard: list[int]) -> None:
-    with held(signal.SIGUSR1) as came:
+    with defer_signals(signal.SIGUSR1) as came:
         signal.raise_signal(signal.SIGUSR1)
         assert (heard, came) == ([], [signal.SIGUSR1])
     assert heard == []
@@ -31,14 +31,14 @@ def test_what_comes_inside_waits_and_is_delivered(heard: list[int]) -> None:
 
 
 def test_a_second_one_does_not_wait(heard: list[int]) -> None:
-    with held(signal.SIGUSR1, signal.SIGUSR2) as came:
+    with defer_signals(signal.SIGUSR1, signal.SIGUSR2) as came:
         for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGUSR1):
             signal.raise_signal(number)
         assert (heard, came) == ([signal.SIGUSR1], [signal.SIGUSR1, signal.SIGUSR2])
 
 
 def test_other_signals_and_those_outside_do_not_wait(heard: list[int]) -> None:
-    with held(signal.SIGUSR1) as came:
+    with defer_signals(signal.SIGUSR1) as came:
         signal.raise_signal(signal.SIGUSR2)
     signal.raise_signal(signal.SIGUSR1)
     assert (heard, came) == ([signal.SIGUSR2, signal.SIGUSR1], [])
@@ -48,7 +48,7 @@ def test_handlers_are_put_back_after_an_exception(heard: list[int]) -> None:
     before = signal.getsignal(signal.SIGUSR1)
 
     def fail() -> None:
-        with held(signal.SIGUSR1):
+        with defer_signals(signal.SIGUSR1):
             raise RuntimeError
 
     with pytest.raises(RuntimeError):
@@ -59,7 +59,7 @@ def test_handlers_are_put_back_after_an_exception(heard: list[int]) -> None:
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, signal.SIG_DFL])
 def test_what_no_function_handles_is_left_alone(heard: list[int], handler: signal.Handlers) -> None:
     signal.signal(signal.SIGUSR1, handler)
-    with held(signal.SIGUSR1):
+    with defer_signals(signal.SIGUSR1):
         assert signal.getsignal(signal.SIGUSR1) is handler
 
 
@@ -68,7 +68,7 @@ def test_other_threads_hold_nothing(heard: list[int]) -> None:
     handlers = []
 
     def hold() -> None:
-        with held(signal.SIGUSR1):
+        with defer_signals(signal.SIGUSR1):
             handlers.append(signal.getsignal(signal.SIGUSR1))
 
     before = signal.getsignal(signal.SIGUSR1)

@@ -123,6 +123,30 @@ def test_a_dry_run_with_a_port_asks_and_sends_nothing(bench: Bench, folder: Path
     assert "bytes; the device accepts 500: " in outcome.err
 
 
+@pytest.mark.parametrize("options", [(), ("--dry-run",)])
+def test_a_dry_run_without_the_key_ends_as_the_upload_does(
+    options: tuple[str, ...], folder: Path, info: DeviceInfo, tmp_path: Path
+) -> None:
+    """With one it says that the key is not tried; of a scan that is active neither needs it, unless forced."""
+    keyed = Bench(model(replace(info, features=info.features | Feature.KEY), boot=BOOT, key=KEY))
+    outcome = keyed.run("upload", folder, *options)
+    assert (outcome.status, outcome.err) == (
+        9,
+        "the device has a key, and refuses COMMIT without it; give the key of this device (--key-file FILE)\n",
+    )
+    assert "would accept" not in outcome.out
+    assert keyed.device.status().received == 0
+    key_file = tmp_path / "key"
+    key_file.write_text(KEY.hex(), "ascii")
+    key_file.chmod(0o600)
+    outcome = keyed.run("upload", folder, *options, "--key-file", key_file)
+    assert outcome.status == 0
+    assert outcome.out.rstrip().endswith("if the key is right, which only an upload tells") == bool(options)
+    keyed.run("upload", folder, "--key-file", key_file)
+    assert "already active" in keyed.run("upload", folder, *options).out
+    assert keyed.run("upload", folder, *options, "--force").status == 9
+
+
 def test_a_direct_table_is_said_to_have_no_fourier_form(tmp_path: Path) -> None:
     direct = build(tmp_path, Variant({"x.table": {"mode": "direct", "bits": 16}, "timing.lines": 40})).folder
     outcome = run("upload", direct, "--dry-run")

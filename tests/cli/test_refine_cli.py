@@ -241,8 +241,8 @@ def test_when_there_is_nothing_to_learn(folder: Path) -> None:
     step = list(rounds(load(folder / "scan.toml"), "x", 2))[-1]
     trace = sensed(step.line, scanner().x, 5, samples=60, periods=1.5)
     found = refine(step.setup, "x", trace["time_s"], trace["displacement_nm"], trace["drive_v"], Options())
-    assert found.lesson.noise_percent > step.true.rms_percent
-    if not found.lesson.harmonics:
+    assert found.update.noise_percent > step.true.rms_percent
+    if not found.update.harmonics:
         assert found.refinement is not None
         assert found.refinement.a == step.setup.scan.x.refinement.a  # type: ignore[union-attr]
     assert found.remarks

@@ -13,7 +13,7 @@ from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.emit.constants import storage_bits
 from tablegen.fixedpoint.table_shape import MODES
-from tablegen.html_report.table_costs import CELLS, INSTRUCTIONS
+from tablegen.html_report.table_costs import CELLS, COUNTS, INSTRUCTIONS, MeasuredRun
 from tablegen.planning.line_plan import make_plan
 
 AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
@@ -46,7 +46,7 @@ def test_of_shaped_output_errors_are_those_before_the_rounding(tmp_path: Path) -
     path = write_pair(tmp_path, edited(f"{SCAN}", "dac.shaping = 'second'", "x.size_nm = 20"))
     text, data = run("tables", path, "--axis", "x"), run("tables", path, "--axis", "x", "--json")
     assert (text.status, data.status) == (0, 0), text.err + data.err
-    assert text.out.splitlines()[0].endswith("; shaped: errors are those before the rounding")
+    assert text.out.splitlines()[0].endswith("; shaped: errors are those before the rounding, instructions without it")
     (axis,) = json.loads(data.out)["axes"]
     assert axis["shaped"]
     assert axis["max_error_lsb"] == 0.01
@@ -127,6 +127,26 @@ def test_a_picture_has_each_mode(tmp_path: Path) -> None:
     assert run("tables", path, "--axis", "x", "--plot", picture).status == 0
     drawn = picture.read_text("utf-8")
     assert all(f'data-name="{mode}"' in drawn for mode in MODES)
+
+
+@pytest.mark.parametrize(
+    ("edits", "output_storage_bits", "coded"),
+    [
+        ((), 16, False),
+        (("dac.coding = 'twos-complement'",), 16, True),
+        (("dac.bits = 18", "limits.max_error_lsb = 4"), 32, False),
+        (("dac.word_bits = 24", "dac.align = 'left'"), 32, True),
+    ],
+)
+def test_instructions_are_those_of_the_widths_and_the_coding(
+    tmp_path: Path, edits: tuple[str, ...], output_storage_bits: int, coded: bool
+) -> None:
+    path = write_pair(tmp_path, edited(SCAN, *edits))
+    rows = json.loads(run("tables", path, "--axis", "x", "--json").out)["axes"][0]["tables"]
+    assert {row["bits"] > 16 for row in rows} == {False, True}
+    for row in rows:
+        counted = MeasuredRun(32 if row["bits"] > 16 else 16, output_storage_bits, coded)
+        assert row["instructions"] == COUNTS[counted][row["mode"]]
 
 
 def test_modes_are_in_the_order_of_what_they_take() -> None:

@@ -78,7 +78,7 @@ def endless() -> object:
         (ValueError("x" * 10_000), 70, "internal error: ValueError: xxx"),
         (PluginFailed("'a' of b failed"), 2, "'a' of b failed"),
     ],
-    ids=lambda value: repr(value)[:40],
+    ids=lambda value: getattr(value, "__name__", repr(value))[:40],  # no address: workers have to agree on it
 )
 def test_it_has_a_message_and_a_status(
     tmp_path: Path, error: BaseException | Callable[[], object], status: int, why: str
@@ -118,6 +118,14 @@ def test_other_commands_end_so_too(tmp_path: Path, command: str) -> None:
 
 def test_a_build_that_is_checked_is_not_called_stale(tmp_path: Path) -> None:
     assert broken(tmp_path, KeyError("x"), "build", "--check", "-o", str(tmp_path / "out")).status == 70
+
+
+@pytest.mark.parametrize("error", [BrokenPipeError(errno.EPIPE, "Broken pipe"), OSError(errno.EPIPE, "Broken pipe")])
+def test_a_pipe_that_is_not_stdout_is_no_success(tmp_path: Path, error: OSError) -> None:
+    """Of a simulator or a worker that died. Where the reader of stdout has gone, there is nothing left to say."""
+    outcome = broken(tmp_path, error, "build", "-o", str(tmp_path / "out"))
+    assert (outcome.status, outcome.err.startswith("Broken pipe (certificate/certified_scan.py:")) == (70, True)
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_interruption_is_still_one(tmp_path: Path) -> None:

@@ -87,6 +87,16 @@ def test_numbers_are_those_of_the_manifests(lab: Path, sides: tuple[str, str]) -
     assert ("rates", "lines to settle") in found
 
 
+def test_the_notes_have_codes_and_axes(tmp_path: Path, lab: Path) -> None:
+    (tmp_path / "scanner.toml").write_text(edited(SCANNER), "utf-8")
+    (tmp_path / "tight.toml").write_text(edited(SCAN, "limits.max_scaling_error_percent = 0.3"), "utf-8")
+    found = record(lab / "one", tmp_path / "tight.toml", status=0)
+    assert [one["text"] for one in found["findings"]] == found["notes"]
+    codes = [(one["code"], one["axis"]) for one in found["findings"]]
+    assert codes[0] == ("scaling-error", "x")
+    assert codes[-1] == ("uncompared-inputs", "")
+
+
 def test_the_text_has_what_differs_and_with_all_the_rest(lab: Path) -> None:
     outcome = run("compare", lab / "scan.toml", lab / "larger.toml")
     assert outcome.status == 1

@@ -250,10 +250,19 @@ def broken(pair: Path, name: str, body: str) -> None:
 @pytest.mark.parametrize(
     ("body", "why"),
     [
-        ("def line(self, wanted): return 1 / 0", "'play' of tablegen-play failed: ZeroDivisionError: division by zero"),
-        ("def line(self, wanted): raise SystemExit", "'play' of tablegen-play failed: SystemExit"),
-        ("def line(self, wanted): return 3", "'play' of tablegen-play: line() returned an object of type int"),
-        ("def line(self, wanted): return None", "'play' of tablegen-play: line() returned None, and no problem"),
+        (
+            "def line(self, request, problems): return 1 / 0",
+            "'play' of tablegen-play failed: ZeroDivisionError: division by zero",
+        ),
+        ("def line(self, request, problems): raise SystemExit", "'play' of tablegen-play failed: SystemExit"),
+        (
+            "def line(self, request, problems): return 3",
+            "'play' of tablegen-play: line() returned an object of type int",
+        ),
+        (
+            "def line(self, request, problems): return None",
+            "'play' of tablegen-play: line() returned None, and no problem",
+        ),
         ("def faults(self): return 1 / 0", "a plug-in of tablegen-play failed: ZeroDivisionError: division by zero"),
         ("def files(self): raise SystemExit", "a plug-in of tablegen-play failed: SystemExit"),
         ("def described(self, line): raise KeyError('x')", "a plug-in of tablegen-play failed: KeyError: 'x'"),

@@ -20,8 +20,8 @@ from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import FIXED_BENDS, envelopes
-from tablegen.compensation.operator.transient import LineOf, after_offset, after_size
-from tablegen.compensation.operator.transient import after as transient
+from tablegen.compensation.operator.transient import SettledLine, after_offset, after_size
+from tablegen.compensation.operator.transient import transient_between as transient
 from tablegen.compensation.transient import Transient
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
@@ -190,7 +190,7 @@ def test_foreign_lines_drift_as_the_operator_says(name: str, first: int, within:
     """Bouc-Wen's loop takes some periods to close, which no settled line shows."""
     for change, (before, now) in CHANGES.items():
         truth = followed_plant(name, change, 0.5, LINE_S, LINE_S, 512)
-        said = transient(foreign(name, 100.0), *(LineOf(*line, 0.5, LINE_S) for line in (before, now)), 1.0)
+        said = transient(foreign(name, 100.0), *(SettledLine(*line, 0.5, LINE_S) for line in (before, now)), 1.0)
         step = 0.2 if change.startswith("size") else 0.0  # percent of the line
         for line in (1, 5, 20, 100, 255):
             if line >= first:
@@ -208,7 +208,7 @@ def test_foreign_frames_drift_as_the_operator_says() -> None:
     frame_s, line_s, lines = 2.0, 0.02, 100
     for change, (before, now) in CHANGES.items():
         truth = followed_plant("plays", change, 0.95, frame_s, line_s, 3 * lines)
-        said = transient(foreign("plays", 5.0), *(LineOf(*line, 0.95, frame_s) for line in (before, now)), 1.0)
+        said = transient(foreign("plays", 5.0), *(SettledLine(*line, 0.95, frame_s) for line in (before, now)), 1.0)
         for line in (0, 5, 20, 100, 150):
             error = abs(said.drift_nm(line_s, line, lines) - truth.drift(line, lines))
             bound = 0.003 * 1250.0 * (now[1] - now[0]) if change.startswith("size") else 0.3

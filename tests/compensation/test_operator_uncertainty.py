@@ -8,7 +8,7 @@ from replacing import replace
 
 from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.compensation.operator.operator import MeasuredLine
-from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
+from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
 from tablegen.numerics.arrays import Floats
 
 SIX = tuple((stroke, 0.5) for stroke in (0.1, 0.25, 0.45, 0.65, 0.82, 0.97))
@@ -116,8 +116,8 @@ def test_two_traces_at_one_place_are_no_reason_for_alarm() -> None:
 
 
 def test_formulas_may_be_wrong_by_a_share_of_what_they_say() -> None:
-    assert of_formulas((0.03, -0.04)) == pytest.approx(0.75)
-    assert of_formulas(()) == 0.0
+    assert size_uncertainty((0.03, -0.04)) == pytest.approx(0.75)
+    assert size_uncertainty(()) == 0.0
 
 
 def test_a_shape_that_no_trace_showed_at_this_offset_may_be_another_one() -> None:
@@ -126,11 +126,11 @@ def test_a_shape_that_no_trace_showed_at_this_offset_may_be_another_one() -> Non
     row = np.array([*one, *(-value for value in one)])
     x = 0.8 * np.linspace(-1.0, 1.0, 161)
     bent = 0.02 * (2.0 * x * x - 1.0)
-    rms, scaling, mismatch = of_places(row, 0.2)
+    rms, scaling, mismatch = shape_uncertainty(row, 0.2)
     assert rms == pytest.approx(0.1 * 100.0 * float(np.sqrt(np.mean(bent**2))), rel=1e-9)
     assert mismatch == pytest.approx(0.1 * 100.0 * 2.0 * float(np.max(np.abs(bent))), rel=1e-9)
     assert scaling == pytest.approx(0.1 * 100.0 * float(np.ptp(np.gradient(bent, x / 2.0))), rel=0.1)
-    assert of_places(row, 0.0) == (0.0, 0.0, 0.0)
-    assert of_places(np.array([*one, *one]) * 0.0, 0.3) == (0.0, 0.0, 0.0)
+    assert shape_uncertainty(row, 0.0) == (0.0, 0.0, 0.0)
+    assert shape_uncertainty(np.array([*one, *one]) * 0.0, 0.3) == (0.0, 0.0, 0.0)
     straight = np.array([0.1, 0.2, *[0.0] * 19] * 2)  # no shape at all: a line
-    assert of_places(straight, 0.3) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert shape_uncertainty(straight, 0.3) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)

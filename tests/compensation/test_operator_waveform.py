@@ -13,7 +13,7 @@ from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import FIXED_BENDS, Plays, envelopes
-from tablegen.compensation.operator.scan_line import Wanted, find_waveform
+from tablegen.compensation.operator.scan_line import TargetLine, learn_waveform
 from tablegen.numerics.arrays import Floats
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -31,8 +31,8 @@ def operator(creep: LogarithmicCreep = NO_CREEP) -> Operator:
     return Operator(family, _NOTHING, _NO_SIZES, creep, 0.5, ())
 
 
-def wanted(size_nm: float = 400.0, turn: float = 0.5, rate_hz: float = 500.0) -> Wanted:
-    return Wanted(size_nm, turn, WINDOW, True, rate_hz, 0.5, 1.0)
+def wanted(size_nm: float = 400.0, turn: float = 0.5, rate_hz: float = 500.0) -> TargetLine:
+    return TargetLine(size_nm, turn, WINDOW, True, rate_hz, 0.5, 1.0)
 
 
 def straight(turn: float) -> FourierSeries:
@@ -59,7 +59,7 @@ def stepped(u: Floats) -> Floats:
 @pytest.mark.parametrize("turn", [0.5, 0.7])
 @pytest.mark.parametrize("size_nm", [100.0, 600.0])
 def test_plays_that_are_stepped_follow_it_straight(turn: float, size_nm: float) -> None:
-    found = find_waveform(operator(), wanted(size_nm, turn), straight(turn), same, None)
+    found = learn_waveform(operator(), wanted(size_nm, turn), straight(turn), same, None)
     t = np.arange(4096) / 4096
     position = stepped(0.5 + found.v_amplitude * (found.series.on_grid(4096) - 0.5))
     x = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
@@ -87,27 +87,27 @@ def test_creep_and_dynamics_are_undone() -> None:
     def inverse(series: FourierSeries) -> FourierSeries:
         return series.times(real, imaginary)
 
-    found = find_waveform(operator(late), wanted(), straight(0.5), inverse, dynamics)
-    without = find_waveform(operator(), wanted(), straight(0.5), same, None)
+    found = learn_waveform(operator(late), wanted(), straight(0.5), inverse, dynamics)
+    without = learn_waveform(operator(), wanted(), straight(0.5), same, None)
     assert max(found.expected.rms) < 0.03
     assert found.expected.mismatch < 0.1
     assert float(np.max(np.abs(found.series.b - without.series.b))) > 1e-3
 
 
 def test_the_expected_size_is_the_wanted_one() -> None:
-    found = find_waveform(operator(), wanted(), straight(0.5), same, None)
+    found = learn_waveform(operator(), wanted(), straight(0.5), same, None)
     assert found.expected.size == pytest.approx(0.0, abs=0.05)
-    again = find_waveform(operator(), wanted(), straight(0.5), same, None)
+    again = learn_waveform(operator(), wanted(), straight(0.5), same, None)
     assert again.series.a.tobytes() == found.series.a.tobytes()
 
 
 def test_a_factor_makes_the_drive_larger() -> None:
     found, more = (
-        find_waveform(operator(), replace(wanted(), factor=factor), straight(0.5), same, None) for factor in (1.0, 1.1)
+        learn_waveform(operator(), replace(wanted(), factor=factor), straight(0.5), same, None) for factor in (1.0, 1.1)
     )
     assert more.v_amplitude / found.v_amplitude == pytest.approx(1.1, abs=0.03)
 
 
 def test_a_scan_beyond_the_driver_is_refused() -> None:
     with pytest.raises(Unphysical, match=r"take \d+ % of v_max by the operator; at this offset 100 % are left"):
-        find_waveform(operator(), wanted(5000.0), straight(0.5), same, None)
+        learn_waveform(operator(), wanted(5000.0), straight(0.5), same, None)

@@ -1001,21 +1001,21 @@ RESPONSE = [
     case(
         response="hz,gain,phase_deg\n# measured\n10,0,0\n20,1,0\n",
         says=(
-            "scanner.toml:28: x.resonance.response: r.csv:3: '10,0,0' is outside what is taken: finite hz, a "
+            "scanner.toml:28: x.resonance.response: r.csv:3: '10,0,0' is outside the accepted range: finite hz, a "
             "gain of 1e-6 to 1e6, phase_deg of -1e6 to 1e6"
         ),
     ),
     case(
         response="hz,gain,phase_deg\n10,nan,0\n20,1,0\n",
         says=(
-            "scanner.toml:28: x.resonance.response: r.csv:2: '10,nan,0' is outside what is taken: finite hz, a "
+            "scanner.toml:28: x.resonance.response: r.csv:2: '10,nan,0' is outside the accepted range: finite hz, a "
             "gain of 1e-6 to 1e6, phase_deg of -1e6 to 1e6"
         ),
     ),
     case(
         response="hz,gain,phase_deg\n10,1,inf\n20,1,0\n",
         says=(
-            "scanner.toml:28: x.resonance.response: r.csv:2: '10,1,inf' is outside what is taken: finite hz, a "
+            "scanner.toml:28: x.resonance.response: r.csv:2: '10,1,inf' is outside the accepted range: finite hz, a "
             "gain of 1e-6 to 1e6, phase_deg of -1e6 to 1e6"
         ),
     ),

@@ -120,7 +120,7 @@ def test_any_image_has_the_lines_that_were_asked_for(
     values = {**VALUES, "timing": timing, "y": y}
     setup, problems = from_values(values, SCANNER_VALUES), Problems()
     schedule = make_schedule(setup, problems)
-    assert {problem.key for problem in problems.found} <= {"timing.pixels", "timing.image_lines"}  # too many of them
+    assert {problem.key for problem in problems.entries} <= {"timing.pixels", "timing.image_lines"}  # too many of them
     assume(schedule is not None)
     assert schedule is not None
     up, down = image_lines_played(schedule)

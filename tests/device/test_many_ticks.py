@@ -12,7 +12,7 @@ from stream_scripts import clamped, occurrences
 from tablegen.device import sequencer as sequencer_module
 from tablegen.device.played_lines import LineTicks
 from tablegen.device.sequencer import Sequencer
-from tablegen.device.slew import guarded
+from tablegen.device.slew import limit_slew
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script, StoredState
@@ -74,7 +74,7 @@ def test_a_guard_that_is_overlooked_makes_a_difference(monkeypatch: pytest.Monke
     def unguarded(targets: Ints, code: int, step: int) -> Ints:
         return targets
 
-    monkeypatch.setattr(sequencer_module, "guarded", unguarded)
+    monkeypatch.setattr(sequencer_module, "limit_slew", unguarded)
     assert played(SHAPES[0], 0) != right
 
 
@@ -92,4 +92,4 @@ def test_the_guard_is_that_of_single_ticks(levels: list[tuple[int, int]], code: 
     for target in targets.tolist():
         now += min(max(target - now, -step), step)
         wanted.append(now)
-    assert guarded(targets, code, step).tolist() == wanted
+    assert limit_slew(targets, code, step).tolist() == wanted

@@ -1,4 +1,4 @@
-"""The table of gentlest waveforms in docs/waveform.md, measured again where that is quick."""
+"""The table of minimum-acceleration waveforms in docs/waveform.md, measured again where that is quick."""
 
 import re
 import runpy
@@ -10,7 +10,7 @@ from variants import plan_of
 
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.optimum import least_acceleration
-from tablegen.waveform.minimum_acceleration import Straightness, gentlest, least_percent
+from tablegen.waveform.minimum_acceleration import Straightness, least_percent, minimum_acceleration_series
 from tablegen.waveform.window_fit import fit_window
 
 PAGE = (REPOSITORY / "docs" / "waveform.md").read_text("utf-8")
@@ -38,13 +38,13 @@ def test_the_table_has_every_line_harmonics_and_error() -> None:
 def test_rows_of_16_and_32_harmonics_are_measured(name: str) -> None:
     straight = LINES[name]
     for _, harmonics, percent, window, *figures in (row for row in ROWS if row[0] == name and row[1] != "64"):
-        fitted = fit_window(straight.asked, int(harmonics), straight.window, straight.both)
+        fitted = fit_window(straight.target, int(harmonics), straight.window, straight.both)
         assert window == f"{fitted.peak_acceleration():.1f}, {straight.error_percent(fitted):.2g} %"
         if figures[0].startswith("from"):
             assert figures[0] == f"from {least_percent(straight, int(harmonics)):.2g} % on"
             assert least_acceleration(straight, int(harmonics), float(percent)) is None
             continue
-        peak = gentlest(straight, int(harmonics), float(percent)).peak_acceleration()
+        peak = minimum_acceleration_series(straight, int(harmonics), float(percent)).peak_acceleration()
         assert figures[0] == f"{peak:.1f}"
         if percent == "1":
             optimum = least_acceleration(straight, int(harmonics), 1.0)

@@ -1,11 +1,13 @@
 """docs/troubleshooting.md: its messages are those of the program, and so are its statuses."""
 
 import re
+from typing import get_args
 
 import pytest
 from building import REPOSITORY
 from click.testing import CliRunner
 
+from tablegen.base.warnings import FindingCode
 from tablegen.cli import cli
 from tablegen.cli.shared.exit_status import ExitStatus
 
@@ -43,3 +45,12 @@ def test_the_statuses_are_those_of_the_program() -> None:
     helped = dict(re.findall(r"^ +(\d+) (.*)$", told, re.MULTILINE))
     for status in ("0", "2", "3", "4", "6", "130"):
         assert rows[status].replace("the ", "") == helped[status].replace("the ", "")
+
+
+def test_the_codes_of_findings_are_those_of_the_program() -> None:
+    """Every code of the type is in the table of the page, in order, and somewhere in the program a finding has it."""
+    table = PAGE[PAGE.index("### Codes of findings") : PAGE.index("## Messages of calibrate")]
+    codes = [code for code in get_args(FindingCode) if code]
+    assert re.findall(r"^\| `([a-z-]+)` \|", table, re.MULTILINE) == sorted(codes) == codes
+    users = "\n".join(text for path, text in SOURCES.items() if path.name != "warnings.py")
+    assert [code for code in codes if f'"{code}"' not in users] == []

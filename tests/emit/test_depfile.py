@@ -260,13 +260,13 @@ def test_it_is_written_anew_when_nothing_else_is(scan: Path) -> None:
 
 def test_a_file_that_is_edited_during_the_build_is_newer(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was read is no longer what stands there: the next make has to build again."""
-    render = module.render
+    render = module.render_scan
 
-    def edit_and_render(*arguments: object) -> dict[str, bytes]:
+    def edit_and_render(*arguments: object, **options: object) -> dict[str, bytes]:
         scan.write_text(edited(SCAN, "timing.lines = 100"), "utf-8")
-        return render(*arguments)  # type: ignore[arg-type]
+        return render(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(module, "render", edit_and_render)
+    monkeypatch.setattr(module, "render_scan", edit_and_render)
     file = scan.parent / "build.d"
     assert run("build", scan, "-o", scan.parent / "out", "--depfile", file).status == 0
     assert file.stat().st_mtime_ns < scan.stat().st_mtime_ns

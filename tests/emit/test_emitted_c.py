@@ -86,7 +86,7 @@ def of_a_variant(pair: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("built", "dialect"),
-    map(of_a_variant, in_pairs(list(IN_C), list(DIALECTS), WHOLE, "gcc-c99")),
+    [of_a_variant(pair) for pair in in_pairs(list(IN_C), list(DIALECTS), WHOLE, "gcc-c99")],
     indirect=["built"],
 )
 def test_compiles_without_a_warning(built: Build, dialect: str) -> None:

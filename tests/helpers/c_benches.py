@@ -82,7 +82,7 @@ class Benches:
         mismatch = compare(expected.tolist(), played.capture)
         assert mismatch is None, mismatch
         assert played.counts == [*script.counts, 0, 0], (played.counts, script.counts)
-        steps_are_limited(played.capture, script.taken)
+        steps_are_limited(played.capture, script.swapped_programs)
         return played
 
 

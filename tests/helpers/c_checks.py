@@ -28,7 +28,16 @@ from c_playing import (
     renderings,
     several_programs,
 )
-from c_requests import answers, banks, commits, lines_of_the_status, reports, status_of_power_up, the_queue
+from c_requests import (
+    answers,
+    banks,
+    commits,
+    lines_of_the_status,
+    reports,
+    status_of_power_up,
+    the_first_trigger,
+    the_queue,
+)
 from c_runs import (
     jumps_that_32_bits_do_not_tell,
     limits,
@@ -41,7 +50,7 @@ from c_runs import (
 
 CHECKS: tuple[Check, ...] = (
     layout, converter_words, converter_words_of_runs, several_programs, a_fill_that_wants_no_markers,
-    markers_known_again, status_of_power_up, the_queue, answers, banks, commits, reports, refusals,
+    markers_known_again, status_of_power_up, the_first_trigger, the_queue, answers, banks, commits, reports, refusals,
     the_largest_schedules, the_first_word_again, offsets_that_overflow, other_converters,
     converters_that_do_not_fit, requests_that_do_not_fit,
     words_too_wide_for_their_storage, lines_of_the_status, one_buffer_for_both,

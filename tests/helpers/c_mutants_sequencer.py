@@ -51,7 +51,8 @@ MUTANTS: tuple[Mutant, ...] = (
             "a scan does not settle": ("s->settle_left = s->now->schedule.settle_lines", "s->settle_left = 0"),
             "catching up is a fault": ("s->catching_up = true;", "s->catching_up = false;"),
             "a trigger is taken unarmed": ("if (!s->armed || s->running", "if (s->running"),
-            "a trigger is taken while a scan runs": ("!s->armed || s->running || s->now", "!s->armed || s->now"),
+            "a trigger is taken while a scan runs": ("!s->armed || s->running || !has", "!s->armed || !has"),
+            "a trigger is lost before the first program is taken": ("s->now != NULL || s->waiting", "s->now != NULL"),
             "every scan is without end": ("s->endless = s->armed_frames == 0", "s->endless = true"),
             "a frame too many": ("s->frames_left = s->armed_frames;", "s->frames_left = s->armed_frames + 1;"),
             "park does not disarm": ("s->armed = s->running = false;", "s->running = false;"),
@@ -186,7 +187,11 @@ MUTANTS: tuple[Mutant, ...] = (
             "a commit is never waited for": "    s->commits++;\n",
             "counts wrap": " && s->fault_counts[i] != UINT32_MAX",
             "more frames than can be counted": "frames <= UINT32_C(1) << 31 && ",
-            "a trigger is taken with nothing to play": " || s->now == NULL",
+            "a trigger is taken with nothing to play": " || !has_program(s)",
+            "the first program is withdrawn, and its scan runs": (
+                "        if (!has_program(s)) /* a scan of the first program was triggered, and never plays */\n"
+                "            s->running = false;\n"
+            ),
             "requests are not taken off the queue": "    s->tail = tail;\n",
             "pixels that are not known are told": "    if (s->pixel_rest == UNKNOWN)\n        return most;\n",
             "x is not moved on after a longer run": "        dac_axis_skip(&s->x, &bank->x, ticks);\n",

@@ -28,10 +28,30 @@ def status_of_power_up(libraries: Libraries) -> None:
         assert set(marks) == {MARKER["parked"]}
     assert device.load(flat(1)) == LOADED
     assert device.commit()
-    assert device.trigger()  # still armed
-    assert device.steps(1)[2][0] & MARKER["playing"] == 0
-    assert device.trigger()
-    assert device.steps(1)[2][0] & MARKER["playing"]
+    assert device.trigger()  # still armed, and the program waits
+    assert device.steps(1)[2][0] & (MARKER["swapped"] | MARKER["playing"]) == MARKER["swapped"] | MARKER["playing"]
+
+
+def the_first_trigger(libraries: Libraries) -> None:
+    """Right after the first commit, before any tick: it starts with the program, unless that is withdrawn."""
+    program = flat(1)
+    for requests, marks in (
+        (("commit", "arm", "trigger"), ("swapped", "playing", "line", "frame")),
+        (("arm", "commit", "trigger"), ("swapped", "playing", "line", "frame")),
+        (("arm", "trigger", "commit"), ("swapped", "parked")),
+        (("commit", "arm", "trigger", "withdraw"), ("parked",)),
+        (("commit", "arm", "trigger", "reset"), ("parked",)),
+        (("commit", "arm", "trigger", "park"), ("swapped", "parked")),
+        (("commit", "arm", "trigger", "withdraw", "commit"), ("swapped", "parked")),
+        (("commit", "arm", "withdraw", "commit", "trigger"), ("swapped", "playing", "line", "frame")),
+    ):
+        device = device_for(libraries.narrow, program)
+        assert device.load(program) == LOADED
+        for name in requests:
+            assert device.arm(0) if name == "arm" else getattr(device, name)()
+        first = device.fill(3)[2] if len(requests) % 2 else device.steps(3)[2]
+        assert first[0] & ~MARKER["valid"] & ~MARKER["pixel"] == sum(MARKER[name] for name in marks), requests
+        assert [bool(each & MARKER["playing"]) for each in first] == ["playing" in marks] * 3, requests
 
 
 def the_queue(libraries: Libraries) -> None:
@@ -55,10 +75,10 @@ def the_queue(libraries: Libraries) -> None:
         assert not device.writable()
         device.answer()
         assert not device.writable(), "the program was not taken yet"
-        assert device.steps(1)[2][0] == MARKER["swapped"] | MARKER["parked"]  # nothing played when it was triggered
-        assert device.writable()
-        assert device.trigger()
+        assert device.trigger()  # nobody armed it again
         marks = device.steps(130)[2]
+        assert marks[0] & MARKER["swapped"]
+        assert device.writable()
         assert np.sum(marks & MARKER["playing"] != 0) == program.schedule.frame_ticks, "the last count of arm is that"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from tablegen.calibration.laws.frequency import fit_frequency
 from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.calibration.laws.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, sizes_of
+from tablegen.calibration.laws.image_sizes import Acquisition, ImageSizes, KnownSample, SampleImage, sizes_of
 from tablegen.calibration.laws.images import Pair, fit_images
 from tablegen.calibration.laws.offset import fit_offset
 from tablegen.calibration.laws.resonance import fit_resonance
@@ -231,7 +231,7 @@ def scan_of(
 
 def measured(images: list[SampleImage]) -> ImageSizes:
     """What such images say."""
-    return sizes_of(images, V_MAX, KnownSample(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM)), Taking())
+    return sizes_of(images, V_MAX, KnownSample(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM)), Acquisition())
 
 
 def size_of_images_case(random: np.random.Generator, noise: float) -> Found:

@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 
 from gwyfile.objects import GwyContainer, GwyDataField, GwyObject
@@ -28,14 +29,14 @@ def png(values: Floats, bits: int = 16) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(stream)) + chunk(b"IEND", b"")
 
 
-def gwy(path: Path, **channels: Floats) -> bytes:
-    """As the Python package gwyfile writes it, with what Gwyddion keeps beside the data."""
+def gwy(path: Path, meta: Mapping[str, str] | None = None, /, **channels: Floats) -> bytes:
+    """As the Python package gwyfile writes it, with what Gwyddion keeps beside the data, and more metadata."""
     container = GwyContainer()
     container["/0/base/palette"] = "Gwyddion.net"
     for number, (title, heights) in enumerate(channels.items()):
         container[f"/{number}/data/title"] = title
         container[f"/{number}/data"] = GwyDataField(heights, xreal=1e-6, yreal=1e-6, si_unit_z="m")
-        container[f"/{number}/meta"] = GwyObject("GwyContainer", {"Scan rate": "1 Hz", "Lines": 40})
+        container[f"/{number}/meta"] = GwyObject("GwyContainer", {"Scan rate": "1 Hz", "Lines": 40, **(meta or {})})
     container.tofile(str(path))
     return path.read_bytes()
 

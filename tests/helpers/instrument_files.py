@@ -14,7 +14,13 @@ from tablegen.numerics.arrays import Floats
 Both = Mapping[str, tuple[Floats, Floats]]  # trace and retrace by signal
 
 
-def sxm(signals: Both, nm: tuple[float, float] = (500.0, 250.0), scan_dir: str = "up", units: str = "m") -> bytes:
+def sxm(
+    signals: Both,
+    nm: tuple[float, float] = (500.0, 250.0),
+    scan_dir: str = "up",
+    units: str = "m",
+    angle_deg: float = 0.0,
+) -> bytes:
     """Nanonis: big-endian floats in the order of time, so that backward lines begin at the right."""
     rows, columns = next(iter(signals.values()))[0].shape
     info = "".join(f"\t{14 + n}\t{name}\t{units}\tboth\t9.0E-9\t0.0E+0\n" for n, name in enumerate(signals))
@@ -24,7 +30,7 @@ def sxm(signals: Both, nm: tuple[float, float] = (500.0, 250.0), scan_dir: str =
         f":SCAN_PIXELS:\n       {columns}       {rows}\n:SCAN_FILE:\nC:\\scan.sxm\n"
         ":SCAN_TIME:\n             4.000E-1             1.000E-1\n"
         f":SCAN_RANGE:\n           {nm[0] * 1e-9:.6E}           {nm[1] * 1e-9:.6E}\n"
-        ":SCAN_OFFSET:\n             0.000000E+0         0.000000E+0\n:SCAN_ANGLE:\n            0.000E+0\n"
+        f":SCAN_OFFSET:\n             0.000000E+0         0.000000E+0\n:SCAN_ANGLE:\n            {angle_deg:.3E}\n"
         f":SCAN_DIR:\n{scan_dir}\n:BIAS:\n            1.000E+0\n:COMMENT:\nof a test\n"
         f":DATA_INFO:\n\tChannel\tName\tUnit\tDirection\tCalibration\tOffset\n{info}\n:SCANIT_END:\n\n\n"
     )
@@ -32,8 +38,17 @@ def sxm(signals: Both, nm: tuple[float, float] = (500.0, 250.0), scan_dir: str =
     return header.encode("latin-1") + b"\x1a\x04" + blocks
 
 
-def ibw(channels: Mapping[str, Floats], note: Mapping[str, str], order: str = "<", turned: bool = False) -> bytes:
-    """Igor, version 5: values with x first; ``turned`` stores the row that is first in time last."""
+def ibw(
+    channels: Mapping[str, Floats],
+    note: Mapping[str, str],
+    order: str = "<",
+    turned: bool = False,
+    step_m: tuple[float, float] = (0.0, 0.0),
+) -> bytes:
+    """Igor, version 5: values with x first; ``turned`` stores the row that is first in time last.
+
+    ``step_m`` is the scaling of columns and rows.
+    """
     rows, columns = next(iter(channels.values())).shape
     stored = [heights[::-1] if turned else heights for heights in channels.values()]
     values = b"".join(heights.astype(f"{order}f4").tobytes() for heights in stored)
@@ -44,6 +59,7 @@ def ibw(channels: Mapping[str, Floats], note: Mapping[str, str], order: str = "<
     struct.pack_into(f"{order}ih", wave, 12, rows * columns * len(stored), 2)
     wave[28:33] = b"Image"
     struct.pack_into(f"{order}4i", wave, 68, columns, rows, len(stored), 0)
+    struct.pack_into(f"{order}2d", wave, 84, *step_m)
     wave[148:149] = b"m"
     head = struct.pack(f"{order}hh", 5, 0) + sizes + wave
     checksum = -int(np.frombuffer(head, f"{order}i2").sum()) & 0xFFFF
@@ -51,9 +67,15 @@ def ibw(channels: Mapping[str, Floats], note: Mapping[str, str], order: str = "<
 
 
 def spm(
-    signals: Both, nm: tuple[float, float] = (500.0, 500.0), frame: str = "Up", stored: int = 2, aspect: str = "1:1"
+    signals: Both,
+    nm: tuple[float, float] = (500.0, 500.0),
+    frame: str = "Up",
+    stored: int = 2,
+    aspect: str = "1:1",
+    of_scan: str = "",
+    of_image: str = "",
 ) -> bytes:
-    """Nanoscope: the bottom row first, integers of 100 nm full scale."""
+    """Nanoscope: the bottom row first, integers of 100 nm full scale; further lines of the scan and of each image."""
     start, lists, blocks = 1 << 12, "", b""
     for signal, both in signals.items():
         for name, heights in zip(("Trace", "Retrace"), both, strict=True):
@@ -64,7 +86,7 @@ def spm(
                 f"\\*Ciao image list\r\n\\Data offset: {start + len(blocks)}\r\n\\Data length: {len(block)}\r\n"
                 f"\\Bytes/pixel: 2\r\n\\Start context: OL\r\n\\Samps/line: {columns}\r\n\\Number of lines: {rows}\r\n"
                 f"\\Aspect Ratio: {aspect}\r\n\\Scan Size: {nm[0]:g} {nm[1]:g} nm\r\n\\Line Direction: {name}\r\n"
-                f"\\Frame direction: {frame}\r\n"
+                f"\\Frame direction: {frame}\r\n{of_image}"
                 f'\\@2:Image Data: S [{signal.replace(" ", "")}] "{signal}"\r\n'
                 f"\\@2:Z scale: V [Sens. Zsens] (0.000305 V/LSB) 20.00000 V\r\n"
                 f"\\@2:Z offset: V [Sens. Zsens] (0.000305 V/LSB) 0 V\r\n"
@@ -73,18 +95,29 @@ def spm(
     header = (
         "\\*File list\r\n\\Version: 0x09400202\r\n\\Date: 10:00:00 AM Sun Nov 22 2026\r\n"
         "\\*Equipment list\r\n\\Description: MultiMode\r\n\\*Scanner list\r\n\\@Sens. Zsens: V 5.000000 nm/V\r\n"
-        f"\\*Ciao scan list\r\n\\Scan Size: {nm[0]:g} nm\r\n\\Scan Rate: 2.5\r\n{lists}\\*File list end\r\n\x1a"
+        f"\\*Ciao scan list\r\n\\Scan Size: {nm[0]:g} nm\r\n\\Scan Rate: 2.5\r\n{of_scan}{lists}"
+        "\\*File list end\r\n\x1a"
     )
     return header.encode("cp1252").ljust(start, b"\0") + blocks
 
 
-def jpk(signals: Both, nm: tuple[float, float] = (500.0, 250.0), big: bool = False) -> bytes:
-    """JPK: a page with a picture and the grid, then pages of 16 bits, 0.01 nm a step from -100 nm."""
+def jpk(
+    signals: Both,
+    nm: tuple[float, float] = (500.0, 250.0),
+    big: bool = False,
+    angle_deg: float = 0.0,
+    preview: tuple[str, tuple[int, ...]] = ("settings", (8, 8, 3)),
+    lines: int | None = None,
+) -> bytes:
+    """JPK: a page with a picture and the grid, then pages of 16 bits, 0.01 nm a step from -100 nm.
+
+    ``preview`` is the name and the shape of the picture, ``lines`` those of the grid if the scan was stopped.
+    """
     order = ">" if big else "<"
     rows, columns = next(iter(signals.values()))[0].shape
-    grid = {0x8042: nm[0] * 1e-9, 0x8043: nm[1] * 1e-9, 0x8044: 0.0, 0x8045: 0, 0x8046: columns, 0x8047: rows}
-    grid |= {0x8049: 4.0, 0x8050: "settings"}
-    pages = [({**grid, 262: 2}, np.zeros((8, 8, 3), np.uint8))]
+    grid = {0x8042: nm[0] * 1e-9, 0x8043: nm[1] * 1e-9, 0x8044: float(np.radians(angle_deg))}
+    grid |= {0x8045: 0, 0x8046: columns, 0x8047: lines or rows, 0x8049: 4.0, 0x8050: preview[0]}
+    pages = [({**grid, 262: 2 if len(preview[1]) > 2 else 1}, np.zeros(preview[1], np.uint8))]
     for signal, both in signals.items():
         for flag, heights in enumerate(both):
             steps = np.round((heights + 100.0) / 0.01).astype(f"{order}u2")

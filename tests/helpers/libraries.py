@@ -21,6 +21,7 @@ BASE = edited(
     "y.table.length = 256",
     "- [limits]",
 )
+DAMPED = edited(SCANNER, "x.resonance.quality = 2.0")  # ticks as coarse as these drive a sharp one, with a warning
 SCANS = """
 [[scans]]
 name = "narrow"
@@ -43,7 +44,7 @@ NAMES = ("narrow", "broad", "even")
 
 def write_library(folder: Path, scans: str = SCANS, base: str = BASE) -> Path:
     """The scan file with its ``[[scans]]``, beside its scanner file."""
-    return write_pair(folder, base + scans, SCANNER)
+    return write_pair(folder, base + scans, DAMPED)
 
 
 def programs(library: Path, names: tuple[str, ...] = NAMES) -> list[DualProgram]:

@@ -187,6 +187,10 @@ class LineCheck:
             for codes in self._ramp(old, self._codes):
                 yield self.taken[self._generation], self._started(old, codes)
             return
+        yield from self._ways_of_another(played)
+
+    def _ways_of_another(self, played: PlayedLine) -> Iterator[tuple[str, _Play]]:
+        """How the device may have come to the first line of a later generation, from rest."""
         before = self._play.program if self._play is not None else self._boot
         parked = before.x.output.park_code, before.y.output.park_code
         for name, program in self._offered.items():

@@ -15,8 +15,8 @@ from link_device import DeviceLibrary
 from link_random import KEY, Dialogue
 
 
-def trials() -> Iterator[str]:
-    """Each by its name, before it is tried."""
+def golden_trials() -> Iterator[str]:
+    """Frames and dialogues that are kept byte by byte."""
     for kind, check in (
         ("good", test_c_link.test_a_good_frame_is_answered_or_is_no_request),
         ("bad", test_c_link.test_what_is_no_frame_is_counted_once),
@@ -30,6 +30,11 @@ def trials() -> Iterator[str]:
             continue  # the device of the trials does not shape
         yield f"dialogue: {dialogue['name']}"
         test_c_link.test_golden_dialogues(dialogue)
+
+
+def trials() -> Iterator[str]:
+    """Each by its name, before it is tried."""
+    yield from golden_trials()
     parts = test_c_link_parts
     yield "an upload leaves what plays alone"
     parts.test_an_upload_leaves_what_plays_alone()

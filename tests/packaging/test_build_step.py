@@ -28,6 +28,7 @@ pytestmark = pytest.mark.common
 TOOLS = ("make", "Unix Makefiles", "Ninja")
 BUILT = {"main", NAME, *(path.stem for path in (*c_runtime(), *c_link()) if path.suffix == ".c")}
 LINKED = {"example"}
+STAMPS = {"tablegen-build.d", "tablegen-build.options"}  # of make, beside what tablegen writes
 
 
 @dataclass(frozen=True)
@@ -251,6 +252,49 @@ def test_what_uses_a_scan_is_compiled_for_its_widths(project: Project) -> None:
     project.write(project.scan, wide)
     does(project.build(), 1, BUILT)
     assert project.play().endswith(" 64\n")
+
+
+def snippet_project(folder: Path, snippet: str) -> Project:
+    """A project whose Makefile is that of the page, of the example's scan and main."""
+    root = folder / "project"
+    (root / "build_step" / "build").mkdir(parents=True)
+    shutil.copy(EXAMPLE, root)
+    shutil.copy(REPOSITORY / "examples" / "scanner.toml", root)
+    shutil.copy(REPOSITORY / "examples" / "build_step" / "main.c", root / "build_step")
+    (root / "build_step" / "Makefile").write_text(snippet.replace("scan.toml", f"../{EXAMPLE.name}"), "utf-8")
+    return Project("make", root, REPOSITORY, write_command(folder / "bin", REPOSITORY))
+
+
+def widths_of(project: Project) -> set[str]:
+    """The file names of the objects that were compiled for words of tables of 32 bits."""
+    objects = {path.name: path for path in project.folder.rglob("*.o")}
+    return {name for name, path in objects.items() if b"DAC_TABLE_STORAGE_BITS 32" in path.read_bytes()}
+
+
+@pytest.mark.parametrize("guarded", [True, False])
+def test_the_snippet_of_the_page_compiles_all_objects_when_a_width_changes(tmp_path: Path, guarded: bool) -> None:
+    """From 16 to 20 bits. Without its line on DIR_OPTIONS the runtime stays as it was: a wrong program."""
+    page = (REPOSITORY / "docs" / "build_step.md").read_text("utf-8")
+    snippet = page.partition("```make\n")[2].partition("```")[0]
+    guard = "$(OBJECTS): $(build/scan_OPTIONS)\n"
+    assert snippet.count(guard) == 1
+    project = snippet_project(tmp_path, snippet if guarded else snippet.replace(guard, ""))
+    flags = {"CFLAGS": "-g3"}  # macros stand in the objects
+    done = project.call("make", **flags)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert widths_of(project) == set()
+    objects = {path.name for path in project.folder.rglob("*.o")}
+    assert objects == {f"{name}.o" for name in BUILT}
+    project.write(
+        project.scan,
+        edited(project.scan.read_text("utf-8"), "x.table.bits = 20", "dac.bits = 20", "limits.max_error_lsb = 5"),
+    )
+    done = project.call("make", "-j2", **flags)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert widths_of(project) == (objects if guarded else {"main.o", f"{NAME}.o"})
+    if guarded:
+        project.append(project.scan, "# a comment\n")
+        assert not project.build(*(f"{name}={value}" for name, value in flags.items())).compiled
 
 
 def test_a_number_of_the_scanner_rebuilds(project: Project) -> None:
@@ -517,7 +561,10 @@ def test_the_way_in_is_the_same_wherever_it_is_shown() -> None:
 @pytest.mark.parametrize("two", ["make"], indirect=True)
 def test_make_knows_all_files_of_a_build_by_their_kinds(two: Project) -> None:
     everything, kinds = (set(line.split()) for line in two.build("-s", "list").shown.splitlines())
-    assert everything == {path.name for path in (two.folder / "build" / "one").iterdir()} - {"tablegen-build.d"}
+    assert everything == {path.name for path in (two.folder / "build" / "one").iterdir()} - {
+        "tablegen-build.d",
+        "tablegen-build.options",
+    }
     assert everything - kinds == {"manifest.json", "first.vh"}
 
 

@@ -20,7 +20,7 @@ from tablegen.fixedpoint.table_shape import MODES, TableShape
 from tablegen.manifest.record import plan_record
 from tablegen.numerics.arrays import Ints
 from tablegen.planning import emitted_error
-from tablegen.planning.emitted_error import AskedCodes
+from tablegen.planning.emitted_error import IdealCodes
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.planning.other_table import maker_of, shape_of, with_table
 from tablegen.planning.table_search import TableSearch
@@ -54,7 +54,7 @@ def worst_of(line: LinePlan, shape: TableShape) -> float:
 
     Of shaped output what is rounded: codes cut to 12 bits of fraction, at 16 bits.
     """
-    program, series = maker_of(line).made(shape).program, line.series
+    program, series = maker_of(line).quantise(shape).program, line.series
     k = np.arange(program.ticks)
     t, n = k // program.hold / program.phase.ticks, np.arange(1, series.harmonics + 1)
     angle = 2.0 * np.pi * np.outer(t, n)
@@ -84,8 +84,8 @@ def test_of_shaped_output_it_is_the_error_before_the_rounding(
     found, line = shape_of(plan.x), plan.x
     keeping = [shape for shape in every_shape(line, 1 << 12) if worst_of(line, shape) <= error]
     assert found == min(keeping, key=lambda shape: shape.order)
-    assert line.asked_table is not None
-    assert str(line.asked_table) == f"the least memory within {error:g} LSB before the rounding"
+    assert line.table_request is not None
+    assert str(line.table_request) == f"the least memory within {error:g} LSB before the rounding"
     finest = certify(plan_of(tmp_path, {**edits, **asking(0.0005)}))["x"]
     assert certify(plan)["x"].rms_error_lsb < 1.05 * finest.rms_error_lsb
 
@@ -96,7 +96,7 @@ def test_few_tables_are_made_and_fewer_measured(tmp_path: Path) -> None:
     found = search.smallest(shapes, 1.0)
     assert found is not None
     assert len(shapes) > 180
-    assert search.made <= 60
+    assert search.quantised <= 60
     assert search.measured <= 4
 
 
@@ -127,7 +127,7 @@ def test_a_table_one_step_smaller_breaks_the_error(tmp_path: Path, mode: str, mo
 )
 def test_the_error_that_decides_is_that_of_the_certificate(tmp_path: Path, edits: dict[str, str]) -> None:
     for line in plan_of(tmp_path, edits).lines:
-        asked, found = AskedCodes(maker_of(line)), EmittedPeriod(line).largest_error()
+        asked, found = IdealCodes(maker_of(line)), EmittedPeriod(line).largest_error()
         worst = asked.worst_error(line.program) / 65536
         assert worst == pytest.approx(found, abs=1.0 / 65536)
         assert asked.least_error(line.program) / 65536 <= worst
@@ -135,7 +135,7 @@ def test_the_error_that_decides_is_that_of_the_certificate(tmp_path: Path, edits
 
 def test_a_long_period_is_measured_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     line = plan_of(tmp_path, {"y.table.mode": '"cubic"', "y.table.length": "256"}).y
-    asked = AskedCodes(maker_of(line))
+    asked = IdealCodes(maker_of(line))
     assert long_runs(line.program) is None  # every tick is looked at
     whole = asked.worst_error(line.program)
     monkeypatch.setattr(emitted_error, "_CHUNK_TICKS", 9973)
@@ -146,11 +146,11 @@ def test_of_a_slow_frame_few_ticks_are_looked_at(tmp_path: Path, monkeypatch: py
     """The worst error of a cubic table is found where runs begin and end, and is that of all ticks."""
     slow = {"timing.line_rate_hz": "20", "y.table.mode": '"cubic"', "y.table.length": "256", "y.table.bits": "14"}
     line = plan_of(tmp_path, slow).y
-    asked, looked = AskedCodes(maker_of(line)), []
+    asked, looked = IdealCodes(maker_of(line)), []
 
     def counting(k: Ints) -> Ints:
         looked.append(len(k))
-        return AskedCodes._at(asked, k)
+        return IdealCodes._at(asked, k)
 
     monkeypatch.setattr(asked, "_at", counting)
     by_runs = asked.worst_error(line.program)
@@ -170,8 +170,8 @@ def test_what_is_given_is_kept(tmp_path: Path) -> None:
         assert found.memory_bits >= free.memory_bits
         for key, value in keys.items():
             assert getattr(found, key) == (value.strip('"') if key == "mode" else int(value))
-        assert plan.x.asked_table is not None
-        assert set(plan.x.asked_table.free) == {"mode", "length", "bits"} - set(keys)
+        assert plan.x.table_request is not None
+        assert set(plan.x.table_request.free) == {"mode", "length", "bits"} - set(keys)
 
 
 def test_a_table_that_is_given_whole_is_checked(tmp_path: Path) -> None:
@@ -206,8 +206,8 @@ def test_an_error_that_no_table_keeps_is_refused_and_the_advice_holds(tmp_path: 
 
 def test_auto_keeps_1_lsb_or_the_limit_of_the_scan(tmp_path: Path) -> None:
     def errors(plan: Plan) -> tuple[float, float]:
-        assert plan.x.asked_table is not None
-        return plan.x.asked_table.max_error_lsb, certify(plan)["x"].max_error_lsb
+        assert plan.x.table_request is not None
+        return plan.x.table_request.max_error_lsb, certify(plan)["x"].max_error_lsb
 
     for limit, asked in (("", 1.0), ("3.0", 1.0), ("0.6", 0.6)):
         edits = {**AUTO, "limits.max_error_lsb": limit, "y.table.bits": "20"}
@@ -251,7 +251,7 @@ def test_an_axis_at_rest_has_no_table_to_choose(tmp_path: Path) -> None:
     text = f"{text.split('[y]')[0]}[y]\nmotion = 'off'\nlike = 'x'\n"
     line = make_plan(load(write_pair(tmp_path, text))).y
     assert line.drive.resting
-    assert line.asked_table is None
+    assert line.table_request is None
 
 
 def test_the_plan_says_what_was_asked(tmp_path: Path) -> None:

@@ -63,12 +63,12 @@ def test_images_show_the_true_error_of_the_line(setup: Setup, sample: Sample) ->
     """In 128 x 85 pixels with 5 % of noise, drift and tilt: to 0.02 % of the line, and within the errors it states."""
     found = refine_images(setup, "x", frames_of(setup, sample), Options())
     true = play(setup, "x", scanner().x).true
-    off = 100.0 * (found.lesson.before.error - true.error)
+    off = 100.0 * (found.update.before.error - true.error)
     assert true.rms_percent > 0.3
     assert rms(off) < 0.02
     # Pixels and degrees of the fit do not show the steps of the converter: they are in the truth, and no noise.
-    assert found.lesson.noise_percent < 0.03
-    assert rms(off) < 3.0 * found.lesson.noise_percent
+    assert found.update.noise_percent < 0.03
+    assert rms(off) < 3.0 * found.update.noise_percent
     assert found.worse == ""
 
 
@@ -114,7 +114,7 @@ def test_a_second_frame_tells_drift_from_y() -> None:
     off = []
     for count in (1, 2):
         found = refine_images(setup, "y", frames_of(setup, LATTICE, count), Options())
-        off.append(rms(100.0 * (found.lesson.before.error - true.error)))
+        off.append(rms(100.0 * (found.update.before.error - true.error)))
         assert any("give two frames" in remark for remark in found.remarks) == (count == 1)
     assert off[0] > 0.05  # the drift of 1 % of the frame bends it by 0.07 % rms
     assert off[1] < 0.02
@@ -130,7 +130,7 @@ def test_trace_against_retrace_tells_their_difference_and_nothing_else(plant: st
     assert rms(left) < 0.2 * rms(differing)
     assert rms(kept - shared) < 0.01
     assert first.round is not None
-    seen_shared, seen = shares(first.round.lesson.before)
+    seen_shared, seen = shares(first.round.update.before)
     assert rms(seen - differing) < 0.04
     assert rms(seen_shared) < 1e-3  # of the model's own line, which no image shows
     assert "an error that both share stays" in first.round.remarks[0]
@@ -263,7 +263,7 @@ def test_a_late_image_is_put_right_by_its_delay(setup: Setup) -> None:
     """A pixel late moves trace against retrace by two; told, it is gone."""
     late = frames_of(setup, LATTICE, conditions=replace(IMAGED, late=0.5))
     true = play(setup, "x", scanner().x).true
-    wrong = refine_images(setup, "x", late, Options()).lesson.before
-    told = refine_images(setup, "x", late, Options(), ImageOptions(delay_pixels=0.5)).lesson.before
+    wrong = refine_images(setup, "x", late, Options()).update.before
+    told = refine_images(setup, "x", late, Options(), ImageOptions(delay_pixels=0.5)).update.before
     assert rms(100.0 * (wrong.error - true.error)) > 0.1
     assert rms(100.0 * (told.error - true.error)) < 0.02

@@ -16,7 +16,7 @@ from tablegen.compensation.dynamics import SecondOrder
 from tablegen.config.load import load
 from tablegen.planning.band_limit import band_limited
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.refinement.bound import MAX_ERROR_LEFT, bound, left_of_error, plausible_ratios
+from tablegen.refinement.bound import MAX_ERROR_LEFT, bound, plausible_ratios, remaining_error
 from tablegen.refinement.displacement import Displacement
 from tablegen.refinement.learning import learn
 from tablegen.refinement.round import Options, refine
@@ -69,9 +69,9 @@ def history(line: LinePlan, ratio: np.ndarray, disturbance: FourierSeries, round
     found = []
     for _ in range(rounds):
         try:
-            lesson = learn(line, seen(line, ratio, disturbance), GAIN, N)
-            found.append(lesson.before.rms_percent)
-            line = with_layer(line, lesson.layer)
+            update = learn(line, seen(line, ratio, disturbance), GAIN, N)
+            found.append(update.before.rms_percent)
+            line = with_layer(line, update.layer)
         except Unphysical:
             found.append(np.inf)
             break
@@ -83,10 +83,10 @@ def history(line: LinePlan, ratio: np.ndarray, disturbance: FourierSeries, round
 @settings(max_examples=8, deadline=None)
 def test_inside_the_bound_it_converges(line: LinePlan, gain: float, phase: float, seed: int) -> None:
     ratio = delayed(gain, phase)
-    left = float(np.max(left_of_error(GAIN, ratio[:N])))
+    left = float(np.max(remaining_error(GAIN, ratio[:N])))
     if left > 0.85:  # too near the bound to wait for, or outside of it
         ratio = delayed(1.0, 0.6 * phase)
-        left = float(np.max(left_of_error(GAIN, ratio[:N])))
+        left = float(np.max(remaining_error(GAIN, ratio[:N])))
     assert left <= 0.85
     # More rounds than left**8 would take: smoothing learns slowly what the windows hardly see.
     found = history(line, ratio, disturbed(seed), 20)
@@ -105,7 +105,7 @@ def test_outside_the_bound_it_does_not(line: LinePlan, by_gain: bool, left: floa
     else:
         left = min(left, 0.95 + GAIN)  # no phase leaves more than 1 + GAIN
         ratio = delayed(1.0, float(np.arccos((1.0 + GAIN**2 - left**2) / (2.0 * GAIN)) / (2.0 * np.pi)))
-    assert left_of_error(GAIN, ratio[:N])[-1] == pytest.approx(left)
+    assert remaining_error(GAIN, ratio[:N])[-1] == pytest.approx(left)
     found = history(line, ratio, disturbed(seed), 14)
     assert found[-1] > 2.0 * found[0]
 
@@ -139,7 +139,7 @@ def test_the_coupled_loop_is_no_worse_than_its_harmonics(tmp_path: Path, turn: f
 
     for gain, phase in ((0.5, 0.2), (1.0, 0.15), (1.0, 0.19), (2.0, 0.1), (2.7, 0.0), (2.7, 0.04)):
         ratio = delayed(gain, phase)
-        diagonal = float(np.max(left_of_error(GAIN, ratio[:N])))
+        diagonal = float(np.max(remaining_error(GAIN, ratio[:N])))
         start = change(ratio, np.zeros(2 * N))
         steps = 1e-5 * np.eye(2 * N)
         response = np.stack([(change(ratio, step) - start) / 1e-5 for step in steps], axis=1)
@@ -154,11 +154,11 @@ def test_noise_is_not_learnt(line: LinePlan) -> None:
     for _ in range(100):
         c = noise * generator.standard_normal((2, H))
         shown = seen(line, np.ones(H, complex), FourierSeries(0.0, c[0], c[1]), noise)
-        lesson = learn(line, shown, GAIN, N)
-        learnt.append(lesson.harmonics)
-        assert np.max(np.abs(lesson.after.error - lesson.before.error)) < 10.0 * noise
+        update = learn(line, shown, GAIN, N)
+        learnt.append(update.harmonics)
+        assert np.max(np.abs(update.after.error - update.before.error)) < 10.0 * noise
     assert np.mean(np.array(learnt) == 0) > 0.5
-    assert lesson.noise_percent == pytest.approx(100.0 * noise * np.sqrt(2 * H) / np.sqrt(2.0), rel=0.4)
+    assert update.noise_percent == pytest.approx(100.0 * noise * np.sqrt(2 * H) / np.sqrt(2.0), rel=0.4)
 
 
 def test_what_noise_explains_is_taken_off(line: LinePlan) -> None:

@@ -14,11 +14,14 @@ from building import FEW, VARIANTS, write_variant
 from editing import SCAN, SCANNER, edited, run, write_pair
 from html_page import Page, well_formed
 from operator_files import operator_file, write_operator_scan
+from replacing import replace
 from sets import quick
 
+from tablegen.base.input_errors import Problem
 from tablegen.charts.png import grey_png
 from tablegen.html_report.page import charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.ranking import ranked
 from tablegen.html_report.subject import Subject
 
 
@@ -142,8 +145,31 @@ def test_a_broken_limit_is_shown_and_is_status_3(tmp_path: Path) -> None:
     assert read.verdicts == ["bad"]
     assert "✗ exceeded" in read.said
     assert read.said.count("the x axis has a scaling error") == 1
+    assert content.decode("utf-8").count('data-code="scaling-error" data-axis="x"') == 1
     assert "scan.toml:" in read.said
     assert str(tmp_path) not in content.decode("utf-8")
+
+
+def test_a_finding_is_given_once_by_code_and_axis(tmp_path: Path) -> None:
+    """Other words for the warning of a broken limit, or of the note of a warning, are still the same finding."""
+    subject = planned_scan(write_pair(tmp_path), remedies=False)
+    assert subject.planned is not None
+    limit = Problem("scan.toml", 1, "limits", "too far out").coded("scaling-error", "x")
+    warning = Problem("scan.toml", 2, "x.size_nm", "not straight").coded("scaling-error", "x")
+    other = Problem("scan.toml", 3, "y.size_nm", "not straight").coded("scaling-error", "y")
+    apart = Problem("scan.toml", 4, "timing", "places differ").coded("image-offset", "x")
+    planned = replace(subject.planned, broken=(limit,), warnings=((9.0, warning), (5.0, other), (2.0, apart)))
+    findings = ranked(replace(subject, planned=planned))
+    weights = [(one.code, one.axis, one.weight) for one in findings]
+    assert weights[:3] == [
+        ("scaling-error", "x", "limit"),
+        ("scaling-error", "y", "spoils"),
+        ("image-offset", "x", "spoils"),
+    ]
+    assert len([one for one in weights if one[0] in ("scaling-error", "image-offset")]) == 3
+    alone = [(one.code, one.axis) for one in ranked(replace(subject, planned=replace(subject.planned, broken=())))]
+    assert ("image-offset", "x") in alone
+    assert alone.count(("scaling-error", "x")) == 2
 
 
 def test_what_spoils_an_image_comes_first(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ The scripts that the Verilog sequencer and the C one on this machine play are pl
 """
 
 import sys
+from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +17,10 @@ from c_faults import Mutant
 from c_mutants import runtime_with
 from c_scripts import IN_C, LONG, long_play, renderings, shape_in_c
 from programs import random_dual
+from sets import long
 from stream_scripts import sweep
 
-from tablegen.verification.c.bench import OPTIONS, CBench, CPlayed
+from tablegen.verification.c.bench import OPTIONS, CBench, CPlayed, defines
 from tablegen.verification.c.emulate import CortexMBench, Processor, compile_bare
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -30,6 +33,7 @@ RISC_V = ("riscv32", "riscv64")
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 SHAPES = (SHAPE, SequencerShape(24, 1, 3, 8, 0, 4, 24))  # so many bits that tables and words are kept in 16, and in 32
 FILL = 40
+Compile = Callable[..., CortexMBench]
 WITHOUT_FAULTS = (1 << 56) - 1
 
 
@@ -51,70 +55,90 @@ def hold(played: CPlayed, script: Script, fill: int) -> None:
 
 
 @pytest.fixture(scope="module")
+def benches(tmp_path_factory: pytest.TempPathFactory) -> Compile:
+    """Compile a bench for a processor; one that was compiled serves all shapes of the same storage."""
+    compiled: dict[object, CortexMBench] = {}
+
+    def bench(
+        shape: SequencerShape, core: str, fill: int = 0, options: tuple[str, ...] = OPTIONS, compiler: str = "gcc"
+    ) -> CortexMBench:
+        key = core, options, compiler, tuple(defines(shape, fill).items())
+        if key not in compiled:
+            command = zig(core) if compiler == "zig" else None
+            folder = tmp_path_factory.mktemp("bench")
+            compiled[key] = CortexMBench(shape, folder, command, options, fill=fill, core=core)
+        return compiled[key]
+
+    return bench
+
+
+# Every pair of a compiler, a level and a way of playing, and each of them on every core; the others are of test-long.
+WAYS = [("gcc", "-O2", FILL), ("gcc", "-Os", 0), ("zig", "-O2", 0), ("zig", "-Os", FILL)]
+
+
+@pytest.fixture(scope="module")
 def sweeps() -> dict[SequencerShape, Script]:
     """Everything that a host may ask, the same for all processors."""
     return {shape: sweep(np.random.default_rng(7), shape, 1500) for shape in SHAPES}
 
 
-@pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
-@pytest.mark.parametrize("level", ["-O2", "-Os"])
-@pytest.mark.parametrize("compiler", ["gcc", "zig"])
+@pytest.mark.parametrize("way", long(WAYS, product(("gcc", "zig"), ("-O2", "-Os"), (0, FILL))))
 @pytest.mark.parametrize("core", CORTEX_M)
 def test_cortex_m_plays_everything_that_a_host_may_ask(
-    sweeps: dict[SequencerShape, Script], core: str, compiler: str, level: str, fill: int, tmp_path: Path
+    sweeps: dict[SequencerShape, Script], benches: Compile, core: str, way: tuple[str, str, int]
 ) -> None:
+    compiler, level, fill = way
     for shape in SHAPES:
         script = sweeps[shape]
-        bench = CortexMBench(
-            shape, tmp_path, zig(core) if compiler == "zig" else None, options(level), fill=fill, core=core
-        )
+        bench = benches(shape, core, fill, options(level), compiler)
         hold(bench.run(words_of(script, shape)), script, fill)
 
 
 @pytest.mark.parametrize("name", IN_C)
-def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, tmp_path: Path) -> None:
+def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, benches: Compile) -> None:
     configuration = IN_C[name]
     script = configuration.script(name)
     words, shaping = words_of(script, configuration.shape), (*OPTIONS, f"-DDAC_SHAPING={configuration.shaping}")
     for core, fill in (("cortex-m0plus", 0), ("cortex-m4", FILL)):
-        bench = CortexMBench(configuration.shape, tmp_path, options=shaping, fill=fill, core=core)
-        hold(bench.run(words), script, fill)
+        hold(benches(configuration.shape, core, fill, shaping).run(words), script, fill)
 
 
 @pytest.mark.parametrize("name", LONG)
-def test_cortex_m_plays_long_lines(name: str, tmp_path: Path) -> None:
+def test_cortex_m_plays_long_lines(name: str, benches: Compile) -> None:
     """Those that are played many ticks at once."""
     shape, script = LONG[name][0], long_play(name, 8000)
     words = words_of(script, shape)
     for core in ("cortex-m0plus", "cortex-m4", "riscv32"):
-        hold(CortexMBench(shape, tmp_path, fill=200, core=core).run(words), script, 200)
+        hold(benches(shape, core, 200).run(words), script, 200)
 
 
+@pytest.mark.parametrize("fills", long(["by turns"], ["by turns", "both"]))
 @pytest.mark.parametrize("level", ["-O2", "-Os"])
 @pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
-def test_shaped_output(core: str, level: str, tmp_path: Path) -> None:
-    for name in ("bits_16", "bits_8", "bits_12", "bits_20"):
+def test_shaped_output(core: str, level: str, fills: str, benches: Compile) -> None:
+    """By turns half of the converters are played by fills and half by steps; at the other level the other half."""
+    for index, name in enumerate(("bits_16", "bits_12", "bits_8", "bits_20")):
         shape, script = LONG[name][0], long_play(name, 6000, 0, 3)
         words = words_of(script, shape)
-        for fill in (200, 0):
-            place = tmp_path / f"{name}_{fill}"
-            shaping = (*options(level), "-DDAC_SHAPING=3")
-            hold(CortexMBench(shape, place, options=shaping, fill=fill, core=core).run(words), script, fill)
+        in_turn = 200 if (index % 2 == 0) == (level == "-O2") else 0
+        for fill in (in_turn,) if fills == "by turns" else (200, 0):
+            bench = benches(shape, core, fill, (*options(level), "-DDAC_SHAPING=3"))
+            hold(bench.run(words), script, fill)
 
 
 @pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
-def test_tables_are_rendered_from_fourier_words(core: str, tmp_path: Path) -> None:
+def test_tables_are_rendered_from_fourier_words(core: str, benches: Compile) -> None:
     shape = shape_in_c(SHAPE)
     script = renderings(shape, 12, 9)
-    hold(CortexMBench(shape, tmp_path, core=core).run(words_of(script, shape, fourier=True)), script, 0)
+    hold(benches(shape, core).run(words_of(script, shape, fourier=True)), script, 0)
 
 
 @pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
 @pytest.mark.parametrize("level", ["-O2", "-Os"])
 @pytest.mark.parametrize("core", RISC_V)
-def test_risc_v(sweeps: dict[SequencerShape, Script], core: str, level: str, fill: int, tmp_path: Path) -> None:
+def test_risc_v(sweeps: dict[SequencerShape, Script], core: str, level: str, fill: int, benches: Compile) -> None:
     for shape, script in sweeps.items():
-        bench = CortexMBench(shape, tmp_path, options=options(level), fill=fill, core=core)
+        bench = benches(shape, core, fill, options(level))
         hold(bench.run(words_of(script, shape)), script, fill)
 
 

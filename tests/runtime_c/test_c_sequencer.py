@@ -132,7 +132,7 @@ def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
     script = every_tick(shape)
     capture = everywhere(benches, script, shape)
     swapped = flag(capture, "swapped") & flag(capture, "playing")
-    assert np.sum(swapped) == max(program.schedule.ticks for program in script.taken)
+    assert np.sum(swapped) == max(program.schedule.ticks for program in script.swapped_programs)
     assert np.all(flag(capture, "line")[swapped])
 
 

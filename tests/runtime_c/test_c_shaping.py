@@ -47,7 +47,7 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape) -> None:
 def test_long_lines(name: str, benches: dict[int, Benches]) -> None:
     script = long_play(name, 30_000, 1, 3)
     everywhere(benches[3], script, LONG[name][0])
-    assert any(axis.output.shaping.order == 3 for program in script.taken for axis in (program.x, program.y))
+    assert any(axis.output.shaping.order == 3 for program in script.swapped_programs for axis in (program.x, program.y))
 
 
 @pytest.mark.common
@@ -180,7 +180,7 @@ def test_shaping_changes_what_is_played() -> None:
     """A control of all of the above: the scripts have shaped programs in them whose codes are others."""
     rng = np.random.default_rng(4)
     script = long_play("bits_16", 3000)
-    program = script.taken[0]
+    program = script.swapped_programs[0]
     changed = shaped(rng, program)
     while changed.x.output.shaping.order == 0:
         changed = shaped(rng, program)

@@ -69,7 +69,8 @@ def of_a_choice(pair: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("choice", "compiler"), map(of_a_choice, in_pairs(list(CHOICES), list(COMPILERS), WHOLE, "gcc-c99"))
+    ("choice", "compiler"),
+    [of_a_choice(pair) for pair in in_pairs(list(CHOICES), list(COMPILERS), WHOLE, "gcc-c99")],
 )
 def test_no_warnings(choice: str, compiler: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)

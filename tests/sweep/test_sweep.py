@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from editing import edited, run, write_pair
-from libraries import BASE, NAMES, write_library
+from libraries import BASE, DAMPED, NAMES, write_library
 from limits import PATIENCE_S
 
 import tablegen
@@ -65,7 +65,7 @@ def sweep(folder: Path, *options: str, scan: str = "scan.toml") -> object:
 def test_each_program_is_what_a_build_of_it_would_be(library: Path, tmp_path: Path) -> None:
     """Byte for byte, with the runtime once for all."""
     text = edited(BASE, 'name = "broad"', "x.size_nm = 400.0", "x.offset_v = 45.0", "timing.line_rate_hz = 625.0")
-    path = write_pair(tmp_path, edited(text, "timing.lines = 10"))
+    path = write_pair(tmp_path, edited(text, "timing.lines = 10"), DAMPED)
     built = tablegen.build(path).files
     out = library / "out"
     found = {path.name: path.read_bytes() for path in (out / "broad").iterdir() if path.name != "program.json"}

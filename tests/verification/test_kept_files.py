@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from tablegen.base import file_cache as kept_files
-from tablegen.base.file_cache import KeptFiles
+from tablegen.base.file_cache import CachedFiles
 
-MODELS = KeptFiles("models", 20)
+MODELS = CachedFiles("models", 20)
 KEY, OTHER = "1" * 64, "2" * 64
 
 

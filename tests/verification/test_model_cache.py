@@ -21,6 +21,7 @@ def key_of(sources: Path, top: str = "top", **parameters: int | str) -> str:
     return model_key([sources / "a.v", sources / "b.v"], [sources], {"BITS": 16, **parameters}, top, "-O3")
 
 
+@pytest.mark.common
 def test_everything_that_a_model_is_made_of_makes_another_key(
     sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -44,6 +45,7 @@ def test_everything_that_a_model_is_made_of_makes_another_key(
     assert len(set(keys)) == len(keys) == 9
 
 
+@pytest.mark.common
 def test_the_same_files_in_another_folder_have_the_same_key(sources: Path, tmp_path: Path) -> None:
     before = key_of(sources)
     assert key_of(sources.rename(tmp_path / "elsewhere")) == before

@@ -23,7 +23,7 @@ from tablegen.version import __version__
 OTHER = "0.0.7"
 CAPITAL = NAME.upper()
 REQUESTS, MARKERS, FAULTS = (("requests", "integer model"), ("markers", "integer model"), ("faults", "integer model"))
-X, Y = ("x", "integer model"), ("y", "integer model")
+X = ("x", "integer model")
 WORDS = ("x", "converter word")
 
 
@@ -41,35 +41,10 @@ def verify(folder: Path, *arguments: str) -> Outcome:
 # What the Verilog does
 
 VERILOG = [
-    # what, file, pattern, replacement, what finds it
-    ("no second swap", "dac_bank", r"bank <= !bank", "bank <= 1'b1", X),
-    ("registers load once", "dac_register", r"if \(load\) value <= idle", "if (load && value == 0) value <= idle", X),
-    ("offset loads once", "dac_offset", r"if \(load_high\) high", "if (load_high && high == 0) high", X),
+    # what, file, pattern, replacement, what finds it; heard_edits.py has many more
     ("no lower clamp", "dac_output", r"over_min\[CODE_BITS-1\] \? \{CODE_BITS\{1'b1\}\} : ~over_min", "~over_min", X),
-    ("no upper clamp", "dac_output", r"running && room\[CODE_BITS-1\] \? \{DAC_BITS\{1'b1\}\} : ", "", X),
-    ("no guard upwards", "dac_slew", r"is_above = !above\[BITS\+2\]", "is_above = 1'b0", X),
-    ("no guard downwards", "dac_slew", r"is_below = below\[BITS\+2\]", "is_below = 1'b0", X),
-    ("slew not flagged", "dac_verdict", r"\{underrun, overrun, clamp_fault, slew_fault\}",
-     "{underrun, overrun, clamp_fault, 1'b0}", FAULTS),
-    ("clamp not flagged", "dac_verdict", r"\{underrun, overrun, clamp_fault, slew_fault\}",
-     "{underrun, overrun, 1'b0, slew_fault}", FAULTS),
-    ("underrun not flagged", "dac_verdict", r"\{underrun, overrun, clamp_fault, slew_fault\}",
-     "{1'b0, overrun, clamp_fault, slew_fault}", FAULTS),
-    ("valid in spite of faults", "dac_verdict", r"images && reached && !faulty", "images && reached", MARKERS),
-    ("counters do not saturate", "dac_faults", r" && count != \{COUNT_BITS\{1'b1\}\}", "", REQUESTS),
-    ("clear leaves the counts", "dac_faults", r"if \(clear\)\n", "if (1'b0)\n", REQUESTS),
-    ("frames without end", "dac_scan", r"frame_ends && last_frame", "1'b0", MARKERS),
-    ("one frame too many", "dac_scan", r"frames_left == 1 && !endless", "frames_left == 0 && !endless", MARKERS),
-    ("park ignored", "dac_scan", r"\(still_running \|\| go\) && !park", "(still_running || go)", MARKERS),
-    ("park leaves it armed", "dac_scan", r"if \(park \|\| reset\) armed", "if (reset) armed", REQUESTS),
-    ("reset ignored", "dac_scan", r"&& !park && !reset", "&& !park", MARKERS),
-    ("trigger without arm", "dac_scan", r"trigger && \(armed \|\| arm\)", "trigger", MARKERS),
-    ("arm starts", "dac_scan", r"go = trigger && \(armed \|\| arm\)", "go = (arm || trigger && armed)", MARKERS),
     ("swap in mid-line", "dac_scan", r"committed && \(!running \|\| first\)", "committed", MARKERS),
-    ("withdraw ignored", "dac_bank", r"reset \|\| withdraw \|\| take", "reset || take", REQUESTS),
-    ("always writable", "dac_bank", r"writable = !committed && !draining", "writable = 1'b1", REQUESTS),
     ("never refused", "dac_sequencer", r"refused <= 1'b1", "refused <= 1'b0", REQUESTS),
-    ("refused for ever", "dac_sequencer", r"else if \(clear_faults \|\| reset\)", "else if (1'b0)", REQUESTS),
     ("coding inverted", "dac_coding", r"\^ INVERTED", "^ !INVERTED", WORDS),
 ]  # fmt: skip
 
@@ -125,6 +100,21 @@ C = [
     ("no lower limit", "program.c", r"b->code_min = p->code_min;", "b->code_min = 0;"),
     ("no upper limit", "program.c", r"b->code_max = p->code_max;", "b->code_max = (1 << p->dac_bits) - 1;"),
     ("no slew guard", "program.c", r"b->max_step = p->max_step;", "b->max_step = 1 << 23;"),
+    ("settling ends early", "sequencer.c", r"clean && s->settle_left == 0", "clean && s->settle_left <= 1"),
+    (
+        "a window one too long",
+        "sequencer.c",
+        r"at - window->first < window->count",
+        "at - window->first <= window->count",
+    ),
+    ("a window beyond its line", "program.c", r" && window->count <= length - window->first", ""),
+    ("a window behind its line", "program.c", r"window->first <= length && ", ""),
+    ("a gain too wide", "program.c", r"p->gain_word < INT32_C\(1\) << 17", "p->gain_word < INT32_C(1) << 18"),
+    ("an offset too wide", "program.c", r"&& p->offset_word < INT64_C\(2\)", "&& p->offset_word < INT64_C(8)"),
+    ("a park code beyond", "program.c", r" && p->park_code <= p->code_max", ""),
+    ("a step of 0", "program.c", r"p->max_step >= 1", "p->max_step >= 0"),
+    ("more pixels than ticks", "program.c", r" && p->pixels <= p->line_ticks", ""),
+    ("a period of its own", "program.c", r" && p->x.phase_period == ticks", ""),
     ("a park code of its own", "program.c", r"b->park_code = p->park_code;", "b->park_code = p->code_min;"),
 ]
 

@@ -8,7 +8,7 @@ from foreign_plants import BoucWen, ForeignPlant, ManyPlays
 from replacing import replace
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
+from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
@@ -100,7 +100,7 @@ def test_a_line_from_images_is_where_the_axis_was(name: str) -> None:
         image, kept = taken(axis, v, 50.0, 9), slice(cut, 256 - cut)
         assert image.retrace is not None
         image = replace(image, trace=image.trace[:, kept], retrace=image.retrace[:, kept])
-        line, _ = imaged_line(image, RATE, 100.0, KNOWN, Taking(window=(cut / 256.0, 1.0 - cut / 256.0)))
+        line, _ = imaged_line(image, RATE, 100.0, KNOWN, Acquisition(window=(cut / 256.0, 1.0 - cut / 256.0)))
         truth = true_line(axis, v, 50.0)
         assert np.ptp(line.drive) == pytest.approx(v / 100.0, abs=2e-3)
         moved, expected = line.displacement_nm - line.displacement_nm.mean(), truth - truth.mean()
@@ -116,17 +116,19 @@ def test_an_operator_needs_both_directions_and_the_turns() -> None:
     assert image.retrace is not None
     alone = SampleImage("alone", 60.0, 50.0, image.trace, None)
     with pytest.raises(Unphysical, match="the retrace is missing"):
-        imaged_line(alone, RATE, 100.0, KNOWN, Taking())
+        imaged_line(alone, RATE, 100.0, KNOWN, Acquisition())
     inner = SampleImage("inner", 60.0, 50.0, image.trace[:, 25:231], image.retrace[:, 25:231])
     with pytest.raises(Unphysical, match="the turns are too far outside the images"):
-        imaged_line(inner, RATE, 100.0, KNOWN, Taking(window=(25.0 / 256.0, 231.0 / 256.0)))
+        imaged_line(inner, RATE, 100.0, KNOWN, Acquisition(window=(25.0 / 256.0, 231.0 / 256.0)))
 
 
 def test_an_operator_of_images_predicts_what_was_not_measured() -> None:
     """Images alone, and images beside traces: what they tell of a size left out is what exact traces tell of it."""
     axis = AXES["default"]
     volts = (12.0, 20.0, 40.0, 70.0, 97.0)
-    images = [imaged_line(taken(axis, v, 50.0, seed), RATE, 100.0, KNOWN, Taking())[0] for seed, v in enumerate(volts)]
+    images = [
+        imaged_line(taken(axis, v, 50.0, seed), RATE, 100.0, KNOWN, Acquisition())[0] for seed, v in enumerate(volts)
+    ]
     drive = (50.0 + np.outer(volts, ideal_triangle(PHASES, 0.5) - 0.5)) / 100.0
     traces = [
         PeriodicLine(f"{v:g} V", RATE, 4, drive[i], true_line(axis, v, 50.0), 1e-3 * v, 0.0)

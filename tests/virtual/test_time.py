@@ -13,7 +13,7 @@ from replacing import replace
 
 from tablegen.config.load import Setup
 from tablegen.numerics.driver import Driver
-from tablegen.planning import line_plan
+from tablegen.planning import waveforms
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.windows import retrace_mismatch
 from tablegen.refinement.round import Options, refine
@@ -98,7 +98,7 @@ def test_what_is_played_is_measured_at_its_time(tmp_path: Path, monkeypatch: pyt
     limits = []
     for undone in (True, False):
         if not undone:
-            monkeypatch.setattr(line_plan, "hold_inverse", lambda n, *_, **__: (np.ones(n), np.zeros(n)))
+            monkeypatch.setattr(waveforms, "hold_inverse", lambda n, *_, **__: (np.ones(n), np.zeros(n)))
         error = run_line(planned(tmp_path, SIZES[0]).x, linear()).imaged
         limits.append([max(map(abs, branch.residual_range)) for branch in (error.forward, error.backward)])
     assert max(limits[0]) < AGREES
@@ -149,7 +149,7 @@ def test_drive_and_trigger_name_the_same_instant(tmp_path: Path) -> None:
     by_drive, by_trigger = (one.phase.turns for one in found)
     assert np.max(np.abs(by_drive - by_trigger)) < 0.01 / line.program.ticks
     for one in found:
-        assert one.lesson.before.rms_percent < AGREES
+        assert one.update.before.rms_percent < AGREES
 
 
 def test_the_staircase_itself_is_late_by_half_a_tick_and_counted_so(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The gentlest waveform against the linear programme of scipy, and against what it has to keep."""
+"""The minimum-acceleration waveform against the linear programme of scipy, and against what it has to keep."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,13 @@ from tablegen.certificate.optimum import least_acceleration
 from tablegen.compensation.line import LineShape
 from tablegen.waveform import minimum_acceleration as gentle_fit
 from tablegen.waveform.harmonic_rows import HarmonicRows, series_of, unknowns
-from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, fewest_harmonics, gentlest, least_percent
+from tablegen.waveform.minimum_acceleration import (
+    Straightness,
+    Unreachable,
+    fewest_harmonics,
+    least_percent,
+    minimum_acceleration_series,
+)
 from tablegen.waveform.sampler import Sampler
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -66,7 +72,7 @@ def test_rows_are_the_derivatives_of_the_series(derivative: int) -> None:
 def test_acceleration_is_within_fifteen_percent_of_the_optimum(harmonics: int, percent: float) -> None:
     least = least_acceleration(BOTH, harmonics, percent)
     assert least is not None
-    series = gentlest(BOTH, harmonics, percent)
+    series = minimum_acceleration_series(BOTH, harmonics, percent)
     assert 0.99 * least <= series.peak_acceleration() <= 1.15 * least
     assert worst_error(BOTH, series) <= percent
 
@@ -81,7 +87,7 @@ def test_the_slow_axis_is_near_the_optimum_too() -> None:
     straight = slow_axis()
     least = least_acceleration(straight, 32, 0.3)
     assert least is not None
-    assert gentlest(straight, 32, 0.3).peak_acceleration() <= 1.15 * least
+    assert minimum_acceleration_series(straight, 32, 0.3).peak_acceleration() <= 1.15 * least
 
 
 @pytest.mark.common
@@ -91,7 +97,7 @@ def test_what_is_promised_is_kept(turn: float, low: float, harmonics: int, both:
     shape = LineShape(turn, SECTION_8.forward, SECTION_8.backward)
     straight = Straightness(shape, shape, (low, 1.0 - low), both)
     try:
-        series = gentlest(straight, harmonics, percent)
+        series = minimum_acceleration_series(straight, harmonics, percent)
     except Unphysical:
         assume(False)
         raise
@@ -113,41 +119,41 @@ def test_what_is_promised_is_kept(turn: float, low: float, harmonics: int, both:
 def test_at_the_error_of_the_window_fit_it_is_never_rougher(harmonics: int, straight: Straightness) -> None:
     fitted = fit_window(straight.shape, harmonics, straight.window, straight.both)
     error = straight.error_percent(fitted)
-    series = gentlest(straight, harmonics, error)
+    series = minimum_acceleration_series(straight, harmonics, error)
     assert straight.error_percent(series) <= error
     assert series.peak_acceleration() <= fitted.peak_acceleration()
 
 
-def test_the_range_is_held_where_the_gentlest_way_would_leave_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """turn 0.5, forward only: the way back is long, and the gentlest one leaves the line. The control is free."""
+def test_the_range_is_held_where_minimum_acceleration_would_leave_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """turn 0.5, forward only: the way back is long, and minimum acceleration leaves the line. The control is free."""
     straight = Straightness(SECTION_8, SECTION_8, (0.1, 0.9), False)
-    low, high = range_of(gentlest(straight, 16, 0.3))
+    low, high = range_of(minimum_acceleration_series(straight, 16, 0.3))
     assert low >= 0.0
     assert high <= 1.0
     monkeypatch.setattr(gentle_fit, "_in_range", lambda _: True)
-    assert range_of(gentlest(straight, 16, 0.3))[0] < 0.0
+    assert range_of(minimum_acceleration_series(straight, 16, 0.3))[0] < 0.0
 
 
 def test_between_too_few_nodes_the_error_is_found_and_held(monkeypatch: pytest.MonkeyPatch) -> None:
     """With few nodes, and nothing left between them, the first solution misses; what is returned does not."""
     monkeypatch.setattr(gentle_fit, "_NODES_PER_WAVE", 4)
     monkeypatch.setattr(gentle_fit, "_TIGHT", 1.0)
-    assert worst_error(BOTH, gentlest(BOTH, 32, 0.3)) <= 0.3
+    assert worst_error(BOTH, minimum_acceleration_series(BOTH, 32, 0.3)) <= 0.3
     fitted = fit_window(SECTION_8, 32, (0.1, 0.9), True)
-    assert gentlest(BOTH, 32, 0.3).peak_acceleration() < fitted.peak_acceleration()
+    assert minimum_acceleration_series(BOTH, 32, 0.3).peak_acceleration() < fitted.peak_acceleration()
     monkeypatch.setattr(gentle_fit, "_TRIALS", 1)  # the control: the first solution is refused
-    assert gentlest(BOTH, 32, 0.3).peak_acceleration() == fitted.peak_acceleration()
+    assert minimum_acceleration_series(BOTH, 32, 0.3).peak_acceleration() == fitted.peak_acceleration()
     monkeypatch.setattr(gentle_fit, "_NODES_PER_WAVE", 14)
     with pytest.raises(Unreachable, match="came to no waveform"):
-        gentlest(BOTH, 16, 0.7)
+        minimum_acceleration_series(BOTH, 16, 0.7)
 
 
 def test_what_is_too_straight_for_its_harmonics_is_refused_with_what_they_can() -> None:
     with pytest.raises(Unreachable, match=r"16 harmonics leave at least 0\.7\d* %") as caught:
-        gentlest(BOTH, 16, 0.3)
+        minimum_acceleration_series(BOTH, 16, 0.3)
     least = caught.value.least_percent
     assert least is not None
-    assert worst_error(BOTH, gentlest(BOTH, 16, least)) <= least
+    assert worst_error(BOTH, minimum_acceleration_series(BOTH, 16, least)) <= least
     assert least_acceleration(BOTH, 16, 0.83 * least) is None  # nobody else can do much better
     assert least_percent(BOTH, 16) == least
 
@@ -156,9 +162,9 @@ def test_what_is_too_straight_for_its_harmonics_is_refused_with_what_they_can() 
 def test_the_fewest_harmonics_are_the_fewest(percent: float) -> None:
     fewest = fewest_harmonics(BOTH, percent, 1, 64)
     assert fewest is not None
-    assert worst_error(BOTH, gentlest(BOTH, fewest, percent)) <= percent
+    assert worst_error(BOTH, minimum_acceleration_series(BOTH, fewest, percent)) <= percent
     with pytest.raises(Unreachable):
-        gentlest(BOTH, fewest - 1, percent)
+        minimum_acceleration_series(BOTH, fewest - 1, percent)
     assert least_acceleration(BOTH, fewest - 2, percent) is None
     assert fewest_harmonics(BOTH, percent, 1, fewest - 1) is None
     assert fewest_harmonics(BOTH, percent, fewest + 3, 64) == fewest + 3

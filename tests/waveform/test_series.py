@@ -32,22 +32,22 @@ def plain_sum(series: FourierSeries, count: int, derivative: int) -> Floats:
     return total
 
 
-@pytest.mark.parametrize("kept", [module._KEPT, 0], ids=["kept", "one by one"])
+@pytest.mark.parametrize("kept", [module._CACHED, 0], ids=["kept", "one by one"])
 @pytest.mark.parametrize("derivative", [0, 1, 2, 3])
 @pytest.mark.parametrize("harmonics", [1, 2, 31, 64])
 def test_a_power_of_two_has_every_bit_of_the_plain_sum(
     harmonics: int, derivative: int, kept: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_KEPT", kept)
+    monkeypatch.setattr(module, "_CACHED", kept)
     series = random_series(harmonics, harmonics)
     for count in (8, 256, 2048):
         assert series.on_grid(count, derivative).tobytes() == plain_sum(series, count, derivative).tobytes()
 
 
-@pytest.mark.parametrize("kept", [module._KEPT, 0], ids=["kept", "one by one"])
+@pytest.mark.parametrize("kept", [module._CACHED, 0], ids=["kept", "one by one"])
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6, 7, 10, 12, 331, 992, 1250])
 def test_any_other_grid_is_right_to_some_last_places(count: int, kept: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_KEPT", kept)
+    monkeypatch.setattr(module, "_CACHED", kept)
     series = random_series(31, count)
     for derivative in range(4):
         right = plain_sum(series, count, derivative)

@@ -26,10 +26,21 @@ class FrequencyFit(Fit):
 
 
 def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None = None) -> FrequencyFit:
-    """The law of (23) through gains (any unit, errors in proportion) at frequencies (Hz).
+    """Fit the law of (23) to gains at frequencies, with errors in proportion to the gains.
 
-    ``reference_hz`` is the rate at which the scan size was calibrated, a choice and nothing that could be
-    fitted; without it the lowest frequency. Raises ``Unphysical``.
+    Parameters
+    ----------
+    frequency_hz
+        Frequencies in Hz, shape (points,).
+    gain
+        Gains in any unit, shape (points,).
+    reference_hz
+        The rate at which the scan size was calibrated, which no fit can know; the lowest frequency by default.
+
+    Raises
+    ------
+    Unphysical
+        If the points make no law: too few, or no resonance above them.
     """
     remarks: list[Remark] = []
     if len(np.unique(frequency_hz)) < 2:
@@ -43,8 +54,8 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
     scale = float(np.mean(gain))
 
     def residuals(x: Floats) -> Floats:
-        left: Floats = x[1] * (1.0 - x[0] * decades) * scale / gain - 1.0
-        return left
+        errors: Floats = x[1] * (1.0 - x[0] * decades) * scale / gain - 1.0
+        return errors
 
     solution = solve(residuals, [0.03, 1.0], ("alpha", "gain"), [0.1, 1.0])
     alpha, height = solution.estimate("alpha"), solution.estimate("gain")
@@ -96,10 +107,10 @@ def _rises(frequency_hz: Floats, residuals: Floats, jacobian: Floats) -> bool:
     bend = (frequency_hz / float(np.max(frequency_hz))) ** 2
     orthogonal, _ = np.linalg.qr(jacobian)
     bend = bend - orthogonal @ (orthogonal.T @ bend)
-    left = -(residuals - orthogonal @ (orthogonal.T @ residuals))  # the residuals are model less data
+    deviation = -(residuals - orthogonal @ (orthogonal.T @ residuals))  # the residuals are model less data
     if float(bend @ bend) < 1e-12:
         return False
-    height = float(bend @ left) / float(bend @ bend)
-    rest = left - height * bend
+    height = float(bend @ deviation) / float(bend @ bend)
+    rest = deviation - height * bend
     error = sqrt(float(rest @ rest) / freedom / float(bend @ bend)) * few_points(freedom)
     return height > max(3.0 * error, 1e-6)

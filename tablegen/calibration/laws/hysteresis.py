@@ -67,9 +67,14 @@ def fit_hysteresis(
     drift_order: int | None = None,
     delay_s: float | None = 0.0,
 ) -> HysteresisFit:
-    """Both branches at each turn that was measured; see ``fit_trace`` for what is done to a trace.
+    """Fit both branches at each turn that was measured; see ``fit_trace`` for the treatment of a trace.
 
-    ``rho`` is kept where a turn was measured at one amplitude only. Raises ``Unphysical``, with the trace's name.
+    ``rho`` is kept where a turn was measured at one amplitude only.
+
+    Raises
+    ------
+    Unphysical
+        If a trace does not support the fit; the message has its name.
     """
     driver = Driver.of(v_max)
     fits: list[TraceFit] = []
@@ -88,7 +93,13 @@ def fit_hysteresis(
 
 
 def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[Remark]) -> HysteresisFit:
-    """Amplitudes in any order -> (22) at each turn; remarks of the single ones come first. Raises ``Unphysical``."""
+    """Fit (22) at each turn to amplitudes in any order; remarks of the single ones come first.
+
+    Raises
+    ------
+    Unphysical
+        If the amplitudes make no law.
+    """
     remarks = list(remarks)
     groups: list[list[AmplitudeFit]] = []
     for fit in sorted(fits, key=lambda fit: fit.turn.value):
@@ -129,7 +140,7 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
 
 
 def _offsets(group: Sequence[AmplitudeFit], span: float) -> tuple[float, ...]:
-    """The offset of each, those that are near each other as one.
+    """Return the offset of each amplitude, those near each other as one.
 
     Empty where there is but one, and where no offset has two sizes: traces that all begin at 0 V say nothing of it.
     """
@@ -148,14 +159,14 @@ def _offsets(group: Sequence[AmplitudeFit], span: float) -> tuple[float, ...]:
 
 
 def _check_shape(growth: Growth, v: float) -> None:
-    """The drive that a build would make of it, at the largest amplitude that was measured."""
+    """Check the drive that a build would compute from the shape, at the largest measured amplitude."""
     BranchShape.harmonic(float(growth.beta(np.array(v))), growth.u_peak.value)
 
 
 def _remarks(fit: TraceFit) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     if fit.triangle.departure > _MAX_DRIVE_DEPARTURE:
-        found.append(
+        remarks.append(
             spoils(
                 f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
                 "the fit assumes a triangle",
@@ -163,10 +174,10 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             )
         )
     if fit.inverted:
-        found.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
+        remarks.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
-        found.append(
+        remarks.append(
             spoils(
                 f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of "
                 f"the sensor known, and the record settled?",
@@ -174,7 +185,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             )
         )
     if fit.correlated > 3.0:
-        found.append(
+        remarks.append(
             Remark(
                 f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
                 f"model and drift do not describe; standard errors were widened "
@@ -183,13 +194,13 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         )
     if fit.strays:
         shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        found.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept"))
+        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
-            found.append(
+            remarks.append(
                 spoils(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
             )
-    return found
+    return remarks
 
 
 def _curves(branches: Sequence[TurnFit], span: float) -> list[Curve]:

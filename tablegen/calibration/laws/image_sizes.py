@@ -45,7 +45,7 @@ class KnownSample:
 
 
 @dataclass(frozen=True)
-class Taking:
+class Acquisition:
     """How all images were taken: as in ``fit_pair``; ``aspect`` where it is not that of the pixels, or of the file."""
 
     turn: float = 0.5
@@ -66,9 +66,17 @@ class ImageSizes:
     remarks: tuple[Remark, ...]
 
 
-def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, taking: Taking) -> ImageSizes:
-    """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
-    found: list[ImageSize] = []
+def sizes_of(
+    images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, acquisition: Acquisition
+) -> ImageSizes:
+    """Fit each image's line from turn to turn.
+
+    Raises
+    ------
+    Unphysical
+        If an image shows no line; the message has its name.
+    """
+    sizes: list[ImageSize] = []
     remarks: list[Remark] = []
     for image in images:
         try:
@@ -76,16 +84,16 @@ def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: Known
             line = fit_line(
                 image.trace,
                 image.retrace,
-                taking.turn,
-                taking.window,
-                taking.retrace_mirrored and image.retrace is not None,
-                taking.delay_pixels,
+                acquisition.turn,
+                acquisition.window,
+                acquisition.retrace_mirrored and image.retrace is not None,
+                acquisition.delay_pixels,
             )
-            size = size_of_line(line, sample.cell, sample.grating, taking.aspect or image.aspect)
+            size = size_of_line(line, sample.cell, sample.grating, acquisition.aspect or image.aspect)
         except Unphysical as reason:
             raise Unphysical(f"{image.name}: {reason}") from None
         gap = float(np.max(np.abs(line.gap))) if np.isfinite(line.gap).all() else float("nan")
-        found.append(
+        sizes.append(
             ImageSize(
                 image.name,
                 image.v_scan,
@@ -100,8 +108,8 @@ def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: Known
     for one, other in combinations(images, 2):
         if one.trace.shape == other.trace.shape and np.array_equal(one.trace, other.trace):
             raise Unphysical(f"{other.name}: the image is that of {one.name}; each drive needs one of its own")
-    _check_steps(found)
-    bars = any(not isfinite(one.size.aspect) for one in found)
+    _check_steps(sizes)
+    bars = any(not isfinite(one.size.aspect) for one in sizes)
     if bars and sample.grating is not None and sample.grating.angle_deg is None:
         remarks.append(
             Remark(
@@ -110,9 +118,9 @@ def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: Known
                 f"line; --angle-deg gives it where it is known"
             )
         )
-    nm = np.array([one.size.nm.value for one in found])
-    errors = np.array([one.size.nm.standard_error for one in found])
-    return ImageSizes(tuple(found), nm, errors, max(one.size.shared for one in found), tuple(remarks))
+    nm = np.array([one.size.nm.value for one in sizes])
+    errors = np.array([one.size.nm.standard_error for one in sizes])
+    return ImageSizes(tuple(sizes), nm, errors, max(one.size.shared for one in sizes), tuple(remarks))
 
 
 def apparent_of(sizes: ImageSizes, law: SizeLaw, driver: Driver | float, sample: KnownSample) -> tuple[Floats, Floats]:
@@ -137,9 +145,9 @@ def _check_drive(image: SampleImage, driver: Driver) -> None:
             )
 
 
-def _check_steps(found: Sequence[ImageSize]) -> None:
+def _check_steps(sizes: Sequence[ImageSize]) -> None:
     """Neighbouring drives, or offsets, have about as many nm per volt: else one was another size than said."""
-    for _, group in _groups(found):
+    for _, group in _groups(sizes):
         for less, more in pairwise(group):
             ratio = more.size.nm.value / more.v_scan / (less.size.nm.value / less.v_scan)
             if 1.0 / _MAX_STEP < ratio < _MAX_STEP:
@@ -151,38 +159,38 @@ def _check_steps(found: Sequence[ImageSize]) -> None:
             )
 
 
-def _groups(found: Sequence[ImageSize]) -> list[tuple[float, list[ImageSize]]]:
+def _groups(sizes: Sequence[ImageSize]) -> list[tuple[float, list[ImageSize]]]:
     """By offset for each scan voltage where offsets are given, ascending; else all by scan voltage."""
-    if all(one.v_offset is None for one in found):
-        return [(0.0, sorted(found, key=lambda one: one.v_scan))]
-    volts = sorted({one.v_scan for one in found})
-    return [(v, sorted((one for one in found if one.v_scan == v), key=lambda one: one.v_offset or 0.0)) for v in volts]
+    if all(one.v_offset is None for one in sizes):
+        return [(0.0, sorted(sizes, key=lambda one: one.v_scan))]
+    volts = sorted({one.v_scan for one in sizes})
+    return [(v, sorted((one for one in sizes if one.v_scan == v), key=lambda one: one.v_offset or 0.0)) for v in volts]
 
 
 def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     if not shows_turns(line.geometry):
-        found.append(spoils("the turns are not in the image; the ends of the line are extrapolated"))
+        remarks.append(spoils("the turns are not in the image; the ends of the line are extrapolated"))
     if not line.both:
-        found.append(Remark("without a retrace nothing shows whether columns were cropped, or are late"))
+        remarks.append(Remark("without a retrace nothing shows whether columns were cropped, or are late"))
     if line.widened > 3.0:
         widened = f"standard errors were widened by a factor of {line.widened:.3g}"
-        found.append(Remark(f"{widened}, for what is not only noise"))
+        remarks.append(Remark(f"{widened}, for what is not only noise"))
     if line.explained < 0.5:
-        found.append(
+        remarks.append(
             Remark(f"{100.0 * line.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
         )
     if size.nm.standard_error > _LOOSE_SHARE * size.nm.value:
         percent = 100.0 * size.nm.standard_error / size.nm.value
-        found.append(spoils("the size is uncertain by more than a percent; scan more periods, or average", percent))
+        remarks.append(spoils("the size is uncertain by more than a percent; scan more periods, or average", percent))
     finest = (
         line.geometry.columns
         / (line.geometry.window[1] - line.geometry.window[0])
         / float(np.max(np.abs(line.waves[:, 0])))
     )
     if finest < _MIN_PIXELS_PER_PERIOD:
-        found.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels"))
+        remarks.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels"))
     if line.strays:
         shown = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
-        found.append(Remark(f"{len(line.strays)} lines differ from the others (row {shown}); they were kept"))
-    return found
+        remarks.append(Remark(f"{len(line.strays)} lines differ from the others (row {shown}); they were kept"))
+    return remarks

@@ -36,9 +36,14 @@ def fit_images(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> HysteresisFit:
-    """Both branches from images of a triangle's scan; see ``fit_pair`` for what is done to a pair.
+    """Fit both branches to images of a triangle's scan; see ``fit_pair`` for the treatment of a pair.
 
-    ``rho`` is kept where there is one amplitude only. Raises ``Unphysical``, with the pair's name.
+    ``rho`` is kept where there is one amplitude only.
+
+    Raises
+    ------
+    Unphysical
+        If a pair does not support the fit; the message has its name.
     """
     driver = Driver.of(v_max)
     fits: list[ImageFit] = []
@@ -71,10 +76,10 @@ def fit_images(
 
 
 def _remarks(fit: ImageFit) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
-        found.append(
+        remarks.append(
             spoils(
                 f"the harmonic model leaves {worst:.2g} % of the line; was the drive the triangle itself, is --window "
                 f"what the columns span, and does the feedback follow?",
@@ -82,24 +87,24 @@ def _remarks(fit: ImageFit) -> list[Remark]:
             )
         )
     if fit.widened > 3.0:
-        found.append(
+        remarks.append(
             Remark(
                 f"the rest is not only noise, but also what the model does not describe; standard errors were "
                 f"widened by a factor of {fit.widened:.3g}; a --window that is not that of the images does that too"
             )
         )
     if fit.pixels_a_period < _MIN_PIXELS_PER_PERIOD:
-        found.append(
+        remarks.append(
             Remark(f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels")
         )
     if fit.explained < 0.5:
-        found.append(
+        remarks.append(
             Remark(f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
         )
     if fit.strays:
         shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        found.append(Remark(f"{len(fit.strays)} lines differ from the others (row {shown}); they were kept"))
+        remarks.append(Remark(f"{len(fit.strays)} lines differ from the others (row {shown}); they were kept"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
-            found.append(spoils(f"u_peak {name} is not determined by these images; scan more periods, or average"))
-    return found
+            remarks.append(spoils(f"u_peak {name} is not determined by these images; scan more periods, or average"))
+    return remarks

@@ -39,12 +39,27 @@ def fit_offset(
     size_v: float | None = None,
     errors_nm: Floats | None = None,
 ) -> OffsetFit:
-    """The law of (1) through apparent sizes (nm, of one object, or lattice constants) at three or more offsets (V).
+    """Fit the law of (1) to apparent sizes (of one object, or lattice constants) at three or more offsets.
 
     Least squares; exact for three different offsets. m multiplies the drive, and a drive that is m times as large makes
-    the scan more than m times as large, (6): with the size law and ``size_v``, the scan voltage of the images, apparent
-    sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. ``errors_nm``, where
-    they are known, are the sizes' weights, as in ``fit_size``. Raises ``Unphysical``.
+    the scan more than m times as large, (6): with the size law and ``size_v``, apparent sizes are R(V) / R(V / m).
+    Without them they are taken for m itself, as ``OffsetLaw.fit`` does.
+
+    Parameters
+    ----------
+    offset_v
+        Offsets in V, shape (points,).
+    apparent_nm
+        Apparent sizes in nm, shape (points,).
+    size_v
+        Scan voltage of the images, peak to peak at the piezo, in V.
+    errors_nm
+        Standard errors of the sizes, shape (points,), their weights as in ``fit_size``; equal by default.
+
+    Raises
+    ------
+    Unphysical
+        If there are too few offsets, or the sizes make no law.
     """
     driver = Driver.of(v_max)
     outside = (offset_v < driver.v_min) | (offset_v > driver.v_max)
@@ -66,8 +81,8 @@ def fit_offset(
 
     def solved(errors: Floats) -> Solution:
         def residuals(x: Floats) -> Floats:
-            left: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / errors
-            return left
+            misfits: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / errors
+            return misfits
 
         return solve(residuals, start, _NAMES, [0.5, 0.5, scale])
 
@@ -75,7 +90,7 @@ def fit_offset(
     solution = solved(np.full(len(p), scale)) if errors_nm is None else with_errors(solved, apparent_nm, errors_nm)
     centre = float(solution.values[2])
     expected = centre * looks(shape @ np.array([1.0, *solution.values[:2]]))
-    found = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
+    strays = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
     line = np.linspace(driver.v_min, driver.v_max, 101)
     curve = looks(_shape(driver.p(line)) @ np.array([1.0, *solution.values[:2]]))
     return OffsetFit(
@@ -83,7 +98,7 @@ def fit_offset(
         residual_percent=100.0 * (apparent_nm / expected - 1.0),
         before_percent=float(np.max(np.abs(100.0 * (apparent_nm / centre - 1.0)))),
         remarks=tuple(_remarks(p, solution, driver)),
-        outliers=found,
+        outliers=strays,
         curves=(
             Curve(
                 "apparent size, relative",

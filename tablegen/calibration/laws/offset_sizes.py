@@ -30,10 +30,26 @@ def fit_offset_sizes(
     size_law: SizeLaw,
     errors_nm: Floats | None = None,
 ) -> OffsetFit | OffsetSizesFit:
-    """m over offset and size: ``fit_offset`` for the images of each scan voltage (V, peak to peak at the piezo).
+    """Fit m over offset and size: ``fit_offset`` for the images of each scan voltage.
 
     Images of one scan voltage have to show one object, or a lattice, at three or more offsets; those of another one may
-    show another. Of one scan voltage it is the fit of ``fit_offset``, as are ``errors_nm``. Raises ``Unphysical``.
+    show another. With one scan voltage it is the fit of ``fit_offset``.
+
+    Parameters
+    ----------
+    offset_v
+        Offsets in V, shape (images,).
+    apparent_nm
+        Apparent sizes in nm, shape (images,).
+    size_v
+        Scan voltages, peak to peak at the piezo, in V, shape (images,).
+    errors_nm
+        Standard errors of the sizes in nm, shape (images,), as in ``fit_offset``.
+
+    Raises
+    ------
+    Unphysical
+        If a scan voltage has too few offsets, or its sizes make no law.
     """
     volts = np.unique(size_v).tolist()
     driver = Driver.of(v_max)

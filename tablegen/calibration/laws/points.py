@@ -13,11 +13,15 @@ _MAX_PEAK_ERROR = 0.1  # standard error of a u_peak that was not determined
 
 
 def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
-    """Entries of ``points`` of one direction: size_v, beta, u_peak, by ascending amplitude; of several offsets, by
-    ascending offset_v.
+    """Return the entries of ``points`` of one direction.
 
-    Where noise hides the peak, u_peak is that of the mean; an amplitude at which noise hides all is left out. Raises
-    ``Unphysical`` where a residual has the wrong sign, or makes no branch.
+    Each has size_v, beta and u_peak, by ascending amplitude; of several offsets, by ascending offset_v. Where noise
+    hides the peak, u_peak is that of the mean; an amplitude at which noise hides everything is left out.
+
+    Raises
+    ------
+    Unphysical
+        If a residual has the wrong sign, or makes no branch.
     """
     return [
         {**place, "beta": beta.rounded, "u_peak": peak.rounded} for place, beta, peak in estimates(branch, direction)

@@ -32,9 +32,14 @@ class ResonanceFit(Fit):
 
 
 def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None = None) -> ResonanceFit:
-    """``SecondOrder`` through gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
+    """Fit ``SecondOrder`` to gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
 
-    Without a phase the delay cannot be told and is 0. Raises ``Unphysical``.
+    Without a phase the delay cannot be told and is 0.
+
+    Raises
+    ------
+    Unphysical
+        If the points show no resonance.
     """
     order = np.argsort(frequency_hz, kind="stable")
     f, g = frequency_hz[order], gain[order]
@@ -46,11 +51,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     if phase_deg is None:
         remarks.append(Remark("without phase_deg the delay is not determined; delay_s is set to 0"))
     else:
-        phase = np.unwrap(np.radians(phase_deg[order]))
-        turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
-        if turned % 2:
-            remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were taken off"))
-        phase = phase - pi * turned
+        phase = _unwrapped(phase_deg[order], remarks)
     solution = _best(f, g, phase)
     at, quality = float(np.exp(solution.values[1])), float(np.exp(solution.values[2]))
     if not f[0] < at < f[-1]:
@@ -59,17 +60,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
             f"measure through it"
         )
     frequency, q = (_of_logarithm(solution.estimate(name)) for name in ("frequency_hz", "quality"))
-    delay = Estimate(0.0)
-    if phase is not None:
-        delay = solution.estimate("delay_s")
-        delay = Estimate(delay.value / at, delay.standard_error / at)
-        if delay.value < 0.0:
-            if not -delay.value <= 2.0 * delay.standard_error:
-                raise Unphysical(
-                    f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg"
-                )
-            remarks.append(Remark("no delay is measurable; delay_s is set to 0"))
-            delay = Estimate(0.0, delay.standard_error)
+    delay = Estimate(0.0) if phase is None else _delay(solution, at, remarks)
     for name in solution.undetermined:
         remarks.append(spoils(f"{name} is not determined by these points; measure more of them around the resonance"))
     near = np.abs(f - at) <= at / quality
@@ -113,6 +104,27 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     )
 
 
+def _unwrapped(phase_deg: Floats, remarks: list[Remark]) -> Floats:
+    """Return the phase in radians, from near 0 at the lowest frequency."""
+    phase = np.unwrap(np.radians(phase_deg))
+    turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
+    if turned % 2:
+        remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were taken off"))
+    return np.asarray(phase - pi * turned)
+
+
+def _delay(solution: Solution, resonance_hz: float, remarks: list[Remark]) -> Estimate:
+    """Return the delay in s, 0 where none can be measured. Raises ``Unphysical`` for a phase that leads."""
+    fitted = solution.estimate("delay_s")
+    delay = Estimate(fitted.value / resonance_hz, fitted.standard_error / resonance_hz)
+    if delay.value >= 0.0:
+        return delay
+    if not -delay.value <= 2.0 * delay.standard_error:
+        raise Unphysical(f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg")
+    remarks.append(Remark("no delay is measurable; delay_s is set to 0"))
+    return Estimate(0.0, delay.standard_error)
+
+
 def _response(f: Floats, x: Floats) -> tuple[Floats, Floats]:
     """Gain and phase in radians, unwrapped; x holds ln gain, ln resonance, ln quality, delay times resonance."""
     at = np.exp(x[1])
@@ -123,8 +135,7 @@ def _response(f: Floats, x: Floats) -> tuple[Floats, Floats]:
 
 
 def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
-    """The best of several starts: the highest point is the resonance unless another one is higher."""
-
+    """Return the best of several starts: the highest point is the resonance unless another one fits better."""
     weight = np.ones(2)
 
     def residuals(x: Floats) -> Floats:
@@ -143,11 +154,11 @@ def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
             # What a second-order lag of at most half a turn leaves at the highest frequency is the delay's.
             start.append(max(-(float(phase[-1]) + (pi if f[-1] > at else 0.0)) / (2.0 * pi * float(f[-1]) / at), 0.0))
         try:
-            found = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])
+            solution = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])
         except Unphysical:
             continue
-        if best is None or found.residuals @ found.residuals < best.residuals @ best.residuals:
-            best = found
+        if best is None or solution.residuals @ solution.residuals < best.residuals @ best.residuals:
+            best = solution
     if best is None:
         raise Unphysical("no resonance fits this response; is it gain, and phase_deg, against frequency?")
     for _ in range(2 if phase is not None else 0):  # gain and phase each by its own scatter

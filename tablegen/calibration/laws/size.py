@@ -43,13 +43,28 @@ def fit_size(
     errors_nm: Floats | None = None,
     shared: float = 0.0,
 ) -> SizeFit:
-    """The law of (6) and (10) through actual sizes (nm) at drives (V_scan, volts peak to peak at the piezo).
+    """Fit the law of (6) and (10) to actual sizes at drives.
 
-    ``threshold`` (of v_max) is kept where it is given, and where the points cannot tell. ``noise`` says whether errors
-    of the sizes are in proportion to them, as in images, or the same for all, as of a sensor. ``errors_nm``, where
-    they are known, take its place: the fit weighs sizes by them, and by one relative error more where sizes miss the
-    law by more than that. ``shared`` is a relative error that all sizes have together; it counts for k. Raises
-    ``Unphysical``.
+    Parameters
+    ----------
+    drive_v
+        V_scan, volts peak to peak at the piezo, shape (points,).
+    actual_nm
+        Actual sizes in nm, shape (points,).
+    threshold
+        Share of v_max below which the law is another, kept if given, or if the points cannot show it.
+    noise
+        Whether errors are in proportion to the sizes, as in images, or the same for all, as of a sensor.
+    errors_nm
+        Standard errors of the sizes, shape (points,), in place of ``noise``: the fit weighs sizes by them, and by
+        one relative error more if sizes miss the law by more than that.
+    shared
+        Relative error that all sizes have in common; it counts for k.
+
+    Raises
+    ------
+    Unphysical
+        If there are too few sizes, or they make no law.
     """
     driver = Driver.of(v_max)
     span, v = driver.span, drive_v / driver.span
@@ -66,29 +81,29 @@ def fit_size(
     if threshold is not None and not 0.0 < threshold <= 1.0:
         raise Unphysical(f"a threshold of {threshold:g} is not above 0 and at most 1; it is a fraction of v_max")
     weight = actual_nm if noise == "relative" else np.full(len(v), float(np.max(actual_nm)))
-    kept = threshold if threshold is not None else TYPICAL_THRESHOLD
+    fixed = threshold if threshold is not None else TYPICAL_THRESHOLD
     remarks: list[Remark] = []
     fit = _SizeModel(v, actual_nm, weight, span, base_nm)
     free = fit.best_threshold() if threshold is None and different >= 4 else None
-    solution = free or fit.solve(kept)
+    solution = free or fit.solve(fixed)
     if errors_nm is not None:
 
         def weighed(errors: Floats) -> Solution:
             model = _SizeModel(v, actual_nm, errors, span, base_nm)
-            return (model.best_threshold() if free is not None else None) or model.solve(kept)
+            return (model.best_threshold() if free is not None else None) or model.solve(fixed)
 
         solution = with_errors(weighed, actual_nm, errors_nm)
         free = solution if free is not None and _NAMES[2] in solution.names else None
     if free is None and threshold is None:
         remarks.append(
             Remark(
-                f"the threshold is not determined by these points and was left at {kept:g}; it takes four sizes or "
+                f"the threshold is not determined by these points and was left at {fixed:g}; it takes four sizes or "
                 f"more, some of them above 0.6 of v_max and some below 0.4"
             )
         )
     k, beta = (solution.estimate(name) for name in _NAMES[:2])
     k = Estimate(k.value, hypot(k.standard_error, shared * k.value))
-    v_threshold = solution.estimate(_NAMES[2]) if free is not None else Estimate(kept)
+    v_threshold = solution.estimate(_NAMES[2]) if free is not None else Estimate(fixed)
     if not _LEAST_BETA * 0.999 < beta.value < _LARGEST_BETA * 0.999:
         raise Unphysical(
             f"beta = {beta.value:.4g} is at the edge of what (6) can be; are the drives peak to peak, and v_max right?"
@@ -134,11 +149,11 @@ class _SizeModel:
         self._start_k = float(np.sum(v * actual_nm) / np.sum(v * v)) / v_max
 
     def size(self, x: Floats, v: Floats) -> Floats:
-        """nm at normalised voltages."""
+        """Return sizes in nm at normalised voltages, of their shape."""
         return self._base * _unit(v, x[1], x[2]) / _unit(np.array(self.at_base(x)), x[1], x[2])
 
     def at_base(self, x: Floats) -> float:
-        """The normalised voltage of the base size."""
+        """Return the normalised voltage of the base size."""
         return self._base / (float(x[0]) * self._v_max)
 
     def solve(self, threshold: float | None, start: tuple[float, float, float] | None = None) -> Solution:
@@ -153,16 +168,18 @@ class _SizeModel:
         scales = [_STEP_SCALES[0] * self._start_k, *_STEP_SCALES[1:]]
         low = [1e-3 * self._start_k, _LEAST_BETA, 0.02]
         high = [1e3 * self._start_k, _LARGEST_BETA, 1.0]
-        found = solve(residuals, [k, beta, begin][:count], _NAMES[:count], scales[:count], (low[:count], high[:count]))
+        solution = solve(
+            residuals, [k, beta, begin][:count], _NAMES[:count], scales[:count], (low[:count], high[:count])
+        )
         if not fixed:
-            return found
+            return solution
         return Solution(
-            found.names,
-            np.append(found.values, fixed),
-            found.unit_covariance,
-            found.residuals,
-            found.jacobian,
-            found.undetermined,
+            solution.names,
+            np.append(solution.values, fixed),
+            solution.unit_covariance,
+            solution.residuals,
+            solution.jacobian,
+            solution.undetermined,
         )
 
     def best_threshold(self) -> Solution | None:
@@ -172,12 +189,12 @@ class _SizeModel:
         _, alpha, bend = self._linear(begin)
         beta = min(max(bend / alpha, 0.9 * _LEAST_BETA), 0.9 * _LARGEST_BETA)
         base = float(np.interp(self._base, alpha * _unit(inside, beta, begin), inside))
-        found = self.solve(None, (self._base / (base * self._v_max), beta, begin))
-        at = float(found.values[2])
+        solution = self.solve(None, (self._base / (base * self._v_max), beta, begin))
+        at = float(solution.values[2])
         # The law differs from a parabola only where there are points beyond, and from a line only where some are below.
-        if found.undetermined or np.sum(inside > at) < 1 or np.sum(inside < at) < 2:
+        if solution.undetermined or np.sum(inside > at) < 1 or np.sum(inside < at) < 2:
             return None
-        return found
+        return solution
 
     def _linear(self, threshold: float) -> tuple[float, float, float]:
         """Sum of squares, alpha and alpha beta at a threshold, in which the law is linear."""
@@ -185,8 +202,8 @@ class _SizeModel:
         basis = np.stack([v, np.where(v <= threshold, v * v, 2.0 * threshold * v - threshold**2)], axis=1)
         basis = basis / self._weight[:, None]
         alpha, bend = np.linalg.lstsq(basis, self._actual / self._weight, rcond=None)[0].tolist()
-        left = basis @ np.array([alpha, bend]) - self._actual / self._weight
-        return float(left @ left), alpha, bend
+        residuals = basis @ np.array([alpha, bend]) - self._actual / self._weight
+        return float(residuals @ residuals), alpha, bend
 
 
 def _unit(v: Floats, beta: float, threshold: float) -> Floats:

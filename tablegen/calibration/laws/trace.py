@@ -43,14 +43,18 @@ def fit_trace(
     drift_order: int | None = None,
     delay_s: float | None = 0.0,
 ) -> TraceFit:
-    """Both branches of one trace: times ascending (s), drive at the piezo (V), displacement (any unit).
+    """Fit both branches of one trace: times ascending (s), drive at the piezo (V), displacement (any unit).
 
     Every sample is fitted at its own phase, so that periods are aligned to a fraction of a sample and averaged,
     whatever the sampling rate. The first ``settle_periods`` are left out (of three periods or more the first, if not
     given). Drift is a polynomial of ``drift_order`` over the record: a line, a parabola from two periods on, a cubic
-    from four; creep goes with it as far as these follow it. ``delay_s`` is that of the sensor against the drive;
-    None fits it.
-    Raises ``Unphysical``.
+    from four; creep goes with it as far as these follow it. ``delay_s`` is that of the sensor against the drive; None
+    fits it.
+
+    Raises
+    ------
+    Unphysical
+        If the trace does not support the fit.
     """
     if len(time_s) < _MIN_SAMPLES_PER_PERIOD:
         raise Unphysical(
@@ -95,7 +99,7 @@ class _TraceModel:
             raise Unphysical("the displacement does not move")
         self.measured = (measured - self.low) / self.height
         self.fits_delay = delay_s is None
-        self.given_delay = (delay_s or 0.0) / triangle.period_s  # in periods from here on
+        self.fixed_delay = (delay_s or 0.0) / triangle.period_s  # in periods from here on
         s = 2.0 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]) - 1.0
         self.drift = np.stack([s**n for n in range(1, order + 1)], axis=1) if order else np.zeros((len(s), 0))
         shape = [f"{name}_{side}" for side in "fb" for name in BranchShape.COORDINATES]
@@ -105,10 +109,10 @@ class _TraceModel:
 
     def delay(self, x: Floats) -> float:
         """In periods."""
-        return float(x[-1]) if self.fits_delay else self.given_delay
+        return float(x[-1]) if self.fits_delay else self.fixed_delay
 
     def position(self, x: Floats) -> tuple[Floats, Floats, Bools, Floats]:
-        """u and tau along the sweep, whether it rises, and the normalised displacement."""
+        """Return u and tau along the sweep, whether it rises, and the normalised displacement; each (samples,)."""
         if self._last is None or not np.array_equal(self._last[0], x):  # residuals and their derivatives ask in turn
             self._last = x.copy(), self._position(x)
         return self._last[1]
@@ -124,7 +128,7 @@ class _TraceModel:
         return u, tau, rising, np.where(rising, tau, 1.0 - tau)
 
     def expected(self, x: Floats) -> Floats:
-        """The modelled normalised displacement, with drift."""
+        """Return the modelled normalised displacement, with drift, shape (samples,)."""
         _, _, _, position = self.position(x)
         return float(x[4]) + float(x[5]) * position + self.drift @ x[6 : 6 + self.drift.shape[1]]
 
@@ -135,7 +139,7 @@ class _TraceModel:
         return self.expected(x) - self.measured
 
     def jacobian(self, x: Floats) -> Floats:
-        """Derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
+        """Return the derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
         columns, steep = self._shape_columns(x)
         if self.fits_delay:
             columns.append(-steep * self._by_delay(x))
@@ -186,38 +190,38 @@ class _TraceModel:
 
 
 def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods: float, left_out: int) -> TraceFit:
-    x, left = solution.values, solution.residuals
-    correlated = correlation_length(left)
-    freedom = max(len(left) / correlated - len(x), 1.0)
-    covariance = solution.unit_covariance * float(left @ left) / freedom
+    x, residuals = solution.values, solution.residuals
+    correlated = correlation_length(residuals)
+    freedom = max(len(residuals) / correlated - len(x), 1.0)
+    covariance = solution.unit_covariance * float(residuals @ residuals) / freedom
     # Errors of the drive's timing move the branches too.
     moved = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
     covariance = covariance + moved @ triangle.timing_covariance @ moved.T
     forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
-    delay = Estimate(model.given_delay * triangle.period_s)
+    delay = Estimate(model.fixed_delay * triangle.period_s)
     if model.fits_delay:
         delay = Estimate(float(x[-1]) * triangle.period_s, float(covariance[-1, -1]) ** 0.5 * triangle.period_s)
-    residual, scaling, curve = _averaged(model, x, left)
+    residual, scaling, curve = _averaged(model, x, residuals)
     drift = model.drift @ x[6 : 6 + model.drift.shape[1]]
-    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
     return TraceFit(
         triangle=triangle,
         turn=Estimate(triangle.turn, float(triangle.timing_covariance[2, 2]) ** 0.5),
         v_scan=triangle.v_high - triangle.v_low,
         v_offset=0.5 * (triangle.v_low + triangle.v_high),
         periods=periods,
-        samples=len(left),
+        samples=len(residuals),
         left_out=left_out,
         forward=forward,
         backward=backward,
         delay_s=delay,
         drift_percent=100.0 * float(np.ptp(drift)) / abs(float(x[5])) if drift.size else 0.0,
-        noise_percent=100.0 * float(np.sqrt(np.mean(np.diff(left) ** 2) / 2.0)) / abs(float(x[5])),
+        noise_percent=100.0 * float(np.sqrt(np.mean(np.diff(residuals) ** 2) / 2.0)) / abs(float(x[5])),
         residual_percent=residual,
         scaling_percent=scaling,
         correlated=correlated,
         inverted=bool(x[5] < 0.0),
-        strays=tuple((left_out + np.flatnonzero(np.abs(left) > max(7.0 * spread, 1e-6))).tolist()),
+        strays=tuple((left_out + np.flatnonzero(np.abs(residuals) > max(7.0 * spread, 1e-6))).tolist()),
         curves=(curve,),
     )
 
@@ -226,13 +230,13 @@ def _branches(x: Floats) -> tuple[BranchShape, BranchShape]:
     return BranchShape.at(x[:2]), BranchShape.at(x[2:4])
 
 
-def _averaged(model: _TraceModel, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
-    """What is left over, averaged over the periods, and the measured residual to draw."""
+def _averaged(model: _TraceModel, x: Floats, rest: Floats) -> tuple[Floats, tuple[float, float], Curve]:
+    """Average the residual over the periods; return it, its noise, and the measured residual as a curve."""
     u, tau, rising, _ = model.position(x)
     height = float(x[5])
     residuals, scaling, drawn = [], [], []
     for side, sign, shape in ((rising, 1.0, x[:2]), (~rising, -1.0, x[2:4])):
-        errors = -left[side] / height * sign  # along the sweep, measured less model
+        errors = -rest[side] / height * sign  # along the sweep, measured less model
         place = np.minimum((tau[side] * BINS).astype(np.int64), BINS - 1)
         count = np.maximum(np.bincount(place, minlength=BINS), 1)
         mean = np.bincount(place, errors, minlength=BINS) / count

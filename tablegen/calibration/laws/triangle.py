@@ -35,12 +35,12 @@ class Triangle:
         return t - np.floor(t)
 
     def value(self, time_s: Floats) -> Floats:
-        """The normalised drive, from 0 to 1."""
+        """Return the normalised drive, from 0 to 1, of the shape of ``time_s``."""
         phase = self.phase(time_s)
         return np.where(phase < self.turn, phase / self.turn, (1.0 - phase) / (1.0 - self.turn))
 
     def timing_slopes(self, time_s: Floats) -> Floats:
-        """Derivatives of ``value`` by period_s, start_s and turn, a column each."""
+        """Return the derivatives of ``value`` by period_s, start_s and turn, a column each."""
         phase = self.phase(time_s)
         rising = phase < self.turn
         slope = np.where(rising, 1.0 / self.turn, -1.0 / (1.0 - self.turn))
@@ -50,9 +50,19 @@ class Triangle:
 
 
 def find_triangle(time_s: Floats, drive_v: Floats) -> Triangle:
-    """The triangle in a recorded drive, from one period on; noise is averaged over the whole record.
+    """Fit the triangle in a recorded drive, from one period on; noise is averaged over the whole record.
 
-    Raises ``Unphysical`` where there is none.
+    Parameters
+    ----------
+    time_s
+        Times in s, shape (samples,).
+    drive_v
+        Drive in V, shape (samples,).
+
+    Raises
+    ------
+    Unphysical
+        If the drive is no triangle.
     """
     first = _first_guess(time_s, drive_v)
     middle = 0.5 * (float(time_s[0]) + float(time_s[-1]))
@@ -79,13 +89,13 @@ def find_triangle(time_s: Floats, drive_v: Floats) -> Triangle:
     high = [1.4 * period, start + 0.5 * period, first.turn + 0.9 * room, np.inf, np.inf]
     scales = [0.05 * period, 0.05 * period, 0.1 * room, height, height]
     begin = [period, start, first.turn, first.v_low, first.v_high]
-    found = solve(residuals, begin, _NAMES, scales, (low, high), jacobian)
-    x = found.values
-    covariance = found.unit_covariance[:3, :3] * max(found.variance, 0.0)
+    solution = solve(residuals, begin, _NAMES, scales, (low, high), jacobian)
+    x = solution.values
+    covariance = solution.unit_covariance[:3, :3] * max(solution.variance, 0.0)
     periods = float(np.floor((float(x[1]) - float(time_s[0])) / float(x[0])))
     early = float(x[1]) - periods * float(x[0])
     back = np.array([[1.0, 0.0, 0.0], [-periods, 1.0, 0.0], [0.0, 0.0, 1.0]])  # start is that many periods earlier
-    departure = float(np.sqrt(np.mean(found.residuals**2)))
+    departure = float(np.sqrt(np.mean(solution.residuals**2)))
     return Triangle(float(x[0]), early, float(x[2]), float(x[3]), float(x[4]), back @ covariance @ back.T, departure)
 
 
@@ -117,7 +127,7 @@ def _sweeps(time_s: Floats, level: Floats) -> list[tuple[float, float]]:
     """Time of the middle and slope (1/s) of each sweep that goes all the way from a quarter to three quarters."""
     far = np.flatnonzero((level < 0.25) | (level > 0.75))
     ends = np.flatnonzero(np.diff(level[far] > 0.75))
-    found = []
+    crossings = []
     for end in ends:
         inside = slice(int(far[end]) + 1, int(far[end + 1]))
         t, v = time_s[inside], level[inside]
@@ -126,5 +136,5 @@ def _sweeps(time_s: Floats, level: Floats) -> list[tuple[float, float]]:
         centre = float(np.mean(t))
         slope = float((t - centre) @ (v - np.mean(v)) / ((t - centre) @ (t - centre)))
         if slope * (1.0 if level[far[end]] < 0.5 else -1.0) > 0.0:
-            found.append((centre + (0.5 - float(np.mean(v))) / slope, slope))
-    return found
+            crossings.append((centre + (0.5 - float(np.mean(v))) / slope, slope))
+    return crossings

@@ -29,7 +29,7 @@ class NextTrace:
 
 
 def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver | float) -> NextTrace:
-    """The trace that helps most; ``rate_hz`` is another rate than that of all traces, where they have but one."""
+    """Return the trace that helps most; ``rate_hz`` is a second rate if all traces have the same."""
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
     unknown = _unknown(fit, np.array(reach))
     # Of two that the traces leave equal, as those at equal distances to both sides are, the lower one on every machine.
@@ -42,15 +42,24 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver |
 
 
 def expected_rms(fit: OperatorFit, points: Floats) -> Floats:
-    """The rms residual to expect of lines at points (stroke, centre), (n, 2), in percent of the line: (n,).
+    """Return the expected rms residual of lines.
 
-    Where all is known it is what the fit leaves; it grows with what the fields do not know there, as much as it does
-    for the lines that were left out.
+    Where everything is known it is the residual of the fit; it grows with the uncertainty of the fields there, as much
+    as it does for the lines that were left out.
+
+    Parameters
+    ----------
+    points
+        Points (stroke, centre), shape (n, 2).
+
+    Returns
+    -------
+    Residuals in percent of the line, shape (n,).
     """
     inverse = _inverse(fit)
     without = np.sqrt(1.0 / np.diag(inverse))  # of each line, by all others
     scale = np.exp(np.mean([np.log(max(out.rms, _LEAST_RMS)) for out in fit.left_out] - np.log(without)))
-    least = float(np.median([left.rms for left in fit.left]))
+    least = float(np.median([errors.rms for errors in fit.in_fit]))
     return np.asarray(np.sqrt(least**2 + scale**2 * np.maximum(_unknown(fit, points), 0.0)), dtype=np.float64)
 
 

@@ -14,7 +14,7 @@ _LAGS = 4  # phases
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class BranchResidual:
     """``coefficients`` of both branches, 2 ``DEGREE`` + 2 of them; ``extent_nm`` between the turns.
 
     ``variance`` is what the noise of the trace gives each coefficient.
@@ -25,7 +25,7 @@ class Left:
     variance: Floats
 
 
-def left_of(line: PeriodicLine, family: Family) -> Left:
+def branch_residual(line: PeriodicLine, family: Family) -> BranchResidual:
     """Measured less family, both about from 0 to 1 between the turns: ``Operator.loop`` closes their sum."""
     u, rising = line.drive, line.rising
     low, high = line.low, line.high
@@ -44,11 +44,11 @@ def left_of(line: PeriodicLine, family: Family) -> Left:
     edges = np.polynomial.chebyshev.chebvander(np.array([-1.0, 1.0]), DEGREE)
     matrix[len(u) :] = _CLOSURE * np.hstack([edges, -edges])
     right = np.append((measured - offset) / scale - modelled, [0.0, 0.0])
-    found = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    remain = right[: len(u)] - matrix[: len(u)] @ found
+    coefficients = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    remain = right[: len(u)] - matrix[: len(u)] @ coefficients
     spread = np.diag(np.linalg.inv(matrix.T @ matrix)) * float(np.mean(remain * remain)) * _together(remain)
-    begin, end = (float(edge @ (found[:count] + found[count:])) / 2.0 for edge in edges)
-    return Left(found, float(scale) * (1.0 + end - begin), spread)
+    begin, end = (float(edge @ (coefficients[:count] + coefficients[count:])) / 2.0 for edge in edges)
+    return BranchResidual(coefficients, float(scale) * (1.0 + end - begin), spread)
 
 
 def _together(noise: Floats) -> float:

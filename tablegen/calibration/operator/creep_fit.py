@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tablegen.calibration.operator.branches import left_of
+from tablegen.calibration.operator.branches import branch_residual
 from tablegen.calibration.operator.family import CreepOf
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
@@ -29,10 +29,10 @@ Factor = Callable[[float], float]
 def creep_of_fields(
     lines: Sequence[PeriodicLine], family: Family, factor: Factor, creep_of: CreepOf
 ) -> LogarithmicCreep:
-    """The loss per decade with which the fields over stroke and centre are the likeliest, whatever the hysteresis.
+    """Return the loss per decade with which the fields over stroke and centre are the likeliest.
 
-    Of several rates the sizes decide; of one rate and one turn the shapes, which are straight where the stroke
-    vanishes. Other lines leave it open, and it is taken as 0.
+    This holds whatever the hysteresis. Of several rates the sizes decide; of one rate and one turn the shapes, which
+    are straight where the stroke vanishes. Other lines leave it open, and it is taken as 0.
     """
     rates = [line.rate_hz for line in lines]
     turns = [float(np.mean(line.rising)) for line in lines]
@@ -41,12 +41,14 @@ def creep_of_fields(
         return creep_of(0.0)
 
     def misfit(creep: LogarithmicCreep) -> float:
-        left = [left_of(line.without(None, creep), family) for line in lines]
+        residuals = [branch_residual(line.without(None, creep), family) for line in lines]
         if several:
-            sizes = [one.extent_nm * factor(line.mean) / line.stroke for one, line in zip(left, lines, strict=True)]
+            sizes = [
+                one.extent_nm * factor(line.mean) / line.stroke for one, line in zip(residuals, lines, strict=True)
+            ]
             values = np.array(sizes)[:, None]
             return _unlikelihood(lines, values / np.mean(values) - 1.0, still=False)
-        return _unlikelihood(lines, np.stack([one.coefficients for one in left]), still=True)
+        return _unlikelihood(lines, np.stack([one.coefficients for one in residuals]), still=True)
 
     return _least(creep_of, misfit)
 
@@ -61,24 +63,24 @@ def _unlikelihood(lines: Sequence[PeriodicLine], rows: Floats, still: bool) -> f
         centres = sorted({round(line.centre, 2) for line in lines})
         points = np.concatenate([points, [(0.0, centre) for centre in centres]])
         rows = np.concatenate([rows, np.zeros((len(centres), rows.shape[1]))])
-    found = []
+    misfits = []
     for stroke in _STROKE_LENGTHS:
         matrix = covariance(points, points, Lengths(stroke, _CENTRE_LENGTH, _NOISE)) + _NOISE * np.eye(len(points))
         power = float(np.sum(rows * np.linalg.solve(matrix, rows)))
-        found.append(len(points) * np.log(power) + float(np.linalg.slogdet(matrix)[1]))
-    return float(min(found))
+        misfits.append(len(points) * np.log(power) + float(np.linalg.slogdet(matrix)[1]))
+    return float(min(misfits))
 
 
 def _least(creep: CreepOf, misfit: Callable[[LogarithmicCreep], float]) -> LogarithmicCreep:
-    """The creep of the least misfit: a parabola through the best of some losses."""
+    """Return the creep of the least misfit: a parabola through the best of some losses."""
     coarse = [misfit(creep(loss)) for loss in _LOSSES[::3]]
     best = 3 * int(np.argmin(coarse))
     fine = {i: misfit(creep(_LOSSES[i])) for i in range(best - 2, best + 3) if 0 <= i < len(_LOSSES)}
     at = min(fine, key=lambda i: fine[i])
     loss = _LOSSES[at]
     if at - 1 in fine and at + 1 in fine:
-        left, middle, right = fine[at - 1], fine[at], fine[at + 1]
-        bend = left - 2.0 * middle + right
+        before, middle, after = fine[at - 1], fine[at], fine[at + 1]
+        bend = before - 2.0 * middle + after
         if bend > 0.0:
-            loss += 0.5 * (left - right) / bend * (_LOSSES[1] - _LOSSES[0])
+            loss += 0.5 * (before - after) / bend * (_LOSSES[1] - _LOSSES[0])
     return creep(loss)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.calibration.operator.branches import DEGREE, left_of
+from tablegen.calibration.operator.branches import DEGREE, branch_residual
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
@@ -32,9 +32,12 @@ _PHASE_SHARE = 0.9  # of the resonance, up to which phases are put right; ``with
 
 
 def fit_delay(lines: Sequence[PeriodicLine], response: Response | None) -> Estimate:
-    """The delay in s of the sensor that recorded all lines, beyond the dynamics of ``response``.
+    """Fit the delay in s of the sensor that recorded all lines, beyond the dynamics of ``response``.
 
-    Raises ``Unphysical`` where no delay is the likeliest.
+    Raises
+    ------
+    Unphysical
+        If no delay is the likeliest.
     """
     for line in lines:
         if _sharpness(line) < _SHARP:
@@ -51,9 +54,9 @@ def fit_delay(lines: Sequence[PeriodicLine], response: Response | None) -> Estim
 
     def best_of(steps: Sequence[int], step: float, losses: Sequence[float]) -> float:
         delays = [period_s * step * i for i in steps]
-        found = [min(_unlikelihood(still, straight, delay, loss) for loss in losses) for delay in delays]
-        known.update(zip(delays, found, strict=True))
-        return delays[int(np.argmin(found))]
+        misfits = [min(_unlikelihood(still, straight, delay, loss) for loss in losses) for delay in delays]
+        known.update(zip(delays, misfits, strict=True))
+        return delays[int(np.argmin(misfits))]
 
     coarse = best_of(range(-count, count + 1), _COARSE, _LOSSES[1:2])
     if abs(coarse) > period_s * (_MOST - 0.5 * _COARSE):
@@ -66,12 +69,12 @@ def fit_delay(lines: Sequence[PeriodicLine], response: Response | None) -> Estim
     best_of(range(near - half, near + half + 1), _FINE, _LOSSES)
     delays, values = np.array(list(known)), np.array(list(known.values()))
     at = int(np.clip(np.argmin(values), 1, len(values) - 2))
-    left, middle, right = values[at - 1 : at + 2]
-    bend = float(left - 2.0 * middle + right)
+    before, middle, after = values[at - 1 : at + 2]
+    bend = float(before - 2.0 * middle + after)
     step = period_s * _FINE
     if not bend > 0.0:
         raise Unphysical("the traces do not tell the delay of the sensor; give it with --delay-s S")
-    return Estimate(float(delays[at] + 0.5 * step * (left - right) / bend), float(step * np.sqrt(2.0 / bend)))
+    return Estimate(float(delays[at] + 0.5 * step * (before - after) / bend), float(step * np.sqrt(2.0 / bend)))
 
 
 def _sharpness(line: PeriodicLine) -> float:
@@ -102,11 +105,11 @@ def _unlikelihood(lines: Sequence[PeriodicLine], straight: Family, delay_s: floa
     if loss > 0.0:
         rates = [line.rate_hz for line in lines]
         creep = LogarithmicCreep(loss, 1e-3 / max(rates), 10.0 / min(rates), max(rates))
-    left = [left_of(line.earlier(delay_s).without(None, creep), straight) for line in lines]
+    residuals = [branch_residual(line.earlier(delay_s).without(None, creep), straight) for line in lines]
     points = np.array([(line.stroke, line.centre) for line in lines])
-    noise = np.maximum(np.mean([one.variance for one in left], axis=0), _FLOOR)
-    rows = np.stack([one.coefficients for one in left]) / np.sqrt(noise)
-    found = []
+    noise = np.maximum(np.mean([one.variance for one in residuals], axis=0), _FLOOR)
+    rows = np.stack([one.coefficients for one in residuals]) / np.sqrt(noise)
+    misfits = []
     for stroke in _STROKE_LENGTHS:
         known = covariance(points, points, Lengths(stroke, _CENTRE_LENGTH, 0.0), straight=True)
         values, vectors = np.linalg.eigh(known)
@@ -114,5 +117,5 @@ def _unlikelihood(lines: Sequence[PeriodicLine], straight: Family, delay_s: floa
         spread = 1.0 + _POWERS[:, None] * np.maximum(values, 0.0)
         each = (1.0 / spread) @ (along * along) + np.sum(np.log(spread), axis=1)[:, None]
         both = each[:, : DEGREE + 1] + each[:, DEGREE + 1 :]
-        found.append(float(np.sum(np.min(both, axis=0))) + len(lines) * float(np.sum(np.log(noise))))
-    return min(found)
+        misfits.append(float(np.sum(np.min(both, axis=0))) + len(lines) * float(np.sum(np.log(noise))))
+    return min(misfits)

@@ -48,7 +48,7 @@ def groups_of(centres: Sequence[float]) -> list[int]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Left:
+class _WeightsFit:
     numbers: Floats
     weights: Floats
     residual: Floats
@@ -86,7 +86,7 @@ class FamilyProblem(ABC):
 
     @abstractmethod
     def moved(self, shape: Floats) -> list[Floats]:
-        """What weights of 1 move each line by, for all of v_max 1: shape (phases, weights)."""
+        """Return what weights of 1 move each line by, in shares of v_max: shape (phases, weights) each."""
 
     @abstractmethod
     def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
@@ -95,10 +95,10 @@ class FamilyProblem(ABC):
     def fit(self, near: Floats | None, rounds: int) -> FamilyFit:
         """From the best of the starts, or from numbers that are near; at most so many rounds."""
         if near is None:
-            found = [self.settled(self.left(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
-            best = self.settled(min(found, key=lambda one: one.cost), rounds)
+            solutions = [self.settled(self.best_weights(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
+            best = self.settled(min(solutions, key=lambda one: one.cost), rounds)
         else:
-            best = self.settled(self.left(self._whole(near)), rounds)
+            best = self.settled(self.best_weights(self._whole(near)), rounds)
         weights, shape = best.weights * self.scale, best.numbers[: self._shapes]
         count = len(weights) - 2 * DEGREE
         reversible = weights[count : count + DEGREE] - weights[count + DEGREE :]
@@ -106,8 +106,8 @@ class FamilyProblem(ABC):
             self.family(shape, weights[:count], reversible), float(best.numbers[self._shapes]), best.numbers
         )
 
-    def left(self, numbers: Floats) -> _Left:
-        """What the best weights leave."""
+    def best_weights(self, numbers: Floats) -> _WeightsFit:
+        """Return what the best weights leave of measured numbers."""
         parts, measured = (
             self._moved(tuple(numbers[: self._shapes].tolist())),
             self._measured(float(numbers[self._shapes])),
@@ -117,9 +117,9 @@ class FamilyProblem(ABC):
         normal = matrix.T @ matrix + self.penalty.T @ self.penalty
         weights = nonnegative(normal, matrix.T @ measured)
         residual = np.concatenate([matrix @ weights - measured, self.penalty @ weights])
-        return _Left(numbers, weights, residual, float(residual @ residual))
+        return _WeightsFit(numbers, weights, residual, float(residual @ residual))
 
-    def settled(self, best: _Left, rounds: int) -> _Left:
+    def settled(self, best: _WeightsFit, rounds: int) -> _WeightsFit:
         """So many steps on, or fewer where they no longer help."""
         damping = 1e-3
         for _ in range(rounds):
@@ -127,7 +127,7 @@ class FamilyProblem(ABC):
             normal, slope = jacobian.T @ jacobian, jacobian.T @ best.residual
             for _ in range(_TRIALS):
                 by = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), slope)
-                trial = self.left(self._limited(best.numbers - by))
+                trial = self.best_weights(self._limited(best.numbers - by))
                 if trial.cost < best.cost:
                     best, damping = trial, damping * 0.2
                     break
@@ -136,13 +136,13 @@ class FamilyProblem(ABC):
                 break
         return best
 
-    def jacobian(self, at: _Left) -> Floats:
+    def jacobian(self, at: _WeightsFit) -> Floats:
         """Of the residual by the numbers, with the weights that move along."""
         rows = []
         for i, step in enumerate([*self.shape_steps, _LOSS_STEP, *[_GAIN_STEP] * self._gains]):
             moved = at.numbers.copy()
             moved[i] += step
-            rows.append((self.left(moved).residual - at.residual) / step)
+            rows.append((self.best_weights(moved).residual - at.residual) / step)
         return np.stack(rows, axis=1)
 
     def _whole(self, numbers: Floats) -> Floats:
@@ -165,7 +165,7 @@ class FamilyProblem(ABC):
         ]
 
     def _values(self, creep: LogarithmicCreep) -> Floats:
-        """What was measured, before its creep."""
+        """Return the measured values before their creep."""
         parts = [line.without(None, creep).displacement_nm[::STRIDE] for line in self.lines]
         return np.concatenate(
             [share / self.scale * (y - y.mean()) for share, y in zip(self._share, parts, strict=True)]

@@ -23,7 +23,7 @@ _HEAD = (
 
 
 def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: Sequence[str] = ()) -> bytes:
-    """The file's bytes; ``sources`` says where the traces came from, a line each."""
+    """Format an operator file; ``sources`` has a line for the origin of each trace."""
     operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
     plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
     lines = []

@@ -9,7 +9,7 @@ from msgspec import structs
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
-from tablegen.calibration.operator.branches import Left, left_of
+from tablegen.calibration.operator.branches import BranchResidual, branch_residual
 from tablegen.calibration.operator.creep_fit import creep_of_fields
 from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_of
 from tablegen.calibration.operator.loop_errors import WORST, LineErrors, compare
@@ -57,27 +57,30 @@ class OperatorFit:
     family: str
     rows: Floats
     sizes: Floats
-    left: tuple[LineErrors, ...]
+    in_fit: tuple[LineErrors, ...]
     left_out: tuple[LineErrors, ...]
     candidates: dict[str, float]
 
 
 def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, factor: Factor) -> OperatorFit:
-    """The operator of some lines; ``factor`` is m of (1) at a centre, in shares of v_max.
+    """Fit an operator to lines; ``factor`` is m of (1) at a centre, in shares of v_max.
 
-    Raises ``Unphysical`` for too few lines, for such as are alike, and for noisy ones.
+    Raises
+    ------
+    Unphysical
+        If the lines are too few, too much alike, or too noisy.
     """
     _check(lines)
     still = [line.without(response, None) for line in lines]
     main = _main_centre(still)
     names = (*FAMILIES, NONE)
     alone = [_candidate(name, still, main, factor) for name in names]
-    found = [_judged(one, still, factor) for one in alone]
-    scores = [one.candidates[one.family] for one in found[: len(FAMILIES)]]
+    fits = [_judged(one, still, factor) for one in alone]
+    scores = [one.candidates[one.family] for one in fits[: len(FAMILIES)]]
     if max(scores) < _WORTH_MIXING * min(scores):
-        found += [_judged(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
-    best = min(found, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
-    candidates = {name: value for one in found for name, value in one.candidates.items()}
+        fits += [_judged(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
+    best = min(fits, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
+    candidates = {name: value for one in fits for name, value in one.candidates.items()}
     return replace(best, candidates=candidates)
 
 
@@ -102,7 +105,7 @@ def _check(lines: Sequence[PeriodicLine]) -> None:
 
 
 def _main_centre(lines: Sequence[PeriodicLine]) -> float:
-    """The centre at which most strokes were measured."""
+    """Return the centre at which most strokes were measured."""
     groups = groups_of([line.centre for line in lines])
     most = max(set(groups), key=groups.count)
     return float(np.mean([line.centre for line, group in zip(lines, groups, strict=True) if group == most]))
@@ -146,19 +149,19 @@ class _Fitted:
         self.lines, self.main = lines, main
         self.family, self.creep, self.numbers = family, creep, numbers
         self.settled = [line.without(None, creep) for line in lines]
-        self.left = [left_of(line, family) for line in self.settled]
+        self.residuals = [branch_residual(line, family) for line in self.settled]
 
     def operator(self, lengths: Lengths, factor: Factor) -> tuple[Operator, Floats, Floats]:
         """Both fields through what is left, and the rows and sizes that they go through."""
         points = np.array([(line.stroke, line.centre) for line in self.settled])
-        rows = shrunk(points, self.left, lengths)
+        rows = shrunk(points, self.residuals, lengths)
         residual = through(points, rows, lengths, straight=True)
-        sizes = _sizes(self.family, residual, self.settled, self.left, self.main, factor)
+        sizes = _sizes(self.family, residual, self.settled, self.residuals, self.main, factor)
         size = through(points, sizes[:, None], lengths)
         return Operator(self.family, residual, size, self.creep, self.main, ()), rows, sizes
 
     def weighted(self, share: float, other: "_Fitted") -> "_Fitted":
-        """A share of this family, and the rest of another one, for the same lines."""
+        """Mix a share of this family with the rest of another one, for the same lines."""
         loss = share * self.creep.loss_per_decade + (1.0 - share) * other.creep.loss_per_decade
         creep = structs.replace(self.creep, loss_per_decade=round(loss, 6))
         return _Fitted(self.lines, self.main, self.family.weighted(share, other.family), creep)
@@ -173,7 +176,7 @@ class _Candidate:
     without: list[_Fitted]
 
     def weighted(self, share: float, other: "_Candidate") -> "_Candidate":
-        """A share of this one, and the rest of another."""
+        """Mix a share of this candidate with the rest of another one."""
         name = f"{100.0 * share:.0f} % {self.name}, {100.0 * (1.0 - share):.0f} % {other.name}"
         both = zip(self.without, other.without, strict=True)
         return _Candidate(name, self.whole.weighted(share, other.whole), [a.weighted(share, b) for a, b in both])
@@ -188,15 +191,15 @@ def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Fa
             family = _straight(some)
             return _Fitted(some, main, family, near.creep if near else creep_of_fields(some, family, factor, creep_of))
         problem = FAMILIES[name](some, main, creep_of)
-        found = problem.fit(near.numbers, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
-        return _Fitted(some, main, found.family, creep_of(found.loss_per_decade), found.numbers)
+        solution = problem.fit(near.numbers, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
+        return _Fitted(some, main, solution.family, creep_of(solution.loss_per_decade), solution.numbers)
 
     whole = fitted(lines, None)
     return _Candidate(name, whole, [fitted([*lines[:i], *lines[i + 1 :]], whole) for i in range(len(lines))])
 
 
 def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor) -> OperatorFit:
-    """The best lengths for one family, and the operator with them."""
+    """Choose the best lengths for a family, and return the operator with them."""
     whole, without = candidate.whole, candidate.without
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
@@ -212,8 +215,8 @@ def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor
     operator, rows, sizes = whole.operator(lengths, factor)
     inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, left.figures)
-        for line, errors, left in zip(lines, out, inside, strict=True)
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, inner.figures)
+        for line, errors, inner in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)
     return OperatorFit(operator, candidate.name, rows, sizes, inside, tuple(out), {candidate.name: score})
@@ -226,7 +229,12 @@ def _straight(lines: Sequence[PeriodicLine]) -> Family:
 
 
 def _sizes(
-    family: Family, residual: Field, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor
+    family: Family,
+    residual: Field,
+    lines: Sequence[PeriodicLine],
+    residuals: Sequence[BranchResidual],
+    main: float,
+    factor: Factor,
 ) -> Floats:
     """Measured extents over expected ones, less 1."""
     nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
@@ -239,7 +247,7 @@ def _sizes(
         except Unphysical:  # where a line is left out; its errors are the worst then
             return bare.expected_extent(line.stroke, line.mean, here)
 
-    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(left, lines, strict=True)])
+    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(residuals, lines, strict=True)])
 
 
 def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:

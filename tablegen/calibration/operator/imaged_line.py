@@ -3,7 +3,7 @@
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
+from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.fitting.estimate import LineSize
 from tablegen.images.fast_axis_line import fit_line
@@ -14,12 +14,17 @@ _SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of 
 
 
 def imaged_line(
-    image: SampleImage, rate_hz: float, driver: Driver | float, sample: KnownSample, taking: Taking
+    image: SampleImage, rate_hz: float, driver: Driver | float, sample: KnownSample, acquisition: Acquisition
 ) -> tuple[PeriodicLine, LineSize]:
-    """The line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
+    """Fit the line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
 
-    ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show
-    both sweeps almost from turn to turn. Raises ``Unphysical``, without the image's name.
+    ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show both
+    sweeps almost from turn to turn.
+
+    Raises
+    ------
+    Unphysical
+        If the image shows no such line; the message leaves the image's name to the caller.
     """
     if image.retrace is None:
         raise Unphysical("the retrace is missing: an operator needs both directions")
@@ -30,17 +35,22 @@ def imaged_line(
     if driver.beyond(low, high) > 0.02 * driver.span:
         raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
     line = fit_line(
-        image.trace, image.retrace, taking.turn, taking.window, taking.retrace_mirrored, taking.delay_pixels
+        image.trace,
+        image.retrace,
+        acquisition.turn,
+        acquisition.window,
+        acquisition.retrace_mirrored,
+        acquisition.delay_pixels,
     )
-    if not _SPANNED[0] >= taking.window[0] or not taking.window[1] >= _SPANNED[1]:
+    if not _SPANNED[0] >= acquisition.window[0] or not acquisition.window[1] >= _SPANNED[1]:
         raise Unphysical(
             f"the turns are too far outside the images; they have to span {_SPANNED[0]:g} to {_SPANNED[1]:g} of each "
             f"sweep, or more: save lines without overscan"
         )
-    size = size_of_line(line, sample.cell, sample.grating, taking.aspect or image.aspect)
+    size = size_of_line(line, sample.cell, sample.grating, acquisition.aspect or image.aspect)
     time = np.arange(PHASES) / PHASES
-    rising = time < taking.turn
-    drive = np.where(rising, time / taking.turn, (1.0 - time) / (1.0 - taking.turn))
+    rising = time < acquisition.turn
+    drive = np.where(rising, time / acquisition.turn, (1.0 - time) / (1.0 - acquisition.turn))
     position = np.where(rising, line.position(drive, True), line.position(drive, False))
     error = np.where(rising, line.position_error(drive, True), line.position_error(drive, False))
     nm = size.nm.value

@@ -37,7 +37,7 @@ WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of a loop that cannot be
 
 
 def compare(line: PeriodicLine, loop: Loop) -> LineErrors:
-    """What a scan would be off that was made straight by ``loop``, where the axis does what ``line`` measured."""
+    """Return the errors of a scan linearised by ``loop`` on an axis that does what ``line`` measured."""
     predicted = np.where(line.rising, loop.position(line.drive, True), loop.position(line.drive, False))
     measured = line.displacement_nm
     inside = (predicted > WINDOW[0]) & (predicted < WINDOW[1])

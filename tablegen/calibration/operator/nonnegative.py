@@ -8,7 +8,19 @@ _TOLERANCE = 1e-11
 
 
 def nonnegative(normal: Floats, right: Floats) -> Floats:
-    """The x >= 0 that minimises x N x / 2 - r x; N of shape (n, n) is positive definite."""
+    """Minimise x N x / 2 - r x over x >= 0.
+
+    Parameters
+    ----------
+    normal
+        N, positive definite, shape (n, n).
+    right
+        r, shape (n,).
+
+    Returns
+    -------
+    x, shape (n,).
+    """
     n = len(right)
     x = np.zeros(n)
     free = np.zeros(n, bool)

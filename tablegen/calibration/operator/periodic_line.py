@@ -74,13 +74,13 @@ class PeriodicLine:
         return _RESONANCE_SHARE * response.resonance_hz
 
     def earlier(self, delay_s: float) -> "PeriodicLine":
-        """The same with the displacement of a sensor that is ``delay_s`` behind the drive."""
+        """Return the line with the displacement of a sensor that is ``delay_s`` behind the drive."""
         n = np.arange(PHASES // 2 + 1)
         ahead = np.exp(2j * np.pi * (n * self.rate_hz * delay_s))
         return replace(self, displacement_nm=np.fft.irfft(np.fft.rfft(self.displacement_nm) * ahead, PHASES))
 
     def without(self, response: Response | None, creep: LogarithmicCreep | None) -> "PeriodicLine":
-        """The same with the displacement before the dynamics, which come behind the hysteresis."""
+        """Return the line with the displacement before the dynamics, which come behind the hysteresis."""
         n = np.arange(PHASES // 2 + 1, dtype=np.float64)
         spectrum = np.fft.rfft(self.displacement_nm)
         f_hz: Floats = n * self.rate_hz
@@ -119,28 +119,28 @@ def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
     start = float(time[0]) + settle * period
     grid = start + period * (np.arange((periods - settle) * PHASES) / PHASES)
     rows = [np.interp(grid, time, values).reshape(-1, PHASES) for values in (drive, trace.displacement_nm)]
-    kept = periods - settle
+    settled = periods - settle
     check_repeats(rows[0])
-    centres = np.arange(kept) - 0.5 * (kept - 1)
+    centres = np.arange(settled) - 0.5 * (settled - 1)
     means = rows[1].mean(axis=1)
-    order = min(kept - 1, _MAX_DRIFT_ORDER)
+    order = min(settled - 1, _MAX_DRIFT_ORDER)
     drift = np.polynomial.Polynomial.fit(centres, means, order) if order else np.polynomial.Polynomial([means[0]])
     at = centres[:, None] + (np.arange(PHASES) / PHASES - 0.5)[None, :]
     level = rows[1] - drift(at)
     displacement, shape = level.mean(axis=0), rows[0].mean(axis=0)
-    spread = float(np.sqrt(np.mean((level - displacement) ** 2) / max(kept - 1, 1))) if kept > 1 else 0.0
+    spread = float(np.sqrt(np.mean((level - displacement) ** 2) / max(settled - 1, 1))) if settled > 1 else 0.0
     begin = int(np.argmin(shape))
     shape, displacement = np.roll(shape, -begin), np.roll(displacement, -begin)
     if np.corrcoef(shape, displacement)[0, 1] < 0.0:
         displacement = -displacement
     _check_sweeps(shape)
     return PeriodicLine(
-        trace.name, 1.0 / period, kept, shape, displacement, spread, float(np.ptp(drift(at))) if order else 0.0
+        trace.name, 1.0 / period, settled, shape, displacement, spread, float(np.ptp(drift(at))) if order else 0.0
     )
 
 
 def _period(time: Floats, drive: Floats) -> float:
-    """The period in s, from all rises and falls of the record through the middle."""
+    """Return the period in s, from all rises and falls of the record through the middle."""
     middle = 0.5 * (float(np.max(drive)) + float(np.min(drive)))
     level = (drive - middle) / float(np.ptp(drive))
     side = np.where(level > _LEVEL, 1, np.where(level < -_LEVEL, -1, 0))

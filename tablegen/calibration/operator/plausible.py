@@ -14,7 +14,13 @@ _MOST_DIFFERENCE = 0.02  # of the drive's span, rms, from period to period
 
 
 def check_record(trace: Trace) -> None:
-    """Refuse a record that has no values, that does not move, or that was clipped. Raises ``Unphysical``."""
+    """Refuse a record that has no values, that does not move, or that was clipped.
+
+    Raises
+    ------
+    Unphysical
+        If the record is refused.
+    """
     columns = (("time", trace.time_s), ("drive", trace.drive_v), ("displacement", trace.displacement_nm))
     for name, values in columns:
         missing = np.flatnonzero(~np.isfinite(values))
@@ -36,7 +42,13 @@ def check_record(trace: Trace) -> None:
 
 
 def check_repeats(drives: Floats) -> None:
-    """Refuse a drive, (periods, phases), that is not the same in every period. Raises ``Unphysical``."""
+    """Refuse a drive, (periods, phases), that is not the same in every period.
+
+    Raises
+    ------
+    Unphysical
+        If the drive is refused.
+    """
     mean = drives.mean(axis=0)
     difference = float(np.sqrt(np.mean((drives - mean) ** 2))) / float(np.ptp(mean))
     if difference > _MOST_DIFFERENCE:

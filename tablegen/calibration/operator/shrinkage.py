@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tablegen.calibration.operator.branches import DEGREE, Left
+from tablegen.calibration.operator.branches import DEGREE, BranchResidual
 from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.numerics.arrays import Floats
 
@@ -16,11 +16,11 @@ _POWERS = np.geomspace(1e-4, 1e12, 65)  # variance of an order over that of its 
 _FLOOR = 1e-14  # variance below which no coefficient is known
 
 
-def shrunk(points: Floats, left: Sequence[Left], lengths: Lengths) -> Floats:
+def shrunk(points: Floats, residuals: Sequence[BranchResidual], lengths: Lengths) -> Floats:
     """Rows without noise, shape (lines, 2 ``DEGREE`` + 2), for lines at points (stroke, centre)."""
     known = covariance(points, points, lengths, straight=True)
-    rows = np.stack([one.coefficients for one in left])
-    noise = np.maximum(np.stack([one.variance for one in left]), _FLOOR)
+    rows = np.stack([one.coefficients for one in residuals])
+    noise = np.maximum(np.stack([one.variance for one in residuals]), _FLOOR)
     # The noise of a line times that of an order: nearly all lines have their samples at the same places.
     of_line = np.sqrt(np.mean(noise, axis=1) / np.mean(noise))
     of_order = np.sqrt(np.mean(noise, axis=0))
@@ -33,6 +33,6 @@ def shrunk(points: Floats, left: Sequence[Left], lengths: Lengths) -> Floats:
     count = DEGREE + 1
     best = np.argmax(each[:, :count] + each[:, count:], axis=0)
     power = _POWERS[np.concatenate([best, best])]
-    kept = power * values[:, None] / (1.0 + power * values[:, None])
-    out: Floats = (vectors @ (kept * along)) * of_line[:, None] * of_order
+    weights = power * values[:, None] / (1.0 + power * values[:, None])
+    out: Floats = (vectors @ (weights * along)) * of_line[:, None] * of_order
     return out

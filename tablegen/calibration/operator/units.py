@@ -12,7 +12,13 @@ _MOST_RATIO = 3.0  # of the sensitivities of two traces, or of a trace and the s
 
 
 def check_units(lines: Sequence[PeriodicLine]) -> None:
-    """Refuse lines that cannot all be in V and nm. Raises ``Unphysical``."""
+    """Refuse lines that cannot all be in V and nm.
+
+    Raises
+    ------
+    Unphysical
+        If the lines are refused.
+    """
     largest = max(line.stroke for line in lines)
     if largest < _LEAST_STROKE:
         raise Unphysical(
@@ -30,7 +36,13 @@ def check_units(lines: Sequence[PeriodicLine]) -> None:
 
 
 def check_size(lines: Sequence[PeriodicLine], nm_per_full_scale: float, where: str) -> None:
-    """Refuse lines that are far from the sensitivity that is known otherwise, by ``where``. Raises ``Unphysical``."""
+    """Refuse lines that are far from the sensitivity that is known otherwise, by ``where``.
+
+    Raises
+    ------
+    Unphysical
+        If the lines are refused.
+    """
     usual = float(np.median([sensitivity(line) for line in lines]))
     if not 1.0 / _MOST_RATIO < usual / nm_per_full_scale < _MOST_RATIO:
         raise Unphysical(

@@ -27,7 +27,13 @@ def is_array_file(path: Path) -> bool:
 
 
 def columns_of(content: bytes, name: str) -> dict[str, AnyArray]:
-    """Arrays by their names, as they are stored. Raises ``Rejected`` with ``name``."""
+    """Read arrays by their names, as they are stored.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read; the message has ``name``.
+    """
     try:
         return dict(_members(content) if content.startswith(b"PK") else _fields(content))
     except (ValueError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
@@ -35,7 +41,13 @@ def columns_of(content: bytes, name: str) -> dict[str, AnyArray]:
 
 
 def numbers_of(column: AnyArray, name: str, spelt: str) -> Floats:
-    """A column of real numbers as floats, shape (rows,). Raises ``Rejected``."""
+    """Convert a column of real numbers to floats, shape (rows,).
+
+    Raises
+    ------
+    Rejected
+        If the column has another shape, or something else than real numbers.
+    """
     if column.ndim != 1:
         shape = " x ".join(map(str, column.shape)) or "one number"
         raise Rejected([Problem(name, 0, spelt, f"has shape {shape}; a column has one dimension")])
@@ -67,7 +79,7 @@ def _fields(content: bytes) -> Iterator[tuple[str, AnyArray]]:
 
 
 def _array(content: bytes) -> AnyArray:
-    array, left = npy_array(content)
-    if left:
-        raise ValueError(f"{left} bytes follow its numbers")
+    array, remaining = npy_array(content)
+    if remaining:
+        raise ValueError(f"{remaining} bytes follow its numbers")
     return array

@@ -46,7 +46,7 @@ class Column:
         return self.spelt(next(iter(self.units)))
 
     def spelt(self, unit: str) -> str:
-        """The name of the column in one of its units."""
+        """Return the name of the column in one of its units."""
         return f"{self.quantity}_{unit}" if unit else self.quantity
 
 

@@ -23,7 +23,13 @@ class Block:
 
 
 def blocks_of(path: Path, kind: Kind) -> Iterator[Block]:
-    """The lines of a file, some of them at a time. Raises ``OSError``."""
+    """Yield the lines of a file in blocks.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
     line = 1
     parts: list[bytes] = []
     for chunk in chunks_of(path, kind):

@@ -11,9 +11,12 @@ MARK = "# calibrate resonance: "
 
 
 def response_csv(fit: ResonanceFit, sources: Sequence[Source]) -> bytes:
-    """Comments on where it came from, the header hz,gain,phase_deg, and a row a frequency; without a date.
+    """Write comments on the origin, the header hz,gain,phase_deg, and a row a frequency; without a date.
 
-    Raises ``Unphysical`` where there is no phase, or a frequency stands twice.
+    Raises
+    ------
+    Unphysical
+        If there is no phase, or a frequency stands twice.
     """
     if fit.response is None:
         raise Unphysical("a response takes phase_deg or phase_rad beside the gain")

@@ -50,12 +50,17 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     ``.npz`` and ``.npy`` are numpy's, with an array or a field a column; everything else is CSV with a header.
 
     Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
-    Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
+    Lines that are blank or begin with # count for nothing.
+
+    Raises
+    ------
+    Rejected
+        If the table is faulty; the message has file, line and column.
     """
     name = shown_path(path)
-    wanted = [*needed, *optional]
+    expected = [*needed, *optional]
     if is_array_file(path):
-        return _array_table(path, name, wanted, needed)
+        return _array_table(path, name, expected, needed)
     digest = hashlib.sha256()
     reader: _Reader | None = None
     header_line = 0
@@ -67,7 +72,7 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
             if header_line:
                 separator = next((mark for mark in (";", "\t") if mark in header), ",")
                 cells = _cells(header, separator)
-                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, wanted, needed))
+                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, expected, needed))
                 reader.add_rows(rows)
         elif not reader.full:
             reader.add(block)
@@ -79,12 +84,12 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines)
 
 
-def _array_table(path: Path, name: str, wanted: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
+def _array_table(path: Path, name: str, expected: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
     content = file_content(path, name)
     source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
     arrays = columns_of(content, name)
     del content  # an archive has it a second time
-    places = _places(name, 0, list(arrays), wanted, needed)
+    places = _places(name, 0, list(arrays), expected, needed)
     written = [numbers_of(list(arrays.values())[place[0]], name, place[3]) for place in places]
     if len({len(column) for column in written}) > 1:
         lengths = ", ".join(f"{place[3]} {len(column)}" for place, column in zip(places, written, strict=True))
@@ -118,8 +123,8 @@ class _Reader:
     def add(self, block: Block) -> None:
         """All lines of a block: at once where they are plain numbers in their ranges, otherwise one by one."""
         rows = plain_rows(block.content, self._separator, self._width)
-        found = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
-        values = [each for each in found if each is not None]
+        converted = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
+        values = [each for each in converted if each is not None]
         if rows is None or len(values) < len(self._places):
             self.add_rows(_rows(file_text(block.content, self._name, block.line), self._name, block.line))
             return
@@ -137,33 +142,39 @@ class _Reader:
                 return
 
     def values(self, written: Floats, place: _Place) -> Floats:
-        """A column of numbers in the unit of the fits: at once if all are in range, otherwise one by one."""
-        found = _converted(written, place)
-        if found is None:
-            found = np.zeros(len(written))
+        """Convert a column to the unit of the fits: at once if all are in range, otherwise one by one."""
+        numbers = _converted(written, place)
+        if numbers is None:
+            numbers = np.zeros(len(written))
             for row, value in enumerate(written.tolist()):
-                found[row] = self._number(row + 1, repr(value), *place[1:])
+                numbers[row] = self._number(row + 1, repr(value), *place[1:])
                 if self.full:
                     break
-        return found
+        return numbers
 
     def refuse(self) -> None:
         """Raise ``Rejected`` with all that was wrong, if anything was."""
         if self.problems:
-            found = self.problems[:_MAX_PROBLEMS]
+            problems = self.problems[:_MAX_PROBLEMS]
             if self.full:
-                found.append(Problem(self._name, found[-1].line, "", "more faults follow; stopped"))
-            raise Rejected(found)
+                problems.append(Problem(self._name, problems[-1].line, "", "more faults follow; stopped"))
+            raise Rejected(problems)
 
     def columns(self) -> tuple[dict[str, Floats], Ints]:
-        """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
+        """Return the columns by name, and the line of every row.
+
+        Raises
+        ------
+        Rejected
+            If anything was wrong; the message has all of it.
+        """
         self.refuse()
         values = (np.frombuffer(known, dtype=np.float64) for known in self._values)
         columns = {place[1].name: each for place, each in zip(self._places, values, strict=True)}
         return columns, np.frombuffer(self._lines, dtype=np.int64)
 
     def row(self, line: int, text: str) -> list[float]:
-        """The numbers of one row."""
+        """Return the numbers of one row."""
         cells = _cells(text, self._separator)
         if len(cells) != self._width:
             why = f"{len(cells)} fields where the header has {self._width}"
@@ -198,16 +209,16 @@ class _Reader:
 
 
 def _converted(written: Floats, place: _Place) -> Floats | None:
-    """A column in the unit of the fits; None where that is no plain factor, or a value is out of its range."""
+    """Convert a column to the unit of the fits; None if that is no plain factor, or a value is out of range."""
     _, column, convert, _ = place
     if not isinstance(convert, Times):
         return None
-    found: Floats = written * convert.factor
-    return found if bool(np.all((column.above < found) & (found < column.below))) else None
+    numbers: Floats = written * convert.factor
+    return numbers if bool(np.all((column.above < numbers) & (numbers < column.below))) else None
 
 
 def _places(
-    name: str, line: int, header: list[str], wanted: Sequence[Column], needed: Sequence[Column]
+    name: str, line: int, header: list[str], expected: Sequence[Column], needed: Sequence[Column]
 ) -> list[_Place]:
     header = [cell.lower() for cell in header]
     if header and all(_is_number(cell) for cell in header):
@@ -215,14 +226,14 @@ def _places(
         raise Rejected([Problem(name, line, "", why)])
     places: list[_Place] = []
     problems: list[Problem] = []
-    for column in wanted:
+    for column in expected:
         spelt = {column.spelt(unit): convert for unit, convert in column.units.items()}
-        found = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
-        if len(found) > 1:
-            both = " and ".join(cell for _, cell in found[:2])
-            problems.append(Problem(name, line, found[1][1], f"the header has both {both}; keep one of them"))
-        elif found:
-            at, cell = found[0]
+        cells = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
+        if len(cells) > 1:
+            both = " and ".join(cell for _, cell in cells[:2])
+            problems.append(Problem(name, line, cells[1][1], f"the header has both {both}; keep one of them"))
+        elif cells:
+            at, cell = cells[0]
             places.append((at, column, spelt[cell], cell))
         elif column in needed:
             others = [cell for cell in spelt if cell != column.name]
@@ -237,7 +248,7 @@ def _places(
 
 
 def _blocks(path: Path, name: str) -> Iterator[Block]:
-    """Raises ``Rejected``."""
+    """Read a file in blocks; raise ``Rejected`` with its name if that fails."""
     require_file(path, name)
     try:
         yield from blocks_of(path, MEASUREMENT)
@@ -246,7 +257,7 @@ def _blocks(path: Path, name: str) -> Iterator[Block]:
 
 
 def _rows(text: str, name: str, first: int) -> Iterator[tuple[int, str]]:
-    """What counts, with line numbers."""
+    """Yield the rows of numbers with their line numbers."""
     lines = lines_of(text, name, first)
     return ((n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#"))
 

@@ -8,7 +8,7 @@ from tablegen.calibration.tables.table import MeasuredTable
 
 
 def split_traces(table: MeasuredTable) -> list[Trace]:
-    """The traces of a table, in order; named after the file, and by number where there are several."""
+    """Split a table into its traces, in order; named after the file, and by number where there are several."""
     time = table[TIME]
     if TRACE in table:
         numbers = table[TRACE]

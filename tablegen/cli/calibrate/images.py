@@ -60,6 +60,8 @@ def images(
     Columns: pixels at equal time steps within --window of each sweep.
     Rows:    scan lines in order of time. Both images have the left end of the line at the
              left; otherwise give --retrace-mirrored.
+    Angle:   files of instruments state the scan angle. The fast axis is x at 0 degrees and y
+             at 90; --axis has to be that one.
 
     \b
     Example:

@@ -98,7 +98,7 @@ def upload(
         image = scan.image(form, device.info)
         check(scan, image, device.info, limits, any_rate)
         if dry_run:
-            click.echo(_verdict(device, image))
+            click.echo(_verdict(device, image, force))
             return ExitStatus.OK
         try:
             result = device.upload(image, bar, force=force, timeout_s=timeout, limits=limits)
@@ -129,11 +129,14 @@ def _sizes(scan: "PreparedScan", baud: int) -> list[str]:
     return lines
 
 
-def _verdict(device: "Device", image: "ProgramImage") -> str:
+def _verdict(device: "Device", image: "ProgramImage", force: bool) -> str:
+    """Describe what an upload would come to; raises ``Refused`` where the device has a key and none was given."""
     status = device.hello
-    if status.hash == image.info.hash:
+    if status.hash == image.info.hash and not force:
         return "\nthe scan is already active on the device"
+    keyed = device.needs_key()
     text = f"\nthe device would accept the scan: {len(image.data)} bytes as {_form(image)}"
+    text += ", if the key is right, which only an upload tells" if keyed else ""
     return text if status.permits else f"{text}, but its interlock is open: no upload can become active"
 
 

@@ -22,7 +22,8 @@ def channels(files: tuple[Path, ...], as_json: bool) -> int:
            .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
 
     The options --channel and --retrace-channel of other commands take the number, or the name. A name without the
-    direction, such as Height, finds trace and retrace. A column is empty where a file does not say.
+    direction, such as Height, finds trace and retrace. A column is empty where a file does not say. A scan angle other
+    than 0 has a column of its own: at 90 degrees the fast axis is the other piezo.
 
     \b
     Example:

@@ -211,14 +211,8 @@ def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:
         wrong = "--each and --pairs need a directory, -o DIRECTORY"
     elif several and options["plot"] is not None:
         wrong = "--plot is for one scan"
-    elif not options["fit"] and options["scanner"] is None and options["scan"] is None:
-        wrong = "give --scanner FILE, or --scan SCAN.TOML, or --fit for a periodic sample"
-    elif options["fit"] and (options["scanner"] is not None or options["scan"] is not None):
-        wrong = "--fit needs no scanner file; keep one of the two"
-    elif not options["fit"] and (options["pitch_nm"] or options["lattice_nm"]):
-        wrong = "--pitch-nm and --lattice-nm are for --fit"
-    elif options["pitch_nm"] and options["lattice_nm"]:
-        wrong = "--pitch-nm and --lattice-nm: keep one of the two"
+    else:
+        wrong = _wrong_way(options)
     for axis in ("", "slow_"):
         if options[f"{axis}size_v"] and options[f"{axis}size_nm"]:
             name = f"--{axis.replace('_', '-')}size"
@@ -229,6 +223,21 @@ def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:
         wrong = f"--plot {options['plot']}: is an image to correct"
     if wrong:
         raise click.UsageError(wrong)
+
+
+def _wrong_way(options: dict[str, Any]) -> str | None:
+    """Return what is wrong with the options that say how to correct; None where nothing is."""
+    files = options["scanner"] is not None or options["scan"] is not None
+    if not options["fit"]:
+        if not files:
+            return "give --scanner FILE, or --scan SCAN.TOML, or --fit for a periodic sample"
+        if options["pitch_nm"] or options["lattice_nm"]:
+            return "--pitch-nm and --lattice-nm are for --fit"
+    elif files:
+        return "--fit needs no scanner file; keep one of the two"
+    elif options["pitch_nm"] and options["lattice_nm"]:
+        return "--pitch-nm and --lattice-nm: keep one of the two"
+    return None
 
 
 def _require(images: Sequence[Path], suffix: str | None) -> None:

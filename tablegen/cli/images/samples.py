@@ -101,7 +101,7 @@ def constant_options(command: F) -> F:
 
 
 def sample_options(command: F) -> F:
-    """Add what says of the sample and of the images; ``sample_of`` and ``taking_of`` read it."""
+    """Add what says of the sample and of the images; ``sample_of`` and ``acquisition_of`` read it."""
     options = [
         *_CONSTANTS,
         click.option(

@@ -160,11 +160,11 @@ def written(
 
     An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
     """
-    from tablegen.base.interruption import ENDINGS, held
+    from tablegen.base.interruption import ENDINGS, defer_signals
     from tablegen.emit.write import CannotWrite, NoPlace, write_files
 
     try:
-        with held(*ENDINGS) as came:
+        with defer_signals(*ENDINGS) as came:
             names = write_files(folder, files, outdated)
     except NoPlace as error:
         fail([error], ExitStatus.WRONG_INPUT)

@@ -1,6 +1,6 @@
-"""The models of what a piezo does: a module here has the name of its model and a ``MODEL``; entry points add others.
+"""The hysteresis models: a module here has the name of its model and a ``MODEL``; entry points add others.
 
-A package of somebody else adds one as an entry point of the group ``tablegen.models``: its name is the model's, its
+Another distribution adds one as an entry point of the group ``tablegen.models``: its name is the model's, its
 object a subclass of ``tablegen.compensation.model.Hysteresis`` with that tag.
 """
 
@@ -20,36 +20,45 @@ UNCOMPENSATED = "triangle"  # of an axis without a table
 
 
 class UnknownModel(ValueError):
-    """There is no model of this name, or it cannot be used; the message says what there is, or why."""
+    """No model has this name, or it cannot be used; the message lists the names, or gives the reason."""
 
 
 def names() -> list[str]:
-    """The models of tablegen, in order."""
+    """Return the names of tablegen's own models, in order."""
     return sorted(path.stem for path in Path(__file__).parent.glob("*.py") if path.stem != "__init__")
 
 
 def own() -> list[type[Hysteresis]]:
-    """The same, as types of their tables."""
+    """Return tablegen's own models, as types of their tables."""
     return [get(name) for name in names()]
 
 
 @cache
 def get(name: str) -> type[Hysteresis]:
-    """The model of a name: the type of its table. Raises ``UnknownModel``."""
+    """Return the model of a name: the type of its table.
+
+    Raises
+    ------
+    UnknownModel
+        If there is no such model, or it cannot be loaded.
+    """
     if name in names():
-        found: object = import_module(f"{__name__}.{name}").MODEL
+        model: object = import_module(f"{__name__}.{name}").MODEL
         home = "tablegen"
     else:
-        found, home = _of_others(name)
-    if not (isinstance(found, type) and issubclass(found, Hysteresis) and found.model() == name):
+        model, home = _of_others(name)
+    if not (isinstance(model, type) and issubclass(model, Hysteresis) and model.model() == name):
         raise UnknownModel(f"{name!r} of {home} is no tablegen.compensation.model.Hysteresis of that name")
-    return found
+    return model
 
 
 def line_of(table: Hysteresis, request: LineRequest, problems: ModelProblems) -> LineShape | None:
     """Return the line that a model makes; None where ``problems`` grew.
 
-    Raises ``PluginFailed`` where the model of another distribution fails, or returns anything else.
+    Raises
+    ------
+    PluginFailed
+        If the model of another distribution fails, or returns anything else.
     """
     if type(table).__module__.startswith(f"{__name__}."):
         return table.line(request, problems)
@@ -73,7 +82,7 @@ def _home(name: str, module: str) -> str:
 
 
 def _of_others(name: str) -> tuple[object, str]:
-    """What the one entry point of a name leads to, and its package."""
+    """Return the object of the one entry point of a name, and its distribution."""
     from importlib.metadata import entry_points  # a good part of what a build costs, and seldom needed
 
     entries = list(entry_points(group=GROUP, name=name))

@@ -16,21 +16,21 @@ class HarmonicModel(ByBranches, frozen=True, tag="harmonic"):
 
     @classmethod
     def sweep(cls, beta: float, u_peak: float) -> BranchShape:
-        """Equations (17)-(21)."""
+        """Return the sweep of equations (17)-(21)."""
         return BranchShape.harmonic(beta, u_peak)
 
     @classmethod
     def peak_at(cls, beta: float, u_peak: float) -> float:
-        """As the table has it."""
+        """Return the place of the peak in the table."""
         return u_peak
 
     @classmethod
     def wrong_key(cls, beta: float, u_peak: float) -> str | None:
-        """Outside the poles of (20) it is the peak that is wrong, elsewhere the residual."""
+        """Return ``u_peak`` outside the poles of (20); elsewhere None, since the residual is wrong."""
         return None if LOWEST_PEAK < u_peak - beta < HIGHEST_PEAK else "u_peak"
 
     def lacking(self, branch: Branch) -> list[str]:
-        """The peaks that are not given."""
+        """Return the keys of the peaks that are not given."""
         return branch.without_peak
 
 

@@ -1,4 +1,4 @@
-"""An identified operator: the waveform that it follows straight, found when a scan is built."""
+"""The operator model: the waveform that an identified operator follows straight, learnt when a scan is built."""
 
 from dataclasses import replace
 from math import sqrt
@@ -20,11 +20,14 @@ from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.loop import Loop
-from tablegen.compensation.operator.minimum_acceleration_line import Gentle, gentlest_waveform
+from tablegen.compensation.operator.minimum_acceleration_line import (
+    MinimumAccelerationLine,
+    minimum_acceleration_waveform,
+)
 from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
-from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
+from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
-from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
+from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
@@ -40,18 +43,18 @@ SIDES = ("forward", "backward")
 
 
 class OperatorLine(WholeLine, frozen=True, kw_only=True):
-    """The line, what the operator expects of it, and how far it is from what was measured.
+    """The line, the errors that the operator expects of it, and its distance from what was measured.
 
     ``uncertainty`` is what the operator may be wrong by at this stroke, centre and rate, at ``LEVEL_PERCENT``;
     ``distance`` is that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate,
     ``factor`` that of its loops at the mean of this drive, and ``between`` which share of the size is uncertain since
-    its turns are not even about that mean; ``after`` is what follows a change of offset and one of size. ``kept`` is
-    the scaling error, percent, for which it is the gentlest waveform ``beside`` the one that was ``learnt``; they are
-    None where that is the waveform.
+    its turns are not even about that mean; ``after`` are the transients of a change of offset and of one of size.
+    ``kept`` is the scaling error, percent, for which it has minimum acceleration, ``beside`` that against the line that
+    was ``learnt``; they are None where that is the waveform.
     """
 
-    expected: Expected
-    uncertainty: Expected
+    expected: ExpectedErrors
+    uncertainty: ExpectedErrors
     distance: float
     operator: Operator
     factor: float
@@ -63,40 +66,40 @@ class OperatorLine(WholeLine, frozen=True, kw_only=True):
 
     @property
     def beside_learnt_percent(self) -> float | None:
-        """What of ``kept`` the learnt waveform leaves for the sake of acceleration."""
+        """The part of ``kept`` by which the waveform departs from the learnt one."""
         return self.beside
 
     @property
     def learnt_line(self) -> LineShape:
-        """What was learnt before acceleration was traded for error."""
+        """The line as it was learnt, before acceleration was traded for error."""
         return self if self.learnt is None else WholeLine.of(self.learnt, self.turn)
 
     @property
     def kept_percent(self) -> float | None:
-        """What was allowed, and kept."""
+        """The scaling error that was allowed, and kept."""
         return self.kept
 
     @property
     def transients(self) -> tuple[Transient, Transient]:
-        """Both."""
+        """The transients after a change of offset and after one of size."""
         return self.after
 
     @property
     def expectation(self) -> Expectation:
-        """All of it, in percent."""
-        found, by = self.expected, self.uncertainty
+        """The expected errors and their uncertainties, in percent."""
+        errors, by = self.expected, self.uncertainty
         return Expectation(
             "traces",
-            {side: Figure(found.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
-            {side: Figure(found.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
-            Figure(found.mismatch, by.mismatch),
-            Figure(found.size, by.size),
+            {side: Figure(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
+            {side: Figure(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
+            Figure(errors.mismatch, by.mismatch),
+            Figure(errors.size, by.size),
             100.0 * self.distance,
         )
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
-    """What `tablegen calibrate operator` identified: in a file, for every size, offset and rate. Branches may stay."""
+    """The operator of `tablegen calibrate operator`: in a file, for every size, offset and rate. Branches may stay."""
 
     purpose: ClassVar[str] = "identified from traces"
     calibration: ClassVar[str] = "`calibrate operator`"
@@ -107,20 +110,20 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 
     @property
     def calibrated(self) -> bool:
-        """It is."""
+        """True: the file is a calibration."""
         return True
 
     @classmethod
     def like(cls, other: object) -> "OperatorModel | None":
-        """Branches make no operator."""
+        """Return the operator of another table that has one; branches make no operator."""
         return other if isinstance(other, cls) else None
 
     def files(self) -> tuple[str, ...]:
-        """The operator's."""
+        """Return the operator's file."""
         return (self.file,)
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
-        """Learn the waveform on the operator, from a straight line on."""
+        """Learn the waveform on the operator, starting from a straight line."""
         operator = self._read(request, problems)
         if operator is None or not request.size_nm > 0.0 or not 0.0 <= request.v_share <= 1.0:
             return None  # a size or an offset that was refused, and no line to look for
@@ -161,12 +164,12 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         return operator if problems.count == before else None
 
     def described(self, line: LineShape) -> str:
-        """Its file."""
+        """Return the model and the name of its file."""
         return f"{self.model()} {Path(self.file).name}"
 
 
 def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
-    """The operator at this rate, and the factor of its loops at this offset."""
+    """Return the operator at this rate, and the factor of its loops at this offset."""
     factor = request.factor_at(request.v_share) / request.factor_at(operator.centre)
     operator = replace(operator, creep=operator.creep.down_to(request.rate_hz))
     if request.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
@@ -184,7 +187,7 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     def with_mean(mean: float) -> float:
         return request.factor_at(mean) / at_offset
 
-    line = Wanted(
+    line = TargetLine(
         request.size_nm, request.turn, request.window, request.both, request.rate_hz, centre, factor, with_mean
     )
     response, boost = request.response, request.max_boost_db
@@ -207,56 +210,56 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
 
     straight = LineShape(request.turn, BranchShape(), BranchShape())
     start = fit_window(straight, request.harmonics, request.window, request.both)
-    found = find_waveform(operator, line, start, through, None if response is None else dynamics)
-    gentle: Gentle | None = None
+    learnt = learn_waveform(operator, line, start, through, None if response is None else dynamics)
+    traded: MinimumAccelerationLine | None = None
     if request.allowed is not None:
         try:
-            gentle = gentlest_waveform(
-                operator, line, found, request.allowed.percent, through, None if response is None else dynamics
+            traded = minimum_acceleration_waveform(
+                operator, line, learnt, request.allowed.percent, through, None if response is None else dynamics
             )
-            found = gentle.found
+            learnt = traded.waveform
         except Unphysical as reason:
             if request.allowed.firm:
                 problems.add_to_scan("band_limit.max_scaling_error_percent", str(reason))
                 return None
-    factor *= with_mean(found.mean)
-    between = _BEND_UNKNOWN * found.grown
-    _check_reach(operator, found.stroke, found.centre, request.driver)
+    factor *= with_mean(learnt.mean)
+    between = _BEND_UNKNOWN * learnt.grown
+    _check_reach(operator, learnt.stroke, learnt.centre, request.driver)
     if not request.v_amplitude > 0.0:
         raise Unphysical(
-            f"the operator makes {request.size_nm:.6g} nm with {found.stroke * request.driver.span:.4g} V, and "
+            f"the operator makes {request.size_nm:.6g} nm with {learnt.stroke * request.driver.span:.4g} V, and "
             f"[{request.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
             "size"
         )
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
-    scale = found.v_amplitude * request.driver.span / request.v_amplitude
+    scale = learnt.v_amplitude * request.driver.span / request.v_amplitude
 
     def scaled(series: FourierSeries) -> FourierSeries:
         return FourierSeries(0.5 + scale * (series.a0 - 0.5), scale * series.a, scale * series.b)
 
-    series = scaled(found.series)
+    series = scaled(learnt.series)
     return OperatorLine.of(
         series,
         request.turn,
-        expected=found.expected,
-        uncertainty=_uncertainty(operator, request, found),
-        distance=operator.distance(found.stroke, found.centre),
+        expected=learnt.expected,
+        uncertainty=_uncertainty(operator, request, learnt),
+        distance=operator.distance(learnt.stroke, learnt.centre),
         operator=operator,
         factor=factor,
         between=between,
-        kept=None if gentle is None or request.allowed is None else request.allowed.percent,
-        learnt=None if gentle is None else scaled(gentle.learnt),
-        beside=None if gentle is None else gentle.beside_percent,
+        kept=None if traded is None or request.allowed is None else request.allowed.percent,
+        learnt=None if traded is None else scaled(traded.learnt),
+        beside=None if traded is None else traded.beside_percent,
         after=(
-            after_offset(late, found.stroke, found.centre, factor, request.turn, 1.0 / request.rate_hz),
-            after_size(late, found.stroke, found.centre, factor, request.turn, 1.0 / request.rate_hz),
+            after_offset(late, learnt.stroke, learnt.centre, factor, request.turn, 1.0 / request.rate_hz),
+            after_size(late, learnt.stroke, learnt.centre, factor, request.turn, 1.0 / request.rate_hz),
         ),
     )
 
 
 def _check_sense(operator: Operator, request: LineRequest) -> None:
-    """Refuse an operator that stands still or runs backwards at small drives, which its size is referred to."""
+    """Refuse an operator that stands still or runs backwards at small drives, to which its size refers."""
     for centre in (operator.centre, request.v_share):
         extent = operator.family.extent(SMALL_STROKE, centre)
         if not extent > 0.0:
@@ -268,7 +271,7 @@ def _check_sense(operator: Operator, request: LineRequest) -> None:
 
 
 def _check_reach(operator: Operator, stroke: float, centre: float, driver: Driver) -> None:
-    """Refuse what is far from everything that was measured."""
+    """Refuse a stroke or centre far from everything that was measured."""
     largest = max(line.stroke for line in operator.lines)
     if stroke > largest + STROKE_REACH:
         raise Unphysical(
@@ -285,28 +288,28 @@ def _check_reach(operator: Operator, stroke: float, centre: float, driver: Drive
         )
 
 
-def _uncertainty(operator: Operator, request: LineRequest, found: Found) -> Expected:
-    """What may be wrong beside the waveform: departures of the piezo from the operator, and of the size some more.
+def _uncertainty(operator: Operator, request: LineRequest, learnt: LearntWaveform) -> ExpectedErrors:
+    """Return the possible errors besides the waveform's: departures of the piezo from the operator, more for the size.
 
-    The shape of a stroke is that at other offsets, but for the family's part. The size goes by (1) from the nearest
-    offset that was measured, by (23) or creep from the nearest rate, and by the bend of the loop: no trace of a
-    triangle tells but by that what goes with the mean of the drive, and what with the middle between the turns.
+    The shape of a stroke is that at other offsets, but for the family's part. The size depends on (1) from the nearest
+    offset that was measured, on (23) or creep from the nearest rate, and on the bend of the loop: from a triangle's
+    trace only the bend tells what depends on the mean of the drive, and what on the middle between the turns.
     """
     lines = operator.lines
-    rms, scaling, mismatch, size = departures(lines, found.stroke, found.centre)
-    away = min(abs(line.centre - found.centre) for line in lines)
-    others = of_places(operator.residual.at(found.stroke, found.centre), away)
+    rms, scaling, mismatch, size = departures(lines, learnt.stroke, learnt.centre)
+    away = min(abs(line.centre - learnt.centre) for line in lines)
+    others = shape_uncertainty(operator.residual.at(learnt.stroke, learnt.centre), away)
     rms, scaling, mismatch = (sqrt(a * a + b * b) for a, b in zip((rms, scaling, mismatch), others, strict=True))
-    here = request.factor_at(found.mean)
+    here = request.factor_at(learnt.mean)
     offset = min(abs(here / request.factor_at(line.centre) - 1.0) for line in lines)
     rate = min(abs(_rate_change(operator, request, line.rate_hz)) for line in lines)
-    by = of_formulas((offset, rate))
-    size = sqrt(size * size + by * by + (100.0 * _BEND_UNKNOWN * found.grown) ** 2)
-    return Expected((rms, rms), (scaling, scaling), mismatch, size)
+    by = size_uncertainty((offset, rate))
+    size = sqrt(size * size + by * by + (100.0 * _BEND_UNKNOWN * learnt.grown) ** 2)
+    return ExpectedErrors((rms, rms), (scaling, scaling), mismatch, size)
 
 
 def _rate_change(operator: Operator, request: LineRequest, rate_hz: float) -> float:
-    """By which share lines are larger at a rate than at that of the scan."""
+    """Return by which share lines are larger at a rate than at that of the scan."""
     if request.rate_gain is not None:
         return request.rate_gain(request.rate_hz) / request.rate_gain(rate_hz) - 1.0
     both = np.array([rate_hz, request.rate_hz])

@@ -15,12 +15,12 @@ class SinusoidalModel(ByBranches, frozen=True, tag="sinusoidal"):
 
     @classmethod
     def sweep(cls, beta: float, u_peak: float) -> BranchShape:
-        """Equation (15)."""
+        """Return the sweep of equation (15)."""
         return BranchShape.sinusoidal(beta)
 
     @classmethod
     def peak_at(cls, beta: float, u_peak: float) -> float:
-        """Equation (16)."""
+        """Return the place of the peak by equation (16)."""
         return 0.5 + beta
 
 

@@ -16,12 +16,12 @@ class TriangleModel(WithBranches, frozen=True, tag="triangle"):
     compensates: ClassVar[bool] = False
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape:
-        """A straight line each way."""
+        """Return a straight line each way."""
         straight, none = BranchShape(), AppliedBranch(0.0, 0.5)
         return LineShape(request.turn, straight, straight, (none, none))
 
     def described(self, line: LineShape) -> str:
-        """In words."""
+        """Return the model in a line of text."""
         return f"{self.model()}, hysteresis not compensated"
 
 

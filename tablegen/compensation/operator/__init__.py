@@ -1,1 +1,1 @@
-"""An identified operator of the piezo: what a settled line of any size does; see docs/operator.md."""
+"""An identified operator of the piezo: the settled line of any size; see docs/operator.md."""

@@ -30,7 +30,7 @@ _Number = TypeVar("_Number", float, Floats)
 
 @dataclass(frozen=True, eq=False)
 class BoucWen:
-    """``depth`` in units of the displacement for h = 1; ``bend`` are l and s; see above for the rest."""
+    """The equation with ``depth`` in units of the displacement for h = 1; ``bend`` are l and s."""
 
     depth: float
     n: float
@@ -40,7 +40,7 @@ class BoucWen:
     bend: tuple[float, float]
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
-        """What is taken from the displacement at drives ``u`` of a settled line between two drives."""
+        """Return the part of the displacement at drives ``u`` of a settled line between two drives, shape of ``u``."""
         first, last = (float(bent(at, *self.bend)) for at in (low, high))
         rise, fall = self._ends(last - first)
         v = bent(u, *self.bend)
@@ -48,7 +48,7 @@ class BoucWen:
         return -self.depth * h
 
     def _ends(self, stroke: float) -> tuple[float, float]:
-        """Where a settled line begins on the rising curve, and where its top is on the falling one."""
+        """Return where a settled line begins on the rising curve, and where its top is on the falling one."""
         up, down = self._rising, self._falling
 
         def gap(begin: float) -> tuple[float, float]:
@@ -59,7 +59,7 @@ class BoucWen:
         left, right = -stroke, 0.0
         at_left, at_right = gap(left)[0], gap(right)[0]
         begin, top = left, gap(left)[1]
-        kept = 0
+        side = 0
         for _ in range(_ROUNDS):
             begin = (left * at_right - right * at_left) / (at_right - at_left) if at_right != at_left else left
             here, top = gap(begin)
@@ -67,12 +67,12 @@ class BoucWen:
                 break
             if here > 0.0:  # Illinois: the end that stays counts half
                 left, at_left = begin, here
-                at_right *= 0.5 if kept == 1 else 1.0
-                kept = 1
+                at_right *= 0.5 if side == 1 else 1.0
+                side = 1
             else:
                 right, at_right = begin, here
-                at_left *= 0.5 if kept == -1 else 1.0
-                kept = -1
+                at_left *= 0.5 if side == -1 else 1.0
+                side = -1
         return begin, top
 
     @cached_property
@@ -84,10 +84,10 @@ class BoucWen:
         return self._curve(-1.0)
 
     def _curve(self, direction: float) -> "_Curve":
-        """h from 0 on to both sides."""
+        """Return the curve of h in both directions from 0."""
         against, more = self.gamma, direction * self.beta
         parts = [
-            _grown(against + more * (self.asymmetry + side), self.n)
+            _integrated(against + more * (self.asymmetry + side), self.n)
             for side in (1.0, -1.0)  # of h
         ]
         (up, up_slope), (down, down_slope) = parts
@@ -105,13 +105,13 @@ class _Curve:
         self._arrays = np.array(heights), np.array(slopes) / _STEPS
 
     def at(self, t: float) -> float:
-        """Its height."""
+        """Return the height at t."""
         x = t * _STEPS + _REACH
         i = min(max(int(x), 0), 2 * _REACH - 1)
         return self._cubic(i, x - i)[0]
 
     def where(self, height: float) -> float:
-        """At which t it has a height."""
+        """Return the t of a height."""
         i = min(max(bisect_right(self._heights, height) - 1, 0), 2 * _REACH - 1)
         x = (height - self._heights[i]) / (self._heights[i + 1] - self._heights[i])
         for _ in range(_NEWTON):
@@ -120,18 +120,18 @@ class _Curve:
         return (i + x - _REACH) / _STEPS
 
     def along(self, t: Floats) -> Floats:
-        """Its heights."""
+        """Return the heights at t, of its shape."""
         x = t * _STEPS + _REACH
         i = np.clip(x, 0.0, 2 * _REACH - 1).astype(np.int64)
         x = x - i
         heights, slopes = self._arrays
         low, high, begin, end = heights[i], heights[i + 1], slopes[i], slopes[i + 1]
         square, cubic = _bends(high - low, begin, end)
-        found: Floats = low + x * (begin + x * (square + x * cubic))
-        return found
+        heights_along: Floats = low + x * (begin + x * (square + x * cubic))
+        return heights_along
 
     def _cubic(self, i: int, x: float) -> tuple[float, float]:
-        """Value and slope between the points i and i + 1."""
+        """Return value and slope between the points i and i + 1."""
         begin, end = self._slopes[i] / _STEPS, self._slopes[i + 1] / _STEPS
         square, cubic = _bends(self._heights[i + 1] - self._heights[i], begin, end)
         value = self._heights[i] + x * (begin + x * (square + x * cubic))
@@ -139,26 +139,26 @@ class _Curve:
 
 
 def _bends(rise: _Number, begin: _Number, end: _Number) -> tuple[_Number, _Number]:
-    """Coefficients of x^2 and x^3 of the cubic over 0..1 with this rise and these slopes at its ends."""
+    """Return the coefficients of x^2 and x^3 of the cubic over 0..1 with this rise and these slopes at its ends."""
     return 3.0 * rise - 2.0 * begin - end, begin + end - 2.0 * rise
 
 
-def _grown(against: float, n: float) -> tuple[list[float], list[float]]:
-    """h from 0 on with the slope 1 - against h^n, and that slope, by Runge and Kutta's method."""
+def _integrated(against: float, n: float) -> tuple[list[float], list[float]]:
+    """Return h from 0 on with the slope 1 - against h^n, and that slope, by the Runge-Kutta method."""
     whole, bits = int(n), round((n - int(n)) * (1 << POWER_BITS))
 
     def slope(h: float) -> float:
         power = 1.0
         for _ in range(whole):
             power *= h
-        root, left = h, bits
+        root, remaining = h, bits
         for i in range(POWER_BITS - 1, -1, -1):
-            if not left:
+            if not remaining:
                 break
             root = sqrt(root)
-            if left >> i & 1:
+            if remaining >> i & 1:
                 power *= root
-                left &= (1 << i) - 1
+                remaining &= (1 << i) - 1
         return min(1.0 - against * power, _STEEPEST)
 
     h, dt = 0.0, 1.0 / _STEPS

@@ -20,7 +20,7 @@ _LN10 = 2.302585092994046
 
 
 class LogarithmicCreep(Struct, frozen=True):
-    """Time constants from ``fastest_s`` to ``slowest_s``; at ``reference_hz`` |C| is taken as 1."""
+    """Creep with time constants from ``fastest_s`` to ``slowest_s``; |C| is 1 at ``reference_hz``."""
 
     loss_per_decade: float
     fastest_s: float
@@ -28,18 +28,18 @@ class LogarithmicCreep(Struct, frozen=True):
     reference_hz: float
 
     def down_to(self, rate_hz: float) -> "LogarithmicCreep":
-        """The same, with terms as slow as lines of this rate show: creep knows no slowest time."""
+        """Return the creep with terms as slow as lines of this rate show: creep has no slowest time constant."""
         return replace(self, slowest_s=max(self.slowest_s, _PERIODS / rate_hz))
 
     def response(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part of C(f) / |C(reference)|."""
+        """Return real and imaginary part of C(f) / |C(reference)| at frequencies in Hz, of the shape of ``f_hz``."""
         real, imaginary = self._response(f_hz)
         at_real, at_imaginary = self._response(np.array([self.reference_hz]))
         size = float(np.sqrt(at_real * at_real + at_imaginary * at_imaginary)[0])
         return real / size, imaginary / size
 
     def terms(self) -> tuple[tuple[float, float], ...]:
-        """Share and time constant in s of every term, where |C| is 1 at the reference."""
+        """Return share and time constant in s of every term, where |C| is 1 at the reference."""
         real, imaginary = self._response(np.array([self.reference_hz]))
         size = float(np.sqrt(real * real + imaginary * imaginary)[0])
         return tuple((share / size, tau_s) for share, tau_s in self._terms())

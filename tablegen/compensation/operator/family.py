@@ -11,28 +11,28 @@ from tablegen.numerics.arrays import Floats
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """The sum of both."""
+    """The sum of the plays and of Bouc and Wen's equation."""
 
     plays: Plays
     bouc_wen: BoucWen | None = None
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
-        """The displacement at drives ``u`` of a settled line between two drives; up to a constant of the line."""
+        """Return the displacement at drives ``u`` of a settled line between two drives, up to a constant."""
         moved = self.plays.branch(u, low, high, rising)
         return moved if self.bouc_wen is None else moved + self.bouc_wen.branch(u, low, high, rising)
 
     def extent(self, stroke: float, centre: float) -> float:
-        """nm between the turns of a settled line."""
+        """Return the nm between the turns of a settled line."""
         low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
         ends = self.branch(np.array([low, high]), low, high, True)
         return float(ends[1] - ends[0])
 
     def over(self, reversible: Floats) -> "Family":
-        """Over another polynomial."""
+        """Return the family over another polynomial."""
         return replace(self, plays=replace(self.plays, reversible=reversible))
 
     def weighted(self, share: float, other: "Family") -> "Family":
-        """A share of this one, and the rest of another one, of which one at most has plays."""
+        """Return a share of this family and the rest of another one, of which at most one has plays."""
         mine, theirs = self.plays, other.plays
         reversible = np.zeros(max(len(mine.reversible), len(theirs.reversible)))
         reversible[: len(mine.reversible)] += share * mine.reversible

@@ -1,8 +1,8 @@
-"""What was measured at some strokes and centres, interpolated over both without a formula: a Gaussian process.
+"""The residual at the measured strokes and centres, interpolated over both without a formula: a Gaussian process.
 
 The covariance of two points is Matern's of order 5/2 in the distance of their strokes, times the same in that of their
 centres, each over its own length; at the points themselves the field is what was measured, but for the noise. Far from
-all of them it goes back to 0, that is to the hysteresis family over which it lies.
+all of them it returns to 0, that is to the parametric hysteresis family.
 """
 
 from collections.abc import Sequence
@@ -22,9 +22,9 @@ SAME_CENTRE = 0.02  # of v_max: lines whose centres differ by less have one cent
 
 @dataclass(frozen=True, slots=True)
 class Lengths:
-    """Over which difference of stroke and of centre, as shares of v_max, the field changes; and the noise's variance.
+    """The lengths of stroke and of centre, as shares of v_max, over which the field changes; and the noise.
 
-    ``noise`` is relative to the variance of the field.
+    ``noise`` is its variance relative to that of the field.
     """
 
     stroke: float
@@ -33,9 +33,9 @@ class Lengths:
 
 
 def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool = False) -> Floats:
-    """Of shape (n, m) for points (stroke, centre) of shapes (n, 2) and (m, 2).
+    """Return the covariance, shape (n, m), of points (stroke, centre) of shapes (n, 2) and (m, 2).
 
-    Without ``straight`` it is 1 where they coincide; with it a stroke of 0 is nearly known, to be 0.
+    Without ``straight`` it is 1 where they coincide; with it the value at a stroke of 0 is nearly known to be 0.
     """
     out = np.empty((len(points), len(others)))
     for i, (stroke, centre) in enumerate(points.tolist()):
@@ -55,9 +55,9 @@ def _matern(distance: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Rows of numbers known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns).
+    """A field of rows known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns).
 
-    A ``straight`` one goes towards 0 with the stroke, but for what all strokes have in common.
+    A ``straight`` one tends to 0 with the stroke, but for what all strokes have in common.
     """
 
     points: Floats
@@ -66,7 +66,7 @@ class Field:
     straight: bool = False
 
     def at(self, stroke: float, centre: float) -> Floats:
-        """The interpolated row, shape (columns,)."""
+        """Return the interpolated row, shape (columns,)."""
         near = covariance(np.array([[stroke, centre]]), self.points, self.lengths, self.straight)[0]
         total = np.zeros(self.weights.shape[1])
         for weight, row in zip(near.tolist(), self.weights, strict=True):
@@ -75,16 +75,22 @@ class Field:
 
 
 def through(points: Floats, rows: Floats, lengths: Lengths, straight: bool = False) -> Field:
-    """The field that has these rows at these points, but for the noise."""
+    """Return the field that has these rows at these points, but for the noise.
+
+    Parameters
+    ----------
+    points, rows
+        Shapes (n, 2) of (stroke, centre) and (n, columns).
+    """
     known = covariance(points, points, lengths, straight)
     factor = Cholesky(known + lengths.noise * np.diag(np.diag(known)))
     return Field(points, np.stack([factor.solve(column) for column in rows.T], axis=1), lengths, straight)
 
 
 def distinct(centres: Sequence[float]) -> list[float]:
-    """The first of all centres that are the same within ``SAME_CENTRE``."""
-    found: list[float] = []
+    """Return the first of all centres that are the same within ``SAME_CENTRE``."""
+    centres_apart: list[float] = []
     for centre in centres:
-        if all(abs(centre - other) >= SAME_CENTRE for other in found):
-            found.append(centre)
-    return found
+        if all(abs(centre - other) >= SAME_CENTRE for other in centres_apart):
+            centres_apart.append(centre)
+    return centres_apart

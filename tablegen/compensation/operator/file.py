@@ -41,7 +41,7 @@ class CreepTable(_Table, frozen=True, kw_only=True):
 
 
 class PlaysTable(_Table, frozen=True, kw_only=True):
-    """The hysteresis family; see ``Plays``. Weights in nm; ``bends`` are l and s of both envelopes, a row of each."""
+    """The plays of the hysteresis family; see ``Plays``. Weights in nm; ``bends`` are l and s of both envelopes."""
 
     thresholds: Annotated[list[Annotated[float, Meta(gt=0.0, lt=1.0)]], Meta(max_length=256)]
     weights: Annotated[list[list[_Number]], Meta(min_length=1, max_length=8)]
@@ -50,7 +50,7 @@ class PlaysTable(_Table, frozen=True, kw_only=True):
 
 
 class BoucWenTable(_Table, frozen=True, kw_only=True):
-    """The other hysteresis family; see ``BoucWen``. ``depth_nm`` is 0 where there is none of it."""
+    """Bouc and Wen's part of the hysteresis family; see ``BoucWen``. ``depth_nm`` is 0 where there is none."""
 
     depth_nm: Annotated[float, Meta(ge=0.0, le=1e9)]
     n: Annotated[float, Meta(ge=1.0, le=4.0)]
@@ -61,7 +61,7 @@ class BoucWenTable(_Table, frozen=True, kw_only=True):
 
 
 class LengthsTable(_Table, frozen=True, kw_only=True):
-    """Over which differences the fields change; see ``Lengths``."""
+    """The differences over which the fields change; see ``Lengths``."""
 
     stroke: _Length
     centre: _Length
@@ -69,7 +69,7 @@ class LengthsTable(_Table, frozen=True, kw_only=True):
 
 
 class LineTable(_Table, frozen=True, kw_only=True):
-    """A trace: where it was, what the family leaves of it, and by how much it is missed where it is left out."""
+    """A trace: its stroke and centre, the residual of the family, and the errors of a fit without the trace."""
 
     name: Annotated[str, Meta(max_length=200)]
     stroke: Annotated[float, Meta(gt=0.0, le=1.1)]
@@ -101,7 +101,13 @@ class OperatorFile(_Table, frozen=True, kw_only=True):
 
 
 def read_operator(path: Path, name: str) -> tuple[Operator, OperatorFile]:
-    """The operator of a file, and the file. Raises ``Rejected``, at the line of the first fault."""
+    """Read the operator of a file; return the operator and the file.
+
+    Raises
+    ------
+    Rejected
+        At the line of the first fault.
+    """
     if not os.path.isfile(path):  # a pipe would be waited for
         raise Rejected([Problem(name, 0, "", "is not a file; the path is relative to the scanner file")])
     values, document = read_toml(path, name)
@@ -111,37 +117,37 @@ def read_operator(path: Path, name: str) -> tuple[Operator, OperatorFile]:
         problems.add(document, "version", f"{version!r} is not {VERSION}, the only one that this tablegen knows")
         problems.stop_if_any()
     try:
-        found = convert(values, OperatorFile)
+        file = convert(values, OperatorFile)
     except ValidationError as error:
         why, _, place = str(error).partition(" - at ")
         problems.add(document, re.sub(r"^\$\.?", "", place.strip("`")), f"{why[:1].lower()}{why[1:]}")
-        raise Rejected(problems.found) from None
-    for key, why in _contradictions(found):
+        raise Rejected(problems.entries) from None
+    for key, why in _contradictions(file):
         problems.add(document, key, why)
     problems.stop_if_any()
-    return _operator(found), found
+    return _operator(file), file
 
 
 def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
-    """What the types cannot say."""
-    plays, found = file.plays, []
+    """Return the faults that the types cannot express, each a key and the reason."""
+    plays, faults = file.plays, []
     if any(b <= a for a, b in zip(plays.thresholds, plays.thresholds[1:], strict=False)):
-        found.append(("plays.thresholds", "do not ascend"))
+        faults.append(("plays.thresholds", "do not ascend"))
     if any(len(row) != len(plays.thresholds) for row in plays.weights):
-        found.append(("plays.weights", f"need {len(plays.thresholds)} numbers a row, one for each threshold"))
+        faults.append(("plays.weights", f"need {len(plays.thresholds)} numbers a row, one for each threshold"))
     if len(plays.bends) != len(plays.weights) or any(len(row) != BENDS for row in plays.bends):
-        found.append(("plays.bends", f"need {BENDS} numbers a row, and a row for each of weights"))
+        faults.append(("plays.bends", f"need {BENDS} numbers a row, and a row for each of weights"))
     elif any(abs(row[i]) + 0.5 * abs(row[i + 1]) > 1.0 for row in plays.bends for i in (0, 2)):
-        found.append(("plays.bends", "|l| + |s| / 2 above 1 would let an envelope run backwards"))
+        faults.append(("plays.bends", "|l| + |s| / 2 above 1 would let an envelope run backwards"))
     if any(weight < 0.0 for row in plays.weights for weight in row):
-        found.append(("plays.weights", "a weight below 0 would let a branch run backwards"))
+        faults.append(("plays.weights", "a weight below 0 would let a branch run backwards"))
     if abs(file.bouc_wen.bend[0]) + 0.5 * abs(file.bouc_wen.bend[1]) > 1.0:
-        found.append(("bouc_wen.bend", "|l| + |s| / 2 above 1 would let the bent drive run backwards"))
+        faults.append(("bouc_wen.bend", "|l| + |s| / 2 above 1 would let the bent drive run backwards"))
     if file.creep.slowest_s < file.creep.fastest_s:
-        found.append(("creep.slowest_s", "is below fastest_s"))
+        faults.append(("creep.slowest_s", "is below fastest_s"))
     if len({len(row) for line in file.lines for row in (line.rising, line.falling)}) > 1:
-        found.append(("lines", "have rows of different lengths"))
-    return found
+        faults.append(("lines", "have rows of different lengths"))
+    return faults
 
 
 def _operator(file: OperatorFile) -> Operator:
@@ -175,7 +181,7 @@ def _operator(file: OperatorFile) -> Operator:
 
 
 def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
-    """The file, with the comments at its head."""
+    """Return the text of the file, with the comments at its head."""
 
     def numbers(values: Sequence[float]) -> str:
         return "[" + ", ".join(f"{value:.9g}" if value else "0.0" for value in _floats(values)) + "]"

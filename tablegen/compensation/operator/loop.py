@@ -1,4 +1,4 @@
-"""One settled loop: where the axis is on its way up and on its way down, against the drive."""
+"""One settled loop: the position of the axis on its way up and on its way down, against the drive."""
 
 import numpy as np
 from msgspec import Struct
@@ -9,10 +9,10 @@ POINTS = 1025  # points of a branch; linear between them
 
 
 class Loop(Struct, frozen=True, eq=False):
-    """A line between the normalised drives ``low`` and ``high``.
+    """A settled loop between the normalised drives ``low`` and ``high``.
 
-    ``rising`` and ``falling`` are positions from 0 to 1 at ``POINTS`` drives, evenly from ``low`` to ``high``; of these
-    1 is ``extent_nm``. Beyond its ends a branch goes on straight.
+    ``rising`` and ``falling`` are positions from 0 to 1 at ``POINTS`` drives, evenly from ``low`` to ``high``; a
+    position of 1 is ``extent_nm``. Beyond its ends a branch is extrapolated linearly.
     """
 
     low: float
@@ -22,14 +22,14 @@ class Loop(Struct, frozen=True, eq=False):
     extent_nm: float
 
     def position(self, u: Floats, rising: bool) -> Floats:
-        """The position at normalised drives."""
+        """Return the positions at normalised drives, of the shape of ``u``."""
         values = self.rising if rising else self.falling
         v = (u - self.low) * ((POINTS - 1) / (self.high - self.low))
         left = np.clip(v, 0.0, POINTS - 2).astype(np.int64)
         return values[left] + (v - left) * (values[left + 1] - values[left])
 
     def drive(self, position: FloatsLike, rising: bool) -> Floats:
-        """The normalised drive at positions: the inverse of ``position``."""
+        """Return the normalised drives at positions: the inverse of ``position``."""
         values = self.rising if rising else self.falling
         p = np.asarray(position, dtype=np.float64)
         left: Ints = np.clip(np.searchsorted(values, p, side="right") - 1, 0, POINTS - 2)
@@ -37,10 +37,10 @@ class Loop(Struct, frozen=True, eq=False):
         return self.low + (self.high - self.low) / (POINTS - 1) * v
 
     def grown(self, mean: float) -> float:
-        """By which share it is larger than a loop of its stroke about ``mean`` would be, to first order, by its bend.
+        """Return by which share the loop is larger than one of its stroke about ``mean``, to first order, by its bend.
 
         Halfway between both branches there is little hysteresis. Where that curve is bent, the slope is another one at
-        other drives: with b P_2 of the curve, by 12 b for a way of the stroke.
+        other drives: with b P_2 of the curve, by 12 b over the length of the stroke.
         """
         x = 2.0 * np.arange(POINTS) / (POINTS - 1) - 1.0
         weight = 0.5 * (3.0 * x * x - 1.0)
@@ -51,6 +51,6 @@ class Loop(Struct, frozen=True, eq=False):
 
     @property
     def least_slope(self) -> float:
-        """The least slope of both branches, of a straight line's."""
+        """The least slope of both branches, relative to a straight line's."""
         steps = min(float(np.min(np.diff(branch))) for branch in (self.rising, self.falling))
         return steps * (POINTS - 1)

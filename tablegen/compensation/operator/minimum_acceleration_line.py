@@ -1,9 +1,9 @@
-"""The gentlest waveform that keeps a scaling error on an operator.
+"""The waveform of minimum acceleration that keeps a scaling error on an operator.
 
-Turns decide what the loop of an operator is, and the loop decides what is straight. So a waveform is learnt, then one
-of less acceleration is found that is the same in the windows but for some error; another is learnt from that on, whose
-turns are nearly those, and from it the gentlest again. The error of a learnt waveform itself, where the harmonics do
-not make what the loop needs, counts as well.
+The turns decide the loop of an operator, and the loop decides what is straight. So a waveform is learnt, then one
+of less acceleration is computed that is the same in the windows but for some error; another is learnt from that on,
+whose turns are nearly those, and from it the one of minimum acceleration again. The error of a learnt waveform itself,
+where the harmonics cannot make what the loop needs, counts as well.
 """
 
 from dataclasses import dataclass
@@ -12,71 +12,85 @@ from math import ceil
 from tablegen.base.figures import at_least
 from tablegen.compensation.line import WholeLine
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.scan_line import Found, Linear, ThroughInverse, Wanted, find_waveform
-from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, gentlest, least_percent
+from tablegen.compensation.operator.scan_line import LearntWaveform, Linear, TargetLine, ThroughInverse, learn_waveform
+from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, least_percent, minimum_acceleration_series
 from tablegen.waveform.series import FourierSeries
 
 _ROUNDS = 2  # a third changes nothing that shows
 _TRIALS = 3
-_LEAST_SHARE = 0.1  # of the error that is asked for, left for the sake of acceleration
+_LEAST_SHARE = 0.1  # of the allowed error, left for the sake of acceleration
 _ROUNDING = 2.0**20
-_MARGIN = 1.2  # of an error that is said to be enough: another waveform makes another loop
+_MARGIN = 1.2  # on the error that a message promises to be enough: another waveform makes another loop
 
 
 @dataclass(frozen=True, eq=False)
-class Gentle:
-    """The waveform, the ``learnt`` one beside which it is, and its scaling error beside that, percent."""
+class MinimumAccelerationLine:
+    """The waveform, the ``learnt`` one from which it departs, and its scaling error against that, percent."""
 
-    found: Found
+    waveform: LearntWaveform
     learnt: FourierSeries
     beside_percent: float
 
 
-def gentlest_waveform(
-    operator: Operator, wanted: Wanted, found: Found, percent: float, inverse: ThroughInverse, dynamics: Linear | None
-) -> Gentle:
-    """The waveform of least acceleration, in place of the learnt ``found``, with ``percent`` of scaling error at most.
+def minimum_acceleration_waveform(
+    operator: Operator,
+    target: TargetLine,
+    learnt: LearntWaveform,
+    percent: float,
+    inverse: ThroughInverse,
+    dynamics: Linear | None,
+) -> MinimumAccelerationLine:
+    """Return the waveform of minimum acceleration, in place of the learnt one, within ``percent`` of scaling error.
 
-    Raises ``Unreachable`` where the harmonics cannot be so straight, ``Unphysical`` as ``find_waveform`` does.
+    Raises
+    ------
+    Unreachable
+        If the harmonics cannot be so straight.
+    Unphysical
+        As ``learn_waveform``.
     """
     for _ in range(_ROUNDS):
-        share = percent - _scaling(wanted, found)
-        found = find_waveform(operator, wanted, _gentle(wanted, found, share, percent), inverse, dynamics)
-    share = percent - _scaling(wanted, found)
+        share = percent - _scaling(target, learnt)
+        learnt = learn_waveform(
+            operator, target, _minimum_acceleration(target, learnt, share, percent), inverse, dynamics
+        )
+    share = percent - _scaling(target, learnt)
     for _ in range(_TRIALS):
-        played = find_waveform(operator, wanted, _gentle(wanted, found, share, percent), inverse, dynamics, learn=False)
-        beyond = _scaling(wanted, played) - percent
+        played = learn_waveform(
+            operator, target, _minimum_acceleration(target, learnt, share, percent), inverse, dynamics, learn=False
+        )
+        beyond = _scaling(target, played) - percent
         if beyond <= 0.0:
-            return Gentle(played, found.series, share)
+            return MinimumAccelerationLine(played, learnt.series, share)
         share -= 1.5 * beyond
-    raise _unreachable(wanted, found)
+    raise _unreachable(target, learnt)
 
 
-def _gentle(wanted: Wanted, learnt: Found, share: float, percent: float) -> FourierSeries:
-    """The gentlest waveform that is ``share`` beside a learnt one, where that is enough of ``percent``."""
+def _minimum_acceleration(target: TargetLine, learnt: LearntWaveform, share: float, percent: float) -> FourierSeries:
+    """Return the minimum-acceleration waveform within ``share`` of a learnt one, if that is enough of ``percent``."""
     if share < _LEAST_SHARE * percent:
-        raise _unreachable(wanted, learnt)
+        raise _unreachable(target, learnt)
     try:
-        return gentlest(_straightness(wanted, learnt), learnt.series.harmonics, share)
+        return minimum_acceleration_series(_straightness(target, learnt), learnt.series.harmonics, share)
     except Unreachable:
-        raise _unreachable(wanted, learnt) from None
+        raise _unreachable(target, learnt) from None
 
 
-def _straightness(wanted: Wanted, learnt: Found) -> Straightness:
-    line = WholeLine.of(learnt.series, wanted.turn)
-    return Straightness(line, line, wanted.window, wanted.both)
+def _straightness(target: TargetLine, learnt: LearntWaveform) -> Straightness:
+    line = WholeLine.of(learnt.series, target.turn)
+    return Straightness(line, line, target.window, target.both)
 
 
-def _scaling(wanted: Wanted, found: Found) -> float:
-    """The worse of the directions that image, percent, rounded up: the last bits of a figure must not turn a word."""
-    worst = max(found.expected.scaling) if wanted.both else found.expected.scaling[0]
+def _scaling(target: TargetLine, learnt: LearntWaveform) -> float:
+    """Return the worse of the imaging directions, percent, rounded up so that last bits do not change emitted words."""
+    worst = max(learnt.expected.scaling) if target.both else learnt.expected.scaling[0]
     return ceil(worst * _ROUNDING) / _ROUNDING
 
 
-def _unreachable(wanted: Wanted, learnt: Found) -> Unreachable:
-    """What can be had: the error that was learnt, and beside it what there are harmonics for."""
-    left, harmonics = _scaling(wanted, learnt), learnt.series.harmonics
-    percent = _MARGIN * (left + max(left, least_percent(_straightness(wanted, learnt), harmonics)))
+def _unreachable(target: TargetLine, learnt: LearntWaveform) -> Unreachable:
+    """Return the error that can be had: that of the learnt waveform, and what the harmonics reach against it."""
+    remaining, harmonics = _scaling(target, learnt), learnt.series.harmonics
+    percent = _MARGIN * (remaining + max(remaining, least_percent(_straightness(target, learnt), harmonics)))
     allow = f"allow at least {at_least(percent, 2)} %, or " if percent <= 10.0 else ""
     why = f"{harmonics} harmonics do not keep this scaling error on the operator; {allow}take more harmonics"
     return Unreachable(why, percent)

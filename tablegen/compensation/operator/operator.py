@@ -20,10 +20,10 @@ _LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands sti
 
 @dataclass(frozen=True, slots=True)
 class MeasuredLine:
-    """One trace that the operator rests on: where it was, and by how much it is missed when it is left out.
+    """One trace of the operator's calibration: its place, and its errors when it is left out of the fit.
 
     Strokes and centres are shares of v_max. ``left_out`` is the rms residual, the scaling error and the mismatch of
-    trace and retrace inside the window, in percent, and the error of the size in percent; ``in_fit`` is what is left of
+    trace and retrace inside the window, in percent, and the error of the size in percent; ``in_fit`` is what remains of
     these where the trace is not left out, that is noise.
     """
 
@@ -37,7 +37,7 @@ class MeasuredLine:
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """What a settled line of one axis does.
+    """The settled lines of one axis: a Gaussian-process residual over a parametric hysteresis model, and creep.
 
     ``residual`` has rows of 2 K + 2 Chebyshev coefficients, those of the rising branch first: measured less family, of
     positions from 0 to 1. ``size`` has one column: the measured extent over ``expected_extent``, less 1. ``centre`` is
@@ -52,11 +52,15 @@ class Operator:
     lines: tuple[MeasuredLine, ...]
 
     def loop(self, low: float, high: float, factor: float = 1.0, mean: float | None = None) -> Loop:
-        """The settled loop between two normalised drives, of a drive with a ``mean``; default: the middle of both.
+        """Return the settled loop between two normalised drives, of a drive with a ``mean``; default: their middle.
 
         ``factor`` is m of (1) at the mean over that at ``self.centre``. The size is that of a triangle about the mean,
-        since (1) goes with it; where the middle between the turns is another one, the loop is as much larger as its own
-        bend says. Raises ``Unphysical`` where a branch would stand still or run backwards.
+        to which (1) refers; where the middle between the turns is another one, the loop is larger by its own bend.
+
+        Raises
+        ------
+        Unphysical
+            If a branch would stand still or run backwards.
         """
         stroke, centre = high - low, 0.5 * (low + high)
         rising, falling = _branches(self.family, low, high)
@@ -77,21 +81,21 @@ class Operator:
         return loop
 
     def expected_extent(self, stroke: float, centre: float, factor: float) -> float:
-        """nm between the turns, by the family and the offset law, without the field of sizes.
+        """Return the nm between the turns, by the family and the offset law, without the field of sizes.
 
-        What the factor has beyond the family, at a small stroke, is taken for a sensitivity that depends on the offset.
+        The part of the factor beyond the family, at a small stroke, is a sensitivity that depends on the offset.
         """
         here = self.family.extent(stroke, centre)
         small = self.family.extent(SMALL_STROKE, self.centre) / self.family.extent(SMALL_STROKE, centre)
         return here * small / factor
 
     def distance(self, stroke: float, centre: float) -> float:
-        """How far a line is from the nearest measured one, in shares of v_max."""
+        """Return how far a line is from the nearest measured one, in shares of v_max."""
         return min(max(abs(stroke - line.stroke), abs(centre - line.centre)) for line in self.lines)
 
     @property
     def nm_per_drive(self) -> float:
-        """About how far the axis moves for the whole of v_max: a first guess of amplitudes."""
+        """The approximate travel of the axis in nm for the whole of v_max: a first guess of amplitudes."""
         return self.family.extent(SMALL_STROKE, self.centre) / SMALL_STROKE
 
 
@@ -100,7 +104,7 @@ _GRID = np.arange(POINTS) / (POINTS - 1)
 
 @lru_cache(maxsize=512)  # while lengths are chosen, the same loops come again and again
 def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
-    """Both branches of the family from 0 to 1."""
+    """Return both branches of the family from 0 to 1."""
     u = low + (high - low) * _GRID
     rising, falling = (family.branch(u, low, high, going) for going in (True, False))
     extent = float(rising[-1] - rising[0])
@@ -108,15 +112,15 @@ def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
 
 
 def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:
-    """Both from 0 to 1: they meet where the drive turns, since a settled loop is closed."""
+    """Return both branches from 0 to 1: they meet where the drive turns, since a settled loop is closed."""
     low, high = 0.5 * (rising[0] + falling[0]), 0.5 * (rising[-1] + falling[-1])
     return (rising - low) / (high - low), (falling - low) / (high - low)
 
 
 def _monotonic_ends(branch: Floats) -> Floats:
-    """The branch with its outermost parts, which nobody images, no flatter than ``_LEAST_SLOPE``.
+    """Return the branch with its outermost parts, which are not imaged, no flatter than ``_LEAST_SLOPE``.
 
-    There the series of the residual follow the noise.
+    The series of the residual follows the noise there.
     """
     out = branch.copy()
     step = _LEAST_SLOPE / (POINTS - 1)
@@ -127,7 +131,7 @@ def _monotonic_ends(branch: Floats) -> Floats:
 
 
 def chebyshev(coefficients: Floats, x: Floats) -> Floats:
-    """sum_k c_k T_k(x), by Clenshaw's recurrence."""
+    """Return sum_k c_k T_k(x), by Clenshaw's recurrence, of the shape of ``x``; ``coefficients`` is (k,)."""
     one, two = np.zeros_like(x), np.zeros_like(x)
     for coefficient in coefficients[:0:-1]:
         one, two = float(coefficient) + 2.0 * x * one - two, one

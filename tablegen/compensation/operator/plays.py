@@ -17,34 +17,40 @@ FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0,
 
 
 def envelopes(u: FloatsLike, bend: Floats) -> tuple[Floats, Floats]:
-    """The lower and the upper envelope of a row of four bends, at normalised drives, each of their shape."""
+    """Return the lower and the upper envelope of a row of four bends, at normalised drives, each of their shape."""
     linear, cubic, other_linear, other_cubic = bend.tolist()
     one, two = bent(u, linear, cubic), bent(u, other_linear, other_cubic)
     return np.minimum(one, two), np.maximum(one, two)
 
 
 def bent(u: FloatsLike, linear: float, cubic: float) -> Floats:
-    """A bent drive."""
+    """Return the bent drive, of the shape of ``u``."""
     u = np.asarray(u, dtype=np.float64)
     bow = u * (1.0 - u)
     return u + linear * bow + cubic * (bow * (u - 0.5))
 
 
 def plays(u: Floats, low: float, high: float, rising: bool, thresholds: Floats, bends: Floats) -> Floats:
-    """Settled plays between the drives ``low`` and ``high``, of shape (bends, thresholds, drives)."""
+    """Return settled plays between the drives ``low`` and ``high``, of shape (bends, thresholds, drives).
+
+    Parameters
+    ----------
+    u, thresholds, bends
+        Normalised drives (drives,), thresholds (k,) and rows of bends (n, 4).
+    """
     r = thresholds[:, None]
-    found = []
+    positions = []
     for bend in bends:
         lower, upper = envelopes(u, bend)
         least, most = float(envelopes(low, bend)[1]), float(envelopes(high, bend)[0])
         moving = np.maximum(lower - r, least + r) if rising else np.minimum(upper + r, most - r)
-        found.append(np.where(2.0 * r < most - least, moving, 0.5 * (least + most)))
-    return np.stack(found)
+        positions.append(np.where(2.0 * r < most - least, moving, 0.5 * (least + most)))
+    return np.stack(positions)
 
 
 @dataclass(frozen=True, eq=False)
 class Plays:
-    """Weights in units of the displacement, at normalised drives u of 0..1.
+    """Weighted plays and a polynomial, in units of the displacement, at normalised drives u of 0..1.
 
     ``thresholds`` has shape (k,) and ascends from above 0, ``weights`` (n, k), ``bends`` (n, 4): of each row of weights
     the envelopes; ``reversible`` are the coefficients of u, u^2, ...
@@ -56,7 +62,7 @@ class Plays:
     bends: Floats = field(default_factory=lambda: FIXED_BENDS)
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
-        """The displacement at drives ``u`` of a settled line between two drives; up to a constant of the line."""
+        """Return the displacement at drives ``u`` of a settled line between two drives, up to a constant."""
         power = np.ones_like(u)
         total = np.zeros_like(u)
         for coefficient in self.reversible:

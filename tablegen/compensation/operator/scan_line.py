@@ -1,9 +1,9 @@
-"""The waveform that an operator's axis follows straight: found by learning on the operator, before anything is built.
+"""The waveform that an operator's axis follows straight: learnt on the operator, before anything is built.
 
-A round plays the waveform on the operator: the settled loop of its stroke, then creep and dynamics. What the position
-lacks of the wanted line inside the imaging windows, over the slope of the branch, is projected on the harmonics with a
-penalty on n^4, and added; the amplitude is scaled to the size. Turns are rounded, so that the stroke differs from the
-line; the loop is that of the stroke.
+A round plays the waveform on the operator: the settled loop of its stroke, then creep and dynamics. The distance of
+the position from the target line inside the imaging windows, over the slope of the branch, is projected on the
+harmonics with a penalty on n^4, and added; the amplitude is scaled to the size. Turns are rounded, so that the stroke
+differs from the line; the loop is that of the stroke.
 """
 
 from collections.abc import Callable
@@ -36,8 +36,8 @@ ThroughInverse = Callable[[FourierSeries], FourierSeries]  # what has to arrive 
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """A line: ``size_nm`` from x = 0 to 1, turn in periods, imaged over ``window``, backward too if ``both``.
+class TargetLine:
+    """The target line: ``size_nm`` from x = 0 to 1, turn in periods, imaged over ``window``, backward too if ``both``.
 
     ``centre`` is the offset, of v_max; ``factor`` m of (1) there over that at the operator's centre. ``with_mean`` is m
     at a mean of the drive, of v_max, over that at the offset.
@@ -54,8 +54,8 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
-    """What the operator says of the scan: percent of the line, forward and backward, but for ``mismatch``.
+class ExpectedErrors:
+    """The errors of the scan by the operator: percent of the line, forward and backward, but for ``mismatch``.
 
     ``rms`` is the residual about the common best line of all windows, ``scaling`` peak to peak of chords of 1/20 of the
     line, ``mismatch`` the largest distance of trace and retrace, ``size`` the error of the size.
@@ -68,8 +68,8 @@ class Expected:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """The waveform, about 0..1, of which 1 is ``v_amplitude`` of v_max; what it leaves; and where it turned.
+class LearntWaveform:
+    """The waveform, about 0..1, of which 1 is ``v_amplitude`` of v_max; its errors; and its turns.
 
     ``mean`` is that of the drive over a period, of v_max; ``grown`` by which share the loop is larger since its turns
     are not even about that.
@@ -77,7 +77,7 @@ class Found:
 
     series: FourierSeries
     v_amplitude: float
-    expected: Expected
+    expected: ExpectedErrors
     stroke: float
     centre: float
     mean: float
@@ -85,20 +85,24 @@ class Found:
     rounds: int
 
 
-def find_waveform(
+def learn_waveform(
     operator: Operator,
-    wanted: Wanted,
+    target: TargetLine,
     start: FourierSeries,
     inverse: ThroughInverse,
     dynamics: Linear | None,
     learn: bool = True,
-) -> Found:
-    """The waveform that the operator follows straight, from ``start`` on, in the harmonics of that.
+) -> LearntWaveform:
+    """Learn the waveform that the operator follows straight, starting from ``start``, in its harmonics.
 
-    Without ``learn`` the waveform is ``start``, and only its amplitude is found. Coefficients are multiples of 2^-40.
-    Raises ``Unphysical`` where it does not converge, or is larger than the driver or the operator reach.
+    Without ``learn`` the waveform is ``start``, and only its amplitude is adapted. Coefficients are multiples of 2^-40.
+
+    Raises
+    ------
+    Unphysical
+        If it does not converge, or is larger than the driver or the operator reach.
     """
-    learner = _Learner(operator, wanted, start.harmonics, inverse, dynamics)
+    learner = _Learner(operator, target, start.harmonics, inverse, dynamics)
     series, amplitude = start, learner.first_amplitude()
     before: Floats | None = None
     for turn in range(1, _ROUNDS + 1):
@@ -108,14 +112,16 @@ def find_waveform(
         played = learner.play(series, amplitude)
         line = learner.line_of(played.position)
         inside = played.position[learner.imaged] - line[1]
-        settled = before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * wanted.size_nm
+        settled = before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * target.size_nm
         if settled and amplitude == due:  # a line that is held at the ends of the driver settles at another size
             at = 0.5 * (played.loop.low + played.loop.high)
             expected = learner.expected(played.position)
             stroke, mean = played.loop.high - played.loop.low, played.mean
-            return Found(_rounded(series), amplitude, expected, stroke, at, mean, played.loop.grown(mean), turn)
+            return LearntWaveform(
+                _rounded(series), amplitude, expected, stroke, at, mean, played.loop.grown(mean), turn
+            )
         before = inside
-        amplitude *= wanted.size_nm / line[0]
+        amplitude *= target.size_nm / line[0]
         if learn:
             series = series.plus(learner.correction(played, amplitude, line))
     raise Unphysical(
@@ -136,24 +142,24 @@ class _Played:
 
 
 class _Learner:
-    """What the rounds share: the grid of times, the projection, and the operator behind its dynamics."""
+    """The data that the rounds share: the grid of times, the projection, and the operator behind its dynamics."""
 
     def __init__(
-        self, operator: Operator, wanted: Wanted, harmonics: int, inverse: ThroughInverse, dynamics: Linear | None
+        self, operator: Operator, target: TargetLine, harmonics: int, inverse: ThroughInverse, dynamics: Linear | None
     ) -> None:
-        self._operator, self._wanted, self._harmonics, self._inverse = operator, wanted, harmonics, inverse
+        self._operator, self._target, self._harmonics, self._inverse = operator, target, harmonics, inverse
         self._count = max(_MIN_GRID, 1 << (_GRID_PER_HARMONIC * harmonics - 1).bit_length())
         times = np.arange(self._count) / self._count
-        self._going = times <= wanted.turn
-        self._x = np.where(self._going, times / wanted.turn, (1.0 - times) / (1.0 - wanted.turn))
-        low, high = wanted.window
+        self._going = times <= target.turn
+        self._x = np.where(self._going, times / target.turn, (1.0 - times) / (1.0 - target.turn))
+        low, high = target.window
         inside = (self._x >= low) & (self._x <= high)
-        self.imaged: Bools = inside & (self._going | wanted.both)
+        self.imaged: Bools = inside & (self._going | target.both)
         self._sines, self._cosines = sine_and_cosine(times)
         n = np.arange(1.0, harmonics + 1.0)
-        real, imaginary = operator.creep.response(n * wanted.rate_hz)
+        real, imaginary = operator.creep.response(n * target.rate_hz)
         if dynamics is not None:
-            r, i = dynamics(n * wanted.rate_hz)
+            r, i = dynamics(n * target.rate_hz)
             real, imaginary = real * r - imaginary * i, real * i + imaginary * r
         self._real, self._imaginary = real, imaginary
         self._late = bool(np.any(real != 1.0) or np.any(imaginary != 0.0))
@@ -171,36 +177,36 @@ class _Learner:
         self._factor = Cholesky(normal + np.diag(penalty + 1e-14))
 
     def first_amplitude(self) -> float:
-        """About the one that makes a line of this size: larger lines are more than proportionally larger."""
-        wanted, operator = self._wanted, self._operator
-        amplitude = wanted.size_nm / operator.nm_per_drive
+        """Return a first guess of the amplitude of this size: larger lines are more than proportionally larger."""
+        target, operator = self._target, self._operator
+        amplitude = target.size_nm / operator.nm_per_drive
         for _ in range(_FIRST_ROUNDS):
             stroke = min(amplitude, 1.0)
-            extent = operator.expected_extent(stroke, wanted.centre, wanted.factor)
+            extent = operator.expected_extent(stroke, target.centre, target.factor)
             if not extent > 0.0:
                 break
-            amplitude = wanted.size_nm * stroke / extent
+            amplitude = target.size_nm * stroke / extent
         return amplitude
 
     def most_amplitude(self, series: FourierSeries) -> float:
-        """The one with which the drive just stays inside the driver's range."""
+        """Return the amplitude with which the drive just stays inside the driver's range."""
         wave = self._inverse(series).on_grid(self._count) - 0.5
-        centre = self._wanted.centre
+        centre = self._target.centre
         return min((centre + _BEYOND) / -float(np.min(wave)), (1.0 - centre + _BEYOND) / float(np.max(wave)))
 
     def play(self, series: FourierSeries, amplitude: float) -> _Played:
-        """A waveform on the operator."""
-        wanted = self._wanted
-        u = wanted.centre + amplitude * (self._inverse(series).on_grid(self._count) - 0.5)
+        """Play a waveform on the operator."""
+        target = self._target
+        u = target.centre + amplitude * (self._inverse(series).on_grid(self._count) - 0.5)
         low, high = float(np.min(u)), float(np.max(u))
         if low < -_BEYOND or high > 1.0 + _BEYOND:
-            reach = 2.0 * min(wanted.centre, 1.0 - wanted.centre)
+            reach = 2.0 * min(target.centre, 1.0 - target.centre)
             raise Unphysical(
-                f"{wanted.size_nm:.6g} nm take {100.0 * (high - low):.3g} % of v_max by the operator; at this offset "
+                f"{target.size_nm:.6g} nm take {100.0 * (high - low):.3g} % of v_max by the operator; at this offset "
                 f"{100.0 * reach:.3g} % are left; lower the size, or move the offset to the middle"
             )
         mean = float(tree_sum(u)) / self._count
-        loop = self._operator.loop(low, high, wanted.factor * wanted.with_mean(mean), mean)
+        loop = self._operator.loop(low, high, target.factor * target.with_mean(mean), mean)
         bottom, top = int(np.argmin(u)), int(np.argmax(u))
         k = np.arange(self._count)
         rising = (k - bottom) % self._count < (top - bottom) % self._count
@@ -210,31 +216,31 @@ class _Learner:
         return _Played(u, mean, loop, rising, loop.extent_nm * place)
 
     def line_of(self, position: Floats) -> tuple[float, float]:
-        """Slope in nm from x = 0 to 1, and position at x = 1/2, of the best common line through the windows."""
+        """Return slope in nm from x = 0 to 1, and position at x = 1/2, of the best common line through the windows."""
         x, y, weight = self._x[self.imaged] - 0.5, position[self.imaged], self._weight
         mean_x, mean_y = float(tree_sum(weight * x)), float(tree_sum(weight * y))
         slope = float(tree_sum(weight * (x - mean_x) * y)) / float(tree_sum(weight * (x - mean_x) * x))
         return slope, mean_y - slope * mean_x
 
     def correction(self, played: _Played, amplitude: float, line: tuple[float, float]) -> FourierSeries:
-        """What the waveform lacks, projected on its harmonics."""
+        """Return the missing part of the waveform, projected on its harmonics."""
         imaged, loop = self.imaged, played.loop
-        lacking = line[0] * (self._x[imaged] - 0.5) + line[1] - played.position[imaged]
+        missing = line[0] * (self._x[imaged] - 0.5) + line[1] - played.position[imaged]
         step = (loop.high - loop.low) / (POINTS - 1) * _SLOPE_STEPS
         u, rising = played.drive[imaged], played.rising[imaged]
         ahead, behind = (
             np.where(rising, loop.position(u + by, True), loop.position(u + by, False)) for by in (step, -step)
         )
         slope = loop.extent_nm * (ahead - behind) / (2.0 * step) * amplitude  # nm for 1 of w
-        right = tree_sum(self._basis * (lacking / slope * self._weight))
+        right = tree_sum(self._basis * (missing / slope * self._weight))
         c = self._factor.solve(right)
         return FourierSeries(0.0, c[1 : self._harmonics + 1], c[self._harmonics + 1 :])
 
-    def expected(self, position: Floats) -> Expected:
-        """The measures of a position in nm; approximate sums will do for figures."""
+    def expected(self, position: Floats) -> ExpectedErrors:
+        """Return the errors of a position in nm; fast sums will do, since no emitted word depends on them."""
         slope, middle = self.line_of(position)
         error = 100.0 * ((position - middle) / slope - (self._x - 0.5))
-        grid = np.linspace(*self._wanted.window, 401)
+        grid = np.linspace(*self._target.window, 401)
         sides = []
         for going in (self._going, ~self._going):
             order = np.argsort(self._x[going])
@@ -243,12 +249,12 @@ class _Learner:
         scaling = [float(np.ptp((one[step:] - one[:-step]) / (grid[step] - grid[0]))) for one in sides]
         rms = [float(np.sqrt(np.mean(one * one))) for one in sides]
         mismatch = float(np.max(np.abs(sides[0] - sides[1])))
-        return Expected(
-            (rms[0], rms[1]), (scaling[0], scaling[1]), mismatch, 100.0 * (slope / self._wanted.size_nm - 1.0)
+        return ExpectedErrors(
+            (rms[0], rms[1]), (scaling[0], scaling[1]), mismatch, 100.0 * (slope / self._target.size_nm - 1.0)
         )
 
     def _analysed(self, place: Floats) -> FourierSeries:
-        """Its harmonics; the same bits on every machine, unlike those of a fast transform."""
+        """Return the harmonics of a position; the same bits on every machine, unlike those of a fast transform."""
         a, b = np.empty(self._harmonics), np.empty(self._harmonics)
         k = np.arange(self._count)
         for n in range(1, self._harmonics + 1):

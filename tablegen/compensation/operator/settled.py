@@ -11,10 +11,15 @@ from tablegen.numerics.arrays import Floats
 def settled(
     loop: Loop, u: Floats, rate_hz: float, creep: LogarithmicCreep, response: Response | None, harmonics: int
 ) -> Floats:
-    """nm at the times of ``u``, normalised drives of one period that rise once and fall once between the loop's ends.
+    """Return the position in nm at the times of ``u``, after creep and dynamics.
 
     Creep and ``response`` act on the harmonics up to ``harmonics``; above the last frequency at which a response was
     measured they act as there.
+
+    Parameters
+    ----------
+    u
+        Normalised drives of one period, (n,), that rise once and fall once between the loop's ends.
     """
     bottom, top, count = int(np.argmin(u)), int(np.argmax(u)), len(u)
     rising = (np.arange(count) - bottom) % count < (top - bottom) % count

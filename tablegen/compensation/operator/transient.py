@@ -1,8 +1,8 @@
-"""What an axis does after a change of offset or size: hysteresis keeps its memory for a period, creep for long.
+"""The transient of an axis after a change of offset or size: hysteresis keeps its memory for a period, creep for long.
 
-Where a settled loop turned last is all that hysteresis remembers (return-point memory), whatever its family. So the way
+Hysteresis remembers only where a settled loop turned last (return-point memory), whatever its family. So the way
 from one line to another goes along loops that the operator knows: that of the line before, the branch that rises from
-0 V, where the axis has rested before, and the new line's. Of the change creep brings its share late, by exp(-t / tau)
+0 V, where the axis has rested before, and the new line's. Creep adds its share of the change late, by exp(-t / tau)
 for each term.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
-from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Late, Transient
+from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, CreepTerm, Transient
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.elementary import exp
 
@@ -22,8 +22,8 @@ _MANY_PERIODS = 1e3  # a time constant as long as that knows the mean of a line 
 
 
 @dataclass(frozen=True, slots=True)
-class LineOf:
-    """A line between the normalised drives ``low`` and ``high``, straight, of this turn and ``period_s``."""
+class SettledLine:
+    """A settled, straight line between the normalised drives ``low`` and ``high``, of this turn and ``period_s``."""
 
     low: float
     high: float
@@ -31,8 +31,8 @@ class LineOf:
     period_s: float
 
     @classmethod
-    def about(cls, stroke: float, centre: float, turn: float, period_s: float) -> "LineOf":
-        """Of a stroke about a centre, as much of it as 0..1 holds."""
+    def about(cls, stroke: float, centre: float, turn: float, period_s: float) -> "SettledLine":
+        """Return the line of a stroke about a centre, as much of it as 0..1 holds."""
         stroke = min(stroke, 2.0 * centre, 2.0 - 2.0 * centre)
         return cls(centre - 0.5 * stroke, centre + 0.5 * stroke, turn, period_s)
 
@@ -40,24 +40,24 @@ class LineOf:
 def after_offset(
     operator: Operator, stroke: float, centre: float, factor: float, turn: float, period_s: float
 ) -> Transient:
-    """After a line whose centre was ``OFFSET_CHANGE`` nearer to the middle of v_max, or beyond it."""
+    """Return the transient after a line whose centre was ``OFFSET_CHANGE`` nearer to the middle, or beyond it."""
     before = centre - OFFSET_CHANGE if centre >= 0.5 else centre + OFFSET_CHANGE
-    lines = [LineOf.about(stroke, at, turn, period_s) for at in (before, centre)]
-    return after(operator, lines[0], lines[1], factor)
+    lines = [SettledLine.about(stroke, at, turn, period_s) for at in (before, centre)]
+    return transient_between(operator, lines[0], lines[1], factor)
 
 
 def after_size(
     operator: Operator, stroke: float, centre: float, factor: float, turn: float, period_s: float
 ) -> Transient:
-    """After a line at the same centre of ``SIZE_CHANGE`` the stroke."""
-    lines = [LineOf.about(size, centre, turn, period_s) for size in (SIZE_CHANGE * stroke, stroke)]
-    return after(operator, lines[0], lines[1], factor)
+    """Return the transient after a line at the same centre of ``SIZE_CHANGE`` the stroke."""
+    lines = [SettledLine.about(size, centre, turn, period_s) for size in (SIZE_CHANGE * stroke, stroke)]
+    return transient_between(operator, lines[0], lines[1], factor)
 
 
-def after(operator: Operator, before: LineOf, now: LineOf, factor: float) -> Transient:
-    """From one settled line to another that reaches further, either way; both begin at their lower turn.
+def transient_between(operator: Operator, before: SettledLine, now: SettledLine, factor: float) -> Transient:
+    """Return the transient from one settled line to another that reaches further, either way, from lower turn on.
 
-    ``factor`` is that of ``Operator.loop`` at the new line: what moves is as sensitive as there.
+    ``factor`` is that of ``Operator.loop`` at the new line: the motion is as sensitive as there.
     """
     last, settled = (_loop(operator, line.low, line.high) for line in (before, now))
     # Positions are counted from the upper turn of the line before.
@@ -80,15 +80,15 @@ def after(operator: Operator, before: LineOf, now: LineOf, factor: float) -> Tra
     late = []
     for share, tau_s in operator.creep.terms():
         step = low + settled.extent_nm * _late_state(now, tau_s) + last.extent_nm * (1.0 - _late_state(before, tau_s))
-        kept = exp(-sweep_s / tau_s)
+        decay = exp(-sweep_s / tau_s)
         nm = scale * share * step
-        late.append(Late(nm, kept * nm - (1.0 - kept) * share * mean, tau_s))
+        late.append(CreepTerm(nm, decay * nm - (1.0 - decay) * share * mean, tau_s))
     measured_s = max((1.0 / line.rate_hz for line in operator.lines), default=0.0)
     return Transient(tuple(late), measured_s, sweep_s * along, scale * memory)
 
 
 def _loop(operator: Operator, low: float, high: float) -> Loop:
-    """The settled loop, as sensitive as the family is there; a straight line where the operator's is not monotonic."""
+    """Return the settled loop, as sensitive as the family is there; a straight line if it is not monotonic."""
     centre, stroke = 0.5 * (low + high), high - low
     try:
         return operator.loop(low, high, _at_rest(operator, centre))
@@ -98,12 +98,12 @@ def _loop(operator: Operator, low: float, high: float) -> Loop:
 
 
 def _at_rest(operator: Operator, centre: float) -> float:
-    """The factor with which ``Operator.loop`` has the extents of the family itself, whose sensitivity never changes."""
+    """Return the factor with which ``Operator.loop`` has the extents of the family, whose sensitivity is constant."""
     return operator.family.extent(SMALL_STROKE, operator.centre) / operator.family.extent(SMALL_STROKE, centre)
 
 
-def _late_state(line: LineOf, tau_s: float) -> float:
-    """What a term of creep has of a settled straight line at its lower turn, from 0 at that turn to 1 at the other.
+def _late_state(line: SettledLine, tau_s: float) -> float:
+    """Return the state of a term of creep at the lower turn of a settled line: 0 is that turn, 1 the other.
 
     The steady state of tau s' = p - s for a triangle p: its mean where tau is long, its value where tau is short.
     """

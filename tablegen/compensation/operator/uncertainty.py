@@ -1,8 +1,8 @@
-"""How far an operator may be off: by what its traces are missed when they are left out, and the way from them.
+"""The possible errors of an operator: from the errors of its traces when they are left out, and the distance to them.
 
-Departures of the piezo are a Gaussian process over stroke and centre. What a trace is missed by, less what the operator
-leaves of it in the fit (that is noise), over the standard deviation that the process has there without it, is how
-strong the departures are; times the standard deviation at the scan, it is what to be wrong by there. Noise remains.
+Departures of the piezo are a Gaussian process over stroke and centre. The error of a trace, less what the operator
+leaves of it in the fit (that is noise), over the standard deviation that the process has there without it, is the
+strength of the departures; times the standard deviation at the scan, it is the possible error there. Noise remains.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ _FORMULAS = 0.15  # of what (1) and (23) say from the nearest trace to the scan,
 
 
 def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> tuple[float, float, float, float]:
-    """By how much rms, scaling error, mismatch and size may be off at a stroke and a centre, in percent."""
+    """Return by how much rms, scaling error, mismatch and size may be off at a stroke and a centre, in percent."""
     points = np.array([(line.stroke, line.centre) for line in lines])
     missed, noise = np.array([line.left_out for line in lines]), np.array([line.in_fit for line in lines])
     known = covariance(points, points, _ALIKE)
@@ -41,11 +41,15 @@ def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> t
     return out[0], out[1], out[2], out[3]
 
 
-def of_places(row: Floats, away: float) -> tuple[float, float, float]:
-    """By how much rms, scaling error and mismatch may be off since the shape of a stroke is that at other offsets.
+def shape_uncertainty(row: Floats, away: float) -> tuple[float, float, float]:
+    """Return by how much rms, scaling error and mismatch may be off since the shape was measured at other offsets.
 
-    ``row`` is what the family leaves of both branches there, as the residual of ``Operator`` has it; the nearest trace
-    has an offset that is ``away`` from this one, of v_max. Sensitivities change about as much.
+    Parameters
+    ----------
+    row
+        The residual of the family on both branches there, (2 K + 2,), as ``Operator.residual`` has it.
+    away
+        The distance of the offset to that of the nearest trace, of v_max. Sensitivities change about as much.
     """
     x = _WINDOW * (2.0 * np.arange(_POINTS) / (_POINTS - 1) - 1.0)
     half = len(row) // 2
@@ -60,21 +64,21 @@ def of_places(row: Floats, away: float) -> tuple[float, float, float]:
     return share * sqrt(square), share * scaling, share * float(np.max(np.abs(there - back)))
 
 
-def of_formulas(steps: Sequence[float]) -> float:
-    """By how much the size may be off, in percent, for shares by which formulas change it from the nearest trace."""
+def size_uncertainty(steps: Sequence[float]) -> float:
+    """Return by how much the size may be off, in percent, for the shares by which formulas change it."""
     return 100.0 * _FORMULAS * sqrt(sum(step * step for step in steps))
 
 
 def _deviations(freedom: float) -> float:
-    """Within which Student's t is with 90 %, to second order in the inverse of the degrees of freedom.
+    """Return the bound of 90 % of Student's t, to second order in the inverse of the degrees of freedom.
 
-    That is ``expectation.LEVEL_PERCENT``.
+    The 90 % are ``expectation.LEVEL_PERCENT``.
     """
     return 1.645 + (1.524 + 1.42 / freedom) / freedom
 
 
 def _variance(squares: Sequence[float]) -> float:
-    """From squares of deviations, the largest of which does not count: a family often fails at the largest stroke."""
+    """Return the variance from squares of deviations without the largest: families often fail at the largest stroke."""
     count = len(squares)
     if count < _FEW:
         return _mean(squares)

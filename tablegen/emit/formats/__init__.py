@@ -36,27 +36,27 @@ def names() -> list[str]:
 
 
 def own_names() -> list[str]:
-    """The formats of tablegen."""
+    """List the formats of tablegen."""
     return sorted(_own())
 
 
 @cache
 def get(name: str) -> Format:
-    """The format of a name. Raises ``UnknownFormat``."""
+    """Return the format of a name. Raises ``UnknownFormat``."""
     if name in _own():
-        found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
+        format_found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
     elif name in _others():
-        found = _loaded(name, _others()[name])
+        format_found = _loaded(name, _others()[name])
     else:
         raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
-    if not isinstance(found, Format) or found.name != name:
+    if not isinstance(format_found, Format) or format_found.name != name:
         raise UnknownFormat(
             f"{name!r} of {distribution(_others()[name][0])} is no tablegen.emit.format.Format of that name"
         )
     for attribute in ("purpose", "file_names"):
-        if not isinstance(getattr(found, attribute, None), str):
+        if not isinstance(getattr(format_found, attribute, None), str):
             raise UnknownFormat(f"{name!r} of {distribution(_others()[name][0])}: its {attribute} is not a text")
-    return found
+    return format_found
 
 
 def files_of(one: Format, content: Content) -> dict[str, bytes]:
@@ -104,9 +104,9 @@ def _kind(value: object) -> str:
     return f"an object of type {type(value).__name__}"
 
 
-def chosen(wanted: Iterable[str]) -> list[Format]:
-    """The formats of these names, each once. Raises ``UnknownFormat``."""
-    return [get(name) for name in dict.fromkeys(wanted)]
+def chosen(names: Iterable[str]) -> list[Format]:
+    """Return the formats of these names, each once. Raises ``UnknownFormat``."""
+    return [get(name) for name in dict.fromkeys(names)]
 
 
 @cache
@@ -120,15 +120,15 @@ def _own() -> dict[str, str]:
 def _others() -> "dict[str, list[EntryPoint]]":
     from importlib.metadata import entry_points  # a good part of what a build costs, and seldom needed
 
-    found: dict[str, list[EntryPoint]] = {}
+    entry_points_by_name: dict[str, list[EntryPoint]] = {}
     for entry in entry_points(group=GROUP):
         if entry.name not in _own():
-            found.setdefault(entry.name, []).append(entry)
-    return found
+            entry_points_by_name.setdefault(entry.name, []).append(entry)
+    return entry_points_by_name
 
 
 def _loaded(name: str, entries: "list[EntryPoint]") -> object:
-    """What the one entry point of a name leads to."""
+    """Load what the one entry point of a name leads to."""
     entry, *more = entries
     if more:
         packages = " and ".join(sorted(map(distribution, entries)))

@@ -39,7 +39,7 @@ class C(Format):
     file_names = "NAME.h, NAME.c (unless header_only), dac_*.h, dac_*.c"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """The header, and the arrays in a file of their own unless the build is header-only."""
+        """Render the header, and the arrays in a file of their own unless the build is header-only."""
         context = _context(content)
         files = {f"{content.name}.h": template("c/tables.h.j2", context, literal)}
         if not content.header_only:
@@ -47,7 +47,7 @@ class C(Format):
         return files
 
     def runtime(self) -> list[Path]:
-        """The C sequencer and its link."""
+        """List the files of the C sequencer and its link."""
         return [*c_runtime(), *c_link()]
 
     def sources(self) -> list[Path]:
@@ -55,7 +55,7 @@ class C(Format):
         return [*self.runtime(), *(resource_folder("firmware_templates") / "c").glob("*.j2")]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
-        """The constants of the header, and the words of the arrays."""
+        """Compare the constants of the header, and the words of the arrays."""
         constants, different = wrong_constants(folder, content)
         words, flipped = wrong_arrays(folder, content)
         return [
@@ -68,7 +68,7 @@ FORMAT = C()
 
 
 def literal(value: int) -> str:
-    """An integer as C has it, of a type that holds it on every machine."""
+    """Spell an integer in C, of a type that holds it on every machine."""
     if value > 0x7FFFFFFF or value < -0x7FFFFFFF:
         return f"UINT32_C({value})" if 0 <= value <= 0xFFFFFFFF else f"INT64_C({value})"
     if value > 32767 or value < -32767:  # an int has 16 bits on some microcontrollers
@@ -83,33 +83,33 @@ def arrays_file(content: Content) -> str:
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the C header is to have, and those that it has not, or not so."""
-    name, wanted = f"{content.name}.h", _constants(content)
+    name, expected = f"{content.name}.h", _constants(content)
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
-        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
+        return len(expected), [f"{name}: cannot be read: {error.strerror or error}"]
     prefix = f"{content.name.upper()}_"
     defined = re.findall(rf"^[ \t]*#[ \t]*define[ \t]+({prefix}\w+)[ \t]+(\S.*?)[ \t]*$", text, re.MULTILINE)
-    return len(wanted), differing(name, {key: _value(value) for key, value in defined}, wanted)
+    return len(expected), differing(name, {key: _value(value) for key, value in defined}, expected)
 
 
 def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many words the arrays are to have, and in which of them the first wrong one stands."""
-    name, wanted = arrays_file(content), _arrays(content)
-    count = sum(map(len, wanted.values()))
+    name, expected = arrays_file(content), _arrays(content)
+    count = sum(map(len, expected.values()))
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return count, [f"{name}: cannot be read: {error.strerror or error}"]
-    found = {array: values.split(",") for array, values in re.findall(_ARRAY, text)}
+    arrays = {array: values.split(",") for array, values in re.findall(_ARRAY, text)}
     wrong = []
-    for array, words in wanted.items():
-        if array not in found:
+    for array, words in expected.items():
+        if array not in arrays:
             wrong.append(f"{name}: {array} is missing")
-        elif len(found[array]) != len(words):
-            wrong.append(f"{name}: {array} has {len(found[array])} words, it takes {len(words)}")
+        elif len(arrays[array]) != len(words):
+            wrong.append(f"{name}: {array} has {len(arrays[array])} words, it takes {len(words)}")
         else:
-            pairs = zip(map(str.strip, found[array]), map(str, words.tolist()), strict=True)
+            pairs = zip(map(str.strip, arrays[array]), map(str, words.tolist()), strict=True)
             differs = [(at, word, right) for at, (word, right) in enumerate(pairs) if word != right]
             wrong += [
                 f"{name}: {array}[{at}] is {word[:16]}, it is {right} in the manifest"
@@ -119,7 +119,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 
 def _context(content: Content) -> dict[str, Any]:
-    """What the templates see."""
+    """Return the variables of the templates."""
     sine, storage = _sine(content), _storage(content)
     return {
         "version": content.version,
@@ -158,7 +158,7 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
 
 
 def _table(axis: AxisContent) -> Ints:
-    """The array of a table: its words, and behind the last one the first ones again, so that no index needs a look."""
+    """Return the array of a table: its words, and behind the last the first ones again, for indices beyond it."""
     words = np.asarray(axis.program.words)
     return np.append(words, words[: words_behind(axis.program)])
 
@@ -169,7 +169,7 @@ def words_behind(program: Program) -> int:
 
 
 def _storage(content: Content) -> dict[str, int]:
-    """What the runtime is compiled for: bits of words of both tables, and of both converters, in memory; splines."""
+    """Return what the runtime is compiled for: bits of words of tables and converters in memory; splines."""
     programs = [axis.program for axis in content.axes]
     return {
         "TABLE_STORAGE_BITS": storage_bits(max(program.bits for program in programs)),
@@ -179,7 +179,7 @@ def _storage(content: Content) -> dict[str, int]:
 
 
 def _sine(content: Content) -> Ints:
-    """The sine from which a device renders tables; empty where no table is interpolated."""
+    """Return the sine from which a device renders tables; empty where no table is interpolated."""
     bits = content.sine_index_bits
     return sine_periods(bits) if bits else np.zeros(0, dtype=np.int64)
 
@@ -200,7 +200,7 @@ def _constants(content: Content) -> dict[str, int | str]:
 
 
 def _arrays(content: Content) -> dict[str, Ints]:
-    """What the arrays have to hold, by name."""
+    """Return the contents of the arrays, by name."""
     arrays: dict[str, Ints] = {}
     for axis in content.axes:
         arrays[f"{axis.axis}_table"] = _table(axis)
@@ -211,7 +211,7 @@ def _arrays(content: Content) -> dict[str, Ints]:
 
 
 def _value(text: str) -> int | str:
-    """A number, the content of a string, or what is neither as it stands."""
+    """Read a number, the content of a string, or the text of anything else."""
     if len(text) > 1 and text[0] == text[-1] == '"':
         return text[1:-1]
     number = re.fullmatch(_NUMBER, text)

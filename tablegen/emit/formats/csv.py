@@ -21,7 +21,7 @@ FORMAT = Csv()
 
 
 def _file(waveform: Waveform) -> bytes:
-    """A header, and a row a tick; floats as the shortest text that reads back as the same float."""
+    """Write a header, and a row a tick; floats as the shortest text that reads back as the same float."""
     columns = [
         map(repr, waveform.time_s.tolist()),
         map(repr, waveform.volts.tolist()),

@@ -29,7 +29,7 @@ FORMAT = IntelHex()
 
 
 def _records(data: bytes) -> Iterator[str]:
-    """The lines of a file: data with addresses from 0, a record for each further 64 KiB, the end."""
+    """Yield the lines of a file: data with addresses from 0, a record for each further 64 KiB, the end."""
     for address in range(0, len(data), _RECORD_BYTES):
         if address and address % 0x10000 == 0:
             yield _record(_UPPER_ADDRESS, 0, (address >> 16).to_bytes(2, "big"))
@@ -38,6 +38,6 @@ def _records(data: bytes) -> Iterator[str]:
 
 
 def _record(kind: int, address: int, data: bytes) -> str:
-    """A line: length, address, kind, data, and the byte that makes the sum of all 0."""
+    """Write a line: length, address, kind, data, and the byte that makes the sum of all 0."""
     content = bytes([len(data)]) + address.to_bytes(2, "big") + bytes([kind]) + data
     return f":{content.hex().upper()}{-sum(content) & 0xFF:02X}\n"

@@ -33,7 +33,7 @@ FORMAT = Npz()
 
 
 def _archive(arrays: dict[str, npt.NDArray[np.generic]]) -> bytes:
-    """What ``numpy.savez`` writes, with the same bytes on every machine and day; not compressed, as zlibs differ."""
+    """Write what ``numpy.savez`` does, with the same bytes on every machine; not compressed, as zlibs differ."""
     buffer = BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for name, array in arrays.items():
@@ -45,7 +45,7 @@ def _archive(arrays: dict[str, npt.NDArray[np.generic]]) -> bytes:
 
 
 def _array(array: npt.NDArray[np.generic]) -> bytes:
-    """An array in the format .npy, version 1.0, whose header ends at a multiple of 64 bytes."""
+    """Write an array in the format .npy, version 1.0, whose header ends at a multiple of 64 bytes."""
     header = f"{{'descr': {array.dtype.str!r}, 'fortran_order': False, 'shape': {array.shape}, }}"
     padding = -(10 + len(header) + 1) % 64
     text = f"{header}{' ' * padding}\n".encode("ascii")

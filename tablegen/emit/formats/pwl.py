@@ -26,7 +26,7 @@ FORMAT = Pwl()
 
 
 def _file(waveform: Waveform, tick_s: float) -> bytes:
-    """The corners of the held voltage: where it steps to another code, where that step ends, and the period's end."""
+    """Write the corners of the held voltage: where it steps to another code, where the step ends, the period's end."""
     steps = np.flatnonzero(np.diff(waveform.codes)) + 1
     times, volts = waveform.time_s.tolist(), waveform.volts.tolist()
     corners = [(0.0, volts[0])]

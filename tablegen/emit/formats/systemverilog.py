@@ -57,7 +57,7 @@ class SystemVerilog(Format):
     comment = "//"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """The package."""
+        """Render the package."""
         context = {
             "version": content.version,
             "name": content.name,
@@ -74,14 +74,14 @@ FORMAT = SystemVerilog()
 
 
 def literal(value: int) -> str:
-    """An integer, with a size where it needs more than 32 bits."""
+    """Spell an integer, with a size where it needs more than 32 bits."""
     if -0x7FFFFFFF <= value <= 0x7FFFFFFF:
         return str(value)
     return f"64'sd{value}" if value >= 0 else f"-64'sd{-value}"
 
 
 def _type(name: str) -> str:
-    """The type of a constant, by its name alone: the same in every build."""
+    """Return the type of a constant, by its name alone: the same in every build."""
     return "longint" if is_wide(name) else "int"
 
 

@@ -26,12 +26,12 @@ class Verilog(Format):
     file_names = "NAME.vh, NAME_*.mem, dac_*.v, program_loader.v"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """The header and the memory files."""
+        """Render the header and the memory files."""
         header = template("verilog/tables.vh.j2", _context(content), literal, range=value_range)
         return {f"{content.name}.vh": header, **_memories(content)}
 
     def runtime(self) -> list[Path]:
-        """The Verilog sequencer and the loader."""
+        """List the files of the Verilog sequencer and the loader."""
         return verilog_runtime()
 
     def sources(self) -> list[Path]:
@@ -39,7 +39,7 @@ class Verilog(Format):
         return [*self.runtime(), *(resource_folder("firmware_templates") / "verilog").glob("*.j2")]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
-        """The constants of the header, and the words of the memory files."""
+        """Compare the constants of the header, and the words of the memory files."""
         constants, different = wrong_constants(folder, content)
         words, flipped = wrong_memories(folder, content)
         return [
@@ -52,13 +52,13 @@ FORMAT = Verilog()
 
 
 def literal(value: int) -> str:
-    """An integer as Verilog has it, of 32 or 64 bits."""
+    """Spell an integer in Verilog, of 32 or 64 bits."""
     width = _width(value)
     return f"{width}'sd{value}" if value >= 0 else f"-{width}'sd{-value}"
 
 
 def value_range(value: int) -> str:
-    """The range of a localparam that holds an integer."""
+    """Return the range of a localparam that holds an integer."""
     return "[31:0]" if _width(value) == 32 else "[63:0]"
 
 
@@ -68,31 +68,31 @@ def _width(value: int) -> int:
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the Verilog header is to have, and those that it has not, or not so."""
-    name, wanted = f"{content.name}.vh", _constants(content)
+    name, expected = f"{content.name}.vh", _constants(content)
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
-        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
-    found: dict[str, int | str] = {key: _value(value) for key, value in re.findall(_LOCALPARAM, text)}
-    return len(wanted), differing(name, found, wanted)
+        return len(expected), [f"{name}: cannot be read: {error.strerror or error}"]
+    constants: dict[str, int | str] = {key: _value(value) for key, value in re.findall(_LOCALPARAM, text)}
+    return len(expected), differing(name, constants, expected)
 
 
 def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many words the memory files are to have, and in which of them the first wrong one stands."""
     count, wrong = 0, []
     for name, right in _memories(content).items():
-        wanted = right.decode("ascii").split()
-        count += len(wanted)
+        expected = right.decode("ascii").split()
+        count += len(expected)
         try:
-            found = read_text(folder / name, BUILD_FILE, "ascii", "replace").split()
+            words = read_text(folder / name, BUILD_FILE, "ascii", "replace").split()
         except OSError as error:
             wrong.append(f"{name}: cannot be read: {error.strerror or error}")
             continue
-        if len(found) != len(wanted):
-            wrong.append(f"{name}: has {len(found)} words, the manifest {len(wanted)}")
-        elif found != wanted:
-            at = next(i for i, (word, other) in enumerate(zip(found, wanted, strict=True)) if word != other)
-            wrong.append(f"{name}: word {at} is {found[at][:16]}, it is {wanted[at]} in the manifest")
+        if len(words) != len(expected):
+            wrong.append(f"{name}: has {len(words)} words, the manifest {len(expected)}")
+        elif words != expected:
+            at = next(i for i, (word, other) in enumerate(zip(words, expected, strict=True)) if word != other)
+            wrong.append(f"{name}: word {at} is {words[at][:16]}, it is {expected[at]} in the manifest")
     return count, wrong
 
 
@@ -102,7 +102,7 @@ def _memories(content: Content) -> dict[str, bytes]:
 
 
 def _context(content: Content) -> dict[str, Any]:
-    """What the template sees."""
+    """Return the variables of the template."""
     return {
         "version": content.version,
         "name": content.name,
@@ -144,7 +144,7 @@ def _constants(content: Content) -> dict[str, int | str]:
 
 
 def _value(text: str) -> int | str:
-    """A number, the content of a string, or what is neither as it stands."""
+    """Read a number, the content of a string, or the text of anything else."""
     if len(text) > 1 and text[0] == text[-1] == '"':
         return text[1:-1]
     number = re.fullmatch(_NUMBER, text)

@@ -70,7 +70,7 @@ class Vhdl(Format):
     comment = "--"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """The package."""
+        """Render the package."""
         (x_low, x_high), (y_low, y_high) = (signed_limits(axis.program.bits) for axis in content.axes)
         context = {
             "version": content.version,
@@ -93,12 +93,12 @@ FORMAT = Vhdl()
 
 
 def wide(value: int) -> str:
-    """An integer as 64 bits: VHDL's own end at 2^31 - 1."""
+    """Spell an integer as 64 bits: VHDL's own integers end at 2^31 - 1."""
     return f'x"{value & (1 << 64) - 1:016x}"'
 
 
 def _type(name: str) -> str:
-    """The type of a constant, by its name alone: the same in every build."""
+    """Return the type of a constant, by its name alone: the same in every build."""
     return "signed(63 downto 0)" if is_wide(name) else "integer"
 
 

@@ -36,7 +36,7 @@ FORMAT = Wav()
 
 
 def _rate(content: Content, frame_bytes: int) -> int:
-    """The update rate in Hz, which a WAV file has as a whole number of 32 bits, with the bytes of a second as well."""
+    """Return the update rate in Hz, which a WAV file has as a whole number of 32 bits, like the bytes of a second."""
     rate = content.schedule.update_rate_hz
     if rate.denominator != 1:
         raise Unphysical(
@@ -53,7 +53,7 @@ def _rate(content: Content, frame_bytes: int) -> int:
 
 
 def _samples(content: Content, axis: AxisContent, bits: int) -> Ints:
-    """Samples of a frame: full scale of the converter is full scale of the sample, and code 2^(dac_bits - 1) is 0."""
+    """Scale a frame to samples: the converter's full scale is that of the sample, and code 2^(dac_bits - 1) is 0."""
     period = axis.program.ticks
     codes = axis.program.codes(np.arange(period, dtype=np.int64))
     whole = np.tile(codes, content.schedule.frame_ticks // period)
@@ -62,7 +62,7 @@ def _samples(content: Content, axis: AxisContent, bits: int) -> Ints:
 
 
 def _file(samples: Ints, rate: int, bits: int) -> bytes:
-    """Samples of shape (ticks, 2) with the header of RIFF."""
+    """Write samples of shape (ticks, 2) with the header of RIFF."""
     data = samples.astype(f"<i{bits // 8}").tobytes()
     frame_bytes = bits // 8 * _CHANNELS
     layout = struct.pack("<HHIIHH", _PCM, _CHANNELS, rate, rate * frame_bytes, frame_bytes, bits)

@@ -37,7 +37,13 @@ _Header = dict[str, float]
 
 
 def asd_channels(content: bytes, _: str) -> list[Channel]:
-    """The channels of a movie. Raises ``ValueError`` with what is wrong."""
+    """Return the channels of a movie (.asd).
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     try:
         version = struct.unpack_from("<i", content)[0]
         if version not in (0, 1, 2):
@@ -86,28 +92,28 @@ def _load(
 
 
 def _header(content: bytes, version: int) -> tuple[_Header, list[str]]:
-    """The numbers of a header, and the names of its channels. Raises ``struct.error`` where it ends."""
-    found: dict[str, float | bytes] = {}
-    at = _take(content, 4, _LATER if version else _FIRST, found)
+    """Read the numbers of a header, and the names of its channels. Raise ``struct.error`` where it ends."""
+    values: dict[str, float | bytes] = {}
+    at = _take(content, 4, _LATER if version else _FIRST, values)
     if not version:
-        at += max(0, int(found["name_bytes"]))
-        _take(content, at, _FIRST_SENSORS, found)
-    titles = found.pop("titles")
+        at += max(0, int(values["name_bytes"]))
+        _take(content, at, _FIRST_SENSORS, values)
+    titles = values.pop("titles")
     assert isinstance(titles, bytes)
     half = len(titles) // 2
     names = [part.replace(b"\0", b"").decode("latin-1").strip() for part in (titles[:half], titles[half:])]
-    return {key: float(value) for key, value in found.items()}, [name for name in names if name]
+    return {key: float(value) for key, value in values.items()}, [name for name in names if name]
 
 
-def _take(content: bytes, at: int, fields: tuple[tuple[str, str], ...], found: dict[str, float | bytes]) -> int:
+def _take(content: bytes, at: int, fields: tuple[tuple[str, str], ...], values: dict[str, float | bytes]) -> int:
     for names, layout in fields:
-        found.update(zip(names.split(), struct.unpack_from(f"<{layout}", content, at), strict=True))
+        values.update(zip(names.split(), struct.unpack_from(f"<{layout}", content, at), strict=True))
         at += struct.calcsize(f"<{layout}")
     return at
 
 
 def _scale(title: str, header: _Header) -> tuple[float, float, str]:
-    """The value at level 0, that of one level, and their unit; levels where the file does not say."""
+    """Return the value at level 0, that of one level, and their unit; levels if the file states none."""
     factor, unit = {
         "TP": (header["z_nm_per_v"] * header["z_gain"], "nm"),
         "ER": (-header["sensor"], "nm"),

@@ -43,10 +43,11 @@ class Channel:
     line_rate_hz: float | None = None  # lines in one direction per second
     first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
     frames: int = 1
+    angle_deg: float | None = None  # of the fast axis against the scanner's x; None where the file does not say
 
 
 def loaded(number: int, title: str, matrix: Matrix) -> Channel:
-    """A channel that is read already, of a file that says no more of it."""
+    """Return a channel that is read already, of a file that states nothing else about it."""
     signal, direction = split_direction(title)
     return Channel(number, title, matrix.shape, lambda _: matrix, signal, direction)
 
@@ -55,45 +56,48 @@ def split_direction(title: str) -> tuple[str, Direction | None]:
     """``HeightRetrace``, ``Height (Retrace)`` or ``Height backward`` as ``Height`` and its direction."""
     if len(title) > _MAX_SPLIT or title.strip().lower() in _MEANT:  # "Retrace" is no trace of "Re"
         return title, None
-    found = _DIRECTION.fullmatch(title)
-    return (found[1], _MEANT[found[2].lower()]) if found else (title, None)
+    match = _DIRECTION.fullmatch(title)
+    return (match[1], _MEANT[match[2].lower()]) if match else (title, None)
 
 
-def choose(channels: Sequence[Channel], wanted: str | None, direction: Direction | None) -> Channel:
-    """The channel that a title, a signal or a number names; of a signal with both directions, that of ``direction``.
+def choose(channels: Sequence[Channel], name: str | None, direction: Direction | None) -> Channel:
+    """Choose the channel that a title, a signal or a number names, and ``direction`` of a signal with both.
 
-    Raises ``ValueError`` with the channels that there are.
+    Raises
+    ------
+    ValueError
+        If there is no such channel; the message lists the channels that there are.
     """
     if not channels:
         raise ValueError("contains no image")
     there = listed(channels)
-    if wanted is None:
-        found = list(channels)
+    if name is None:
+        matches = list(channels)
         if len({one.signal for one in channels}) == 1:
-            found = _of_direction(channels, direction)
-        if len(found) > 1:
+            matches = _of_direction(channels, direction)
+        if len(matches) > 1:
             raise ValueError(f"has several channels, {there}; choose with --channel")
-        return found[0]
-    found = (
-        [one for one in channels if one.title == wanted]
-        or _of_direction([one for one in channels if one.signal == wanted], direction)
-        or [one for one in channels if str(one.number) == wanted]
+        return matches[0]
+    matches = (
+        [one for one in channels if one.title == name]
+        or _of_direction([one for one in channels if one.signal == name], direction)
+        or [one for one in channels if str(one.number) == name]
     )
-    if len(found) != 1:
-        raise ValueError(f"has {'no' if not found else 'more than one'} channel {quoted(wanted)}; there is {there}")
-    return found[0]
+    if len(matches) != 1:
+        raise ValueError(f"has {'no' if not matches else 'more than one'} channel {quoted(name)}; there is {there}")
+    return matches[0]
 
 
 def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
-    """The retrace of the same signal; None where there is none, or more than one."""
-    found = [one for one in channels if one.signal == trace.signal and one.direction == "retrace"]
-    return found[0] if trace.direction == "trace" and len(found) == 1 else None
+    """Return the retrace of the same signal; None if there is none, or more than one."""
+    retraces = [one for one in channels if one.signal == trace.signal and one.direction == "retrace"]
+    return retraces[0] if trace.direction == "trace" and len(retraces) == 1 else None
 
 
 def _of_direction(channels: Sequence[Channel], direction: Direction | None) -> list[Channel]:
     """Those of the direction, where the file tells directions; all where it does not."""
-    found = [one for one in channels if one.direction == direction]
-    return found if direction is not None and found else list(channels)
+    matches = [one for one in channels if one.direction == direction]
+    return matches if direction is not None and matches else list(channels)
 
 
 def listed(channels: Sequence[Channel]) -> str:
@@ -106,19 +110,38 @@ def listed(channels: Sequence[Channel]) -> str:
 
 
 def quoted(title: str) -> str:
-    """A title for a message."""
+    """Quote a title for a message."""
     return f"'{shortened(title, _MAX_TITLE)}'"
 
 
 def positive(value: object, unit: float = 1.0) -> float | None:
-    """A number, or the text of one, in another unit; None for what is no positive number."""
+    """Convert a number, or the text of one, to another unit; None unless it is a positive number."""
+    positive_number = number(value, unit)
+    return positive_number if positive_number is not None and positive_number > 0.0 else None
+
+
+def number(value: object, unit: float = 1.0) -> float | None:
+    """Convert a finite number, or the text of one, to another unit; None for anything else."""
     try:
-        found = float(value) * unit  # type: ignore[arg-type]
+        finite = float(value) * unit  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return None
-    return found if isfinite(found) and found > 0.0 else None
+    return finite if isfinite(finite) else None
+
+
+def lines_done(values: Matrix) -> int:
+    """Count the complete lines of a stopped scan, (channels, lines, columns), whose missing lines are NaN.
+
+    All lines count unless the missing ones are the last: NaN elsewhere is a defect of the image.
+    """
+    lines = values.shape[1]
+    finite = np.isfinite(values)
+    whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
+    some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
+    done = whole.index(False) if False in whole else lines
+    return done if done and not any(some[done + 1 :]) else lines
 
 
 def first_line(error: BaseException) -> str:
-    """What a library says of a fault, for a message."""
+    """Return the first line of a library's error, for a message."""
     return shortened((str(error).strip() or type(error).__name__).splitlines()[0], 100)

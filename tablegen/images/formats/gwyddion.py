@@ -10,18 +10,22 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, loaded, positive
+from tablegen.images.formats.channel import Channel, loaded, number, positive
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
 _MAX_COMPONENTS = 100_000  # of an object or a list; files have some hundred
+_ANGLES = ("scanangle", "rotateang", "rotation", "scanrotation", "fastscanangle")  # keys of metadata: letters alone
 _FIXED = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
 _ITEMS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
 
 
 @dataclass(frozen=True, eq=False)
 class DataField:
-    """An image of the file: its number and title, the values, the sides in m where those are lengths, and the unit."""
+    """An image of the file: its number and title, the values, the sides in m where those are lengths, and the unit.
+
+    ``angle_deg`` is the scan angle by the metadata that the instrument's file had; None where there is none.
+    """
 
     number: int
     title: str
@@ -29,37 +33,64 @@ class DataField:
     width_m: float | None
     height_m: float | None
     unit: str
+    angle_deg: float | None = None
 
 
 def gwy_channels(content: bytes, _: str) -> list[Channel]:
-    """The data fields of a .gwy file as channels. Raises ``ValueError`` with what is wrong."""
+    """Return the data fields of a .gwy file as channels.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     channels = []
     for field in data_fields(content):
         width, height = (None if side is None else side * 1e9 for side in (field.width_m, field.height_m))
         channel = loaded(field.number, field.title, field.values)
-        channels.append(replace(channel, unit=field.unit, width_nm=width, height_nm=height))
+        channels.append(replace(channel, unit=field.unit, width_nm=width, height_nm=height, angle_deg=field.angle_deg))
     return channels
 
 
 def data_fields(content: bytes) -> list[DataField]:
-    """The data fields, by number. Raises ``ValueError`` with what is wrong."""
+    """Return the data fields, by number.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if content[:4] != _MAGIC:
         raise ValueError("does not begin as a Gwyddion file does")
     _, outer, _ = _object(content, 4, len(content))
     titles: dict[int, str] = {}
     fields: dict[int, tuple[int, int]] = {}
+    angles: dict[int, float | None] = {}
     for name, kind, at, end in _components(content, *outer):
-        number, _, rest = name.removeprefix("/").partition("/")
-        if not number.isdecimal() or len(number) > 6:
+        own, _, rest = name.removeprefix("/").partition("/")
+        if not own.isdecimal() or len(own) > 6:
             continue
         if rest == "data/title" and kind == b"s":
-            titles[int(number)] = content[at : end - 1].decode("utf-8", "replace")
+            titles[int(own)] = content[at : end - 1].decode("utf-8", "replace")
         elif rest == "data" and kind == b"o":
-            fields[int(number)] = at, end
-    return [_field(content, *fields[number], number, titles.get(number, "")) for number in sorted(fields)]
+            fields[int(own)] = at, end
+        elif rest == "meta" and kind == b"o":
+            angles[int(own)] = _angle(content, at, end)
+    return [_field(content, *fields[one], one, titles.get(one, ""), angles.get(one)) for one in sorted(fields)]
 
 
-def _field(content: bytes, at: int, end: int, number: int, title: str) -> DataField:
+def _angle(content: bytes, at: int, end: int) -> float | None:
+    """Return the scan angle of metadata in degrees, as instruments name it; None if it is not there."""
+    _, inside, _ = _object(content, at, end)
+    for key, kind, start, stop in _components(content, *inside):
+        letters = "".join(c for c in key.rpartition("::")[2].lower() if c.isalpha())
+        if kind == b"s" and letters in _ANGLES:
+            text = content[start : stop - 1].decode("utf-8", "replace").split()
+            return number(text[0].rstrip("°")) if text else None
+    return None
+
+
+def _field(content: bytes, at: int, end: int, own: int, title: str, angle_deg: float | None) -> DataField:
     name, inside, _ = _object(content, at, end)
     size: dict[str, int] = {}
     sides: dict[str, float] = {}
@@ -80,7 +111,7 @@ def _field(content: bytes, at: int, end: int, number: int, title: str) -> DataFi
         raise ValueError(f"a data field of {size['xres']} x {size['yres']} has {len(values)} values")
     lengths = [positive(sides.get(key)) if units["si_unit_xy"] == "m" else None for key in ("xreal", "yreal")]
     matrix = values.reshape(size["yres"], size["xres"])
-    return DataField(number, title, matrix, lengths[0], lengths[1], units["si_unit_z"])
+    return DataField(own, title, matrix, lengths[0], lengths[1], units["si_unit_z"], angle_deg)
 
 
 def _unit(content: bytes, at: int, end: int) -> str:

@@ -2,7 +2,8 @@
 
 A header of 64 bytes, one of the wave of 320, the values with x first, and texts: a note of ``key: value`` lines, and
 a label for each channel, such as HeightTrace. The first row is the bottom one; it is the last in time, and rows are
-turned, if the note has ``ScanDown: 1``.
+turned, if the note has ``ScanDown: 1``. A scan that was stopped has fewer rows than its note says, or NaN in place of
+those that are missing; the sizes in the note are those of the whole scan.
 """
 
 import re
@@ -12,10 +13,19 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, FirstRow, Matrix, positive, split_direction
+from tablegen.images.formats.channel import (
+    Channel,
+    FirstRow,
+    Matrix,
+    lines_done,
+    number,
+    positive,
+    split_direction,
+)
 
 _VERSION = 5
 _HEADERS = 64 + 320  # bytes
+_STEP_AT = 64 + 84  # bytes: the steps of all dimensions, in units of the wave
 _LABEL = 32  # bytes
 _MAX_NOTE = 1 << 20  # bytes; files have some ten thousand
 _MAX_CHANNELS = 1000
@@ -24,7 +34,13 @@ _UNITS = ((r"Height|ZSensor|Deflection|Amplitude\d?", "m"), (r"Phase\d?", "deg")
 
 
 def ibw_channels(content: bytes, _: str) -> list[Channel]:
-    """The layers of a wave of two or three dimensions. Raises ``ValueError`` with what is wrong."""
+    """Return the layers of a wave of two or three dimensions (.ibw).
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     order = next((order for order in "<>" if content[:2] == struct.pack(f"{order}h", _VERSION)), None)
     if order is None:
         raise ValueError("does not begin as an Igor binary wave of version 5 does, which images are")
@@ -54,44 +70,63 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
     unit = content[64 + 148 : 64 + 152].split(b"\0")[0].decode("latin-1") if layers == 1 else ""
     down = note.get("ScanDown")
     first: FirstRow = "top" if down == "1" else "bottom"
+    shape = rows, columns
+    done = rows
+    if kind in ("f4", "f8"):
+        starts = range(_HEADERS, texts, size)
+        done = lines_done(np.stack([_load(content, f"{order}{kind}", at, shape, first, rows, 0) for at in starts]))
+    width, height = positive(note.get("FastScanSize"), 1e9), positive(note.get("SlowScanSize"), 1e9)
+    step_m = struct.unpack_from(f"{order}d", content, _STEP_AT + 8)[0]
+    planned = _planned_lines(note, rows, height, step_m * 1e9)
     channels = []
-    for number, label in enumerate(labels):
+    for at, label in enumerate(labels):
         signal, direction = split_direction(label)
-        load = partial(_load, content, f"{order}{kind}", _HEADERS + size * number, (rows, columns), first)
+        load = partial(_load, content, f"{order}{kind}", _HEADERS + size * at, shape, first, done)
         channels.append(
             Channel(
-                number,
+                at,
                 label,
-                (rows, columns),
+                (done, columns),
                 load,
                 signal,
                 direction,
                 next((by_name for names, by_name in _UNITS if re.fullmatch(names, signal)), unit),
-                positive(note.get("FastScanSize"), 1e9),
-                positive(note.get("SlowScanSize"), 1e9),
+                width,
+                None if height is None else height * done / planned,
                 positive(note.get("ScanRate"), 1.0),
                 first,
+                angle_deg=number(note.get("ScanAngle")),
             )
         )
     return channels
 
 
-def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], first: FirstRow, _: int) -> Matrix:
+def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], first: FirstRow, done: int, _: int) -> Matrix:
     values = np.frombuffer(content, kind, prod(shape), start).reshape(shape)
-    return values[::-1] if first == "top" else values
+    return (values[::-1] if first == "top" else values)[:done]
+
+
+def _planned_lines(note: dict[str, str], rows: int, height_nm: float | None, step_nm: float) -> float:
+    """Lines of the whole scan: by the note, else by the wave's scaling, which has N - 1 steps; at least ``rows``."""
+    lines = positive(note.get("ScanLines"))
+    if lines is None and height_nm is not None and 0.0 < step_nm < height_nm:
+        lines = height_nm / step_nm + 1.0
+        if abs(lines - rows) < 1.5:  # N or N - 1 steps in the height: a whole scan
+            lines = None
+    return max(lines or 0.0, float(rows))
 
 
 def _note(text: bytes) -> dict[str, str]:
-    """The keys of a note and their values; the first of a key that comes again."""
-    found: dict[str, str] = {}
+    """Return the keys of a note and their values; the first of a repeated key."""
+    keys: dict[str, str] = {}
     for line in re.split(r"[\r\n]+", text.decode("latin-1")):
         key, colon, value = line.partition(":")
         if colon:
-            found.setdefault(key.strip(), value.strip())
-    return found
+            keys.setdefault(key.strip(), value.strip())
+    return keys
 
 
 def _labels(text: bytes, layers: int) -> list[str]:
-    """A label for each layer, after that of the dimension itself; empty where the file has none."""
+    """Return a label for each layer, after that of the dimension itself; empty if the file has none."""
     cells = [text[at : at + _LABEL].split(b"\0")[0].decode("latin-1") for at in range(_LABEL, len(text), _LABEL)]
     return [*cells, *[""] * layers][:layers]

@@ -4,14 +4,16 @@ Tags of its own say what a page is. The first row is the bottom one, unless the 
 """
 
 from functools import partial
-from math import isfinite
+from math import degrees, isfinite
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, Direction, Matrix, positive
+from tablegen.images.formats.channel import Channel, Direction, Matrix, number, positive
 from tablegen.images.formats.tiff import TiffImage, TiffTags, tiff_pages, tiff_tags
 
-_WIDTH, _HEIGHT, _REFLECTED, _LINE_RATE = 0x8042, 0x8043, 0x8045, 0x8049  # of the first page
+_WIDTH, _HEIGHT, _ANGLE, _REFLECTED, _COLUMNS, _ROWS = range(0x8042, 0x8048)  # the grid, of the first page; radians
+_LINE_RATE = 0x8049
+_PREVIEW = "thumbnail"
 _NAME, _RETRACE, _SHOWN_AS = 0x8050, 0x8051, 0x8052
 _SLOTS, _DEFAULT_SLOT = 0x8080, 0x8081
 _SLOT_NAME, _UNIT, _SCALING, _FACTOR, _OFFSET = 0x8090, 0x80A2, 0x80A3, 0x80A4, 0x80A5  # of the first slot
@@ -20,23 +22,41 @@ _MAX_SLOTS = 64
 
 
 def jpk_channels(content: bytes, _: str) -> list[Channel]:
-    """The channels of an image. Raises ``ValueError`` with what is wrong."""
+    """Return the channels of a JPK image.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if content[:2] == b"PK":
         raise ValueError("is an archive of curves, not of images; export the image as .jpk or .jpk-qi-image")
     pages, tags = tiff_pages(content), tiff_tags(content)
     channels: list[Channel] = []
-    for page, own in zip(pages, tags, strict=False):
-        if len(page.shape) == 2 and (own.get(_NAME) or own.get(_SHOWN_AS)):
+    for at, (page, own) in enumerate(zip(pages, tags, strict=False)):
+        named = own.get(_NAME) or own.get(_SHOWN_AS)
+        if len(page.shape) == 2 and named and not _is_preview(at, page, own, tags[0]):
             channels.append(_channel(len(channels), page, own, tags[0]))
     return channels
 
 
-def _channel(number: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> Channel:
+def _is_preview(at: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> bool:
+    """Test for a small picture of the scan, which comes first and has other pixels than the grid."""
+    if own.get(_NAME) == _PREVIEW:
+        return True
+    return at == 0 and _COLUMNS in grid and page.shape[1] != grid[_COLUMNS]
+
+
+def _channel(at: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> Channel:
     signal = str(own.get(_NAME) or own.get(_SHOWN_AS))
     direction: Direction = "retrace" if own.get(_RETRACE) else "trace"
     factor, offset, unit = _scale(own)
+    height, planned = positive(grid.get(_HEIGHT), 1e9), positive(grid.get(_ROWS))
+    if height is not None and planned is not None and page.shape[0] < planned:  # stopped; the grid is the whole scan's
+        height *= page.shape[0] / planned
+    angle = number(grid.get(_ANGLE))
     return Channel(
-        number,
+        at,
         f"{signal} {direction}",
         page.shape,
         partial(_load, page, factor, offset),
@@ -44,9 +64,10 @@ def _channel(number: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> Cha
         direction,
         unit,
         positive(grid.get(_WIDTH), 1e9),
-        positive(grid.get(_HEIGHT), 1e9),
+        height,
         positive(grid.get(_LINE_RATE), 1.0),
         "top" if grid.get(_REFLECTED) else "bottom",
+        angle_deg=None if angle is None else degrees(angle),
     )
 
 
@@ -56,11 +77,11 @@ def _load(page: TiffImage, factor: float, offset: float, _: int) -> Matrix:
 
 
 def _scale(own: TiffTags) -> tuple[float, float, str]:
-    """What one step of the values is, what is added, and the unit, by the slot that the instrument shows."""
-    wanted, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
+    """Return the size of a step, the offset, and the unit, of the slot that the instrument shows."""
+    default, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
     for slot in range(min(int(count), _MAX_SLOTS) if isinstance(count, int) else 0):
         at = slot * _BETWEEN_SLOTS
-        if wanted is None or own.get(_SLOT_NAME + at) != wanted:
+        if default is None or own.get(_SLOT_NAME + at) != default:
             continue
         unit = own.get(_UNIT + at)
         named = unit if isinstance(unit, str) else ""

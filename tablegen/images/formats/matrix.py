@@ -14,7 +14,13 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 
 
 def npy_channels(content: bytes, _: str) -> list[Channel]:
-    """The images of a .npy file. Raises ``ValueError`` with what is wrong."""
+    """Return the images of a .npy file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if content[:2] == b"PK":
         raise ValueError("is an .npz archive; save one array with numpy.save")
     array = npy_array(content)[0]
@@ -24,9 +30,16 @@ def npy_channels(content: bytes, _: str) -> list[Channel]:
 
 
 def text_channels(content: bytes, name: str) -> list[Channel]:
-    """Rows of numbers; the first tells what separates. Between blanks, tabs and semicolons a comma is a decimal one.
+    """Read rows of numbers; the first row shows the separator.
 
-    Raises ``Rejected`` with the line, or ``ValueError``.
+    Between blanks, tabs and semicolons a comma is a decimal one.
+
+    Raises
+    ------
+    Rejected
+        If a line is faulty; the message has its number.
+    ValueError
+        If the content is no text of numbers.
     """
     mark: str | None = None
     width = 0
@@ -58,7 +71,7 @@ def text_channels(content: bytes, name: str) -> list[Channel]:
 
 
 def _separator(row: str) -> str | None:
-    """What separates the numbers of a row; None for blanks."""
+    """Return the separator of the numbers of a row; None for blanks."""
     mark = next((mark for mark in (";", "\t") if mark in row), None)
     if mark is not None or "," not in row:
         return mark

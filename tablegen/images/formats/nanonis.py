@@ -9,7 +9,16 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, positive, quoted
+from tablegen.images.formats.channel import (
+    Channel,
+    Direction,
+    FirstRow,
+    Matrix,
+    lines_done,
+    number,
+    positive,
+    quoted,
+)
 
 _MAGIC = b":NANONIS_VERSION:"
 _END, _DATA = b":SCANIT_END:", b"\x1a\x04"
@@ -27,7 +36,13 @@ _FIRST_ROW: dict[str, FirstRow] = {"up": "bottom", "down": "top"}
 
 
 def sxm_channels(content: bytes, _: str) -> list[Channel]:
-    """Both directions of each signal of a .sxm file. Raises ``ValueError`` with what is wrong."""
+    """Return both directions of each signal of a .sxm file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if not content.startswith(_MAGIC):
         raise ValueError("does not begin as a Nanonis file does")
     end = content.find(_END, 0, _MAX_HEADER)
@@ -48,15 +63,16 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
     if start + size * len(blocks) > len(content):
         least = f"{len(blocks)} images of {columns} x {rows} pixels"
         raise ValueError(f"ends in the middle of its images ({least} by its header); copy it again")
-    done = _lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
+    done = lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
     width, height = _lengths(tags, "SCAN_RANGE", 1e9)
     times = _lengths(tags, "SCAN_TIME", 1.0)
+    angle = number(next(iter(_words(tags, "SCAN_ANGLE")), None))
     return [
         Channel(
-            number,
+            at,
             f"{signal} {_NAMES[direction]}",
             (done, columns),
-            partial(_load, content, kind, start + size * number, (done, columns), direction),
+            partial(_load, content, kind, start + size * at, (done, columns), direction),
             signal,
             direction,
             unit,
@@ -64,19 +80,10 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
             None if height is None else height * done / rows,
             None if None in times else 1.0 / sum(filter(None, times)),
             _FIRST_ROW.get(" ".join(_words(tags, "SCAN_DIR"))),
+            angle_deg=angle,
         )
-        for number, (signal, unit, direction) in enumerate(blocks)
+        for at, (signal, unit, direction) in enumerate(blocks)
     ]
-
-
-def _lines_done(values: Matrix) -> int:
-    """How many lines a scan has that was stopped, which ends in lines without a number; all, if that is not so."""
-    lines = values.shape[1]
-    finite = np.isfinite(values)
-    whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
-    some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
-    done = whole.index(False) if False in whole else lines
-    return done if done and not any(some[done + 1 :]) else lines
 
 
 def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], direction: Direction, _: int) -> Matrix:
@@ -85,7 +92,7 @@ def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], directi
 
 
 def _tags(header: str) -> dict[str, list[str]]:
-    """The lines below each tag."""
+    """Return the lines below each tag."""
     tags: dict[str, list[str]] = {}
     lines: list[str] = []
     for line in header.splitlines():
@@ -122,13 +129,13 @@ def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:
     head, *rows = [line.strip().split("\t") for line in tags.get("DATA_INFO", [])] or [[]]
     try:
         name, unit, direction = (head.index(key) for key in ("Name", "Unit", "Direction"))
-        found = [
+        channels = [
             (row[name].strip(), row[unit].strip(), one)
             for row in rows
             for one in _DIRECTIONS[row[direction].strip().lower()]
         ]
     except (ValueError, KeyError, IndexError):
         raise ValueError("has a table DATA_INFO that does not say Name, Unit and Direction of each row") from None
-    if len(found) > _MAX_BLOCKS:
-        raise ValueError(f"has {len(found)} images; at most {_MAX_BLOCKS} are read")
-    return found
+    if len(channels) > _MAX_BLOCKS:
+        raise ValueError(f"has {len(channels)} images; at most {_MAX_BLOCKS} are read")
+    return channels

@@ -1,6 +1,7 @@
-"""Nanoscope files of Bruker and Veeco (.spm, .000): lists of ``\\key: value`` lines, then integers.
+r"""Nanoscope files of Bruker and Veeco (.spm, .000): lists of ``\key: value`` lines, then integers.
 
-The first row is the bottom one; it is the last in time, and rows are turned, if the frame's direction is Down.
+The first row is the bottom one; it is the last in time, and rows are turned, if the frame's direction is Down. Of a
+scan that was stopped only the valid rows are read; its aspect ratio is that of the whole scan.
 """
 
 import re
@@ -9,7 +10,7 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, positive
+from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, number, positive
 
 _END = b"\\*File list end"
 _MAX_HEADER = 4 << 20  # bytes; files have some hundred thousand at most
@@ -24,7 +25,13 @@ _List = dict[str, str]
 
 
 def spm_channels(content: bytes, _: str) -> list[Channel]:
-    """The images of a Nanoscope file. Raises ``ValueError`` with what is wrong."""
+    """Return the images of a Nanoscope file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if not content.startswith(b"\\*File list"):
         what = "is a file of force curves, not images" if content.startswith(b"\\*Force file list") else ""
         raise ValueError(what or "does not begin as a Nanoscope file does")
@@ -37,11 +44,10 @@ def spm_channels(content: bytes, _: str) -> list[Channel]:
     for _, one in lists:
         for key, value in one.items():
             others.setdefault(key, value)
-    rate = next((one.get("scan rate", "") for name, one in lists if name == _SCAN), "")
+    scan = next((one for name, one in lists if name == _SCAN), {})
     if len(images) > _MAX_IMAGES:
         raise ValueError(f"has {len(images)} images; at most {_MAX_IMAGES} are read")
-    line_rate = positive(rate.partition(" ")[0])
-    return [_channel(content, number, one, others, line_rate) for number, one in enumerate(images)]
+    return [_channel(content, at, one, others, scan) for at, one in enumerate(images)]
 
 
 def _lists(header: str) -> list[tuple[str, _List]]:
@@ -52,20 +58,20 @@ def _lists(header: str) -> list[tuple[str, _List]]:
         if text.startswith("*"):
             lists.append((text, {}))
         elif lists:
-            found = re.match(r"(@\d+:[^:]*|[^:]*):(.*)", text)
-            if found:
-                lists[-1][1].setdefault(found[1].strip().lower(), found[2].strip())
+            entry = re.match(r"(@\d+:[^:]*|[^:]*):(.*)", text)
+            if entry:
+                lists[-1][1].setdefault(entry[1].strip().lower(), entry[2].strip())
     return lists
 
 
-def _channel(content: bytes, number: int, image: _List, others: _List, line_rate: float | None) -> Channel:
-    columns, rows = _whole(number, image, "samps/line"), _whole(number, image, "number of lines")
-    start, size = _whole(number, image, "data offset"), _whole(number, image, "data length")
+def _channel(content: bytes, at: int, image: _List, others: _List, scan: _List) -> Channel:
+    columns, rows = _whole(at, image, "samps/line"), _whole(at, image, "number of lines")
+    start, size = _whole(at, image, "data offset"), _whole(at, image, "data length")
     count = columns * rows
     stored = size // count if count else 0  # bytes; version 9.2 stores 4 where Bytes/pixel says 2
     if stored not in (2, 4) or start + size > len(content):
         where = f"{columns} x {rows} pixels in {size} bytes from byte {start} of {len(content)}"
-        raise ValueError(f"has an image {number} of {where}; copy it again")
+        raise ValueError(f"has an image {at} of {where}; copy it again")
     key = next((key for key in image if re.fullmatch(r"@\d+:image data", key)), "")
     named = _NAMED.match(image.get(key, ""))
     signal = (named["name"] or named["internal"] or "" if named else "").strip()
@@ -73,38 +79,51 @@ def _channel(content: bytes, number: int, image: _List, others: _List, line_rate
     factor, unit = _scale(image.get(f"{key.partition(':')[0]}:z scale", ""), others, stored)
     down = image.get("frame direction", "").lower()
     first: FirstRow = "top" if down == "down" else "bottom"
-    width, height = _size(image, columns, rows)
+    valid = _valid_rows(image, rows)
+    done = len(range(*valid.indices(rows)))
+    planned = max(rows, round(positive(scan.get("lines")) or 0.0))
+    width, height = _size(image, columns, planned)
     return Channel(
-        number,
+        at,
         f"{signal} {direction}" if direction else signal,
-        (rows, columns),
-        partial(_load, content, f"<i{stored}", start, (rows, columns), first, factor),
+        (done, columns),
+        partial(_load, content, f"<i{stored}", start, (rows, columns), valid, first, factor),
         signal,
         direction,
         unit,
         width,
-        height,
-        line_rate,
+        None if height is None else height * done / planned,
+        positive(scan.get("scan rate", "").partition(" ")[0]),
         first,
+        angle_deg=number((image.get("rotate ang.") or scan.get("rotate ang.") or "").partition(" ")[0]),
     )
 
 
+def _valid_rows(image: _List, rows: int) -> slice:
+    """Return the stored rows that were scanned; all if the file states no valid number of them."""
+    first, count = (image.get(f"valid data {what} y", "") for what in ("start", "len"))
+    if not (first.isdecimal() and count.isdecimal() and len(first) < 7 and len(count) < 7):
+        return slice(0, rows)
+    valid = slice(int(first), int(first) + int(count))
+    return valid if valid.start < valid.stop <= rows else slice(0, rows)
+
+
 def _load(
-    content: bytes, kind: str, start: int, shape: tuple[int, int], first: FirstRow, factor: float, _: int
+    content: bytes, kind: str, start: int, shape: tuple[int, int], valid: slice, first: FirstRow, factor: float, _: int
 ) -> Matrix:
-    values = np.frombuffer(content, kind, prod(shape), start).reshape(shape) * factor
+    values = np.frombuffer(content, kind, prod(shape), start).reshape(shape)[valid] * factor
     return values[::-1] if first == "top" else values
 
 
-def _whole(number: int, image: _List, key: str) -> int:
+def _whole(at: int, image: _List, key: str) -> int:
     word = (image.get(key, "").split() or [""])[0]
     if not word.isdecimal() or len(word) > 10:
-        raise ValueError(f"has no whole number as {key} of its image {number}")
+        raise ValueError(f"has no whole number as {key} of its image {at}")
     return int(word)
 
 
 def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | None]:
-    """Width and height in nm; no height where the pixels are not square by the aspect ratio, since readers differ."""
+    """Width and height in nm of a whole scan; no height unless the aspect ratio gives square pixels: readers differ."""
     words = image.get("scan size", "").split()
     nm = _NM.get(words[-1]) if words else None
     width = positive(words[0]) if nm else None
@@ -117,16 +136,16 @@ def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | 
 
 
 def _scale(text: str, others: _List, stored: int) -> tuple[float, str]:
-    """The unit of the values, and how much of it is one step; steps where the file does not say."""
-    found = _SCALED.match(text)
-    most = positive(found["value"]) if found else None
-    if found is None or most is None:
+    """Return the size of a step of the values, and their unit; steps if the file states none."""
+    scale = _SCALED.match(text)
+    most = positive(scale["value"]) if scale else None
+    if scale is None or most is None:
         return 1.0, "LSB"
     step = most / 256.0**stored
-    if not found["by"]:
-        return step, found["unit"]
-    sensitivity = _SCALED.match(others.get(f"@{found['by'].lower()}", ""))
+    if not scale["by"]:
+        return step, scale["unit"]
+    sensitivity = _SCALED.match(others.get(f"@{scale['by'].lower()}", ""))
     each = positive(sensitivity["value"]) if sensitivity else None
     if sensitivity is None or each is None:
-        return step, found["unit"]
-    return step * each, sensitivity["unit"].removesuffix("/V") or found["unit"]
+        return step, scale["unit"]
+    return step * each, sensitivity["unit"].removesuffix("/V") or scale["unit"]

@@ -9,7 +9,13 @@ from tablegen.images.formats.channel import Channel, Matrix, first_line
 
 
 def png_channels(content: bytes, _: str) -> list[Channel]:
-    """The image of a .png file. Raises ``ValueError`` with what is wrong."""
+    """Return the image of a .png file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     from PIL import Image as Pillow
 
     def damaged(error: Exception) -> ValueError:

@@ -37,7 +37,13 @@ class TiffImage:
 
 
 def tiff_channels(content: bytes, _: str) -> list[Channel]:
-    """The pages of a .tif file, in grey. Raises ``ValueError`` with what is wrong."""
+    """Return the pages of a .tif file, in grey.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     pages = tiff_pages(content)
     for page in pages:
         if len(page.shape) == 3 and page.shape[-1] in (3, 4):
@@ -50,7 +56,13 @@ def _of_frame(page: TiffImage, _: int) -> Matrix:
 
 
 def tiff_pages(content: bytes) -> list[TiffImage]:
-    """The pages of a file, in order. Raises ``ValueError`` with what is wrong."""
+    """Return the pages of a file, in order.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     import tifffile
 
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it logs is said by what it raises
@@ -81,11 +93,14 @@ def _unreadable(error: Exception) -> ValueError:
 
 
 def tiff_tags(content: bytes) -> list[TiffTags]:
-    """Tags of each page that hold one number or a short text, by code; other ones are left out.
+    """Return the tags of each page that hold one number or a short text, by code; others are left out.
 
-    Raises ``ValueError`` where the directories, or what these tags point at, do not end inside the file.
+    Raises
+    ------
+    ValueError
+        If the directories, or what these tags point at, do not end inside the file.
     """
-    found: list[TiffTags] = []
+    pages: list[TiffTags] = []
     for order, big, at, count in _directories(content):
         tags: TiffTags = {}
         for entry in range(at, at + count * (20 if big else 12), 20 if big else 12):
@@ -101,8 +116,8 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
                 raise ValueError(f"ends before byte {place}, where a tag should be; copy it again")
             (value,) = struct.unpack_from(order + layout, content, place)
             tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
-        found.append(tags)
-    return found
+        pages.append(tags)
+    return pages
 
 
 def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:

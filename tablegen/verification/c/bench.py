@@ -41,12 +41,12 @@ class CPlayed:
 
     @classmethod
     def of(cls, capture: Words, script: str, constants: int = 0) -> "CPlayed":
-        """What the bench wrote while it played a script: after the ticks come counts, states, constants."""
+        """Split what the bench wrote while it played a script: ticks, then counts, states, constants."""
         states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
         ticks = len(capture) - len(FAULTS) - states - constants
         tail = capture[ticks:].astype(np.int64).tolist()
-        counted, told = len(FAULTS), len(FAULTS) + states
-        return cls(capture[:ticks], tail[:counted], tail[counted:told], tail[told:])
+        counted, reported = len(FAULTS), len(FAULTS) + states
+        return cls(capture[:ticks], tail[:counted], tail[counted:reported], tail[reported:])
 
 
 def storage_bits(bits: int) -> int:
@@ -55,7 +55,7 @@ def storage_bits(bits: int) -> int:
 
 
 def defines(shape: SequencerShape, fill: int = 0) -> dict[str, int]:
-    """The choices of a firmware for programs of a shape; with ``fill`` ticks are played that many at once at most."""
+    """Return the macros of a firmware for programs of a shape; with ``fill``, at most that many ticks a call."""
     chosen = {
         "DAC_REQUESTS": 128,
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(shape.x_word_bits, shape.y_word_bits)),
@@ -73,7 +73,7 @@ def constants_written(chosen: Mapping[str, int] | None) -> int:
 
 
 def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None) -> str:
-    """A script as the C bench reads it: shape, codes at power-up, the sine table if it is needed, commands."""
+    """Format a script for the C bench: shape, codes at power-up, the sine table if it is needed, commands."""
     x_index, y_index = (
         getattr(shape, f"{axis}_index_bits") if getattr(shape, f"{axis}_interpolated") else 0 for axis in "xy"
     )
@@ -86,12 +86,23 @@ def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None
 
 
 def sine_of(shape: SequencerShape) -> Ints:
-    """The sine table from which the runtime renders tables of a shape."""
+    """Return the sine table from which the runtime renders tables of a shape.
+
+    Returns
+    -------
+    Words of the table, shape (entries,).
+    """
     return sine_periods(max(shape.x_index_bits, shape.y_index_bits))
 
 
 def require_compiler(compiler: str) -> list[str]:
-    """The words of a compiler's command; ``ToolMissing`` where there is none of that name."""
+    """Return the words of a compiler's command.
+
+    Raises
+    ------
+    ToolMissing
+        If no command has that name.
+    """
     try:
         command = shlex.split(compiler)
     except ValueError:
@@ -102,7 +113,7 @@ def require_compiler(compiler: str) -> list[str]:
 
 
 def macros(chosen: Mapping[str, int]) -> list[str]:
-    """What is chosen, as words of a compiler's command."""
+    """Return macros as words of a compiler's command."""
     return [f"-D{name}={value}" for name, value in chosen.items()]
 
 
@@ -119,7 +130,7 @@ class CBench:
         fill: int = 0,
         chosen: Mapping[str, int] | None = None,
     ) -> None:
-        """``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape."""
+        """Compile the bench; ``sources`` replace the shipped runtime, ``chosen`` the macros that suit the shape."""
         runtime = list(c_runtime() if sources is None else sources)
         folder.mkdir(parents=True, exist_ok=True)
         self.shape, self.program = shape, folder / "stream_bench"
@@ -135,6 +146,6 @@ class CBench:
         return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
 
     def run(self, words: str, timeout: float | None = None) -> CPlayed:
-        """The same for a script as ``script_words`` makes it; a bench fails that takes longer, in seconds."""
+        """Play a script in the form of ``script_words``; a bench fails that takes longer than ``timeout`` seconds."""
         written = run(self.program, words.encode("ascii"), timeout)
         return CPlayed.of(np.frombuffer(written, dtype="<u8"), words, self._constants)

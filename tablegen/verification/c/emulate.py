@@ -60,7 +60,13 @@ _PACKAGES = {"arm-none-eabi-gcc": "gcc-arm-none-eabi", "riscv64-unknown-elf-gcc"
 
 
 def require_emulator(compiler: str = COMPILERS["arm"]) -> list[str]:
-    """The words of a compiler's command; ``ToolMissing`` unless it, unicorn and elftools are there."""
+    """Return the words of a cross compiler's command.
+
+    Raises
+    ------
+    ToolMissing
+        If the compiler, unicorn or elftools is not installed.
+    """
     try:
         import elftools  # noqa: F401
         import unicorn  # noqa: F401
@@ -151,7 +157,7 @@ class Processor:
         return uc
 
     def symbol(self, name: str) -> int:
-        """The address of a symbol, without the bit that says Thumb."""
+        """Return the address of a symbol, without the Thumb bit."""
         try:
             address = self.executable.symbols[name]
         except KeyError:
@@ -159,12 +165,12 @@ class Processor:
         return address & ~self._thumb
 
     def read(self, name: str, count: int | None = None, offset: int = 0) -> bytes:
-        """The bytes of a variable, all of them or so many."""
+        """Read the bytes of a variable, all or ``count`` of them."""
         size = self.executable.sizes[name] if count is None else count
         return bytes(self.uc.mem_read(self.symbol(name) + offset, size))
 
     def text(self, address: int) -> str:
-        """A string that ends with 0, of 32 characters at most."""
+        """Read a string that ends with 0, of at most 32 characters."""
         return bytes(self.uc.mem_read(address, 32)).split(b"\0")[0].decode("ascii", "replace")
 
     def write(self, name: str, data: bytes) -> None:
@@ -172,7 +178,7 @@ class Processor:
         self.uc.mem_write(self.symbol(name), data)
 
     def word(self, name: str) -> int:
-        """A variable of 32 bits."""
+        """Read a 32-bit variable."""
         return int.from_bytes(self.read(name, 4), "little")
 
     def run(self, start: int, stop: int) -> None:
@@ -268,7 +274,7 @@ class CortexMBench:
         return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
 
     def run(self, words: str) -> CPlayed:
-        """The same for a script as ``script_words`` makes it."""
+        """Play a script in the form of ``script_words``."""
         script = np.frombuffer(bytes.fromhex(words), dtype=">u8").astype("<u8")
         processor = Processor(self.executable, self.core)
         captures = []

@@ -22,7 +22,13 @@ class EmulatedPlayer:
         self._work, self._program, self._shape = work, program, shape
 
     def played(self, fills: bool) -> CPlayed:
-        """What the bench stored, a tick a call, or many. Raises ``SimulationFailed``."""
+        """Return what the bench captured, one tick or (``fills``) many ticks a call.
+
+        Raises
+        ------
+        SimulationFailed
+            If the bench does not end by itself.
+        """
         fill = MOST_FILLED if fills else 0
         job = {
             "shape": asdict(self._shape),

@@ -28,7 +28,7 @@ _STEP, _FILL = "step_capture.bin", "fill_capture.bin"
 
 
 def host_compiler() -> str:
-    """The command that the environment has for C."""
+    """Return the C compiler of the environment."""
     return os.environ.get("CC") or "cc"
 
 
@@ -40,7 +40,13 @@ class HostPlayer:
         self._work, self._program, self._script, self._ticks = work, program, script, ticks
 
     def played(self, fills: bool) -> CPlayed:
-        """What the bench stored, a tick a call, or many. Raises ``SimulationFailed``."""
+        """Return what the bench captured, one tick or (``fills``) many ticks a call.
+
+        Raises
+        ------
+        SimulationFailed
+            If the bench does not end by itself.
+        """
         record = _FILL if fills else _STEP
         if record in self._failures:
             raise SimulationFailed(self._failures[record])
@@ -65,7 +71,7 @@ class HostPlayer:
         return failures
 
     def _objects(self) -> list[Objects]:
-        """What does not depend on the words of the build: the sequencer, the link, the bench."""
+        """Return the objects that do not depend on the build: the sequencer, the link, the bench."""
         program, options = self._program, _options()
         words = [*options, *macros(program.choices)]
         runtime, bench = list(map(str, program.runtime)), list(map(str, {*BENCH, *OWN_SOURCES}))
@@ -80,7 +86,7 @@ class HostPlayer:
         ]
 
     def _line(self, objects: list[Objects]) -> list[str]:
-        """The command that compiles what is the build's own, and links all."""
+        """Return the command that compiles the build's own sources and links everything."""
         program = self._program
         places = sorted({str(path.parent) for path in (*program.sources, *BENCH)})
         own = [str(path) for path in program.own if path.suffix == ".c"]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from tablegen.base.file_cache import KeptFiles
+from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import file_sha256
 
-_KEPT = KeptFiles("objects", 300)
+_CACHE = CachedFiles("objects", 300)
 # Settings by which compilers find or make something else.
 _SETTINGS = (
     *("CFLAGS", "CPATH", "C_INCLUDE_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX", "CCC_OVERRIDE_OPTIONS"),
@@ -39,35 +39,35 @@ class Objects:
         return [f"{Path(source).stem}.o" for source in self.sources]
 
     def line(self, compiler: Sequence[str]) -> list[str]:
-        """The command that makes them, in the folder where it runs."""
+        """Return the command that compiles these objects, for the folder where it runs."""
         places = sorted({os.path.dirname(path) for path in self.files})
         return [*compiler, *self.words, *(f"-I{place}" for place in places), "-c", *self.sources]
 
-    def take(self, made_by: str, place: Path) -> bool:
+    def take(self, compiler_key: str, place: Path) -> bool:
         """Put the objects there that a compiler would make; whether all of them were kept."""
-        keys = self._keys(made_by)
-        return all(_KEPT.take(key, place / name) for name, key in keys.items())
+        keys = self._keys(compiler_key)
+        return all(_CACHE.take(key, place / name) for name, key in keys.items())
 
-    def keep(self, made_by: str, place: Path) -> None:
+    def keep(self, compiler_key: str, place: Path) -> None:
         """Keep them for the next time."""
-        for name, key in self._keys(made_by).items():
-            _KEPT.keep(key, place / name)
+        for name, key in self._keys(compiler_key).items():
+            _CACHE.keep(key, place / name)
 
-    def _keys(self, made_by: str) -> dict[str, str]:
+    def _keys(self, compiler_key: str) -> dict[str, str]:
         files = [(Path(path).name, file_sha256(path)) for path in self.files]
-        common = repr((made_by, self.words, sorted(files)))
+        common = repr((compiler_key, self.words, sorted(files)))
         return {name: sha256(f"{common}\n{name}".encode()).hexdigest() for name in self.names}
 
 
 def maker(compiler: Sequence[str]) -> str | None:
     """All that tells a compiler from others; None where its objects may depend on more than that."""
-    found = shutil.which(compiler[0])
-    if found is None or len(compiler) > 1 or any(os.environ.get(name) for name in _SETTINGS):
+    compiler_path = shutil.which(compiler[0])
+    if compiler_path is None or len(compiler) > 1 or any(os.environ.get(name) for name in _SETTINGS):
         return None
-    said = subprocess.run(
-        [found, "-v"], capture_output=True, text=True, errors="replace", check=False, stdin=subprocess.DEVNULL
+    output = subprocess.run(
+        [compiler_path, "-v"], capture_output=True, text=True, errors="replace", check=False, stdin=subprocess.DEVNULL
     )
-    path = os.path.realpath(found)
+    path = os.path.realpath(compiler_path)
     status = os.stat(path)
-    told = said.stdout + said.stderr
-    return repr((path, status.st_size, status.st_mtime_ns, os.uname().machine, told)) if told else None
+    version = output.stdout + output.stderr
+    return repr((path, status.st_size, status.st_mtime_ns, os.uname().machine, version)) if version else None

@@ -29,12 +29,12 @@ def require_headers(compiler: Sequence[str]) -> None:
 
 
 def run(program: Path, script: bytes, timeout: float | None = None) -> bytes:
-    """What a bench writes while it plays a script; one fails that takes longer than ``timeout``, in seconds."""
+    """Return what a bench writes while it plays a script; it fails after ``timeout`` seconds."""
     return _ended(script, timeout, [str(program)], stdout=subprocess.PIPE)
 
 
 def record(command: Sequence[str], script: bytes, place: Path, most: int, timeout: float | None = None) -> None:
-    """The same into a file; the system ends a bench that writes more than ``most`` bytes."""
+    """Record what a bench writes in a file; the system ends a bench that writes more than ``most`` bytes."""
 
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
@@ -83,9 +83,9 @@ def _compile(folder: Path, compiler: list[str], objects: list[Objects]) -> None:
     place = folder / OBJECTS
     shutil.rmtree(place, ignore_errors=True)  # a directory that is kept may have those of another build
     place.mkdir()
-    made_by = maker(compiler)
+    compiler_key = maker(compiler)
     for one in objects:
-        if made_by is None or not one.take(made_by, place):
+        if compiler_key is None or not one.take(compiler_key, place):
             compile_line(one.line(compiler), place)
-            if made_by is not None:
-                one.keep(made_by, place)
+            if compiler_key is not None:
+                one.keep(compiler_key, place)

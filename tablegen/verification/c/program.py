@@ -40,7 +40,7 @@ class CProgram:
 
 
 def c_program(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[CProgram, list[str]]:
-    """What is compiled of the build in ``folder``, copied to ``work``, and what of it is missing."""
+    """Return the C program of the build in ``folder``, copied to ``work``, and a list of what is missing."""
     names = stored.runtime(".c", ".h")
     own, absent = copies(folder, sorted({f"{stored.manifest.name}.h", arrays_file(stored_content(stored))}), work / "c")
     runtime, missing = copies(folder, names, work / "runtime")
@@ -54,14 +54,14 @@ def c_program(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> t
 
 
 def header_constants(content: Content) -> dict[str, int]:
-    """What the emitted header defines, by whole names; of the hash each character is a number."""
+    """Return the values of the emitted header's macros by name; each character of the hash is a number."""
     own = {f"{content.name.upper()}_{key}": value for key, value in scan_constants(content).items()}
     digits = {f"{content.name.upper()}_HASH[{at}]": ord(digit) for at, digit in enumerate(content.hash)}
     return own | digits
 
 
 def _choices(stored: StoredBuild) -> dict[str, int]:
-    """What a firmware for this build is compiled with."""
+    """Return the macros with which a firmware for this build is compiled."""
     axes = [axis for _, axis in stored.axes]
     order = max(program.output.shaping.order for program in (stored.program.x, stored.program.y))
     return {
@@ -73,7 +73,7 @@ def _choices(stored: StoredBuild) -> dict[str, int]:
 
 
 def _bench_choices(stored: StoredBuild, fourier: bool) -> dict[str, int]:
-    """What the bench is for this build."""
+    """Return the macros with which the bench for this build is compiled."""
     axes = [axis for _, axis in stored.axes]
     rendered = [len(axis.table.words) for axis in axes if fourier and axis.table.mode != "direct"]
     return {
@@ -89,7 +89,7 @@ def _variation_words(own: Program) -> int:
 
 
 def _bench_program(stored: StoredBuild, fourier: bool) -> str:
-    """The C file that hands what the build emitted to the bench, by the names that its header has."""
+    """Return the C file that hands the emitted tables to the bench, by the names in their header."""
     name = stored.manifest.name
     capital = name.upper()
     lines = [

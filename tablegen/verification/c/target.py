@@ -50,7 +50,7 @@ class CTarget:
     format_name: str = "c"
 
     def require(self) -> None:
-        """A compiler, and what runs its output."""
+        """Require a compiler, and what runs its output."""
         if self.machine == "cortex-m":
             from tablegen.verification.c.emulate import require_emulator
 
@@ -123,15 +123,15 @@ class CTarget:
 
     @staticmethod
     def _header(stored: StoredBuild, step: CPlayed) -> Check:
-        """The constants of the header as the compiler reads them."""
+        """Check the constants of the header as the compiler reads them."""
         content = stored_content(stored)
-        wanted = header_constants(content)
+        constants = header_constants(content)
         wrong = [
             f"{content.name}.h: {name} is {value} to the compiler, it is {right} in the manifest"
-            for (name, right), value in zip(wanted.items(), step.constants, strict=True)
+            for (name, right), value in zip(constants.items(), step.constants, strict=True)
             if value != right
         ]
-        return differing_check("c header", "manifest, by the compiler", f"{len(wanted)} constants", wrong)
+        return differing_check("c header", "manifest, by the compiler", f"{len(constants)} constants", wrong)
 
 
 def _states(script: Script, played: CPlayed) -> Check:

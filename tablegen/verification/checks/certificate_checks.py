@@ -1,6 +1,7 @@
 """The certificates of a build against what its words and its waveform make of them."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from tablegen.verification.checks.scaling import (
     rounded_scaling,
     scaling_figures,
 )
-from tablegen.verification.checks.shaped import told_of
+from tablegen.verification.checks.shaped import stated_shaping
+from tablegen.verification.expected_figures import header_texts, wrong_mismatch, wrong_texts
+from tablegen.verification.position import wrong_position
 
 _ROUNDED = 1.0 + 1e-9  # the target is worked out again from what is played
 
@@ -32,15 +35,19 @@ class Certificates:
     unknown_models: list[str]
 
 
-def check_certificates(stored: StoredBuild, same_version: bool) -> Certificates:
-    """Every figure of both axes; those of scaling errors only of this version of tablegen and of its own models."""
+def check_certificates(stored: StoredBuild, same_version: bool, folder: Path | None = None) -> Certificates:
+    """Every figure of both axes; those of scaling errors only of this version of tablegen and of its own models.
+
+    What is expected on the scanner is compared with the text of the headers in ``folder``, where that is given.
+    """
     checks: list[Check] = []
     limits: dict[str, float] = {}
     unknown: set[str] = set()
     for name, axis in stored.axes:
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
-                check, limits[name] = _check(name, axis, stored, same_version)
+                texts = header_texts(folder, stored) if folder is not None and same_version else {}
+                check, limits[name] = _check(name, axis, stored, same_version, texts)
                 if same_version and not knows(axis.drive.model):
                     unknown.add(axis.drive.model)
         except (ArithmeticError, ValueError) as error:  # figures that no build states, whatever their types allow
@@ -52,30 +59,36 @@ def check_certificates(stored: StoredBuild, same_version: bool) -> Certificates:
 
 def _wrong_rounded(stated: ManifestShaped, sides: dict[str, float] | None, exact: bool) -> list[str]:
     """Scaling errors without shaping that are others; ``sides`` are None where they cannot be known."""
-    told, name = stated.rounded.scaling_error_percent, "shaped.rounded.scaling_error_percent"
+    sides_stated, name = stated.rounded.scaling_error_percent, "shaped.rounded.scaling_error_percent"
     if sides is None:
         return []
-    if sides.keys() != told.keys():
-        return [f"certificate.{name} has {', '.join(told) or 'no direction'}"]
-    return different_figures(told, sides, exact, f"{name}.")
+    if sides.keys() != sides_stated.keys():
+        return [f"certificate.{name} has {', '.join(sides_stated) or 'no direction'}"]
+    return different_figures(sides_stated, sides, exact, f"{name}.")
 
 
-def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: bool) -> tuple[Check, float]:
+def _check(
+    name: str, axis: ManifestAxis, stored: StoredBuild, same_version: bool, texts: dict[str, str]
+) -> tuple[Check, float]:
     period = PlayedPeriod(axis)
     schedule = stored.program.schedule
     rate_hz = float(schedule.line_rate if name == "x" else schedule.frame_rate)
     shaped = period.shaped_by(float(schedule.update_rate_hz))
-    found = period.figures(rate_hz, shaped)
+    computed = period.figures(rate_hz, shaped)
     gentle = axis.fourier.max_scaling_error_percent is not None
     if gentle or axis.certificate.peak_acceleration is not None:
-        found["peak_acceleration"] = peak_acceleration(axis) if gentle else None
-    told = {key: getattr(axis.certificate, key) for key in found}
-    wrong, count = different_figures(told, found, period.is_whole), len(found)
-    wrong += wrong_passage(axis, rate_hz)
+        computed["peak_acceleration"] = peak_acceleration(axis) if gentle else None
+    stated_figures = {key: getattr(axis.certificate, key) for key in computed}
+    wrong, count = different_figures(stated_figures, computed, period.is_whole), len(computed)
+    misplaced = wrong_passage(axis, rate_hz)
+    wrong += misplaced
+    if not misplaced and (same_version or axis.certificate.position is not None):
+        figures_of_position, others = wrong_position(axis, period, rate_hz, same_version and knows(axis.drive.model))
+        count, wrong = count + figures_of_position, wrong + others
     if shaped is not None:
         figures = shaped.figures()
         count += len(figures)
-        wrong += different_figures(told_of(axis.certificate.shaped), figures, period.is_whole, "shaped.")
+        wrong += different_figures(stated_shaping(axis.certificate.shaped), figures, period.is_whole, "shaped.")
         if same_version and knows(axis.drive.model) and axis.certificate.shaped is not None:
             wrong += _wrong_rounded(axis.certificate.shaped, rounded_scaling(axis, period, shaped), period.is_whole)
     if same_version and knows(axis.drive.model):
@@ -95,7 +108,9 @@ def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: boo
                     wrong.append(f"fourier.max_scaling_error_percent is {most}, {side} has {parts['band_limit']:.6g}")
     if same_version:
         wrong += wrong_expectations(axis)
-    step = found["largest_step"]
+        wrong += wrong_mismatch(axis)
+        wrong += wrong_texts(name, axis, texts)
+    step = computed["largest_step"]
     if isinstance(step, int) and step > axis.output.max_step:
         wrong.append(f"output.max_step is {axis.output.max_step}, the words step by {step}")
     failure = f"{name}: {some([f'axes.{name}.{one}' for one in wrong])}" if wrong else None

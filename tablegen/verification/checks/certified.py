@@ -37,7 +37,17 @@ def on_grid(series: ManifestSeries, count: int, derivative: int = 0) -> Floats:
 
 
 def at(series: ManifestSeries, t: Floats, derivative: int = 0) -> Floats:
-    """The same at times in periods, term by term."""
+    """Evaluate the series, or a derivative, term by term.
+
+    Parameters
+    ----------
+    t
+        Times in periods, any shape.
+
+    Returns
+    -------
+    Values of the shape of ``t``, in the series' unit (per period for each derivative).
+    """
     total = np.full(t.shape, series.a0 if derivative == 0 else 0.0)
     for n, (a, b) in enumerate(zip(series.a, series.b, strict=True), start=1):
         for _ in range(derivative):
@@ -48,7 +58,7 @@ def at(series: ManifestSeries, t: Floats, derivative: int = 0) -> Floats:
 
 
 def played_series(axis: ManifestAxis) -> ManifestSeries:
-    """The w that is played."""
+    """Return the series of the played waveform w."""
     return ManifestSeries(axis.fourier.a, axis.fourier.b, axis.fourier.a0)
 
 
@@ -61,16 +71,16 @@ class PlayedPeriod:
         self.is_whole = self.program.phase.ticks <= _MOST_ADVANCES
         points = self.program.phase.ticks if self.is_whole else _GRID
         drive, output, w = axis.drive, axis.output, on_grid(played_series(axis), points)
-        self._asked = (drive.v_offset + drive.v_amplitude * (w - 0.5) - output.v_zero) / output.v_per_code
+        self._intended = (drive.v_offset + drive.v_amplitude * (w - 0.5) - output.v_zero) / output.v_per_code
         self._slope = np.zeros(0) if self.is_whole else on_grid(played_series(axis), points, 1)
 
     def shaped_by(self, update_rate_hz: float) -> ShapedPlay | None:
-        """What is played of a shaped axis; None of any other."""
+        """Return what a shaped axis plays; None of any other axis."""
         if self.axis.output.shaping is None:
             return None
         ticks = np.arange(min(self.program.ticks, MOST_TICKS), dtype=np.int64)
-        asked = self.runs.at(ticks) - self.errors(ticks)
-        return ShapedPlay(self.axis, asked, update_rate_hz)
+        codes = self.runs.at(ticks) - self.errors(ticks)
+        return ShapedPlay(self.axis, codes, update_rate_hz)
 
     @property
     def codes_per_unit(self) -> float:
@@ -85,18 +95,18 @@ class PlayedPeriod:
     def errors(self, k: Ints) -> Floats:
         """Code less the unrounded code of the waveform, at ticks k, of any period."""
         advance = k % self.program.ticks // self.program.hold
-        asked = self._asked[advance] if self.is_whole else self._between(advance)
-        errors: Floats = self.runs.at(k % self.program.ticks) - asked
+        intended = self._intended[advance] if self.is_whole else self._between(advance)
+        errors: Floats = self.runs.at(k % self.program.ticks) - intended
         return errors
 
     def _between(self, advance: Ints) -> Floats:
-        """The waveform between points of the grid, by values and slopes."""
+        """Interpolate the waveform between points of the grid, by values and slopes."""
         at, rest = np.divmod(advance * _GRID, self.program.phase.ticks)
         f, after = rest / self.program.phase.ticks, (at + 1) % _GRID
-        y0, y1 = self._asked[at], self._asked[after]
+        y0, y1 = self._intended[at], self._intended[after]
         s0, s1 = (self.codes_per_unit / _GRID * self._slope[i] for i in (at, after))
-        asked: Floats = y0 + f * (s0 + f * (3.0 * (y1 - y0) - 2.0 * s0 - s1 + f * (2.0 * (y0 - y1) + s0 + s1)))
-        return asked
+        intended: Floats = y0 + f * (s0 + f * (3.0 * (y1 - y0) - 2.0 * s0 - s1 + f * (2.0 * (y0 - y1) + s0 + s1)))
+        return intended
 
     def error_moments(self) -> tuple[float, float, float]:
         """Largest magnitude, mean, and mean square, over every tick."""
@@ -132,7 +142,7 @@ class PlayedPeriod:
         low = max(int(codes.min()) - beyond, output.code_min)
         high = min(int(codes.max()) + beyond, output.code_max)
         noise = square - mean * mean if shaped is None else float(np.var(shaped.code_errors))
-        found: dict[str, float | int | None] = {
+        values: dict[str, float | int | None] = {
             "ticks": runs.ticks,
             "max_error_lsb": largest,
             "rms_error_lsb": float(np.sqrt(square)),
@@ -148,11 +158,11 @@ class PlayedPeriod:
         }
         if shaped is not None:
             errors = shaped.position_errors
-            del found["max_error_lsb"], found["rms_error_lsb"]
+            del values["max_error_lsb"], values["rms_error_lsb"]
             if errors is not None:
-                found |= {"max_error_lsb": float(np.max(np.abs(errors)))}
-                found |= {"rms_error_lsb": float(np.sqrt(np.mean(errors * errors)))}
-        return found
+                values |= {"max_error_lsb": float(np.max(np.abs(errors)))}
+                values |= {"rms_error_lsb": float(np.sqrt(np.mean(errors * errors)))}
+        return values
 
     def largest_code_error(self) -> float:
         """No code of this axis is further from the waveform than this, in LSB, shaped or not."""
@@ -179,23 +189,23 @@ class PlayedPeriod:
         return 10.0 * log10(max(inside, _LEAST_POWER) / power)
 
 
-def agree(told: float | int | None, found: float | int | None, exact: bool, tiny: float) -> bool:
+def agree(stated: float | int | None, figure: float | int | None, exact: bool, tiny: float) -> bool:
     """Whether a figure of six digits is the one that was found; ``tiny`` is what nothing depends on."""
-    if told is None or found is None:
-        return told is None and found is None
-    if isinstance(found, int):
-        return told == found
-    return abs(told - found) <= (_SIX_DIGITS if exact else _LONG_PERIOD) * abs(found) + tiny
+    if stated is None or figure is None:
+        return stated is None and figure is None
+    if isinstance(figure, int):
+        return stated == figure
+    return abs(stated - figure) <= (_SIX_DIGITS if exact else _LONG_PERIOD) * abs(figure) + tiny
 
 
 def different_figures(
-    told: Mapping[str, float | int | None], found: Mapping[str, float | int | None], exact: bool, prefix: str = ""
+    stated: Mapping[str, float | int | None], figures: Mapping[str, float | int | None], exact: bool, prefix: str = ""
 ) -> list[str]:
-    """The figures that a certificate states otherwise, or not at all."""
+    """List the figures that a certificate states otherwise, or not at all."""
     wrong = []
-    for name, value in found.items():
+    for name, value in figures.items():
         tiny = 1e-3 if name.endswith("_db") else 1e-9
-        if not agree(told.get(name), value, exact, tiny):
+        if not agree(stated.get(name), value, exact, tiny):
             right = "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
-            wrong.append(f"certificate.{prefix}{name} is {told.get(name)}, the words make it {right}")
+            wrong.append(f"certificate.{prefix}{name} is {stated.get(name)}, the words make it {right}")
     return wrong

@@ -27,59 +27,61 @@ def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:
         checks += [(f"axes.{name}.{key}", right, why) for key, right, why in _axis(manifest, name, axis)]
     x, y = manifest.axes.x, manifest.axes.y
     ranges = [axis.drive.v_scan / axis.drive.v_scan_normalised for axis in (x, y)]
-    told = y.line.requested_hz
+    requested = y.line.requested_hz
     right = x.line.requested_hz / manifest.sequence.frame_lines
     checks += [
         ("axes.y.drive.v_scan_normalised", _close(*ranges), f"of {ranges[1]:g} V, of x it is of {ranges[0]:g} V"),
-        ("axes.y.line.requested_hz", _close(told, right), f"{told}, that of x makes it {right}"),
+        ("axes.y.line.requested_hz", _close(requested, right), f"{requested}, that of x makes it {right}"),
     ]
     checks += _hardware(x, y)
     return len(checks), [f"{key} is {why}" for key, right, why in checks if not right]
 
 
-Found = list[tuple[str, bool, str]]
+Results = list[tuple[str, bool, str]]
 
 
-def _hardware(x: ManifestAxis, y: ManifestAxis) -> Found:
-    """Converter and amplifier of y are those of x, unless the manifest says that they are not."""
+def _hardware(x: ManifestAxis, y: ManifestAxis) -> Results:
+    """Compare converter and amplifier of y with those of x, unless the manifest states that they differ."""
     pairs = [(key, getattr(y.output, key), getattr(x.output, key)) for key in CONVERTER_KEYS]
     if y.output.own_hardware:
         apart = any(mine != other for _, mine, other in pairs)
-        found: Found = [("axes.y.output.own_hardware", apart, "stated, and nothing of it differs from that of x")]
+        results: Results = [("axes.y.output.own_hardware", apart, "stated, and nothing of it differs from that of x")]
     else:
-        found = [(f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}") for key, mine, other in pairs]
-    return [*found, ("axes.x.output.own_hardware", not x.output.own_hardware, "stated, and only y can")]
+        results = [(f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}") for key, mine, other in pairs]
+    return [*results, ("axes.x.output.own_hardware", not x.output.own_hardware, "stated, and only y can")]
 
 
-def _sequence(manifest: Manifest) -> Found:
-    """Turns and windows, from the turn of each axis and its imaging window."""
+def _sequence(manifest: Manifest) -> Results:
+    """Compare turns and windows with the turn of each axis and its imaging window."""
     sequence, x, y = manifest.sequence, manifest.axes.x, manifest.axes.y
-    found: Found = []
+    results: Results = []
     ticks, lines = sequence.line_ticks, sequence.frame_lines
     for key, axis, period in (("turn_tick", x, ticks), ("turn_line", y, lines)):
-        told, right = getattr(sequence, key), ceil(_exact(axis.drive.turn) * period)
-        found.append((f"sequence.{key}", told == right, f"{told}, the turn makes it {right}"))
+        stated, right = getattr(sequence, key), ceil(_exact(axis.drive.turn) * period)
+        results.append((f"sequence.{key}", stated == right, f"{stated}, the turn makes it {right}"))
     for key, axis, period, slack in (
         ("forward_ticks", x, ticks, _WINDOW_TICKS),
         ("backward_ticks", x, ticks, _WINDOW_TICKS),
         ("up_lines", y, lines, 1),
         ("down_lines", y, lines, 1),
     ):
-        told = getattr(sequence, key)
-        begin, end = _asked_window(axis, backward=key in ("backward_ticks", "down_lines"))
+        stated = getattr(sequence, key)
+        begin, end = _requested_window(axis, backward=key in ("backward_ticks", "down_lines"))
         if begin == end:
-            found.append((f"sequence.{key}", told[1] == 0, f"{told}, nothing of it is imaged"))
+            results.append((f"sequence.{key}", stated[1] == 0, f"{stated}, nothing of it is imaged"))
             continue
         first, stop = floor(begin * period), ceil(end * period)
-        right = abs(told[0] - first) <= slack and abs(told[0] + told[1] - stop) <= slack
-        found.append((f"sequence.{key}", right, f"{list(told)}, the imaging window is near {[first, stop - first]}"))
+        right = abs(stated[0] - first) <= slack and abs(stated[0] + stated[1] - stop) <= slack
+        results.append(
+            (f"sequence.{key}", right, f"{list(stated)}, the imaging window is near {[first, stop - first]}")
+        )
         if key.endswith("ticks"):
-            enough = told[1] >= sequence.pixels
-            found.append(("sequence.pixels", enough, f"{sequence.pixels}, more than the ticks of a window"))
-    return found
+            enough = stated[1] >= sequence.pixels
+            results.append(("sequence.pixels", enough, f"{sequence.pixels}, more than the ticks of a window"))
+    return results
 
 
-def _asked_window(axis: ManifestAxis, backward: bool) -> tuple[Fraction, Fraction]:
+def _requested_window(axis: ManifestAxis, backward: bool) -> tuple[Fraction, Fraction]:
     """Where a direction images, in periods; empty where it does not."""
     turn, (low, high) = _exact(axis.drive.turn), (_exact(edge) for edge in axis.fourier.window)
     if not backward:
@@ -93,7 +95,7 @@ def _exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
+def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Results:
     drive, line, fourier, table, output = axis.drive, axis.line, axis.fourier, axis.table, axis.output
     low, high = fourier.window
     rate = Fraction(*manifest.sequence.update_rate_hz) / line.ticks
@@ -105,7 +107,7 @@ def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
     rendered = words is not None and np.array_equal(
         synthesize(words, len(table.words), table.bits), np.array(table.words, dtype=np.int64)
     )
-    found: Found = [
+    results: Results = [
         ("line.rate_exact", Fraction(*line.rate_exact) == rate, f"{list(line.rate_exact)}, the ticks make it {rate}"),
         ("line.rate_hz", line.rate_hz == float(rate), f"{line.rate_hz}, the ticks make it {float(rate)}"),
         ("drive.v_amplitude", _close(drive.v_amplitude, drive.m * drive.g * drive.v_scan), "not m g v_scan"),
@@ -120,17 +122,17 @@ def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
         ("table.words", rendered, "not what the Fourier words make"),
         ("table.guard_bits", table.guard_bits == guard_bits(table.bits), f"{table.guard_bits}"),
     ]
-    held = len(fourier.held_factors) == len(fourier.held_harmonics) and all(
-        0.0 < left < 1.0 + _RELATIVE for left in fourier.held_factors
+    shares = len(fourier.held_factors) == len(fourier.held_harmonics) and all(
+        0.0 < share < 1.0 + _RELATIVE for share in fourier.held_factors
     )
-    found.append(("fourier.held_factors", held, "not a share for each of the held harmonics"))
+    results.append(("fourier.held_factors", shares, "not a share for each of the held harmonics"))
     if axis.resting:
         flat = fourier.a0 == 0.5 and not any(fourier.a) and not any(fourier.b)
-        found.append(("drive.size_nm", flat, "0, and the waveform moves"))
+        results.append(("drive.size_nm", flat, "0, and the waveform moves"))
     if fourier.target is not None:
         target = len(fourier.target.a) == len(fourier.target.b) == fourier.harmonics
-        found.append(("fourier.target", target, f"not of {fourier.harmonics} harmonics"))
-    return found
+        results.append(("fourier.target", target, f"not of {fourier.harmonics} harmonics"))
+    return results
 
 
 def _close(a: float, b: float) -> bool:

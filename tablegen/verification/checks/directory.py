@@ -10,21 +10,27 @@ _MAX_SHOWN = 5
 
 
 def wrong_files(folder: Path, stored: StoredBuild) -> list[str]:
-    """What is wrong with the files that the manifest lists."""
+    """List what is wrong with the files that the manifest names."""
     wrong = []
     for name, digest in stored.manifest.files.items():
         try:
-            found = file_sha256(folder / name)
+            actual = file_sha256(folder / name)
         except OSError as error:
             wrong.append(f"{name}: {'missing' if isinstance(error, FileNotFoundError) else error.strerror or error}")
             continue
-        if found != digest:
+        if actual != digest:
             wrong.append(f"{name}: stale or edited: its SHA-256 is not that of the manifest")
     return wrong
 
 
 def memory_words(path: Path, count: int) -> list[int]:
-    """The words of a memory file as a device gets them; ``ValueError`` says what is wrong with it."""
+    """Read the words of a memory file as a device does.
+
+    Raises
+    ------
+    ValueError
+        If the file has other words, or another number of them.
+    """
     try:
         lines = read_text(path, BUILD_FILE, "ascii").split()
         words = [int(line, 16) for line in lines]
@@ -40,9 +46,9 @@ def memory_words(path: Path, count: int) -> list[int]:
 
 
 def copies(folder: Path, names: list[str], into: Path) -> tuple[list[Path], list[str]]:
-    """Copies of files of a build, and what is wrong where there are none.
+    """Copy files of a build; return the copies, and what is wrong where files are missing.
 
-    They are copied since make, and with it Verilator, does not like every path.
+    The copies have plain paths, since make, and with it Verilator, does not accept every path.
     """
     into.mkdir(exist_ok=True)
     wrong = []
@@ -57,6 +63,6 @@ def copies(folder: Path, names: list[str], into: Path) -> tuple[list[Path], list
 
 
 def some(wrong: list[str]) -> str:
-    """A few of many."""
+    """Shorten a list of errors for a message."""
     more = [f"... and {len(wrong) - _MAX_SHOWN} more"] if len(wrong) > _MAX_SHOWN else []
     return "\n".join(wrong[:_MAX_SHOWN] + more)

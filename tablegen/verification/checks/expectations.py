@@ -10,7 +10,7 @@ from tablegen.verification.checks.scaling import OPERATOR
 
 
 def wrong_expectations(axis: ManifestAxis) -> list[str]:
-    """What no build of this version states."""
+    """List expectations that no build of this version states."""
     expected, layer = axis.certificate.expected, axis.fourier.refinement is not None
     if expected is None:
         return ["certificate.expected is missing, and the operator says it"] if _by_operator(axis) and not layer else []
@@ -29,15 +29,19 @@ def _wrong(axis: ManifestAxis, expected: ManifestExpected) -> Iterator[str]:
     both, traces = axis.fourier.directions == "both", expected.basis == "traces"
     sides = (["forward", "backward"] if both else ["forward"]) if traces else []
     for name in ("rms_percent", "scaling_percent"):
-        found = getattr(expected, name)
-        if sorted(found) != sorted(sides):
-            yield f"{name} has {', '.join(found) or 'no direction'}, not {', '.join(sides) or 'none'}"
-        for side, figure in found.items():
+        figures = getattr(expected, name)
+        if sorted(figures) != sorted(sides):
+            yield f"{name} has {', '.join(figures) or 'no direction'}, not {', '.join(sides) or 'none'}"
+        for side, figure in figures.items():
             if figure.value < 0.0 or (figure.uncertainty or 0.0) < 0.0:
                 yield f"{name}.{side} is below 0"
     for name, due in (("mismatch_percent", both), ("size_percent", traces), ("distance_percent", traces)):
         if (getattr(expected, name) is not None) != due:
             yield f"{name} is {'missing' if due else 'there, and nothing says it'}"
+    if both and traces and expected.mismatch_percent is not None and sorted(expected.rms_percent) == sorted(sides):
+        one, other = (figure.value for figure in expected.rms_percent.values())
+        if abs(one - other) > expected.mismatch_percent.value * (1.0 + 1e-5):  # of their difference the rms is less
+            yield "rms_percent of both directions differ by more than mismatch_percent"
     mismatch, size = expected.mismatch_percent, expected.size_percent
     if mismatch is not None and (mismatch.value < 0.0 or (mismatch.uncertainty or 0.0) < 0.0):
         yield "mismatch_percent is below 0"

@@ -15,7 +15,7 @@ _REWRITTEN = ("c", "verilog")  # formats that are compared constant by constant 
 
 
 def known_formats(stored: StoredBuild) -> tuple[list[Format], list[str]]:
-    """The formats of a build that are installed here, and why others are not."""
+    """Return the formats of a build that are installed here, and why others are not."""
     formats, unknown = [], []
     for name in stored.formats:
         try:
@@ -29,7 +29,15 @@ Written = list[tuple[Format, dict[str, bytes]]]
 
 
 def written_files(content: Content, formats: list[Format]) -> Written:
-    """Files that follow from a manifest, by format and name. Raises ``Unphysical``, ``FormatFailed``."""
+    """Write the files that follow from a manifest, by format and name.
+
+    Raises
+    ------
+    Unphysical
+        If the manifest describes no possible scan.
+    FormatFailed
+        If a format cannot write its files.
+    """
     return [(one, files_of(one, content)) for one in formats]
 
 
@@ -40,28 +48,28 @@ def listed_files(
 
     Which files the runtime has depends on the version: where that is another one, a runtime of any files will do.
     """
-    wanted: dict[str, str] = {}  # name: format
+    formats_by_name: dict[str, str] = {}  # name: format
     for one, own in written:
-        wanted |= dict.fromkeys(own, one.name)
+        formats_by_name |= dict.fromkeys(own, one.name)
         if same_version:
-            wanted |= {path.name: one.name for path in one.runtime()}
+            formats_by_name |= {path.name: one.name for path in one.runtime()}
     listed = set(stored.manifest.files)
     wrong = [
-        f"{name}: a build of {wanted[name]} has it, the manifest does not list it"
-        for name in sorted(wanted.keys() - listed)
+        f"{name}: a build of {formats_by_name[name]} has it, the manifest does not list it"
+        for name in sorted(formats_by_name.keys() - listed)
     ]
     runtime = {name for name in listed if not same_version and _is_runtime(name)}
     if all_known:
         wrong += [
             f"{name}: the manifest lists it, no build of {', '.join(stored.formats)} has it"
-            for name in sorted(listed - wanted.keys() - runtime)
+            for name in sorted(listed - formats_by_name.keys() - runtime)
         ]
     present = {path.name for pattern in _RUNTIME for path in folder.glob(pattern)}
     wrong += [
         f"{name}: not a file of the build, but compilers that are given a pattern take it in"
         for name in sorted(present - listed)
     ]
-    return len(wanted.keys() | listed), wrong
+    return len(formats_by_name.keys() | listed), wrong
 
 
 def _is_runtime(name: str) -> bool:
@@ -77,28 +85,28 @@ def unlike_installed(folder: Path, written: Written) -> tuple[int, list[str]]:
     for one, own in written:
         for path in one.runtime():
             count += 1
-            found = _content(folder / path.name)
-            if found is not None and sha256(found).digest() != sha256(path.read_bytes()).digest():
+            content = _content(folder / path.name)
+            if content is not None and sha256(content).digest() != sha256(path.read_bytes()).digest():
                 wrong.append(f"{path.name}: is not the one that is installed")
         for name, right in (own if one.name in _REWRITTEN else {}).items():
             count += 1
-            found = _content(folder / name)
-            if found is not None and (at := _first_difference(found, right)) is not None:
+            content = _content(folder / name)
+            if content is not None and (at := _first_difference(content, right)) is not None:
                 wrong.append(f"{name}: line {at} is not as this version writes it")
     return count, wrong
 
 
 def _content(path: Path) -> bytes | None:
-    """What is in a file; missing ones are told elsewhere."""
+    """Read a file; None if it is missing, which another check reports."""
     try:
         return read_bytes(path, BUILD_FILE)
     except OSError:
         return None
 
 
-def _first_difference(found: bytes, right: bytes) -> int | None:
-    """The first line that differs, counted from 1, after the comment at the beginning of both."""
-    skipped, ours = _after_comment(found)
+def _first_difference(text: bytes, right: bytes) -> int | None:
+    """Return the first line that differs, counted from 1, after the comment at the beginning of both."""
+    skipped, ours = _after_comment(text)
     others = _after_comment(right)[1]
     if ours == others:
         return None

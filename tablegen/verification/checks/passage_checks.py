@@ -14,14 +14,14 @@ _SAME = 1e-9  # of the largest harmonic; both ways are in float64
 
 
 def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
-    """A passage that is not the one of the axis: the response that takes harmonics to their target, or their band."""
+    """Check the passage against the axis: the response that takes harmonics to their target, or their band."""
     stated, resonance = axis.certificate.shaped, axis.drive.resonance
     if (stated is None) != (axis.output.shaping is None):
         return [
             "certificate.shaped is there, and the output does not shape" if stated else "certificate.shaped is missing"
         ]
     if stated is None:
-        return []
+        return _wrong_response(axis, rate_hz)
     passage = stated.passage
     if resonance is None:
         band = axis.fourier.harmonics * rate_hz
@@ -32,6 +32,18 @@ def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
     return []
 
 
+def _wrong_response(axis: ManifestAxis, rate_hz: float) -> list[str]:
+    """Check the response behind which the position of an unshaped axis is judged."""
+    stated, resonance = axis.certificate.position, axis.drive.resonance
+    if stated is None or resonance is None:
+        return []
+    passage = stated.passage
+    known = passage.response is not None or (passage.frequency_hz is not None and passage.quality is not None)
+    if known and passage.band_hz is None and _follows(axis, passage, rate_hz) and _is_resonance(axis, passage):
+        return []
+    return ["certificate.position.passage is not the response that was compensated"]
+
+
 def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bool:
     """Whether what is played arrives as what the axis is to follow."""
     program, played, target = axis.program, played_series(axis), reached(axis)
@@ -39,10 +51,10 @@ def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bo
     f_hz: Floats = rate_hz * np.arange(1, axis.fourier.harmonics + 1, dtype=np.float64)
     if passage.response is not None and f_hz[-1] > passage.response.hz[-1]:
         return False
-    held = (np.array(played.a) - 1j * np.array(played.b)) * (real + 1j * imaginary)
-    arrives = np.asarray(held * passes(passage, f_hz))
-    wanted = np.array(target.a) - 1j * np.array(target.b)
-    return bool(np.max(np.abs(arrives - wanted)) <= _SAME * max(float(np.max(np.abs(wanted))), 1e-300))
+    output = (np.array(played.a) - 1j * np.array(played.b)) * (real + 1j * imaginary)
+    arrives = np.asarray(output * passes(passage, f_hz))
+    intended = np.array(target.a) - 1j * np.array(target.b)
+    return bool(np.max(np.abs(arrives - intended)) <= _SAME * max(float(np.max(np.abs(intended))), 1e-300))
 
 
 def _is_resonance(axis: ManifestAxis, passage: ManifestPassage) -> bool:

@@ -39,13 +39,13 @@ class Check:
 
 
 def first_difference(capture: Capture) -> str | None:
-    """The first tick at which anything differs, with all that was expected and got."""
-    differs = np.flatnonzero(capture.got != capture.wanted)
+    """Describe the first tick at which anything differs, with all that was expected and captured."""
+    differs = np.flatnonzero(capture.got != capture.expected)
     if not len(differs):
         return f"{capture.lost} ticks are missing or too many at the end of the capture" if capture.lost else None
     at = int(differs[0])
-    wanted, got = _sample(capture.wanted[at]), _sample(capture.got[at])
-    return f"{_where(capture, at)}\n  expected  {wanted}\n  got       {got}"
+    expected, got = _sample(capture.expected[at]), _sample(capture.got[at])
+    return f"{_where(capture, at)}\n  expected  {expected}\n  got       {got}"
 
 
 def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints]) -> list[Check]:
@@ -62,18 +62,18 @@ def _model(capture: Capture, subject: str) -> Check:
     failure = None
     worst = "0"
     if len(differs):
-        got, wanted = part(subject, capture.got), part(subject, capture.wanted)
+        got, model = part(subject, capture.got), part(subject, capture.expected)
         at = int(differs[0])
         undefined = capture.got[at] == UNDEFINED
         if subject == "markers":
-            expected, found = _markers(int(wanted[at])), _markers(int(got[at]))
+            expected, actual = _markers(int(model[at])), _markers(int(got[at]))
             worst = f"{len(differs)} differ"
         else:
-            expected, found = str(wanted[at]), str(got[at])
-            worst = str(int(np.max(np.abs(got - wanted)[capture.known], initial=0)))
+            expected, actual = str(model[at]), str(got[at])
+            worst = str(int(np.max(np.abs(got - model)[capture.known], initial=0)))
         failure = (
             f"{subject}: {len(differs)} of {len(capture.got)} ticks differ from the model, the first at "
-            f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else found}"
+            f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else actual}"
         )
     elif capture.lost:
         failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
@@ -91,15 +91,15 @@ def _shaped(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis) ->
     """Codes of the build's program against shaped ones that were worked out in another way than the model's."""
     at = np.flatnonzero(capture.own & capture.steady & capture.known)
     since = capture.since[at]
-    wanted = shaped_codes(content.program, int(np.max(since, initial=-1)) + 1)[since]
+    expected = shaped_codes(content.program, int(np.max(since, initial=-1)) + 1)[since]
     got = part(axis, capture.got)[at]
-    wrong = np.flatnonzero(got != wanted)
+    wrong = np.flatnonzero(got != expected)
     failure = None
     if len(wrong):
         first = int(wrong[0])
         failure = (
             f"{axis}: {len(wrong)} of {len(at)} shaped codes are others, the first at "
-            f"{_where(capture, int(at[first]))}: expected {wanted[first]}, got {got[first]}"
+            f"{_where(capture, int(at[first]))}: expected {expected[first]}, got {got[first]}"
         )
     return Check(axis, "shaped codes", f"{len(at)} codes", f"{len(wrong)} differ", "0", failure, exercised=len(at) > 0)
 
@@ -128,12 +128,12 @@ def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, lim
 
 
 def _slew(capture: Capture, axis: str, content: ManifestAxis) -> Check:
-    """The slew guard on every tick, whatever plays; exercised where the model held codes back, up and down."""
+    """Check the slew guard on every tick; exercised where the model limited codes, up and down."""
     known = capture.known
     steps, most = np.diff(part(axis, capture.got)), capture.limits(axis, "max_step")[1:]
     beyond = np.flatnonzero((np.abs(steps) > most) & known[1:] & known[:-1])
     # A program of the build takes no step as large as its guard; one that is held back takes nothing else.
-    model = np.diff(part(axis, capture.wanted))
+    model = np.diff(part(axis, capture.expected))
     up, down = (int(np.sum((model == sign * most) & (most > 0))) for sign in (1, -1))
     failure = None
     if len(beyond):
@@ -147,11 +147,11 @@ def _slew(capture: Capture, axis: str, content: ManifestAxis) -> Check:
 
 def _clamp(capture: Capture, axis: str) -> Check:
     """No code leaves the limits of its program; exercised where the model clamps on both sides."""
-    codes, model = part(axis, capture.got), part(axis, capture.wanted)
+    codes, model = part(axis, capture.got), part(axis, capture.expected)
     low, high = capture.limits(axis, "code_min"), capture.limits(axis, "code_max")
     steady = capture.steady & capture.known
     outside = np.flatnonzero(((codes < low) | (codes > high)) & steady)
-    clamps = part("faults", capture.wanted) >> FAULTS.index("clamp") & 1 > 0
+    clamps = part("faults", capture.expected) >> FAULTS.index("clamp") & 1 > 0
     below, above = (int(np.sum((model == limit) & steady & clamps)) for limit in (low, high))
     failure = None
     if len(outside):
@@ -166,7 +166,7 @@ def _clamp(capture: Capture, axis: str) -> Check:
 
 
 def check_no_faults(capture: Capture) -> Check:
-    """The program of the build raises no fault."""
+    """Check that the program of the build raises no fault."""
     flags = part("faults", capture.got)
     wrong = np.flatnonzero((flags != 0) & capture.own)
     failure = None
@@ -179,74 +179,84 @@ def check_no_faults(capture: Capture) -> Check:
 
 def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Check:
     """Faults on purpose equal the model's, tick for tick, and so do their ``counted`` numbers at the end."""
-    wanted, wrong = part("faults", capture.wanted), differing("faults", capture)
+    expected, wrong = part("faults", capture.expected), differing("faults", capture)
     failure = None
     if len(wrong):
         got, at = part("faults", capture.got), int(wrong[0])
         failure = (
-            f"faults: {len(wrong)} of {len(wanted)} ticks differ from the model, the first at "
-            f"{_where(capture, at)}: expected {_raised(int(wanted[at]))}, got {_raised(int(got[at]))}"
+            f"faults: {len(wrong)} of {len(expected)} ticks differ from the model, the first at "
+            f"{_where(capture, at)}: expected {_raised(int(expected[at]))}, got {_raised(int(got[at]))}"
         )
     elif counted != counts:
         failure = f"faults: expected are {_counts(counts)}; counted are {_counts(counted)}"
-    seen = [name for bit, name in enumerate(FAULTS) if np.any(wanted & 1 << bit)]
+    seen = [name for bit, name in enumerate(FAULTS) if np.any(expected & 1 << bit)]
     return Check(
-        "faults", "integer model", f"{len(wanted)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
+        "faults", "integer model", f"{len(expected)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
     )
 
 
 def check_states(
-    wanted: list[tuple[str, StoredState]], got: list[StoredState], most_counted: int, untold: tuple[str, ...] = ()
+    model_states: list[tuple[str, StoredState]], got: list[StoredState], most_counted: int, untold: tuple[str, ...] = ()
 ) -> Check:
-    """What the device says of itself after each request; it does not tell what is ``untold``."""
+    """Check the status that the device reports after each request; fields in ``untold`` are not reported."""
     wrong = []
-    for (when, state), found in zip(wanted, got, strict=False):
-        right, found = state.limited(most_counted, untold), found.limited(most_counted, untold)
-        if right == found:
+    for (when, state), state_read in zip(model_states, got, strict=False):
+        right, state_read = state.limited(most_counted, untold), state_read.limited(most_counted, untold)
+        if right == state_read:
             continue
-        expected, told = (_told(one) for one in (right, found))
-        different = [(mine, other) for mine, other in zip(expected, told, strict=True) if mine != other]
+        expected, actual = (_state_lines(one) for one in (right, state_read))
+        different = [(mine, other) for mine, other in zip(expected, actual, strict=True) if mine != other]
         texts = (", ".join(pair[side] for pair in different) for side in (0, 1))
         wrong.append("requests: {}: expected {}; got {}".format(when, *texts))
-    if len(got) != len(wanted):
-        wrong.append(f"requests: {len(got)} states were stored in place of {len(wanted)}")
-    compared = f"{len(wanted)} states"
+    if len(got) != len(model_states):
+        wrong.append(f"requests: {len(got)} states were stored in place of {len(model_states)}")
+    compared = f"{len(model_states)} states"
     return Check("requests", "integer model", compared, f"{len(wrong)} differ", "0", wrong[0] if wrong else None)
 
 
-def _told(state: StoredState) -> list[str]:
+def _state_lines(state: StoredState) -> list[str]:
     flags = [name if flag else f"not {name}" for name, flag in zip(STATES, state.flags, strict=True)]
-    held = Sample.of(state.outputs)
-    outputs = [f"x {held.x}", f"y {held.y}", f"markers {' '.join(held.flags) or 'none'}"]
+    sample = Sample.of(state.outputs)
+    outputs = [f"x {sample.x}", f"y {sample.y}", f"markers {' '.join(sample.flags) or 'none'}"]
     return [*flags, f"faults {_raised(state.faults)}", *_counts(list(state.counts)).split(", "), *outputs]
 
 
 def _converter(capture: Capture, axis: str, content: ManifestAxis, words: Ints) -> Check:
-    """What the converter is sent: coding and alignment of the model's codes."""
-    wanted = coded(part(axis, capture.wanted), content)
-    words = words[: len(wanted)]
-    differs = np.flatnonzero(words != wanted[: len(words)])
+    """Check the words sent to the converter: coding and alignment of the model's codes."""
+    expected = coded(part(axis, capture.expected), content)
+    words = words[: len(expected)]
+    differs = np.flatnonzero(words != expected[: len(words)])
     failure = None
     if len(differs):
         at = int(differs[0])
         failure = (
             f"{axis}: {len(differs)} of {len(words)} converter words differ from the model's, the first at "
-            f"{_where(capture, at)}: expected 0x{wanted[at]:x}, got 0x{words[at]:x}"
+            f"{_where(capture, at)}: expected 0x{expected[at]:x}, got 0x{words[at]:x}"
         )
-    elif len(words) < len(wanted):
-        failure = f"{axis}: {len(words)} converter words came in place of {len(wanted)}"
+    elif len(words) < len(expected):
+        failure = f"{axis}: {len(words)} converter words came in place of {len(expected)}"
     return Check(axis, "converter word", f"{len(words)} words", f"{len(differs)} differ", "0", failure)
 
 
 def coded(codes: Ints, content: ManifestAxis) -> Ints:
-    """Converter words of codes, by the coding and the alignment that the manifest has."""
+    """Return the converter words of codes, by the manifest's coding and alignment.
+
+    Parameters
+    ----------
+    codes
+        Codes in LSB, any shape.
+
+    Returns
+    -------
+    Words of the same shape.
+    """
     output = content.program.output
     return output.word(codes)
 
 
 def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], least: int) -> Check:
     """Words that a serial converter got, by the number of their sample, at least so many."""
-    x, y = (coded(part(axis, capture.wanted), content) for axis, content in stored.axes)
+    x, y = (coded(part(axis, capture.expected), content) for axis, content in stored.axes)
     numbers = [number for number in sent if number < len(x)]
     wrong = [number for number in numbers if sent[number] != int(y[number]) << 32 | int(x[number])]
     failure = None
@@ -286,13 +296,13 @@ def check_outputs(results: Mapping[str, tuple[int, int, int]]) -> list[Check]:
 
 def check_whole(subject: str, capture: Capture, how: str) -> Check:
     """Codes, markers and faults of all ticks at once."""
-    differs = np.flatnonzero(capture.got != capture.wanted)
+    differs = np.flatnonzero(capture.got != capture.expected)
     failure = None
     if len(differs):
         at = int(differs[0])
         failure = (
             f"{subject}: {len(differs)} of {len(capture.got)} ticks differ from the model, the first at "
-            f"{_where(capture, at)}:\n  expected  {_sample(capture.wanted[at])}\n  got       "
+            f"{_where(capture, at)}:\n  expected  {_sample(capture.expected[at])}\n  got       "
             f"{_sample(capture.got[at])}"
         )
     elif capture.lost:
@@ -302,8 +312,8 @@ def check_whole(subject: str, capture: Capture, how: str) -> Check:
 
 
 def check_filled(capture: Capture, states: Check, counted: list[int], counts: list[int]) -> Check:
-    """The same session played many ticks at a time: codes and markers; of faults how many there were, and states."""
-    check = check_whole("fill", _with(capture, without_faults(capture.got), without_faults(capture.wanted)), "")
+    """Check the session played many ticks a call: codes, markers, states, and the number of faults."""
+    check = check_whole("fill", _with(capture, without_faults(capture.got), without_faults(capture.expected)), "")
     failure = check.failure
     if failure is None and counted != counts:
         failure = f"fill: faults expected are {_counts(counts)}; counted are {_counts(counted)}"
@@ -312,8 +322,8 @@ def check_filled(capture: Capture, states: Check, counted: list[int], counts: li
     return Check(check.subject, check.against, check.compared, check.worst, check.limit, failure)
 
 
-def _with(capture: Capture, got: Any, wanted: Any) -> Capture:
-    return replace(capture, got=got, wanted=wanted)
+def _with(capture: Capture, got: Any, expected: Any) -> Capture:
+    return replace(capture, got=got, expected=expected)
 
 
 def _raised(flags: int) -> str:
@@ -325,7 +335,7 @@ def _counts(counted: list[int]) -> str:
 
 
 def check_timing(capture: Capture, status: Mapping[str, Any]) -> Check:
-    """A strobe for every tick, always as many clocks after it."""
+    """Check that every tick has a strobe, always as many clocks after it."""
     jitter, ticks, strobes = (int(status[key]) for key in ("jitter", "ticks", "strobes"))
     failure = None
     if jitter or ticks != strobes or capture.lost:

@@ -69,7 +69,7 @@ class WaveformBranch:
 
     @classmethod
     def of(cls, axis: ManifestAxis, side: str) -> "WaveformBranch":
-        """What the piezo is to follow, less a layer: what the operator found."""
+        """Return the waveform that the piezo is to follow, less a layer: the output of the operator."""
         waveform, layer = followed(axis), axis.fourier.refinement
         if layer is not None:
             a, b = (np.subtract(one, other).tolist() for one, other in ((waveform.a, layer.a), (waveform.b, layer.b)))
@@ -111,7 +111,7 @@ _EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
 
 
 def knows(model: str) -> bool:
-    """Whether the scaling errors of this model can be worked out here; those of installed packages cannot.
+    """Test whether the scaling errors of this model can be computed here; those of installed packages cannot.
 
     Raises ``ValueError`` for a model that nobody has: no build states it.
     """
@@ -122,6 +122,11 @@ def knows(model: str) -> bool:
     if not entry_points(group="tablegen.models", name=model):
         raise ValueError(f"drive.model is {shortened(repr(model))}, which neither tablegen nor a package here has")
     return False
+
+
+def law(branch: ManifestBranch, model: str) -> ModelBranch | None:
+    """Return the branch of an equation that is known here; None of another model."""
+    return ModelBranch.of(branch, model) if model in _EQUATIONS else None
 
 
 def _branch(axis: ManifestAxis, side: str) -> ModelBranch | WaveformBranch:
@@ -146,7 +151,7 @@ def _times(series: ManifestSeries, real: Floats, imaginary: Floats) -> ManifestS
 
 
 def followed(axis: ManifestAxis) -> ManifestSeries:
-    """What the piezo is to follow: stated, or what arrives where there are no dynamics."""
+    """Return the series that the piezo is to follow: stated, or what arrives if there are no dynamics."""
     if axis.fourier.target is not None:
         return axis.fourier.target
     program = axis.program
@@ -155,42 +160,42 @@ def followed(axis: ManifestAxis) -> ManifestSeries:
 
 
 def peak_acceleration(axis: ManifestAxis) -> float:
-    """max |w''| of what the piezo is to follow, per period squared."""
+    """Return max abs(w'') of the series that the piezo is to follow, per period squared."""
     return float(np.max(np.abs(on_grid(followed(axis), _ACCELERATION_POINTS * axis.fourier.harmonics, 2))))
 
 
 def reached(axis: ManifestAxis) -> ManifestSeries:
-    """What it does follow: the same less what the boost limit held back."""
+    """Return the series that the piezo follows: the intended one less what the boost limit removed."""
     target = followed(axis)
     factor = np.ones(len(target.a))
-    for harmonic, left in zip(axis.fourier.held_harmonics, axis.fourier.held_factors, strict=True):
-        factor[harmonic - 1] = left
+    for harmonic, share in zip(axis.fourier.held_harmonics, axis.fourier.held_factors, strict=True):
+        factor[harmonic - 1] = share
     return _times(target, factor, np.zeros(len(factor)))
 
 
 def scaling_figures(
     axis: ManifestAxis, period: PlayedPeriod, shaped: ShapedPlay | None = None
 ) -> dict[str, dict[str, float]]:
-    """The parts of the scaling error of each direction that is imaged, in percent; none of an axis at rest.
+    """Return the parts of the scaling error of each imaged direction, in percent; none of a static axis.
 
-    Of a shaped axis they are those of its position, the worst of what was judged; without what cannot be known of it.
+    For a shaped axis they are those of its position, the worst of what was judged, without the unknown parts.
     """
     if axis.resting:
         return {}
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
-    found = {side: _direction(axis, [period], side) for side in sides}
+    parts = {side: _direction(axis, [period], side) for side in sides}
     if shaped is None or not shaped.is_whole:
-        return found
+        return parts
     if shaped.position_errors is None:
         return {
-            side: {name: one[name] for name in one.keys() - {"total", "quantisation"}} for side, one in found.items()
+            side: {name: one[name] for name in one.keys() - {"total", "quantisation"}} for side, one in parts.items()
         }
     every: list[PlayedPeriod | PositionErrors] = [PositionErrors(period, errors) for errors in shaped.position_errors]
     return {side: _direction(axis, every, side) for side in sides}
 
 
 def rounded_scaling(axis: ManifestAxis, period: PlayedPeriod, shaped: ShapedPlay) -> dict[str, float] | None:
-    """The total of each direction without shaping; None where it cannot be known."""
+    """Return the total of each direction without shaping; None where it cannot be computed."""
     if not shaped.is_whole or axis.resting:
         return {}
     if shaped.rounded_errors is None:
@@ -198,6 +203,18 @@ def rounded_scaling(axis: ManifestAxis, period: PlayedPeriod, shaped: ShapedPlay
     every: list[PlayedPeriod | PositionErrors] = [PositionErrors(period, errors) for errors in shaped.rounded_errors]
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
     return {side: _direction(axis, every, side)["total"] for side in sides}
+
+
+def position_scaling(axis: ManifestAxis, period: PlayedPeriod, errors: Floats) -> dict[str, float]:
+    """Return the total of each direction from the errors of the position.
+
+    Parameters
+    ----------
+    errors
+        Errors of the position in LSB at every tick, shape (ticks,).
+    """
+    sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
+    return {side: _direction(axis, [PositionErrors(period, errors)], side)["total"] for side in sides}
 
 
 class PositionErrors:
@@ -214,24 +231,24 @@ class PositionErrors:
 
 
 def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None:
-    """What the layer moves in each direction, in percent; None without a layer."""
+    """Return what the refinement layer moves in each direction, in percent; None without a layer."""
     layer = axis.fourier.refinement
     if layer is None:
         return None
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
-    found = {}
+    figures = {}
     for side in sides:
         branch, position, sweep, times = _sweep(axis, side)
         moved = at(layer, times) / branch.slope(sweep)
-        found[side] = {
+        figures[side] = {
             "position": 100.0 * float(np.max(np.abs(moved))),
             "scaling": _peak_to_peak(np.gradient(moved, position)),
         }
-    return found
+    return figures
 
 
 def _sweep(axis: ManifestAxis, side: str) -> tuple[ModelBranch | WaveformBranch, Floats, Floats, Floats]:
-    """The branch of a direction; positions over its window, where its sweep is there, and when."""
+    """Return the branch of a direction, positions over its window, the sweep's position there, and its times."""
     turn, (low, high) = axis.drive.turn, axis.fourier.window
     position = np.linspace(low, high, _POINTS[0] * axis.fourier.harmonics + _POINTS[1])
     branch = _branch(axis, side)

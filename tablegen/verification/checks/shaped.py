@@ -35,7 +35,7 @@ def code_excess(axis: ManifestAxis) -> float:
 
 
 def shaped_codes(program: Program, count: int) -> Ints:
-    """The first codes of a shaped program since it began, (count,), within its limits."""
+    """Return the first codes of a shaped program since it began, within its limits: shape (count,)."""
     output = program.output
     bits = _CODE_AND_REMAINDER_BITS - output.dac_bits
     half = 1 << (bits - 1)
@@ -45,15 +45,15 @@ def shaped_codes(program: Program, count: int) -> Ints:
     value = np.resize(((exact + (1 << (output.gain_q - 1))) >> (output.gain_q - bits)) - half, count)
     order = output.shaping.order
     if order == 3:
-        left = _carried(value, half, output.shaping.zero)
+        residue = _carried(value, half, output.shaping.zero)
     else:
-        left = value
+        residue = value
         for _ in range(order):
-            left = np.cumsum(left)  # wraps at 2^64, a multiple of every code
-        left = (left + half & 2 * half - 1) - half
-    e1, e2, e3 = (np.concatenate([np.zeros(by, dtype=np.int64), left])[:count] for by in (1, 2, 3))
+            residue = np.cumsum(residue)  # wraps at 2^64, a multiple of every code
+        residue = (residue + half & 2 * half - 1) - half
+    e1, e2, e3 = (np.concatenate([np.zeros(by, dtype=np.int64), residue])[:count] for by in (1, 2, 3))
     fed = {1: e1, 2: 2 * e1 - e2}.get(order, e1 - e2 + e3 + output.shaping.zero * (e1 - e2) // 64)
-    codes: Ints = np.clip((value + fed - left) // (2 * half), output.code_min, output.code_max)
+    codes: Ints = np.clip((value + fed - residue) // (2 * half), output.code_min, output.code_max)
     return codes
 
 
@@ -67,15 +67,15 @@ def _carried(value: Ints, half: int, zero: int) -> Ints:
 
 
 class ShapedPlay:
-    """The periods of a shaped axis that a certificate judges; ``asked`` are unrounded codes, one a tick of a period."""
+    """The periods of a shaped axis that a certificate judges; ``intended`` are unrounded codes, one a tick."""
 
-    def __init__(self, axis: ManifestAxis, asked: Floats, update_rate_hz: float) -> None:
+    def __init__(self, axis: ManifestAxis, intended: Floats, update_rate_hz: float) -> None:
         self.axis, self._rate_hz = axis, update_rate_hz
         program = axis.program
         ticks = min(program.ticks, MOST_TICKS)
         self.is_whole = ticks == program.ticks
         periods = max(1, min(_PERIODS, _SEVERAL_TICKS // ticks))
-        self._asked = asked
+        self._intended = intended
         self._shaped = shaped_codes(program, periods * ticks).reshape(periods, ticks)
         self._rounded = np.tile(program.rounded.codes(np.arange(ticks, dtype=np.int64)), (periods, 1))
         self._first = min(periods - 1, 1)
@@ -88,7 +88,7 @@ class ShapedPlay:
     @property
     def code_errors(self) -> Floats:
         """Those of these codes, (ticks,)."""
-        return np.asarray((self._shaped - self._asked)[self._first :].reshape(-1))
+        return np.asarray((self._shaped - self._intended)[self._first :].reshape(-1))
 
     @cached_property
     def position_errors(self) -> Floats | None:
@@ -104,7 +104,7 @@ class ShapedPlay:
         stated = self.axis.certificate.shaped
         if stated is None:
             return None
-        errors = (codes - self._asked).reshape(-1)
+        errors = (codes - self._intended).reshape(-1)
         size = 2
         while size < 2 * len(errors):
             size *= 2
@@ -113,9 +113,9 @@ class ShapedPlay:
         return np.asarray(arrived[: len(errors)].reshape(codes.shape)[self._first :])
 
     def figures(self) -> dict[str, float | int | None]:
-        """The figures of shaping; those of the position where they can be known."""
+        """Return the figures of shaping; those of the position where they can be computed."""
         errors, changes, before = self.code_errors, _changes(self.codes), _changes(self._judged_rounded)
-        found: dict[str, float | int | None] = {
+        values: dict[str, float | int | None] = {
             "ticks": len(self.codes),
             "max_code_error_lsb": float(np.max(np.abs(errors))),
             "rms_code_error_lsb": float(np.sqrt(np.mean(errors**2))),
@@ -126,9 +126,9 @@ class ShapedPlay:
             "rounded.changes.mean_step": before[1],
         }
         if self.rounded_errors is not None:
-            found["rounded.max_error_lsb"] = float(np.max(np.abs(self.rounded_errors)))
-            found["rounded.rms_error_lsb"] = float(np.sqrt(np.mean(self.rounded_errors**2)))
-        return found
+            values["rounded.max_error_lsb"] = float(np.max(np.abs(self.rounded_errors)))
+            values["rounded.rms_error_lsb"] = float(np.sqrt(np.mean(self.rounded_errors**2)))
+        return values
 
     @property
     def _judged_rounded(self) -> Ints:
@@ -141,13 +141,13 @@ def _changes(codes: Ints) -> tuple[float, float]:
     return 100.0 * len(moved) / max(len(steps), 1), float(np.mean(moved)) if len(moved) else 0.0
 
 
-def told_of(stated: ManifestShaped | None) -> dict[str, float | int | None]:
-    """What a certificate states of shaping, by the names of ``figures``."""
+def stated_shaping(stated: ManifestShaped | None) -> dict[str, float | int | None]:
+    """Return what a certificate states of shaping, by the names of ``figures``."""
     if stated is None:
         return {}
-    told: dict[str, float | int | None] = {
+    figures: dict[str, float | int | None] = {
         name: getattr(stated, name) for name in ("ticks", "max_code_error_lsb", "rms_code_error_lsb", "largest_step")
     }
     for prefix, changes in (("", stated.changes), ("rounded.", stated.rounded.changes)):
-        told |= {f"{prefix}changes.{name}": getattr(changes, name) for name in ("percent", "mean_step")}
-    return told | {f"rounded.{name}": getattr(stated.rounded, name) for name in ("max_error_lsb", "rms_error_lsb")}
+        figures |= {f"{prefix}changes.{name}": getattr(changes, name) for name in ("percent", "mean_step")}
+    return figures | {f"rounded.{name}": getattr(stated.rounded, name) for name in ("max_error_lsb", "rms_error_lsb")}

@@ -25,7 +25,7 @@ class Capture:
     """
 
     got: Words
-    wanted: Words
+    expected: Words
     place: Ints
     since: Ints
     which: Ints
@@ -41,64 +41,69 @@ class Capture:
         return known
 
     def limits(self, axis: str, name: str) -> Ints:
-        """A figure of the output stage, such as max_step, of the program of each tick; 0 before the first one."""
+        """Return a figure of the output stage, such as max_step, of the program of each tick; 0 before the first.
+
+        Returns
+        -------
+        Shape (ticks,).
+        """
         figures = [0 if one is None else int(getattr(getattr(one, axis).output, name)) for one in self.programs]
         return np.array(figures, dtype=np.int64)[self.which]
 
 
 def part(subject: str, words: Words) -> Ints:
-    """A field of stored words: x, y, markers, or faults."""
+    """Return a field of captured words: x, y, markers, or faults, shape (ticks,)."""
     shift, mask = _MASK[subject]
     return (words >> np.uint64(shift) & np.uint64(mask)).view(np.int64)
 
 
 def differing(subject: str, capture: Capture) -> Ints:
-    """The ticks at which a field of what was stored is not that of the model."""
+    """Return the ticks at which a field of the captured words differs from the model, shape (errors,)."""
     shift, mask = _MASK[subject]
-    return np.flatnonzero((capture.got ^ capture.wanted) & np.uint64(mask << shift))
+    return np.flatnonzero((capture.got ^ capture.expected) & np.uint64(mask << shift))
 
 
 def without_faults(words: Words) -> Words:
-    """Stored words whose faults are none."""
-    kept: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
-    return kept
+    """Return captured words with their faults cleared, shape (ticks,)."""
+    cleared: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
+    return cleared
 
 
 def recaptured(capture: Capture, got: Words) -> Capture | None:
-    """The same session played once more, where as much came of it as before."""
+    """Return a second capture of the same session, if it has as many ticks as the first; else None."""
     return None if capture.lost or len(got) != len(capture.got) else replace(capture, got=got)
 
 
 def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
     """Line capture and model up."""
-    wanted = np.array(script.expected, dtype=np.uint64)
-    playing, frame = (wanted & np.uint64(1 << 48 + FLAGS.index(name)) != 0 for name in ("playing", "frame"))
-    index = np.arange(len(wanted))
+    model = np.array(script.expected, dtype=np.uint64)
+    playing, frame = (model & np.uint64(1 << 48 + FLAGS.index(name)) != 0 for name in ("playing", "frame"))
+    index = np.arange(len(model))
     place = np.where(playing, index - np.maximum.accumulate(np.where(frame, index, -1)), -1)
     firsts = [first for first, _ in script.programs]
     programs = tuple(program for _, program in script.programs)
     which = np.searchsorted(firsts, index, side="right") - 1
-    steady = np.zeros(len(wanted), dtype=np.bool_)
-    own = np.zeros(len(wanted), dtype=np.bool_)
-    since = np.zeros(len(wanted), dtype=np.int64)
-    for number, (first, stop) in enumerate(zip(firsts, [*firsts[1:], len(wanted)], strict=True)):
+    steady = np.zeros(len(model), dtype=np.bool_)
+    own = np.zeros(len(model), dtype=np.bool_)
+    since = np.zeros(len(model), dtype=np.int64)
+    for number, (first, stop) in enumerate(zip(firsts, [*firsts[1:], len(model)], strict=True)):
         program = programs[number]
         if program is None:
             continue
         own[first:stop] = program is stored.program
         since[first:stop] = _since_begin(program, place[first:stop])
-        steady[first:stop] = _caught_up(program, place[first:stop], since[first:stop], wanted[first:stop])
-    length = min(len(wanted), len(got))
+        steady[first:stop] = _caught_up(program, place[first:stop], since[first:stop], model[first:stop])
+    length = min(len(model), len(got))
     return Capture(
         got[:length],
-        wanted[:length],
+        model[:length],
         place[:length],
         since[:length],
         which[:length],
         steady[:length],
         own[:length],
         programs,
-        abs(len(wanted) - len(got)),
+        abs(len(model) - len(got)),
     )
 
 
@@ -110,18 +115,18 @@ def _since_begin(program: DualProgram, place: Ints) -> Ints:
     return index - np.maximum.accumulate(np.where(begins, index, 0))
 
 
-def _caught_up(program: DualProgram, place: Ints, since: Ints, wanted: Words) -> Bools:
+def _caught_up(program: DualProgram, place: Ints, since: Ints, model: Words) -> Bools:
     """Where the codes of the model had caught up with one program."""
     reached = place >= 0
     for axis, one in (("x", program.x), ("y", program.y)):
-        reached[reached] = _codes(one, place[reached], since[reached]) == part(axis, wanted)[reached]
+        reached[reached] = _codes(one, place[reached], since[reached]) == part(axis, model)[reached]
     index = np.arange(len(place))
     # Caught up is for good: one right tick since the program began, this one included, is enough.
     return (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= index - since)
 
 
 def _codes(program: Program, place: Ints, since: Ints) -> Ints:
-    """The codes at ticks of a frame, and since the program began."""
+    """Return the codes at ticks of a frame, and since the program began."""
     if not program.output.shaping.order:
         if len(place) > program.ticks:  # every code of a period once
             return program.codes(np.arange(program.ticks, dtype=np.int64))[place % program.ticks]

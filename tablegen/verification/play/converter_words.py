@@ -14,16 +14,16 @@ def packed(words: Words, stored: StoredBuild) -> Words:
     packed = np.empty(len(words) // 2, dtype=np.uint64)
     for first in range(0, len(packed), _CHUNK_TICKS):
         chunk = slice(2 * first, 2 * (first + _CHUNK_TICKS))
-        sent, told = words[: 2 * len(packed)][chunk].reshape(-1, 2).T
+        sent, flags = words[: 2 * len(packed)][chunk].reshape(-1, 2).T
         x = codes_of(sent & np.uint64(0xFFFFFFFF), stored.program.x.output)
         y = codes_of(sent >> np.uint64(32), stored.program.y.output)
-        told = (told & np.uint64(0xFFFF)) << np.uint64(48)  # faults above markers
-        packed[first : first + _CHUNK_TICKS] = told | y << np.uint64(24) | x
+        flags = (flags & np.uint64(0xFFFF)) << np.uint64(48)  # faults above markers
+        packed[first : first + _CHUNK_TICKS] = flags | y << np.uint64(24) | x
     return packed
 
 
 def codes_of(words: Words, output: Output) -> Words:
-    """The codes in converter words, by the coding that the manifest has."""
+    """Decode converter words by the manifest's coding; shape (ticks,) in and out."""
     shift = output.word_bits - output.dac_bits if output.align == "left" else 0
     flip = 1 << (output.dac_bits - 1) if output.coding == "twos-complement" else 0
     codes: Words = (words >> np.uint64(shift) ^ np.uint64(flip)) & np.uint64(0xFFFFFF)

@@ -26,7 +26,7 @@ class Placement:
     spline: bool = False
 
     def playing(self, program: DualProgram) -> "Placement":
-        """The same with what a program needs."""
+        """Return this placement with what a program needs."""
         axes = (program.x, program.y)
         shaping = max(axis.output.shaping.order for axis in axes)
         return replace(self, shaping=shaping, spline=any(axis.mode == "cubic" for axis in axes))

@@ -41,7 +41,7 @@ class Requests:
         self._refused_commits()
         self._refusals()
         self._clamps()
-        self._held_back()
+        self._slew_limited()
         self._swaps()
         if not self._in_c and self.loader.has_long_tables:
             self._wide_registers()
@@ -68,7 +68,7 @@ class Requests:
         self._ticks(_RESTING_TICKS)
 
     def _without_a_program(self) -> None:
-        """The codes of power-up hold, and there is nothing to start or to commit."""
+        """Request a start and a commit while there is no program: the codes of power-up hold."""
         self.script.commit_unfit()
         self._ticks(_RESTING_TICKS)
         self._rest("at power-up")
@@ -81,7 +81,7 @@ class Requests:
         self._ticks(1)
 
     def _first_program(self) -> DualProgram:
-        """It starts with the tick that takes it, and parks while its codes are on their way."""
+        """Load the first program, which starts with the tick that takes it and parks while codes are under way."""
         script = self.script
         program = self.loader.load("free")
         script.come_to_rest()
@@ -97,7 +97,7 @@ class Requests:
         return program
 
     def _with_next_tick(self, *names: str, frames: int = 0) -> None:
-        """Requests on the clock of the first tick after a rest, once a commit came through."""
+        """Put requests on the clock of the first tick after a rest, once a commit came through."""
         script, pace = self.script, self.placement.tick_clocks
         script.wait(script.commit_clocks + 1)
         script.tick_every(pace)
@@ -183,7 +183,7 @@ class Requests:
         self._ticks(line + 7)
 
     def _refusals(self) -> None:
-        """A program that waits: writes are refused, it is withdrawn, or emptied by a reset."""
+        """Play with a pending program: writes are refused, it is withdrawn, or emptied by a reset."""
         script, loader = self.script, self.loader
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         for empties in ("withdraw", "reset"):
@@ -219,7 +219,7 @@ class Requests:
         self._ticks((line // 2 - self.script.model.tick) % line + 1)
 
     def _clamps(self) -> None:
-        """A program that clamps at both limits of both axes; faults are counted, and forgotten on request."""
+        """Play a program that clamps at both limits of both axes; faults are counted, and cleared on request."""
         script = self.script
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         program = self.loader.load("clamped")
@@ -232,8 +232,8 @@ class Requests:
             self._ticks(program.schedule.ticks)
         self._rest("with codes that clamp, after faults were cleared")
 
-    def _held_back(self) -> None:
-        """A program whose steps are too large, up and down: the guard holds them, and says so."""
+    def _slew_limited(self) -> None:
+        """Play a program whose steps are too large, up and down: the guard limits them, and reports it."""
         script = self.script
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         program = self.loader.load("held")
@@ -275,13 +275,14 @@ class Requests:
         script.request("park")
         self._ticks(1)
         self._ramp()
+        if not self._in_c:
+            self._part_of_a_program()
         program = loader.load("free")
         script.come_to_rest()
         words = program_words(program.schedule, program.x, program.y)
         outside, inside = loader.edges(words)
-        first = [words[0]]
         for address, word in outside:
-            script.write(PROGRAM, first)  # which begins a program
+            script.write(PROGRAM, words)  # after a withdrawal they count anew; the tables stay
             script.write_unfit(address, word, at_once=not self._in_c)
             script.wait(_REFUSAL_CLOCKS)
             script.state(f"with word {address} of {word:#x}", rests=True)
@@ -294,11 +295,23 @@ class Requests:
         script.request("arm", "trigger")
         self._ticks(program.schedule.ticks + 7)
 
+    def _part_of_a_program(self) -> None:
+        """Registers over the table of another program, since the last swap, are no program."""
+        script, own = self.script, self.loader.own
+        script.wait_writable()
+        script.write(PROGRAM, program_words(own.schedule, own.x, own.y))
+        script.write(Y_TABLE, own.y.words)
+        script.come_to_rest()
+        script.commit_unfit()
+        script.wait(_REFUSAL_CLOCKS)
+        script.state("with a part of a program", rests=True)
+        script.request("withdraw", "clear_faults")
+
     def _discards(self, words: list[int], address: int, word: int) -> None:
-        """What becomes of an idle program with a word that does not fit."""
+        """Check that an idle program with an invalid word is discarded."""
         script = self.script
         for discards in ("withdraw", "reset"):
-            script.write(PROGRAM, words[:1])
+            script.write(PROGRAM, words)
             script.write_unfit(address, word)
             script.write(PROGRAM, [words[address]], first=address)
             script.commit_unfit()  # a right word over a wrong one is not enough
@@ -310,7 +323,7 @@ class Requests:
             script.request("clear_faults")
 
     def _unused_addresses(self) -> None:
-        """Registers and regions that a device does not have: what is written there is ignored."""
+        """Write to registers and regions that a device does not have; it ignores them."""
         script = self.script
         for page in _UNUSED_PAGES:
             script.write(PROGRAM, [_NONSENSE] * 2, first=page + 3)
@@ -321,6 +334,7 @@ class Requests:
         """They are committed, and withdrawn again."""
         script = self.script
         for edge in inside:
+            script.write(PROGRAM, words)
             for address, word in edge.items():
                 script.write(PROGRAM, [word], first=address)
             self.loader.commit(program)  # in place of what was written: no tick will take it
@@ -367,7 +381,7 @@ class Requests:
             script.write_refused(PROGRAM, [_NONSENSE] * words, first)
 
     def _faults_of_the_clock(self) -> None:
-        """Samples that were missed, ticks that came too early: no pixel is valid until they are forgotten."""
+        """Miss samples and tick too early: no pixel is valid until the faults are cleared."""
         script = self.script
         program = self.loader.load("free")
         script.come_to_rest()
@@ -398,7 +412,7 @@ class Requests:
         self._ramp()
 
     def _missed_in_an_image(self, frame: int) -> None:
-        """A pixel that was valid is so no more once a sample after it was missed, and neither is the missed one."""
+        """Miss a sample in an image: the pixel before it becomes invalid, and so does the missed one."""
         script = self.script
         self._until_valid(frame)
         self._rest("in an image")
@@ -414,8 +428,6 @@ class Requests:
         if self._in_c:
             return
         self._until_valid(frame)
-        while not script.image_goes_on:
-            self._ticks(1)
         script.come_to_rest()
         script.missed_with_sample(self.placement.latency)
         script.state("with the sample of this clock missed")
@@ -423,9 +435,9 @@ class Requests:
         self._ticks(1)
 
     def _until_valid(self, most: int) -> None:
-        """Play until the last pixel was valid, as it is somewhere in so many ticks of a frame."""
+        """Play into valid ticks, as there are some in so many of a frame: one more may come before it rests."""
         for _ in range(most):
-            if self.script.images:
+            if self.script.images(2):
                 return
             self._ticks(1)
         raise AssertionError("a variation without an image")

@@ -22,7 +22,7 @@ class SequencerShape:
 
     @classmethod
     def of(cls, *programs: tuple[Program, Program]) -> "SequencerShape":
-        """The smallest shape that holds programs of x and y, which have to agree on modes and widths."""
+        """Return the smallest shape for programs of x and y, which have to agree on modes and widths."""
         return cls(
             programs[0][0].output.dac_bits,
             *_table(tuple(pair[0] for pair in programs)),

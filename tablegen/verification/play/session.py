@@ -50,12 +50,15 @@ def needed_ticks(program: DualProgram) -> int:
 
 
 def power_up_codes(program: DualProgram) -> tuple[int, int]:
-    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room."""
+    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room.
+
+    That of y takes longer, and ends with a step of one code.
+    """
     x, y = program.x.output, program.y.output
     top = (1 << x.dac_bits) - 1
     return (
         max(x.park_code - _POWER_UP_STEPS * x.max_step - 1, 0),
-        min(y.park_code + _POWER_UP_STEPS * y.max_step + 1, top),
+        min(y.park_code + (_POWER_UP_STEPS + 2) * y.max_step + 1, top),
     )
 
 
@@ -106,7 +109,7 @@ def make_session(
     placement: Placement,
     requests: bool = True,
 ) -> BuildSession:
-    """Requests, and then at most some ``most`` ticks of a program whose words come from ``memories``.
+    """Make requests, and then some ``most`` ticks at most of a program whose words come from ``memories``.
 
     Without memories the device has the program already, as the C of a build does, and a driver reports overruns.
     Without ``requests`` the own program alone is played. A swap in mid-frame comes at a random tick, ticks then come
@@ -152,7 +155,7 @@ def make_session(
 
 
 def _slowly(own: _Own) -> None:
-    """A start, with ticks so far apart that a serial converter gets every sample."""
+    """Play a start with ticks so far apart that a serial converter gets every sample."""
     script = own.script
     script.request("arm", "trigger")
     script.tick_every(0)
@@ -167,7 +170,7 @@ def _slowly(own: _Own) -> None:
 
 
 def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
-    """A variation in mid-frame, and the own program again; whether both came in mid-frame."""
+    """Swap to a variation in mid-frame and back; return True if both swaps came in mid-frame."""
     script = own.script
     variation = own.loader.load("free")
     script.pace(own.pace, own.pace)

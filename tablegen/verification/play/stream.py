@@ -42,13 +42,13 @@ Words = NDArray[np.uint64]
 
 
 def pack(tick: Tick) -> int:
-    """A tick as the bench captures it: faults, flags, y code, x code."""
+    """Pack a tick as the bench captures it: faults, flags, y code, x code."""
     flags = sum(1 << i for i, flag in enumerate(_flags_of(tick)) if flag)
     return tick.faults.value << 56 | flags << 48 | tick.y << 24 | tick.x
 
 
 def pack_line(ticks: LineTicks, faults: Ints) -> Words:
-    """The same for ticks of a line, all of which play, with the faults so far, shape (ticks,)."""
+    """Pack the ticks of a line, all of which play, with the faults so far: shape (ticks,)."""
     markers = {"line": ticks.line, "frame": ticks.frame, "pixel": ticks.pixel, "backward": ticks.backward}
     words = faults << _FAULTS_AT | 1 << 48 + FLAGS.index("playing") | ticks.y << 24 | ticks.x
     for name, marker in {**markers, "valid": ticks.valid}.items():
@@ -67,7 +67,7 @@ class Sample:
 
     @classmethod
     def of(cls, word: int) -> "Sample":
-        """The sample of a stored word."""
+        """Decode a captured word."""
         flags = tuple(name for i, name in enumerate(FLAGS) if word >> (48 + i) & 1)
         return cls(word & 0xFFFFFF, word >> 24 & 0xFFFFFF, flags, word >> 56 & 0xF)
 
@@ -83,7 +83,7 @@ class StoredState:
 
     @classmethod
     def of(cls, words: list[int]) -> "StoredState":
-        """The state of its stored words."""
+        """Decode the captured words of a state."""
         flags = tuple(bool(words[0] >> bit & 1) for bit in range(len(STATES)))
         counts = tuple(word >> shift & 0xFFFFFFFF for word in words[1:3] for shift in (0, 32))
         return cls(flags, words[0] >> 8 & 0xF, counts, words[3] & ~(0xFF << _FAULTS_AT))
@@ -107,7 +107,7 @@ class Script:
     commit_clocks: int = 1
     commands: list[int] = field(default_factory=list)
     expected: "array[int]" = field(default_factory=lambda: array("Q"))  # as wide as Words
-    taken: list[DualProgram] = field(default_factory=list)  # programs, one a swap
+    swapped_programs: list[DualProgram] = field(default_factory=list)  # programs, one a swap
     refused: bool = False  # a write was to be refused, and nobody has cleared that
     states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
     programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # from which tick on which one plays
@@ -143,7 +143,7 @@ class Script:
             self._pass(clocks)
 
     def with_tick(self, *names: str, frames: int = 0) -> None:
-        """Requests on the clock of the next tick."""
+        """Put requests on the clock of the next tick."""
         assert self._period, "no tick comes"
         self.wait(self._until)
         self.request(*names, frames=frames)
@@ -162,7 +162,7 @@ class Script:
         self._pass(len(words))
 
     def write_refused(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
-        """Writes that must not have an effect, since a program waits or the last one is still on its way out."""
+        """Write words that must have no effect: a program is pending, or the last one is still leaving."""
         assert not self.writable
         self.write(region, words, first)
         self.refused = True
@@ -242,7 +242,7 @@ class Script:
         self.wait(self.drain)
 
     def missed_with_sample(self, latency: int) -> None:
-        """A tick at rest, and an underrun on the clock on which its sample leaves, ``latency`` clocks after it."""
+        """Tick at rest, with an underrun on the clock on which its sample leaves, ``latency`` clocks later."""
         self.tick_every(2 * latency)
         self.wait(1)
         self.tick_every(0)
@@ -263,28 +263,22 @@ class Script:
         self.states.append((when, StoredState(flags, int(model.faults) | reported, counts, self._outputs)))
         self._command(_STATE)
 
-    @property
-    def images(self) -> bool:
-        """True if the last tick is a valid one of an image."""
-        return bool(self.expected and self.expected[-1] & _VALID)
-
-    @property
-    def image_goes_on(self) -> bool:
-        """True if the next tick will be a valid one too, while nothing else comes."""
-        ahead = copy(self.model)
-        ahead.fault_counts = dict(self.model.fault_counts)
-        return bool(ahead.step().valid)
+    def images(self, ahead: int) -> bool:
+        """Return True if the last tick is a valid one of an image, and so many after it, if nothing else comes."""
+        model = copy(self.model)
+        model.fault_counts = dict(self.model.fault_counts)
+        return bool(self.expected[-1] & _VALID) and all(model.step().valid for _ in range(ahead))
 
     @property
     def _outputs(self) -> int:
         """Codes and markers that the device holds."""
         if not self.expected:
             return self.power_up[1] << 24 | self.power_up[0]
-        held = self.expected[-1] & ~(0xFF << _FAULTS_AT)
-        return held & ~_VALID if self._faulty_after == len(self.expected) else held
+        output = self.expected[-1] & ~(0xFF << _FAULTS_AT)
+        return output & ~_VALID if self._faulty_after == len(self.expected) else output
 
     def lost_tick(self, under_way: bool) -> None:
-        """A tick that comes too early: while the last sample is ``under_way``, or reported by a driver at rest."""
+        """Tick too early: while the last sample is ``under_way``, or reported by a driver at rest."""
         assert not self._period
         self._reported["overrun"] += 1
         self._faulty_after = len(self.expected)
@@ -293,14 +287,14 @@ class Script:
         self._command(_EXTRA)
 
     def _with_reported(self, word: int) -> int:
-        """A tick of the model with the faults that the model has not."""
+        """Add the reported faults, which the model does not have, to a tick of the model."""
         for name, count in self._reported.items():
             if count:
                 word = word & ~_VALID | 1 << _FAULTS_AT + FAULTS.index(name)
         return word
 
     def text(self) -> str:
-        """The script as the bench reads it; it ends with the ticks, and what is on its way then."""
+        """Format the script for the bench; it ends with the ticks, and what is under way then."""
         if self._period:
             self.wait(self._period)  # requests act with a tick
             self.tick_every(0)
@@ -343,7 +337,7 @@ class Script:
             tick = self.model.step()
             if tick.swapped:
                 assert self.model.playing is not None
-                self.taken.append(self.model.playing)
+                self.swapped_programs.append(self.model.playing)
                 self.programs.append((len(self.expected), self.model.playing))
                 self._writable_at = self.clocks + self.drain
             self.expected.append(self._with_reported(pack(tick)))
@@ -353,7 +347,7 @@ class Script:
     @property
     def swaps(self) -> int:
         """How many programs were taken."""
-        return len(self.taken)
+        return len(self.swapped_programs)
 
     @property
     def all_counts(self) -> list[int]:
@@ -367,12 +361,12 @@ class Script:
 
 
 def read_states(words: list[int]) -> list[StoredState]:
-    """The states of their stored words, one after the other."""
+    """Read states from their captured words, one after the other."""
     return [StoredState.of(words[at : at + STATE_WORDS]) for at in range(0, len(words), STATE_WORDS)]
 
 
 def read_capture(path: Path) -> Words:
-    """The words of a capture, shape (ticks,); a word with unknown bits becomes all ones, which no tick is."""
+    """Read the words of a capture, shape (ticks,); a word with unknown bits becomes all ones, which no tick is."""
     text = path.read_text("ascii").lower()
     if "x" in text or "z" in text:
         text = re.sub(r"^.*[xz].*$", "f" * 16, text, flags=re.MULTILINE)
@@ -390,14 +384,14 @@ class Mismatch:
 
 def compare(expected: Sequence[int], capture: Words) -> Mismatch | None:
     """Every tick of a capture against the model, codes, markers and faults; None where all are equal."""
-    wanted = np.array(expected, dtype=np.uint64)
-    length = min(len(wanted), len(capture))
-    differs = np.flatnonzero(wanted[:length] != capture[:length])
-    if not len(differs) and len(wanted) == len(capture):
+    model = np.array(expected, dtype=np.uint64)
+    length = min(len(model), len(capture))
+    differs = np.flatnonzero(model[:length] != capture[:length])
+    if not len(differs) and len(model) == len(capture):
         return None
     at = int(differs[0]) if len(differs) else length
     return Mismatch(
         at,
-        Sample.of(int(wanted[at])) if at < len(wanted) else None,
+        Sample.of(int(model[at])) if at < len(model) else None,
         Sample.of(int(capture[at])) if at < len(capture) else None,
     )

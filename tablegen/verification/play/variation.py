@@ -32,16 +32,22 @@ _ZERO = 45  # of a shaping of order 3: no power of 2
 
 
 def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualProgram:
-    """A program for the device of ``own`` whose tables are those of a bank, 0 or 1; lines ``longer`` by so many ticks.
+    """Vary a program for the device of ``own``: tables of a bank, 0 or 1, lines ``longer`` by so many ticks.
 
     A ``free`` one neither clamps nor is held back, and images both ways. A ``clamped`` one is held at both limits of
-    both axes, a ``held`` one by the slew guard, up and down; it steps y once a line. For a device that shapes, they
+    both axes, a ``held`` one by the slew guard, up and down. ``held`` ones step y once a line, and so does the
+    ``clamped`` one of bank 1, whose two lines are the largest step of a phase. For a device that shapes, they
     have all orders that it has.
     """
     x_words = _room(own.x)
     ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
     lines = min({"free": 3, "clamped": 2, "held": 4}[kind], _room(own.y))
-    steps = kind == "held" or (kind == "free" and longer > 0) or lines * ticks > _room(own.y)
+    steps = (
+        kind == "held"
+        or (kind == "clamped" and bank == 1)
+        or (kind == "free" and longer > 0)
+        or lines * ticks > _room(own.y)
+    )
     schedule = _schedule(kind, bank, ticks, lines)
     y_phase, hold = RationalPhase(lines if steps else lines * ticks), ticks if steps else 1
     highest = max(own.x.output.shaping.order, own.y.output.shaping.order)
@@ -141,24 +147,24 @@ def _words(own: Program, advances: int, bank: int) -> Ints:
 
 
 def _lifted_words(own: Program) -> float:
-    """The amplitude in words of a table whose gain is ``_LIFTING_GAIN``."""
+    """Return the amplitude in words of a table whose gain is ``_LIFTING_GAIN``."""
     gain, _ = _gain(own.output, 0)
     return gain * _PEAK * (1 << (own.bits - 1)) / _LIFTING_GAIN
 
 
 def _is_lifted(own: Program) -> bool:
-    """True if the table has words enough for a variation whose offset is negative."""
+    """Test whether the table has words enough for a variation whose offset is negative."""
     lifted = -_lift(own) / (1 << (own.bits - 1))  # share of the converter's range, since the gain is almost 2
     return _lifted_words(own) >= _LEAST_CODES and own.output.park_code < (lifted - 0.1) * (1 << own.output.dac_bits)
 
 
 def _lift(own: Program) -> int:
-    """The mean of words that a negative gain lifts far above the park code: only a negative offset takes them back."""
+    """Return the mean of words that a negative gain lifts so far that only a negative offset takes them back."""
     return ceil(_lifted_words(own)) + 2 - (1 << (own.bits - 1))
 
 
 def _gain(output: Output, room: int) -> tuple[int, int]:
-    """A gain whose codes are few steps of the build away from its park code, and the code in their middle.
+    """Choose a gain whose codes are few steps of the build from its park code; return it and their middle.
 
     At least ``room`` codes are left to the converter's ends.
     """

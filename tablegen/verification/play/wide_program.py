@@ -31,7 +31,7 @@ class WideProgram:
 
 
 def wide_program(part: Part, like: DualProgram) -> WideProgram:
-    """A program like another one whose line, or whose frame, is as long as can be."""
+    """Return a program like another one whose line, or whose frame, is as long as can be."""
     schedule = like.schedule
     if part == "line":
         ticks, lines, whole = _MODEL_TICKS, 2, Window(_FIRST, _MODEL_TICKS - _FIRST)
@@ -53,6 +53,6 @@ def wide_program(part: Part, like: DualProgram) -> WideProgram:
 
 
 def _longer(like: Program, phase: RationalPhase, hold: int) -> Program:
-    """An axis of another period whose guard takes half of the converter's codes in a step: the highest bit of it."""
+    """Return an axis of another period whose guard allows half of the converter's codes in a step (highest bit)."""
     output = like.output
     return replace(like, phase=phase, hold=hold, output=replace(output, max_step=1 << (output.dac_bits - 1)))

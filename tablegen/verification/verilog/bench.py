@@ -16,7 +16,8 @@ from tablegen.verification.play.stream import Words, read_capture
 
 TOP = "verify_bench"
 WORDS, WIRES, STATES, CONSTANTS = "words.hex", "wires.hex", "states.hex", "constants.txt"  # in the folder of a bench
-OUTPUTS, BOOT_PROGRAM, BOOT_WORDS = "outputs.txt", "boot_program.hex", "boot_words.hex"
+OUTPUTS = "outputs.txt"
+BOOT = {"BOOT_PROGRAM": "boot_program.hex", "BOOT_X": "boot_x.hex", "BOOT_Y": "boot_y.hex"}
 OUTPUT_BENCH = Path(str(files("tablegen.verification.verilog"))) / "output_bench.v"
 SPACING_CLOCKS = 200  # a strobe so long after the one before it is sent on the wires
 COUNT_BITS = 8  # of a fault counter: few enough that it ends at its largest number
@@ -29,8 +30,8 @@ _MODULE = """\
 
 module verify_bench #(
     parameter SCRIPT = "", parameter CAPTURE = "", parameter STATES = "", parameter WORDS = "", parameter WIRES = "",
-    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_WORDS = "",
-    parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
+    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
+    parameter BOOT_Y = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
     parameter LOW_AREA = 0, parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "",
     parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
 );
@@ -121,7 +122,7 @@ module verify_bench #(
             end
 
             // What stands beside the sequencer, with the options that this build does not use.
-            output_bench #(.RESULTS(OUTPUTS), .PROGRAM_FILE(BOOT_PROGRAM), .WORDS_FILE(BOOT_WORDS)) outputs ();
+            output_bench #(.RESULTS(OUTPUTS), .PROGRAM_FILE(BOOT_PROGRAM), .X_FILE(BOOT_X), .Y_FILE(BOOT_Y)) outputs ();
         end
     endgenerate
 endmodule
@@ -130,16 +131,16 @@ endmodule
 """
 
 
-def wanted_constants(content: Content) -> dict[str, str]:
-    """The constants of the header as the bench writes them."""
+def expected_constants(content: Content) -> dict[str, str]:
+    """Return the constants of the header as the bench writes them."""
     numbers = {name: str(value) for name, value in scan_constants(content).items()}
     return {"HASH": content.hash, **numbers}
 
 
 def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
-    """The module for the header of a build; ``index_bits`` are those of the memories of x and y."""
+    """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y."""
     name = content.name.upper()
-    formats = {key: "%h" if key == "HASH" else "%0d" for key in wanted_constants(content)}
+    formats = {key: "%h" if key == "HASH" else "%0d" for key in expected_constants(content)}
     lines = [f'        $fwrite(constants, "{how}\\n", {name}_{key});' for key, how in formats.items()]
     return _MODULE.format(
         header=f"{content.name}.vh",
@@ -153,9 +154,9 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
 
 
 def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, int | str]:
-    """The files that the bench reads and writes in the folder of its run; words and wires only with ``converters``.
+    """Return the files of the bench, in the folder of its run; words and wires only with ``converters``.
 
-    They are named from the folder in which the model runs, so that the model is the same wherever that is.
+    Their names are relative to the folder in which the model runs, so that the same model serves every folder.
     """
     names = {
         "SCRIPT": script,
@@ -165,21 +166,21 @@ def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, i
         "WIRES": WIRES,
         "CONSTANTS": CONSTANTS,
     }
-    names |= {"OUTPUTS": OUTPUTS, "BOOT_PROGRAM": BOOT_PROGRAM, "BOOT_WORDS": BOOT_WORDS}
+    names |= {"OUTPUTS": OUTPUTS, **BOOT}
     paths: dict[str, int | str] = {key: f"../{name}" for key, name in names.items()}
     return {**paths, "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
 
 
 def write_boot_files(folder: Path) -> None:
-    """Memory files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and 9 of 16."""
+    """Memory files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and twice 9 of 16."""
     random = np.random.default_rng(1)
-    for name, count, bits in ((BOOT_PROGRAM, 48, 32), (BOOT_WORDS, 9, 16)):
+    for name, (count, bits) in zip(BOOT.values(), ((48, 32), (9, 16), (9, 16)), strict=True):
         words = random.integers(0, 1 << bits, count)
         (folder / name).write_text("".join(f"{word:0{bits // 4}x}\n" for word in words), "ascii")
 
 
 def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
-    """What came of each module beside the sequencer: what it did, what it lost on purpose, and wrong clocks."""
+    """Read the outputs of each module beside the sequencer: samples, deliberate losses, and wrong clocks."""
     lines = (folder / OUTPUTS).read_text("ascii", "replace").splitlines()
     rows = [line.split() for line in lines]
     return {
@@ -188,14 +189,14 @@ def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:
-    """What the simulator reads in the header otherwise than the manifest has it."""
-    wanted = wanted_constants(content)
-    found = (folder / CONSTANTS).read_text("ascii", "replace").split()
-    if len(found) != len(wanted):
-        return [f"{content.name}.vh: {len(found)} of its constants were read, there are {len(wanted)}"]
+    """List the constants that the simulator reads in the header otherwise than the manifest has them."""
+    constants = expected_constants(content)
+    readings = (folder / CONSTANTS).read_text("ascii", "replace").split()
+    if len(readings) != len(constants):
+        return [f"{content.name}.vh: {len(readings)} of its constants were read, there are {len(constants)}"]
     return [
         f"{content.name}.vh: {content.name.upper()}_{key} is {value} to the simulator, it is {right} in the manifest"
-        for (key, right), value in zip(wanted.items(), found, strict=True)
+        for (key, right), value in zip(constants.items(), readings, strict=True)
         if value != right
     ]
 

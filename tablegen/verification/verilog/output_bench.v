@@ -10,7 +10,8 @@
 module output_bench #(
     parameter RESULTS = "",
     parameter PROGRAM_FILE = "",  // 48 words of 32 bits
-    parameter WORDS_FILE = "",    // 9 words of 16 bits, Fourier words of 4 harmonics, and a table
+    parameter X_FILE = "",        // 9 words of 16 bits: a table, or Fourier words of 4 harmonics
+    parameter Y_FILE = "",        // and others
     parameter CLOCKS = 1500
 );
     reg clock = 0;
@@ -76,19 +77,19 @@ module output_bench #(
 
     wire [31:0] written [0:4], boot_errors [0:4];
     wire [4:0] incomplete;
-    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .WORDS_FILE(WORDS_FILE)) boot (
+    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE)) boot (
         .clock(clock), .random(random), .words(written[0]), .missing(incomplete[0]), .errors(boot_errors[0])
     );
-    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .WORDS_FILE(WORDS_FILE), .FOURIER(1)) boot_fourier (
+    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(1)) boot_fourier (
         .clock(clock), .random(~random), .words(written[1]), .missing(incomplete[1]), .errors(boot_errors[1])
     );
-    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .WORDS_FILE(WORDS_FILE), .LACKS_PROGRAM(1)) no_program (
+    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .LACKS_PROGRAM(1)) no_program (
         .clock(clock), .random(random), .words(written[2]), .missing(incomplete[2]), .errors(boot_errors[2])
     );
-    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .WORDS_FILE(WORDS_FILE), .X_WORDS(10)) short_x (
+    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .X_WORDS(10)) short_x (
         .clock(clock), .random(random), .words(written[3]), .missing(incomplete[3]), .errors(boot_errors[3])
     );
-    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .WORDS_FILE(WORDS_FILE), .Y_WORDS(10)) short_y (
+    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .Y_WORDS(10)) short_y (
         .clock(clock), .random(random), .words(written[4]), .missing(incomplete[4]), .errors(boot_errors[4])
     );
 
@@ -295,7 +296,7 @@ endmodule
 // dac_boot with a device that makes it wait, and a reset in between: every word in its place, then a commit, then the
 // host. A file may be missing, or have fewer words than there should be; then there is no commit.
 module check_boot #(
-    parameter PROGRAM_FILE = "", parameter WORDS_FILE = "", parameter FOURIER = 0, parameter X_WORDS = 9,
+    parameter PROGRAM_FILE = "", parameter X_FILE = "", parameter Y_FILE = "", parameter FOURIER = 0, parameter X_WORDS = 9,
     parameter Y_WORDS = 9, parameter LACKS_PROGRAM = 0
 ) (
     input wire clock,
@@ -305,14 +306,14 @@ module check_boot #(
     output reg [31:0] errors
 );
     localparam FILE_WORDS = 9, LACKS_WORDS = LACKS_PROGRAM || X_WORDS > FILE_WORDS || Y_WORDS > FILE_WORDS;
-    localparam PROGRAM_WORDS = 48, WORD_BITS = FOURIER ? 32 : 16, HARMONICS = 4, CLOCKS = 400;
+    localparam PROGRAM_WORDS = 48, WORD_BITS = FOURIER ? 32 : 16, HARMONICS = 4, CLOCKS = 400, RESET_AT = 80;  // in the tables
     reg [31:0] program_words [0:PROGRAM_WORDS-1];
-    reg [15:0] table_words [0:FILE_WORDS-1];
-    reg [31:0] fourier_words [0:FILE_WORDS-1];
+    reg [15:0] x_words [0:FILE_WORDS-1], y_words [0:FILE_WORDS-1];
     reg reset = 0, writable = 0, host_write = 0, host_commit = 0, has_ended = 0;
     reg [2:0] host_region = 0;
     reg [15:0] host_address = 0;
     reg [31:0] host_data = 0, due;
+    reg [15:0] table_word;
     integer at = 0, clocks = 0, place;
     reg committed = 0;
 
@@ -320,8 +321,8 @@ module check_boot #(
         words = 0;
         errors = 0;
         $readmemh(PROGRAM_FILE, program_words);
-        if (FOURIER) $readmemh(WORDS_FILE, fourier_words);
-        else $readmemh(WORDS_FILE, table_words);
+        $readmemh(X_FILE, x_words);
+        $readmemh(Y_FILE, y_words);
     end
 
     wire write, commit, booting;
@@ -329,7 +330,7 @@ module check_boot #(
     wire [15:0] address;
     wire [31:0] data;
     dac_boot #(
-        .PROGRAM_FILE(LACKS_PROGRAM ? "" : PROGRAM_FILE), .X_FILE(WORDS_FILE), .Y_FILE(WORDS_FILE), .FOURIER(FOURIER), .X_WORDS(X_WORDS),
+        .PROGRAM_FILE(LACKS_PROGRAM ? "" : PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(FOURIER), .X_WORDS(X_WORDS),
         .Y_WORDS(Y_WORDS), .X_WORD_BITS(WORD_BITS), .Y_WORD_BITS(WORD_BITS), .X_HARMONICS(HARMONICS),
         .Y_HARMONICS(HARMONICS)
     ) boot (
@@ -342,7 +343,7 @@ module check_boot #(
     wire is_program = at < PROGRAM_WORDS, is_x = at < PROGRAM_WORDS + X_WORDS;
     always @(negedge clock) begin
         // Outputs as the next clock finds them, with inputs that have changed for it.
-        reset = clocks == 40;
+        reset = clocks == RESET_AT;
         writable = random[1] || random[30];
         host_write = random[5];
         host_commit = random[8];
@@ -351,8 +352,8 @@ module check_boot #(
         host_data = random[63:32] ^ random[31:0];
         #1;
         place = is_program ? at : is_x ? at - PROGRAM_WORDS : at - PROGRAM_WORDS - X_WORDS;
-        due = is_program ? program_words[place] : FOURIER ? fourier_words[place] :
-              {{16{table_words[place][15]}}, table_words[place]};
+        table_word = is_x ? x_words[place] : y_words[place];
+        due = is_program ? program_words[place] : {FOURIER ? 16'd0 : {16{table_word[15]}}, table_word};
         if (FOURIER && (at == 26 || at == 42)) due = HARMONICS;
         if (!booting) begin
             has_ended = 1;
@@ -360,7 +361,7 @@ module check_boot #(
                 data !== host_data || (LACKS_WORDS ? !missing : missing || !committed))
                 errors = errors + 1;
         end else begin
-            if (has_ended && clocks > 42) errors = errors + 1;
+            if (has_ended && clocks > RESET_AT + 2) errors = errors + 1;
             if (write) begin
                 if (!writable || region !== (is_program ? 3'd0 : (is_x ? 3'd1 : 3'd2) + (FOURIER ? 3'd2 : 3'd0)) ||
                     address !== place || at >= PROGRAM_WORDS + X_WORDS + Y_WORDS ||

