@@ -23,26 +23,26 @@ from tablegen.base.resources import c_runtime
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.charts.picture_file import picture
-from tablegen.cli.tables_text import tables_text
 from tablegen.config.load import from_values, load
 from tablegen.config.schema import Table
 from tablegen.emit.render import render
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import MODES, TableShape
+from tablegen.html_report.table_charts import table_charts
+from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
+from tablegen.html_report.table_rows import axis_tables
+from tablegen.html_report.tables_text import tables_text
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.other_table import maker_of, with_table
 from tablegen.planning.table_choice import possible_shapes
 from tablegen.planning.table_search import TableSearch
-from tablegen.report.table_charts import table_charts
-from tablegen.report.table_costs import CELLS, COUNTS, MeasuredRun
-from tablegen.report.table_rows import axis_tables
 from tablegen.verification.c.emulate import Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
 PAGE = HERE.parent / "docs" / "tables.md"
 FIGURE = HERE.parent / "docs" / "figures" / "tables.svg"
-COSTS = HERE.parent / "tablegen" / "report" / "table_costs.py"
+COSTS = HERE.parent / "tablegen" / "html_report" / "table_costs.py"
 CORES = ("cortex-m4", "cortex-m0plus")
 ERRORS = (2.0, 1.0, 0.75, 0.6, 0.55)
 SINES = ((16, 1000, 1.0), (16, 65536, 1.0), (18, 1000, 0.6), (18, 65536, 0.6))

@@ -8,7 +8,8 @@ From a scan file to arrays and files in two lines::
 What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
 scan, ``variants`` and ``build_many`` many, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks
 to an instrument. ``calibrate``, ``refine`` and ``correct`` take measurements and images; ``Laboratory`` simulates them.
-Everything else may change. Names are loaded when they are first used, so that importing tablegen costs nothing.
+Every command is one function of its name. Everything else may change. Names are loaded when they are first used, so
+that importing tablegen costs nothing.
 """
 
 import re

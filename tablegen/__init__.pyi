@@ -12,9 +12,22 @@ from tablegen.api.many import (
 )
 from tablegen.manifest.read import read_build as read_build
 from tablegen.verification.run import verify as verify
-from tablegen.api.calibrate import calibrate as calibrate
+from tablegen.api.calibrate import (
+    calibrate as calibrate,
+    calibrate_images as calibrate_images,
+)
+from tablegen.api.calibrate_operator import calibrate_operator as calibrate_operator
+from tablegen.api.read_image import (
+    channels as channels,
+    read_image as read_image,
+)
 from tablegen.api.refine import refine as refine
 from tablegen.api.correct import correct as correct
+from tablegen.api.simulate import simulate as simulate
+from tablegen.api.compare import compare as compare
+from tablegen.api.tables import tables as tables
+from tablegen.api.report import report as report
+from tablegen.sweeping.sweep import sweep as sweep
 from tablegen.api.laboratory import Laboratory as Laboratory
 from tablegen.link.device import Device as Device
 from tablegen.config.load import Setup as Setup
@@ -24,9 +37,23 @@ from tablegen.api.build import Build as Build
 from tablegen.api.samples import Samples as Samples
 from tablegen.config.variants import Variant as Variant
 from tablegen.api.many import BuildOutcome as BuildOutcome
+from tablegen.api.result import (
+    Result as Result,
+    Picture as Picture,
+)
 from tablegen.api.calibrate import Calibrated as Calibrated
+from tablegen.api.calibrate_operator import CalibratedOperator as CalibratedOperator
+from tablegen.api.read_image import (
+    Image as Image,
+    Channels as Channels,
+)
 from tablegen.api.refine import RefinedScan as RefinedScan
 from tablegen.api.correct import Corrected as Corrected
+from tablegen.api.simulate import SimulatedScan as SimulatedScan
+from tablegen.api.compare import Compared as Compared
+from tablegen.api.tables import FeasibleTables as FeasibleTables
+from tablegen.api.report import ReportPage as ReportPage
+from tablegen.sweeping.run import ScanLibrary as ScanLibrary
 from tablegen.manifest.read import StoredBuild as StoredBuild
 from tablegen.link.prepare import PreparedScan as PreparedScan
 from tablegen.verification.build_report import Report as Report

@@ -5,6 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from tablegen.api.result import Result
 from tablegen.base.input_errors import Rejected
 from tablegen.base.warnings import Finding
 from tablegen.certificate.certificate import Certificate
@@ -12,7 +13,7 @@ from tablegen.certificate.certificate import certify as certify_plan
 from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.scan_notes import scan_findings
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
-from tablegen.certificate.summary import summary
+from tablegen.certificate.summary import summary as summary_of
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
 from tablegen.config.schema import DEFAULT_FORMATS
@@ -20,10 +21,12 @@ from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import format_rejected, render_scan, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
+from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.planning.line_plan import Plan, make_plan
 
 if TYPE_CHECKING:
     from tablegen.api.samples import Samples
+    from tablegen.charts.picture_file import PlottedCharts
     from tablegen.link.prepare import PreparedScan
 
 Source = str | Path | Setup
@@ -36,7 +39,25 @@ class BrokenLimit(Rejected):
 def load(path: str | Path) -> Setup:
     """Read a scan file and the scanner file that it names.
 
-    Raises ``Rejected`` with every fault of both files, each at its file, line and key.
+    Parameters
+    ----------
+    path : str or Path
+        Scan file.
+
+    Returns
+    -------
+    Setup
+        Both files as checked values.
+
+    Raises
+    ------
+    Rejected
+        With every fault of both files, each at its file, line and key.
+
+    Examples
+    --------
+    >>> tablegen.load("scan.toml").scan.name
+    'annexin_200nm'
     """
     return load_files(path)
 
@@ -49,14 +70,54 @@ def plan(
 ) -> Plan:
     """Compensate, shape and quantise a scan: of a scan file, of a setup, or of values without any file.
 
-    ``scan`` and ``scanner`` have the keys of the two files, nested: ``scan={"x": {"size_nm": 200.0, ...}, ...}``.
-    Raises ``Rejected`` with every contradiction.
+    Parameters
+    ----------
+    source : path or Setup, optional
+        Scan file, or what ``load`` gave.
+    scan, scanner : mapping, optional
+        In place of ``source`` the keys of the two files, nested: ``scan={"x": {"size_nm": 200.0, ...}, ...}``.
+
+    Returns
+    -------
+    Plan
+        The integers of both axes, and what they were made from.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction.
+
+    Examples
+    --------
+    >>> round(tablegen.plan("scan.toml").x.drive.v_amplitude, 2)  # V peak to peak at the piezo
+    20.37
     """
     return make_plan(_setup(source, scan, scanner))
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:
-    """What the emitted integers of a plan promise, by axis "x" and "y": every tick is measured."""
+    """Measure what the emitted integers of a plan promise, at every tick.
+
+    Parameters
+    ----------
+    plan : Plan
+        What ``plan`` gave.
+
+    Returns
+    -------
+    dict of str to Certificate
+        By axis, "x" and "y": errors in LSB of the converter, scaling errors in percent.
+
+    Raises
+    ------
+    Rejected
+        The codes leave the range of the converter.
+
+    Examples
+    --------
+    >>> tablegen.certify(tablegen.plan("scan.toml"))["x"].max_error_lsb < 0.6
+    True
+    """
     return certify_plan(plan)
 
 
@@ -71,9 +132,36 @@ def build(
 ) -> "Build":
     """Plan and certify a scan, and write it into the directory ``out`` if one is given.
 
-    ``source``, ``scan`` and ``scanner`` are those of ``plan``; ``formats`` those of the scan file unless given.
-    ``progress`` is called with what is being done. Raises ``Rejected`` for wrong input, ``BrokenLimit`` where the
-    certificate exceeds a limit of the scan, ``CannotWrite`` where the directory cannot be written.
+    Parameters
+    ----------
+    source, scan, scanner
+        As for ``plan``.
+    out : str or Path, optional
+        Directory; what an earlier build left there is removed.
+    formats : sequence of str, optional
+        Output formats; those of the scan file unless given.
+    progress : callable
+        Called with what is being done.
+
+    Returns
+    -------
+    Build
+        Arrays, certificate and files.
+
+    Raises
+    ------
+    Rejected
+        The input is wrong.
+    BrokenLimit
+        The certificate exceeds a limit of the scan.
+    CannotWrite
+        The directory cannot be written.
+
+    Examples
+    --------
+    >>> scan = tablegen.build("scan.toml", "build")
+    >>> scan.x.volts.shape  # a value a tick of one line
+    (1250,)
     """
     setup = _setup(source, scan, scanner)
     wanted = _formats(setup, formats)
@@ -87,7 +175,7 @@ def build(
     return built
 
 
-class Build:
+class Build(Result):
     """A certified scan: its plan, its arrays, its certificate, and the files that it is emitted as."""
 
     def __init__(
@@ -137,9 +225,26 @@ class Build:
         return self.files["manifest.json"].decode("ascii")
 
     @property
+    def record(self) -> dict[str, Any]:
+        """The manifest as plain data."""
+        found: dict[str, Any] = read_json(self.files[MANIFEST])
+        return found
+
+    def to_json(self) -> str:
+        """Return ``manifest.json`` as text."""
+        return self.manifest
+
+    def charts(self) -> "PlottedCharts":
+        """Give the drive of each axis, and the error of the modelled piezo with and without compensation."""
+        from tablegen.charts.picture_file import PlottedCharts
+        from tablegen.html_report.scan_charts import drive_of, modelled_error
+
+        pairs = [(drive_of(line), modelled_error(line)) for line in self.plan.moving]
+        return PlottedCharts(self.name, tuple(chart for pair in pairs for chart in pair))
+
     def summary(self) -> str:
-        """Drive and certificate of both axes as text."""
-        return "\n".join(summary(self.plan, self.certificates))
+        """Return drive and certificate of both axes as text."""
+        return "\n".join(summary_of(self.plan, self.certificates))
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -195,14 +300,14 @@ class Build:
         """Files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""
         return leftover_files(Path(folder), self.files)
 
-    def __repr__(self) -> str:
+    def _lines(self) -> Sequence[str]:
         first, *_ = repr(self.plan).splitlines()
         worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
         errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
-        head = first.replace("<tablegen plan", "<tablegen build")
         volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.moving)
-        found = [f"  warning: {text}\n" for text in brief_warnings(self.plan, self.certificates)]
-        return f"{head}\n  {errors} peak to peak\n{''.join(found)}  {volts}; formats {', '.join(self.formats)}>"
+        warnings = [f"warning: {text}" for text in brief_warnings(self.plan, self.certificates)]
+        head = first.removeprefix("<tablegen plan")
+        return f"build{head}", f"{errors} peak to peak", *warnings, f"{volts}; formats {', '.join(self.formats)}"
 
     def _repr_html_(self) -> str:
         """Drive, error and certificate, for notebooks."""

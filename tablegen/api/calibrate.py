@@ -1,18 +1,35 @@
 """From measurements to the parameters of a scanner file, with their standard errors, and into the file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from tablegen.api.measured import Measured, table_of
+import numpy as np
+
+from tablegen.api.image_input import (
+    IMAGE_OPTIONS,
+    acquisition_of,
+    check_names,
+    read_trace_and_retrace,
+    sample_image,
+    sample_of,
+)
+from tablegen.api.known_scanner import KnownScanner
+from tablegen.api.measured import Measured, measured_list, table_of
+from tablegen.api.result import Result
+from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.data_files import Source
-from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
-from tablegen.base.toml import read_toml
+from tablegen.base.warnings import Finding
 from tablegen.calibration.fit_checks import doubts
+from tablegen.calibration.fit_text import calibration_text
+from tablegen.calibration.fit_warnings import fit_findings
 from tablegen.calibration.laws.frequency import fit_frequency
 from tablegen.calibration.laws.hysteresis import fit_hysteresis
+from tablegen.calibration.laws.image_sizes import apparent_of, sizes_of
+from tablegen.calibration.laws.images import Pair, fit_images
 from tablegen.calibration.laws.offset import fit_offset
 from tablegen.calibration.laws.offset_sizes import fit_offset_sizes
 from tablegen.calibration.laws.resonance import ResonanceFit, fit_resonance
@@ -35,16 +52,18 @@ from tablegen.calibration.tables.columns import (
 from tablegen.calibration.tables.response_csv import MARK, response_csv
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces
-from tablegen.compensation.size import SizeLaw
-from tablegen.config.decode import decode
-from tablegen.config.like import inherited
-from tablegen.config.scanner import Scanner
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate, Fit
+from tablegen.images.files import ScanImage
+from tablegen.images.scan_angle import angle_remarks, require_fast_axis
 from tablegen.numerics.driver import Driver
-from tablegen.planning.laws import size_law_of
 
+Axis = Literal["x", "y"]
 Kind = Literal["size", "offset", "hysteresis", "frequency", "resonance"]
+_IMAGE_FIT = ("rho", "turn", "window", "retrace_mirrored", "delay_pixels")
+_BASE_NM = 200.0
+_OF_IMAGES: dict[str, tuple[str, ...]] = {"size": ("base_nm", "threshold"), "offset": ()}
 _COLUMNS = {
     "size": ([DRIVE, ACTUAL], []),
     "offset": ([OFFSET, APPARENT], [SIZE]),
@@ -54,11 +73,13 @@ _COLUMNS = {
 }
 
 
+@one_blas_thread
 def calibrate(
     kind: Kind,
-    data: Measured | Sequence[Measured],
+    data: Measured | Sequence[Measured] = (),
     *,
-    axis: Literal["x", "y"],
+    axis: Axis,
+    images: Sequence[tuple[Any, ...]] = (),
     scanner: str | Path | None = None,
     v_max: float | None = None,
     v_min: float = 0.0,
@@ -67,38 +88,182 @@ def calibrate(
 ) -> "Calibrated":
     """Fit what ``tablegen calibrate KIND`` fits, to CSV files or to arrays by the names of their columns.
 
-    Sizes take ``drive_v`` and ``actual_nm``; offsets ``offset_v`` and ``apparent_nm``, optionally ``size_v``;
-    hysteresis one or more traces of ``time_s``, ``drive_v``, ``displacement_nm``; frequency ``frequency_hz`` and
-    ``gain``; resonance also ``phase_deg``. Volts are at the piezo, and drives peak to peak. ``v_max``, ``v_min`` and
-    what a fit needs of other calibrations are read from the file ``scanner``; without one, give them. With ``points``
-    hysteresis, or a response, is kept as measured, in place of a law.
+    Parameters
+    ----------
+    kind : {"size", "offset", "hysteresis", "frequency", "resonance"}
+        What to fit; docs/python.md lists the columns and options of each.
+    data : path, mapping of arrays, or a sequence of them
+        CSV file or arrays (n,) by column: ``drive_v`` and ``actual_nm`` of sizes; ``offset_v``, ``apparent_nm`` and
+        perhaps ``size_v`` of offsets; ``time_s``, ``drive_v``, ``displacement_nm`` of hysteresis; ``frequency_hz``,
+        ``gain`` and perhaps ``phase_deg`` of frequency and resonance. Volts at the piezo, drives peak to peak.
+    axis : {"x", "y"}
+        Axis that was measured.
+    images : sequence of (volts, trace[, retrace]), of offsets (volts, offset_v, trace[, retrace])
+        In place of ``data``, images of a sample of known constant: files, or heights of shape (rows, columns).
+    scanner, v_max, v_min : optional
+        Scanner file, which has the range of the driver and what a fit needs of other calibrations; or the range in V.
+    points : bool
+        True to keep hysteresis, or a response, as measured, in place of a law.
+    **options : optional
+        ``base_nm``, ``threshold``, ``noise`` of sizes, ``size_v`` of offsets, ``reference_hz`` of frequency; ``rho``,
+        ``settle_periods``, ``drift_order``, ``delay_s`` of hysteresis; of ``images`` those of ``calibrate_operator``.
 
-    ``options`` are those of the fits: ``base_nm``, ``threshold``, ``noise`` of sizes, ``size_v`` of offsets,
-    ``reference_hz`` of frequency; ``rho``, ``settle_periods``, ``drift_order``, ``delay_s`` of hysteresis. Raises
-    ``Rejected`` for wrong input, ``Unphysical`` for data that no scanner makes.
+    Returns
+    -------
+    Calibrated
+        Parameters with standard errors; ``write`` puts them into the scanner file.
+
+    Raises
+    ------
+    Rejected
+        A file or a column is wrong.
+    Unphysical
+        No scanner makes such data.
+
+    Examples
+    --------
+    >>> sizes = tablegen.Laboratory().sizes("x", drives_v=[10, 20, 40, 60, 80, 100], rate_hz=100.0)
+    >>> fit = tablegen.calibrate("size", sizes, axis="x", v_max=100.0)
+    >>> fit.parameters["k_nm_per_v"].value > 0.0
+    True
     """
     if kind not in _COLUMNS:
         raise ValueError(f"{kind!r} is none of {', '.join(_COLUMNS)}")
-    measured = list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
+    measured = measured_list(data)
+    if bool(measured) == bool(images):
+        raise TypeError("give data, or images of a sample of known constant")
+    if images:
+        if kind not in _OF_IMAGES:
+            raise TypeError(f"{kind} takes no images of a sample of known constant; calibrate_images fits hysteresis")
+        check_names(options, (*IMAGE_OPTIONS, *_OF_IMAGES[kind]))
+        return _of_images(kind, images, known_scanner(scanner, axis, v_max, v_min), options)
     tables = [table_of(one, *_COLUMNS[kind]) for one in measured]
     if len(tables) > 1 and kind != "hysteresis":
         raise ValueError(f"{kind} takes one table; hysteresis alone takes several")
-    found = _Scanner(None if scanner is None else Path(scanner), axis, v_max, v_min)
-    sources = tuple(dict.fromkeys(table.source for table in tables))
-    return Calibrated(_fit(kind, tables, found, options), axis, sources, points)
+    known = known_scanner(scanner, axis, v_max, v_min)
+    return Calibrated(_fit(kind, tables, known, options), axis, tuple(tables), points)
 
 
-@dataclass(frozen=True, eq=False)
-class Calibrated:
+def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], known: KnownScanner, how: dict[str, Any]) -> "Calibrated":
+    """Sizes, or sizes at several offsets, of images of a sample of known constant."""
+    sample, acquisition = sample_of(how), acquisition_of(how)
+    rows = [row if kind == "offset" else (row[0], None, *row[1:]) for row in images]
+    read = [sample_image(size, at, pair[0], pair[1] if pair[1:] else None, how) for size, at, *pair in rows]
+    files = tuple(one for _, both in read for one in both)
+    driver, size_v = known.driver, np.array([row[0] for row in rows], dtype=np.float64)
+    law = known.size_law("the calibration of offsets by images") if kind == "offset" else None
+    fit: Fit
+    try:
+        sizes = sizes_of([image for image, _ in read], driver, sample, acquisition)
+        if law is not None:
+            apparent, errors = apparent_of(sizes, law, driver, sample)
+            offset_v = np.array([row[1] for row in rows], dtype=np.float64)
+            offsets = fit_offset_sizes(offset_v, apparent, size_v, driver, law, errors)
+            fit = replace(offsets, images=sizes.images, remarks=sizes.remarks + offsets.remarks)
+        else:
+            base, threshold = how.get("base_nm") or known.number("size", "base_nm") or _BASE_NM, how.get("threshold")
+            size = fit_size(size_v, sizes.nm, driver, base, threshold, errors_nm=sizes.errors_nm, shared=sizes.shared)
+            fit = replace(size, images=sizes.images, remarks=sizes.remarks + size.remarks)
+    except Unphysical as reason:
+        raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
+    return Calibrated(_with_angles(fit, files, known.axis), known.axis, files)
+
+
+def known_scanner(scanner: str | Path | None, axis: str, v_max: float | None, v_min: float) -> KnownScanner:
+    """What the scanner file says; with ``v_max`` it may be missing. Raises as ``KnownScanner.read`` does."""
+    return KnownScanner.read(None if scanner is None else Path(scanner), axis, v_max, v_min, new=v_max is not None)
+
+
+_PAIR_OPTIONS = ("channel", "retrace_channel", "frame", *_IMAGE_FIT)
+
+
+@one_blas_thread
+def calibrate_images(
+    pairs: Sequence[tuple[Any, ...]],
+    *,
+    axis: Axis,
+    scanner: str | Path | None = None,
+    v_max: float | None = None,
+    v_min: float = 0.0,
+    points: bool = False,
+    **how: Any,
+) -> "Calibrated":
+    """Fit hysteresis, equations (17) to (22), to trace and retrace images of a grating or a lattice.
+
+    Parameters
+    ----------
+    pairs : sequence of (volts, trace) or (volts, trace, retrace)
+        Scan voltage at the piezo in V, peak to peak, of a triangle; and its images: files, what ``read_image`` gave, or
+        heights of shape (rows, columns), rows in order of time, the left end of the line at the left. A file may have
+        both directions.
+    axis : {"x", "y"}
+        Fast axis of the images.
+    scanner, v_max, v_min : optional
+        Scanner file, which has the range of the driver in V; or that range.
+    points : bool
+        True to write the hysteresis of each voltage, in place of the law (22).
+    **how : optional
+        ``rho``, ``turn``, ``window``, ``retrace_mirrored``, ``delay_pixels``; ``channel``, ``retrace_channel``,
+        ``frame`` of files: the options of ``tablegen calibrate images``.
+
+    Returns
+    -------
+    Calibrated
+        Parameters with standard errors; ``write`` puts them into the scanner file.
+
+    Raises
+    ------
+    Rejected
+        A file cannot be read, an image has the wrong shape, or a file states a scan angle at which ``axis`` is not the
+        fast axis.
+    Unphysical
+        No scanner makes such images, or they are not of one scan.
+
+    Examples
+    --------
+    >>> fit = tablegen.calibrate_images([(20.0, "trace.npy", "retrace.npy")], axis="x", v_max=100.0)
+    >>> 0.0 < fit.parameters["forward.beta_max"].value < 0.2
+    True
+    """
+    check_names(how, _PAIR_OPTIONS)
+    images = [read_trace_and_retrace(pair[1], pair[2] if len(pair) > 2 else None, how) for pair in pairs]
+    files = tuple(image for both in images for image in both)
+    require_fast_axis(files, axis)
+    driver = known_scanner(scanner, axis, v_max, v_min).driver
+    scans = [
+        Pair(" and ".join(dict.fromkeys(one.source.name for one in both)), pair[0], *(one.heights for one in both))
+        for pair, both in zip(pairs, images, strict=True)
+    ]
+    try:
+        fit = fit_images(scans, driver, **{name: how[name] for name in _IMAGE_FIT if name in how})
+    except Unphysical as reason:
+        raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
+    return Calibrated(_with_angles(fit, files, axis), axis, files, points)
+
+
+def _with_angles(fit: Fit, images: Sequence[ScanImage], axis: str) -> Fit:
+    """Return the fit with remarks on the scan angles of its images before its own."""
+    remarks = angle_remarks(images, axis)
+    return replace(fit, remarks=(*remarks, *fit.remarks)) if remarks else fit
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibrated(Result):
     """A fit of one kind to an axis: ``parameters`` with standard errors, ``doubts``, and how it gets into the file.
 
-    ``fit`` has residuals, outliers and remarks; ``points`` says that measured values are written in place of a law.
+    ``fit`` has residuals, outliers and remarks, ``measured`` the tables or images that were fitted; ``points`` says
+    that measured values are written in place of a law.
     """
 
     fit: Fit
     axis: str
-    sources: tuple[Source, ...]
+    measured: tuple[MeasuredTable | ScanImage, ...]
     points: bool = False
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Names of the files with their SHA-256, each once."""
+        return tuple(dict.fromkeys(one.source for one in self.measured))
 
     @property
     def kind(self) -> str:
@@ -165,73 +330,62 @@ class Calibrated:
         changed = write_files(path.parent, {name: files[name] for name in beside}) if beside else []
         return changed + write_files(path.resolve().parent, {own: files[own]})
 
-    def __repr__(self) -> str:
+    def places(self, path: bool = True) -> list[str]:
+        """Return the file and line of each outlier, or its image; without ``path`` the name of the file alone."""
+        if self.fit.images:
+            return [self.fit.images[at].name for at in self.fit.outliers]
+        first = self.measured[0]
+        name = first.file if path else first.source.name
+        lines = first.lines if isinstance(first, MeasuredTable) else None
+        return [name if lines is None else f"{name}:{lines[at]}" for at in self.fit.outliers]
+
+    def findings(self) -> list[Finding]:
+        """Return what to know before the fit is trusted, the worst first."""
+        return fit_findings(self.fit, self.places(), self.points)
+
+    def summary(self) -> str:
+        """Return what ``tablegen calibrate`` prints: parameters with standard errors, what is left, and what is odd."""
+        return "\n".join([*self.table(), *(finding.line for finding in self.findings())])
+
+    def table(self) -> list[str]:
+        """Return the lines of ``summary`` without the findings."""
+        return calibration_text(self.fit, self.axis, self.measured)
+
+    def page(self) -> bytes:
+        """Return the HTML page that ``tablegen calibrate --report`` writes."""
+        from tablegen.html_report.fitted import fit_page
+
+        return fit_page(self.fit, self.axis, list(self.sources), self.places(path=False), self.points)
+
+    def charts(self) -> PlottedCharts:
+        from tablegen.html_report.fitted import fit_charts
+
+        return fit_charts(self.fit, self.axis)
+
+    def _lines(self) -> Sequence[str]:
         values = ", ".join(f"{key} {_shown(one)}" for key, one in list(self.parameters.items())[:4])
         left = f"left {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
-        doubtful = f"\n  means nothing: {self.doubts[0]}" if self.doubts else ""
         what = f"{self.axis}.{self.kind} from {self.fit.points} points"
-        return f"<tablegen calibration of {what}: {left}\n  {values}{doubtful}>"
+        files = f"from {', '.join(one.name for one in self.sources)}"
+        third = f"means nothing: {self.doubts[0]}" if self.doubts else files
+        return f"calibration of {what}: {left}", values, third
 
 
-def scanner_tables(path: Path) -> tuple[dict[str, Any], list[Problem]]:
-    """The tables of a scanner file that are whole, by their path such as "x.size", and the faults of the others.
-
-    Raises ``Rejected`` where the file is no TOML.
-    """
-    values, document = inherited(*read_toml(path, str(path)))
-    tables: dict[str, Any] = {}
-    problems = Problems()
-    decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
-    return tables, problems.entries
-
-
-def _values(path: Path) -> dict[str, Any]:
-    """As the file says them, or as the axis says that it is like."""
-    return inherited(*read_toml(path, str(path)))[0]
-
-
-class _Scanner:
-    """What is known of the scanner beside the data."""
-
-    def __init__(self, path: Path | None, axis: str, v_max: float | None, v_min: float) -> None:
-        self.path, self.axis = path, axis
-        self.values: dict[str, Any] = _values(path) if path is not None and path.exists() else {}
-        known = self.values.get("v_max", v_max)
-        if not isinstance(known, int | float) or isinstance(known, bool) or known <= 0.0:
-            raise ValueError("give v_max, the driver's maximum output in V, or a scanner file that has it")
-        if v_max is not None and v_max != known:
-            raise ValueError(f"v_max is {known:g} in {path}, and {v_max:g} was given")
-        self.driver = Driver(float(known), float(self.values.get("v_min", v_min)))
-
-    def number(self, kind: str, key: str) -> float | None:
-        """A number of the file as it is, or None."""
-        value: Any = self.values
-        for name in (self.axis, kind, key):
-            value = value.get(name) if isinstance(value, dict) else None
-        return float(value) if isinstance(value, int | float) and value > 0.0 else None
-
-    def size_law(self) -> SizeLaw:
-        """That of the file."""
-        table = scanner_tables(self.path)[0].get(f"{self.axis}.size") if self.path is not None and self.values else None
-        if table is None:
-            raise Unphysical("sizes of the scan are known, and the size law is not; calibrate the size first")
-        return size_law_of(table, self.driver)
-
-
-def _fit(kind: Kind, tables: list[MeasuredTable], scanner: _Scanner, options: dict[str, Any]) -> Fit:
-    table, driver = tables[0], scanner.driver
+def _fit(kind: Kind, tables: list[MeasuredTable], scanner: KnownScanner, options: dict[str, Any]) -> Fit:
+    table = tables[0]
     match kind:
         case "size":
-            base = options.pop("base_nm", None) or scanner.number("size", "base_nm") or 200.0
-            return fit_size(table[DRIVE], table[ACTUAL], driver, base, **options)
+            base = options.pop("base_nm", None) or scanner.number("size", "base_nm") or _BASE_NM
+            return fit_size(table[DRIVE], table[ACTUAL], scanner.driver, base, **options)
         case "offset" if SIZE in table:
-            return fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], driver, scanner.size_law(), **options)
+            sizes = scanner.size_law("the column size_v")
+            return fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], scanner.driver, sizes, **options)
         case "offset":
             size_v = options.pop("size_v", None)
-            law = None if size_v is None else scanner.size_law()
-            return fit_offset(table[OFFSET], table[APPARENT], driver, law, size_v, **options)
+            law = None if size_v is None else scanner.size_law("size_v")
+            return fit_offset(table[OFFSET], table[APPARENT], scanner.driver, law, size_v, **options)
         case "hysteresis":
-            return fit_hysteresis([trace for one in tables for trace in split_traces(one)], driver, **options)
+            return fit_hysteresis([trace for one in tables for trace in split_traces(one)], scanner.driver, **options)
         case "frequency":
             reference = options.pop("reference_hz", None) or scanner.number("frequency", "reference_hz")
             return fit_frequency(table[FREQUENCY], table[GAIN], reference, **options)

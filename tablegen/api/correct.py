@@ -1,32 +1,32 @@
 """Images that were already taken, put straight, as `tablegen correct` does it; given as files or as arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from tablegen.base.data_files import Source
+from tablegen.api.image_input import ImageSource, check_names, read_trace_and_perhaps_retrace
+from tablegen.api.result import Result
+from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Problem, Rejected
+from tablegen.charts.picture_file import PlottedCharts
+from tablegen.correction.correction_text import correct_text
 from tablegen.correction.job import Choice, Images, OldAxis, OldScan, by_fit, by_scan_file, by_scanner, read_scan
 from tablegen.correction.output_files import files_of
 from tablegen.correction.straight import StraightScan
 from tablegen.emit.write import write_files
-from tablegen.images.files import ScanImage
 from tablegen.numerics.arrays import Floats
 
-Image = str | Path | Floats
 _AXIS = ("size_v", "size_nm", "offset_v", "turn", "window")
 _CHOICE = ("channel", "retrace_channel", "retrace_mirrored", "frame")
 _REST = ("rate_hz", "lines", "delay_pixels")
 _BACK = "slow_back"
 
 
+@one_blas_thread
 def correct(
-    trace: Image,
-    retrace: Image | None = None,
+    trace: ImageSource,
+    retrace: ImageSource | None = None,
     *,
     scanner: str | Path | None = None,
     scan: str | Path | None = None,
@@ -37,28 +37,56 @@ def correct(
 ) -> "Corrected":
     """Put an image straight: by a scanner file, by the scan file that it was taken with, or by a fit to a lattice.
 
-    Images are files that ``tablegen channels`` reads, or arrays of heights, (rows, columns), rows in the order of time,
-    the left end of the line at the left in both directions. With ``scanner`` it has to be known how the image was
-    taken; with ``fit``, or ``lattice_nm`` or ``pitch_nm``, which give the size, the sample has to be periodic.
+    Parameters
+    ----------
+    trace, retrace : path, Image or array
+        Files, what ``read_image`` gave, or heights of shape (rows, columns), rows in order of time, the left end of
+        the line at the left in both directions. A file may have both, and all its channels are corrected.
+    scanner, scan : path, optional
+        Scanner file, with ``how`` the image was taken; or the scan file that it was taken with.
+    lattice_nm, pitch_nm, fit : optional
+        Constant in nm of a periodic sample, which is fitted; ``fit=True`` where it is not known.
+    **how : optional
+        ``size_v`` in V peak to peak at the piezo or ``size_nm``, ``offset_v``, ``turn``, ``window`` of the fast axis,
+        the same with ``slow_`` of the slow one; ``rate_hz``, ``lines``, ``slow_back``, ``delay_pixels``; of files
+        ``channel``, ``retrace_channel``, ``retrace_mirrored``, ``frame``.
 
-    ``how`` the image was taken: ``size_v`` or ``size_nm``, ``offset_v``, ``turn`` and ``window`` of the fast axis, the
-    same with ``slow_`` of the slow one, ``rate_hz``, ``lines`` in a period of the slow axis, ``slow_back``,
-    ``delay_pixels``; and of files ``channel``, ``retrace_channel``, ``retrace_mirrored``, ``frame``. Volts are at the
-    piezo, sizes peak to peak. Raises ``Rejected`` and ``Unphysical``.
+    Returns
+    -------
+    Corrected
+        ``trace`` and ``retrace`` put straight; ``write`` makes a file.
+
+    Raises
+    ------
+    Rejected
+        A file is wrong, or an image has the wrong shape.
+    Unphysical
+        The sample has no period, or no scanner takes such an image.
+
+    Examples
+    --------
+    >>> straight = tablegen.correct("trace.npy", "retrace.npy", lattice_nm=17.7)
+    >>> before, after = straight.difference  # of trace and retrace, rms
+    >>> after < 0.5 * before
+    True
     """
-    if unknown := [name for name in how if name not in _NAMES]:
-        raise TypeError(f"{unknown[0]} is none of {', '.join(_NAMES)}")
+    check_names(how, _NAMES)
     fitted = fit or lattice_nm is not None or pitch_nm is not None
     if fitted == (scanner is not None or scan is not None):
         raise TypeError("give scanner, the scanner file, or scan, or fit=True for a periodic sample; one of the ways")
     if isinstance(trace, str | Path):
-        if isinstance(retrace, np.ndarray):
+        if not (retrace is None or isinstance(retrace, str | Path)):
             raise TypeError("give both images as files, or both as arrays")
         images = read_scan(Path(trace), None if retrace is None else Path(retrace), choice_of(how))
     else:
-        images = _images(trace, retrace, bool(how.get("retrace_mirrored", False)))
+        if isinstance(retrace, str | Path):
+            raise TypeError("give both images as files, or both as arrays")
+        both = read_trace_and_perhaps_retrace(trace, retrace, how)
+        mirrored = bool(how.get("retrace_mirrored", False))
+        images = Images(tuple(both), (True, False)[: len(both)], tuple(range(len(both))), (), mirrored)
     given = None if scanner is None else Path(scanner)
-    return Corrected(straight(images, given, None if scan is None else Path(scan), taken_of(how), pitch_nm, lattice_nm))
+    taken = straight(images, given, None if scan is None else Path(scan), taken_of(how), pitch_nm, lattice_nm)
+    return Corrected(taken, images)
 
 
 def straight(
@@ -92,11 +120,15 @@ def taken_of(how: Mapping[str, Any]) -> OldScan:
 _NAMES = (*_AXIS, *(f"slow_{name}" for name in _AXIS), *_REST, _BACK, *_CHOICE)
 
 
-@dataclass(frozen=True, eq=False)
-class Corrected:
-    """An image put straight: ``trace`` and ``retrace``, by how much it was moved, how far both agree now."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Corrected(Result):
+    """An image put straight: ``trace`` and ``retrace``, by how much it was moved, how far both agree now.
+
+    ``scan`` has all channels that were corrected, ``images`` what they were before.
+    """
 
     scan: StraightScan
+    images: Images
 
     @property
     def trace(self) -> Floats:
@@ -124,6 +156,11 @@ class Corrected:
         return None if self.scan.agreement is None else self.scan.agreement.difference
 
     @property
+    def apart_pixels(self) -> tuple[float, float] | None:
+        """Largest distance of the same thing in trace and retrace, before and after; None where it is not known."""
+        return None if self.scan.agreement is None else self.scan.agreement.worst
+
+    @property
     def record(self) -> dict[str, Any]:
         """What was done, as plain data: every file that is written has it."""
         return self.scan.record
@@ -135,28 +172,21 @@ class Corrected:
             raise Rejected([Problem(str(path), 0, "", "the name has to end in .gwy, .tif, .npy or .png")])
         return write_files(path.parent, files_of(self.scan, path.stem, path.suffix.lower()))
 
-    def __repr__(self) -> str:
+    def summary(self) -> str:
+        """Return what ``tablegen correct`` prints."""
+        return "\n".join(correct_text(self.scan, self.images))
+
+    def charts(self) -> PlottedCharts:
+        """Give the charts that ``tablegen correct --plot`` draws."""
+        from tablegen.html_report.corrected import correction_charts
+
+        return correction_charts(self.scan, self.images.first.file)
+
+    def _lines(self) -> Sequence[str]:
         x, y = self.moved_pixels
         size = "" if self.size_nm is None else f", {self.size_nm[0]:.4g} x {self.size_nm[1]:.4g} nm"
-        found = self.difference
-        apart = "" if found is None else f"\n  trace and retrace differ by {found[0]:.3g} before, {found[1]:.3g} after"
-        return f"<tablegen corrected image{size}: moved by up to {x:.3g} pixels along x, {y:.3g} along y{apart}>"
-
-
-def _images(trace: Floats, retrace: Image | None, mirrored: bool) -> Images:
-    """Arrays as the images of a file."""
-    if isinstance(retrace, str | Path):
-        raise TypeError("give both images as files, or both as arrays")
-    found = []
-    for direction, heights in (("trace", trace), ("retrace", retrace)):
-        if heights is None:
-            continue
-        values = np.ascontiguousarray(heights, dtype=np.float64)
-        if values.ndim != 2 or min(values.shape) < 2:
-            why = f"has the shape {values.shape}; it takes (rows, columns)"
-            raise Rejected([Problem(direction, 0, "", why)])
-        source = Source(direction, sha256(values.tobytes()).hexdigest()[:16])
-        found.append(ScanImage(direction, source, values, direction))
-    if len({one.heights.shape for one in found}) > 1:
-        raise Rejected([Problem("retrace", 0, "", "has another shape than the trace")])
-    return Images(tuple(found), (True, False)[: len(found)], tuple(range(len(found))), (), mirrored)
+        difference = self.difference
+        third = "there is no retrace; nothing tells whether this is right"
+        if difference is not None:
+            third = f"trace and retrace differ by {difference[0]:.3g} before, {difference[1]:.3g} after"
+        return f"corrected image{size}", f"moved by up to {x:.3g} pixels along x, {y:.3g} along y", third

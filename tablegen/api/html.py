@@ -6,8 +6,8 @@ from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.scan_warnings import brief_warnings
 from tablegen.certificate.summary import certificate_lines, drive_lines, rate
 from tablegen.charts.svg import embedded
+from tablegen.html_report.scan_charts import drive_of, modelled_error
 from tablegen.planning.line_plan import Plan
-from tablegen.report.scan_charts import drive_of, modelled_error
 
 
 def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:

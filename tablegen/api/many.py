@@ -42,9 +42,27 @@ class BuildOutcome:
 def variants(path: str | Path, settings: Mapping[str, Iterable[Any]] | None = None) -> list[Variant]:
     """Every scan of a file: of its ``[[scans]]``, or the file itself, with each combination of the settings.
 
-    ``settings`` are values by keys of the scan file: ``{"x.size_nm": range(50, 1001, 50)}``. Each variant has a
-    ``name``, the ``settings`` that differ, and a ``setup``. Raises ``Rejected`` where the file cannot be read, or names
-    meet; what is wrong with a single scan is found when its ``setup`` is asked for.
+    Parameters
+    ----------
+    path : str or Path
+        Scan file.
+    settings : mapping of sequences, optional
+        Values by keys of the scan file: ``{"x.size_nm": range(50, 1001, 50)}``.
+
+    Returns
+    -------
+    list of Variant
+        Each with a ``name``, the ``settings`` that differ, and a ``setup``, which raises ``Rejected`` for a wrong scan.
+
+    Raises
+    ------
+    Rejected
+        The file cannot be read, or two scans have the same name.
+
+    Examples
+    --------
+    >>> [one.settings for one in tablegen.variants("scan.toml", {"x.size_nm": [100, 150]})]
+    [{'x.size_nm': 100}, {'x.size_nm': 150}]
     """
     return library_and_variants(path, settings or {})[1]
 
@@ -58,9 +76,32 @@ def build_many(
 ) -> Iterator[BuildOutcome]:
     """Build many scans in parallel processes, and give each as it completes, its error in place of a build.
 
-    ``sources`` are scan files, setups or variants; they are taken as workers become free, and nothing is kept, so that
-    memory does not grow with their number. Where ``out`` is given, each is written into ``out/NAME``, as by ``build``.
-    ``jobs`` are processes: nine tenths of the cores unless given; with 1 all of it runs in this process.
+    Parameters
+    ----------
+    sources : iterable of path, Setup or Variant
+        Taken as workers become free, and nothing is kept, so that memory does not grow with their number.
+    out : str or Path, optional
+        Directory; each is written into ``out/NAME``, as by ``build``.
+    formats : sequence of str, optional
+        Output formats; those of the scan files unless given.
+    jobs : int, optional
+        Number of processes: nine tenths of the cores unless given; with 1 all of it runs in this process.
+
+    Yields
+    ------
+    BuildOutcome
+        Number and name of a scan, its ``build`` or its ``error``.
+
+    Raises
+    ------
+    Exception
+        Whatever ``sources`` raises; what goes wrong with one scan is the ``error`` of its outcome.
+
+    Examples
+    --------
+    >>> scans = tablegen.variants("scan.toml", {"x.size_nm": [100, 150]})
+    >>> sorted(one.name for one in tablegen.build_many(scans, jobs=1))
+    ['annexin_200nm_size_nm_100', 'annexin_200nm_size_nm_150']
     """
     given: dict[int, str | Path | Setup | Variant] = {}
 

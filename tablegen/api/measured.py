@@ -17,6 +17,11 @@ Measured = str | Path | Mapping[str, ArrayLike]
 VALUES = "values"  # what messages and comments call arrays that are of no file
 
 
+def measured_list(data: Measured | Sequence[Measured]) -> list[Measured]:
+    """One table, or several, as a list."""
+    return list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
+
+
 def table_of(data: Measured, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
     """The columns that are needed, and the optional ones that are there; of arrays in the first unit of each.
 

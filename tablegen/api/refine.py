@@ -1,56 +1,140 @@
-"""A trace of the running scan to a layer over the model, and into the scan file: a round of iterative learning."""
+"""A trace or images of the running scan to a layer over the model, and into the scan file: a round of learning."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
 
+from tablegen.api.image_input import ImageSource, check_names, read_trace_and_retrace, sample_of
 from tablegen.api.measured import Measured, table_of
+from tablegen.api.result import Result
+from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.reading import CONFIGURATION, read_text
+from tablegen.base.warnings import Finding, of_remarks, worst_first
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.emit.write import write_files
+from tablegen.images.scan_angle import running_scan_remarks
 from tablegen.refinement.comment import provenance
+from tablegen.refinement.image_round import refine_images, refine_mismatch
+from tablegen.refinement.lattice_line import ImageOptions
 from tablegen.refinement.round import Options, Round, with_refinement
 from tablegen.refinement.round import refine as learn_from
+from tablegen.refinement.round_text import refine_record, refine_text
 from tablegen.refinement.scan_file import rounds_of, with_layer
 
 
+@one_blas_thread
 def refine(
     scan: str | Path | Setup,
-    trace: Measured,
+    trace: Measured | None = None,
     *,
     axis: Literal["x", "y"],
+    images: Sequence[tuple[ImageSource, ...]] = (),
     triggered: bool = False,
-    **options: Any,
+    mismatch: bool = False,
+    **how: Any,
 ) -> "RefinedScan":
-    """Learn from a trace of the running scan what the model leaves, as ``tablegen refine`` does.
+    """Learn what the model of the scanner leaves, from a trace or from images of the running scan.
 
-    ``trace`` is a CSV file, or arrays ``time_s``, ``displacement_nm`` and ``drive_v`` (volts at the piezo) of several
-    periods of the build of this very ``scan``. With ``triggered`` it needs no ``drive_v``: its time 0 is a line start,
-    of y a frame start. ``options`` are ``gain`` (0.7 of what is measured is corrected), ``harmonics``, ``period_s``,
-    ``delay_s``, ``settle_periods`` and ``drift_order``. Raises ``Rejected`` for wrong input, ``Unphysical`` for a trace
-    that is not of this scan.
+    Parameters
+    ----------
+    scan : path or Setup
+        Scan whose build was recorded.
+    trace : path or mapping of arrays, optional
+        Several periods of ``time_s`` in s, ``displacement_nm`` in nm and ``drive_v`` in V at the piezo, (n,) each.
+    axis : {"x", "y"}
+        Axis to correct.
+    images : sequence of (trace,) or (trace, retrace)
+        In place of ``trace``, frames of a grating or a lattice: files, or heights of shape (rows, columns).
+    triggered : bool
+        True if time 0 of the trace is a line start, of y a frame start; ``drive_v`` is not needed then.
+    mismatch : bool
+        True if the sample of ``images`` has no period: only the difference of trace and retrace is corrected.
+    **how : optional
+        ``gain``, ``harmonics``; of a trace ``period_s``, ``delay_s``, ``settle_periods``, ``drift_order``; of images
+        ``lattice_nm``, ``lattice``, ``cell``, ``pitch_nm``, ``angle_deg``, ``retrace_mirrored``, ``delay_pixels``,
+        ``channel``, ``retrace_channel``, ``frame``.
+
+    Returns
+    -------
+    RefinedScan
+        ``setup`` has what was learnt; ``write`` puts it into the scan file.
+
+    Raises
+    ------
+    Rejected
+        A file is wrong, or a column is missing.
+    Unphysical
+        The measurement is not of this scan.
+
+    Examples
+    --------
+    >>> trace = tablegen.Laboratory(like="scanner.toml").running_trace("scan.toml", "x")
+    >>> refined = tablegen.refine("scan.toml", trace, axis="x")
+    >>> refined.after_percent < refined.before_percent  # rms, percent of the line
+    True
     """
+    if (trace is None) == (not images):
+        raise TypeError("give trace, of a sensor, or images; one of them")
+    check_names(how, (*_LEARNING, *(_OF_IMAGES if images else _OF_TRACES)))
     setup = scan if isinstance(scan, Setup) else load(scan)
-    if axis == "y" and setup.scan.y.off:
-        raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
     path = None if isinstance(scan, Setup) else Path(scan)
     text = "" if path is None else read_text(path, CONFIGURATION)
+    options = Options(**{name: how[name] for name in (*_LEARNING, *_OF_TRACES) if name in how})
+    if trace is None:
+        found, sources = _of_images(setup, axis, images, options, mismatch, how)
+        return RefinedScan(found, sources, path, text)
+    if axis == "y" and setup.scan.y.off:
+        raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
     table = table_of(trace, [TIME, DISPLACEMENT], [DRIVE])
     if DRIVE not in table and not triggered:
         why = "missing; or give --triggered if time 0 is a line start"
         raise Rejected([Problem(table.file, max(int(table.lines[0]) - 1, 0), DRIVE.name, why)])
     drive = None if triggered else table[DRIVE]
-    found = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, Options(**options))
+    found = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
     return RefinedScan(found, (table.source,), path, text)
 
 
-@dataclass(frozen=True, eq=False)
-class RefinedScan:
+_LEARNING = ("gain", "harmonics")
+_OF_TRACES = ("period_s", "delay_s", "settle_periods", "drift_order")
+_CONSTANTS = ("lattice_nm", "cell", "pitch_nm", "angle_deg")
+_OF_IMAGES = (*_CONSTANTS, "lattice", "retrace_mirrored", "delay_pixels", "channel", "retrace_channel", "frame")
+
+
+def _of_images(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    images: Sequence[tuple[ImageSource, ...]],
+    options: Options,
+    mismatch: bool,
+    how: dict[str, Any],
+) -> tuple[Round, tuple[Source, ...]]:
+    if setup.scan.y.off:
+        raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, which takes no images")])
+    known = any(how.get(name) is not None for name in _CONSTANTS)
+    if mismatch and known:
+        raise TypeError("mismatch is for a sample without a period; it has no constant")
+    pairs = [read_trace_and_retrace(pair[0], pair[1] if pair[1:] else None, how) for pair in images]
+    heights = [(one.heights, other.heights) for one, other in pairs]
+    stored = ImageOptions(bool(how.get("retrace_mirrored", False)), float(how.get("delay_pixels", 0.0)))
+    sources = tuple(image.source for pair in pairs for image in pair)
+    found: Round
+    if mismatch:
+        found = refine_mismatch(setup, axis, heights, options, stored)
+    else:
+        found = refine_images(setup, axis, heights, options, stored, sample_of(how) if known else None)
+    remarks = running_scan_remarks(image for pair in pairs for image in pair)
+    return replace(found, remarks=(*remarks, *found.remarks)), sources
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RefinedScan(Result):
     """A round: ``setup`` is the scan with the new layer, ``refused`` why it must not be used, if so.
 
     ``round`` has residuals and remarks; ``scan`` and ``text`` are the scan file that was learnt for, and what it said.
@@ -133,9 +217,44 @@ class RefinedScan:
         path = Path() if self.scan is None else self.scan.resolve()
         return write_files(path.parent, {path.name: content}) if content else []
 
-    def __repr__(self) -> str:
-        axis, name = self.round.line.axis, self.round.setup.scan.name
+    @property
+    def record(self) -> dict[str, Any]:
+        """The round as plain data, as ``tablegen refine --json`` prints it."""
+        return refine_record(self.round, self._name, list(self.sources))
+
+    @property
+    def _name(self) -> str:
+        return self.round.setup.scan.name
+
+    def findings(self) -> list[Finding]:
+        """Return what to know before the round is used, the worst first."""
+        return worst_first(of_remarks(self.round.remarks))
+
+    def table(self) -> list[str]:
+        """Return the lines of ``summary`` without the findings."""
+        return refine_text(self.round, self._name, list(self.sources))
+
+    def summary(self) -> str:
+        """Return what ``tablegen refine`` prints: errors before and after, and what is odd."""
+        return "\n".join([*self.table(), *(finding.line for finding in self.findings())])
+
+    def charts(self) -> PlottedCharts:
+        """Give the charts that ``tablegen refine --plot`` draws."""
+        from tablegen.html_report.learnt import round_charts
+
+        return round_charts(self.round, self._name)
+
+    def page(self) -> bytes:
+        """Return the HTML page that ``tablegen refine --report`` writes."""
+        from tablegen.html_report.learnt import round_page
+
+        return round_page(self.round, self._name, list(self.sources), self.earlier, self.refused)
+
+    def _lines(self) -> Sequence[str]:
+        third = f"from {', '.join(dict.fromkeys(one.name for one in self.sources))}"
+        if self.refused:
+            third = f"not to be used: {self.refused}"
+        elif self.stopped:
+            third = f"stopped: {self.stopped}"
         residual = f"residual {self.before_percent:.3g} % rms, {self.after_percent:.2g} % predicted after it"
-        refused = f"\n  not to be used: {self.refused}" if self.refused else ""
-        stopped = f"\n  stopped: {self.stopped}" if self.stopped and not self.refused else ""
-        return f"<tablegen refinement of {axis} of {name!r}: {residual}{refused}{stopped}>"
+        return f"refinement of {self.round.line.axis} of {self._name!r}", residual, third

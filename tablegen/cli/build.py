@@ -126,7 +126,7 @@ def build(
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
     if plot is not None:
-        from tablegen.report.scan_charts import scan_charts
+        from tablegen.html_report.scan_charts import scan_charts
 
         brief = in_terminal(plot)
         put_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))

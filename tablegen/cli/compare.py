@@ -13,11 +13,8 @@ from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, p
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
-    from tablegen.charts.chart import Chart
-    from tablegen.charts.picture_file import PlottedCharts
-    from tablegen.comparison.comparison import SideBySide
+    from tablegen.api.compare import Compared
 
-_IN_TERMINAL = 6  # charts
 _path = click.Path(path_type=Path)
 
 
@@ -53,47 +50,29 @@ def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path 
     if output is not None and output.suffix == ".toml":
         raise click.UsageError(f"-o {output}: the page would replace a scan or a scanner file; give a name in .html")
     check_plot(plot, as_json)
-    from tablegen.comparison.charts import comparison_charts
-
     with Progress() as progress:
-        both = _read(a, b, progress)
-        charts = []
+        found = _compared(a, b, progress)
         if output is not None or plot is not None:
             progress.now("playing both and drawing")
-            charts = comparison_charts(both)
+            found.charts()
     if as_json:
-        click.echo(json.dumps(both.record(everything), indent=2, allow_nan=False))
+        click.echo(json.dumps(found.both.record(everything), indent=2, allow_nan=False))
     else:
-        from tablegen.cli.compare_text import compare_text
-
-        click.echo("\n".join(compare_text(both, everything)))
-    if charts:
-        put_plot(plot, lambda: _plotted(both, charts))
+        click.echo(found.summary(everything))
+    if plot is not None and found.charts().charts:
+        put_plot(plot, found.charts)
     if output is not None:
-        from tablegen.comparison.page import comparison_page
-
-        written(output.parent, {output.name: comparison_page(both, charts)})
-    return ExitStatus.OK if both.same else ExitStatus.STALE
+        written(output.parent, {output.name: found.page()})
+    return ExitStatus.OK if found.same else ExitStatus.STALE
 
 
-def _plotted(both: "SideBySide", charts: "list[Chart]") -> "PlottedCharts":
-    """All in a file, what differs in it first; in the terminal only that, the first of them."""
-    from tablegen.charts.picture_file import PlottedCharts
-    from tablegen.comparison.charts import differing_charts
-
-    first = differing_charts(charts)
-    rest = [chart for chart in charts if chart not in first]
-    heading = "A: {}, B: {}".format(*both.titles)
-    return PlottedCharts(heading, (*first, *rest), brief=tuple((first or charts)[:_IN_TERMINAL]))
-
-
-def _read(a: Path, b: Path, progress: Progress) -> "SideBySide":
+def _compared(a: Path, b: Path, progress: Progress) -> "Compared":
+    from tablegen.api.compare import compare as compared
     from tablegen.base.input_errors import Rejected, Unphysical
-    from tablegen.comparison.comparison import compared
     from tablegen.manifest.read import NotABuild
 
     try:
-        return compared(a, b, progress.now)
+        return compared(a, b, progress=progress.now)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except (NotABuild, Unphysical) as error:

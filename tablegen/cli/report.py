@@ -11,9 +11,8 @@ from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
+    from tablegen.api.report import ReportPage
     from tablegen.charts.chart import Chart
-    from tablegen.report.subject import Subject
-    from tablegen.report.verify_record import VerifyRecord
 
 
 @click.command(short_help="Write an HTML page of a scan: errors, charts, certificate.")
@@ -76,50 +75,26 @@ def report(
         raise click.UsageError("--figure needs --svg, --png or --pdf")
     if png or pdf:
         require("matplotlib", extra="plot", otherwise="; or write --svg, which needs nothing")
-    from tablegen.report.page import charts_of, page, sections
-
     with Progress() as progress:
-        record = None if verified is None else _record(verified)
-        subject = _of_directory(source, record) if source.is_dir() else _of_scan(source, record, progress)
-        found = sections(subject, progress.now)
-        content = page(subject, found)
-        charts = _chosen(charts_of(found), figures)
-    written(output.parent, {output.name: content})
+        found = _reported(source, verified, progress)
+    charts = _chosen(found.figures, figures)
+    written(output.parent, {output.name: found.content})
     _write_charts(charts, svg, png, pdf)
-    click.echo(f"{output}: {len(content) / 1000:.0f} kB")
-    if subject.planned is not None and subject.planned.broken:
-        lines = [f"{output}: the certificate exceeds a limit", *map(str, subject.planned.broken)]
-        fail(lines, ExitStatus.BROKEN_LIMIT)
+    click.echo(f"{output}: {len(found.content) / 1000:.0f} kB")
+    if found.broken:
+        fail([f"{output}: the certificate exceeds a limit", *found.broken], ExitStatus.BROKEN_LIMIT)
     return ExitStatus.OK
 
 
-def _record(path: Path) -> "VerifyRecord":
-    from tablegen.report.verify_record import read_record
-
-    try:
-        return read_record(path)
-    except OSError as error:
-        fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-    except ValueError as error:
-        fail([f"{path}: {error}"], ExitStatus.WRONG_INPUT)
-
-
-def _of_directory(folder: Path, record: "VerifyRecord | None") -> "Subject":
+def _reported(source: Path, verified: Path | None, progress: Progress) -> "ReportPage":
+    from tablegen.api.report import report as reported
+    from tablegen.base.input_errors import Rejected
     from tablegen.manifest.read import NotABuild
-    from tablegen.report.subject import of_directory
 
     try:
-        return of_directory(folder, record)
+        return reported(source, verified=verified, progress=progress.now)
     except NotABuild as error:
         fail([error], ExitStatus.WRONG_INPUT)
-
-
-def _of_scan(scan: Path, record: "VerifyRecord | None", progress: Progress) -> "Subject":
-    from tablegen.base.input_errors import Rejected
-    from tablegen.report.planned_scan import planned_scan
-
-    try:
-        return planned_scan(scan, record, progress.now)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 

@@ -49,7 +49,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         return
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
-    lines = built.summary.splitlines()
+    lines = built.summary().splitlines()
     if optimum:
         from tablegen.certificate.certificate import Certificate
         from tablegen.certificate.optimum import with_optimum
@@ -70,6 +70,6 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
 
 
 def _charts(built: "Build", plot: Path | None) -> "PlottedCharts":
-    from tablegen.report.scan_charts import scan_charts
+    from tablegen.html_report.scan_charts import scan_charts
 
     return scan_charts(built.setup, built.plan, built.certificates, in_terminal(plot))

@@ -14,10 +14,6 @@ from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.config.load import Setup
-    from tablegen.virtual.parameters import Truth
-    from tablegen.virtual.report import SimulationStage
-    from tablegen.virtual.scanner import VirtualScanner
-    from tablegen.virtual.simulation import Run
 
 OWN, DEFAULT = "own", "default"
 
@@ -100,50 +96,28 @@ def simulate(
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     check_plot(plot, as_json)
-    from msgspec.structs import replace
-
-    from tablegen.api.laboratory import Laboratory
-    from tablegen.base.input_errors import Rejected
+    from tablegen.api.simulate import simulate as simulated
+    from tablegen.base.input_errors import Rejected, Unphysical
     from tablegen.config.load import load
-    from tablegen.virtual import report
-    from tablegen.virtual.own_run import own_axes
 
     try:
         setup = load(scan)
+        own = _plays_own(context, setup, truth_file)
+        if calibrated and not own:
+            require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
+        truth = OWN if own else truth_file or DEFAULT
+        with Progress() as progress:
+            found = simulated(
+                setup, truth, calibrated=calibrated, noise_percent=noise, seed=seed, progress=progress.now
+            )
     except Rejected as faults:
         fail(faults.problems, ExitStatus.WRONG_INPUT)
-    if setup.scan.y.off:
-        problem = setup.scan_file.problem("y.motion", "'off' makes a line scan, and frames alone are simulated")
-        fail([problem], ExitStatus.WRONG_INPUT)
-    if _plays_own(context, setup, truth_file):
-        _simulate_own(setup, seed, plot, as_json)
-        return
-    truth_file = truth_file or DEFAULT
-    if calibrated:
-        require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
-    try:
-        laboratory = Laboratory(truth_file, setup.scanner)
-    except Rejected as faults:
-        fail(faults.problems, ExitStatus.WRONG_INPUT)
-    scanner, truth = laboratory.scanner, laboratory.truth
-    if laboratory.scaled:
-        truth = replace(truth, name=f"{truth.name}, {laboratory.scaled}")
-    with Progress() as progress:
-        heading = "with the scanner file as it is"
-        if own_axes(setup):
-            heading += "; its operator is that of the piezo on which it was measured"
-        stages = [_play("given", heading, setup, scanner, truth_file, progress)]
-        if not stages[0].runs:
-            fail(_reasons(stages[0]), ExitStatus.WRONG_INPUT)
-        if calibrated:
-            stages.append(_calibrated(setup, scanner, truth_file, noise, seed, progress))
+    except Unphysical as reason:
+        fail([reason], ExitStatus.WRONG_INPUT)
     if csv_file is not None:
-        written(csv_file.parent, {csv_file.name: report.csv(stages).encode()})
-    _print_stages(setup, truth, stages, as_json)
-    if plot is not None:
-        from tablegen.report.simulated import stage_charts
-
-        put_plot(plot, lambda: stage_charts(setup.scan.name, stages))
+        written(csv_file.parent, {csv_file.name: found.csv().encode()})
+    click.echo(found.to_json() if as_json else found.summary())
+    put_plot(plot, found.charts)
 
 
 def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -> bool:
@@ -167,82 +141,3 @@ def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -
                 f"{name} does not go with the scanner file's own operator; give --scanner-truth {DEFAULT} as well"
             )
     return True
-
-
-def _simulate_own(setup: "Setup", seed: int, plot: Path | None, as_json: bool) -> None:
-    from tablegen.base.input_errors import Rejected, Unphysical
-    from tablegen.virtual import own_report
-    from tablegen.virtual.own_run import own_axes, simulate_own
-
-    try:
-        with Progress() as progress:
-            runs = simulate_own(setup, seed, progress.now)
-    except Rejected as faults:
-        fail(faults.problems, ExitStatus.WRONG_INPUT)
-    except Unphysical as reason:
-        fail([str(reason)], ExitStatus.WRONG_INPUT)
-    found = setup.scan.name, runs, [axis for axis in ("x", "y") if axis not in own_axes(setup)]
-    if as_json:
-        import json
-
-        click.echo(json.dumps(own_report.data(*found), indent=2))
-    else:
-        click.echo("\n".join(own_report.text(*found)))
-    if plot is not None:
-        from tablegen.report.simulated import own_charts
-
-        put_plot(plot, lambda: own_charts(setup.scan.name, runs))
-
-
-def _print_stages(setup: "Setup", truth: "Truth", stages: "list[SimulationStage]", as_json: bool) -> None:
-    from tablegen.virtual import report
-
-    if as_json:
-        import json
-
-        click.echo(json.dumps(report.data(setup.scan.name, truth, stages), indent=2))
-    else:
-        click.echo("\n".join(report.text(setup.scan.name, truth, stages)))
-
-
-def _reasons(stage: "SimulationStage") -> list[str]:
-    """Return why no model could be played, each reason once."""
-    return list(dict.fromkeys(why for _, reasons in stage.rejected for why in reasons))
-
-
-def _calibrated(
-    setup: "Setup", scanner: "VirtualScanner", truth_file: str, noise: float, seed: int, progress: Progress
-) -> "SimulationStage":
-    """Play with parameters that were calibrated on simulated data; ``noise`` is in percent."""
-    from tablegen.base.input_errors import Unphysical
-    from tablegen.virtual.calibration_day import calibrate
-    from tablegen.virtual.report import SimulationStage
-
-    progress.now("calibrating")
-    heading = f"with one calibrated on the virtual scanner's own data, {noise:g} % noise"
-    try:
-        after = calibrate(setup, scanner, 0.01 * noise, seed).setup
-        return _play("calibrated", heading, after, scanner, truth_file, progress)
-    except (Unphysical, ValueError) as reason:
-        return SimulationStage("calibrated", heading, (), (("calibration", (str(reason),)),))
-
-
-def _play(
-    name: str, heading: str, setup: "Setup", scanner: "VirtualScanner", truth_file: str, progress: Progress
-) -> "SimulationStage":
-    """Every model that can be played, and why the others cannot."""
-    from tablegen.base.input_errors import Rejected
-    from tablegen.virtual.report import SimulationStage
-    from tablegen.virtual.simulation import models_of, simulate
-
-    runs: list[Run] = []
-    rejected: list[tuple[str, tuple[str, ...]]] = []
-    for model in models_of(setup):
-        progress.now(f"playing the {model} model, scanner file as {name}")
-        try:
-            runs.append(simulate(setup, scanner, model))
-        except Rejected as faults:
-            rejected.append((model, tuple(map(str, faults.problems))))
-        except ValueError as reason:
-            rejected.append((model, (f"{truth_file}: {reason}",)))
-    return SimulationStage(name, heading, tuple(runs), tuple(rejected))

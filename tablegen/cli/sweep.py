@@ -10,9 +10,7 @@ from tablegen.cli.shared.common import OutputFolder, fail, format_option, scan_a
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
-    from tablegen.sweep.run import ScanLibrary
-
-_SHOWN = 20  # scans with the same reason, by name
+    from tablegen.sweeping.run import ScanLibrary
 
 
 @click.command(short_help="Build many scans as a library of programs with one index.")
@@ -83,21 +81,20 @@ def sweep(
     3 no scan could be built, and some for a limit of the certificate (with --strict: or a
     warning), 4 cannot write, 11 some scans could not be built.
     """
-    from tablegen.base.workers import default_jobs
     from tablegen.cli.shared.common import quiet_blas
     from tablegen.cli.shared.progress_bar import Bar
 
     quiet_blas()
     from tablegen.emit.write import CannotWrite, NoPlace
-    from tablegen.sweep.run import run
+    from tablegen.sweeping.sweep import build_library
 
-    found = _asked(scan, texts, output)
+    found = _library(scan, texts, output)
     chosen = list(formats) or None
     if only_list:
         return _listed(found, chosen)
     bar = Bar(unit="scans")
     try:
-        run(found, formats=chosen, jobs=jobs or default_jobs(), strict=strict, only_check=only_check, progress=bar)
+        build_library(found, formats=chosen, jobs=jobs, strict=strict, only_check=only_check, progress=bar)
     except KeyboardInterrupt:
         bar.close()
         again = "" if only_check else "; what was built stays, and the same command goes on from there"
@@ -113,27 +110,25 @@ def sweep(
     return _told(found, only_check, quiet)
 
 
-def _asked(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
-    """The scans that are asked for; a file that cannot be read, or a wrong setting, ends the command."""
+def _library(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
+    """The scans of the library; a file that cannot be read, or a wrong setting, ends the command."""
     from tablegen.base.input_errors import Rejected
     from tablegen.config.settings import parse_setting
-    from tablegen.config.variants import variants
-    from tablegen.sweep.run import ScanLibrary
+    from tablegen.sweeping.sweep import planned_library
 
     try:
-        library, found = variants(scan, [parse_setting(text) for text in texts])
+        return planned_library(scan, [parse_setting(text) for text in texts], output)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
-    return ScanLibrary(library, found, output)
 
 
 def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
     """A line a scan: what a sweep would do with it."""
     from tablegen.base.input_errors import Rejected
     from tablegen.library.entry import Entry
-    from tablegen.sweep.inputs import Inputs
-    from tablegen.sweep.run import state
-    from tablegen.sweep.written_records import WrittenRecords
+    from tablegen.sweeping.inputs import Inputs
+    from tablegen.sweeping.run import state
+    from tablegen.sweeping.written_records import WrittenRecords
 
     inputs, written, wrong = Inputs(), WrittenRecords(), 0
     width = max(len(variant.name) for variant in found.variants)
@@ -152,37 +147,16 @@ def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
 
 def _told(found: "ScanLibrary", only_check: bool, quiet: bool) -> int:
     """Print what became of a sweep, and return the status."""
-    for entry in found.in_order:
-        for warning in entry.warnings:
-            click.echo(f"warning: {entry.name}: {warning}", err=True)
-    for lines in _reasons(found):
-        click.echo(lines, err=True)
-    for note in found.notes:
-        click.echo(f"note: {note}", err=True)
-    count, failed = len(found.variants), len(found.failed)
+    for line in found.remarks():
+        click.echo(line, err=True)
     status = _status(found)
     if only_check and found.different:
         click.echo("\n".join(f"{found.folder / name}: not up to date" for name in found.different))
         click.echo(f"{found.folder} is stale; run the same command without --check", err=True)
         return status if status not in (ExitStatus.OK, ExitStatus.PARTIAL) else ExitStatus.STALE
     if not quiet:
-        parts = [f"{len(found.built)} built"] * bool(found.built)
-        parts += [f"{len(found.current)} up to date"] * bool(found.current)
-        parts += [f"{failed} failed"] * bool(failed) + [f"{len(found.removed)} removed"] * bool(found.removed)
-        click.echo(f"{found.folder}: {count} scan{'s' if count != 1 else ''}: {', '.join(parts)}")
+        click.echo(found.verdict())
     return status
-
-
-def _reasons(found: "ScanLibrary") -> list[str]:
-    """Each reason once, with the scans that it holds for."""
-    by_reason: dict[str, list[str]] = {}
-    for failed in found.failed:
-        by_reason.setdefault("\n".join(failed.reasons), []).append(failed.variant.name)
-    lines = []
-    for reason, names in by_reason.items():
-        more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-        lines.append(f"failed: {', '.join(names[:_SHOWN])}{more}:\n  " + reason.replace("\n", "\n  "))
-    return lines
 
 
 def _status(found: "ScanLibrary") -> ExitStatus:

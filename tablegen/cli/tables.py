@@ -1,6 +1,5 @@
 """``tablegen tables``: which tables would do, and the smallest of them."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -13,7 +12,7 @@ from tablegen.cli.shared.progress import Progress
 from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
-    from tablegen.report.table_rows import AxisTables
+    from tablegen.api.tables import FeasibleTables
 
 
 @click.command(
@@ -45,44 +44,27 @@ def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_jso
     within 1 LSB if that is less. Tables that not all formats of the scan file play are marked -, and not chosen.
     """
     check_plot(plot, as_json)
-    name, found = _found(scan, axis)
+    found = _feasible(scan, axis)
     if as_json:
-        click.echo(json.dumps({"name": name, "axes": [one.record() for one in found]}, indent=2, allow_nan=False))
+        click.echo(found.to_json())
     else:
-        from tablegen.cli.tables_text import tables_text
-
-        for i, one in enumerate(found):
+        for i, lines in enumerate(found.texts()):
             if i:
                 click.echo()
-            for number, text in enumerate(tables_text(one)):
+            for number, text in enumerate(lines):
                 tell(text, bold=number == 0)
-    if plot is not None:
-        from tablegen.report.table_charts import table_charts
-
-        put_plot(plot, lambda: table_charts(name, found))
+    put_plot(plot, found.charts)
 
 
-def _found(scan: Path, axis: str | None) -> "tuple[str, list[AxisTables]]":
+def _feasible(scan: Path, axis: Literal["x", "y"] | None) -> "FeasibleTables":
     quiet_blas()
-    from tablegen.base.input_errors import Problems, Rejected
-    from tablegen.config.load import load
-    from tablegen.planning.line_plan import make_plan
-    from tablegen.report.table_rows import axis_tables
+    from tablegen.api.tables import tables as feasible
+    from tablegen.base.input_errors import Rejected
 
     try:
         with Progress() as progress:
-            progress.now("shaping the waveforms")
-            setup = load(scan)
-            plan = make_plan(setup)
-            lines = [line for line in plan.moving if axis in (None, line.axis)]
-            if not lines:
-                raise click.UsageError(f"{axis} rests in this scan: it has no table to choose.")
-            problems, found = Problems(), []
-            for line in lines:
-                progress.now(f"measuring tables of {line.axis}")
-                with problems.at(setup.scan_file, f"{line.axis}.table"):
-                    found.append(axis_tables(setup, line))
-            problems.stop_if_any()
+            return feasible(scan, axis, progress=progress.now)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
-    return plan.name, found
+    except ValueError as reason:
+        raise click.UsageError(str(reason)) from None

@@ -10,13 +10,13 @@ from tablegen.comparison.law_charts import law_charts
 from tablegen.comparison.operators import SIDES, ComparedOperator, Place, residuals
 from tablegen.comparison.overlay import overlaid
 from tablegen.compensation.operator.loop import POINTS
+from tablegen.html_report.blocks import Charts as ChartsBlock
+from tablegen.html_report.blocks import Section
+from tablegen.html_report.playing import PlayedAxis, played_axes
+from tablegen.html_report.scan_errors import inside
+from tablegen.html_report.subject import Subject, series_of
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.numerics.arrays import Floats
-from tablegen.report.blocks import Charts as ChartsBlock
-from tablegen.report.blocks import Section
-from tablegen.report.playing import PlayedAxis, played_axes
-from tablegen.report.scan_errors import inside
-from tablegen.report.subject import Subject, series_of
 
 _POINTS = 801
 _MOST_LOOPS = 4

@@ -98,7 +98,7 @@ class SideBySide:
         }
 
 
-def compared(a: Path, b: Path, tell: Callable[[str], None] = lambda _: None) -> SideBySide:
+def compared(a: Path, b: Path, tell: Callable[[str], object] = lambda _: None) -> SideBySide:
     """Read both. Raises ``Rejected`` where one cannot be read or where the two are not alike, and ``NotABuild``."""
     a, b = folder_of(a), folder_of(b)
     kinds = kind_of(a), kind_of(b)

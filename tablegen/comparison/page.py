@@ -8,8 +8,8 @@ from tablegen.comparison.charts import chart_section
 from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.difference import ComparedPair
 from tablegen.comparison.side import WORDS
-from tablegen.report.blocks import Grid, Section, TableCell, row
-from tablegen.report.document import document
+from tablegen.html_report.blocks import Grid, Section, TableCell, row
+from tablegen.html_report.document import document
 from tablegen.version import __version__
 
 

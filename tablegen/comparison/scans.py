@@ -7,8 +7,8 @@ import msgspec
 from tablegen.comparison.quantity import ComparedQuantity, digest, keys_of
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.emit.constants import storage_bits
+from tablegen.html_report.subject import PlannedScan, Subject
 from tablegen.manifest.fields import ManifestAxis, ManifestFigure, ManifestSequence
-from tablegen.report.subject import PlannedScan, Subject
 
 _PARTS = (
     ("uncompensated", "scaling error {}, uncompensated"),

@@ -15,9 +15,9 @@ from tablegen.comparison.scans import scan_quantities
 from tablegen.compensation.models.operator import OperatorModel
 from tablegen.config.load import load_scanner
 from tablegen.config.scanner import Scanner
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.subject import Subject, of_directory
 from tablegen.manifest.format import MANIFEST
-from tablegen.report.planned_scan import planned_scan
-from tablegen.report.subject import Subject, of_directory
 
 Kind = Literal["scan", "build", "scanner", "operator"]
 WORDS: dict[Kind, str] = {
@@ -83,7 +83,7 @@ def together(a: Kind, b: Kind) -> bool:
     return any({a, b} <= kinds for kinds in _TOGETHER)
 
 
-def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: None) -> ComparedSide:
+def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: None) -> ComparedSide:
     """Read one side; a scan is planned and certified. Raises ``Rejected`` and ``NotABuild``."""
     if kind == "build":
         subject = of_directory(path)

@@ -75,7 +75,29 @@ class StoredBuild(Struct, frozen=True, eq=False, dict=True):
 
 
 def read_build(folder: str | Path) -> StoredBuild:
-    """Read the build in a directory. Raises ``NotABuild`` if a manifest is missing, damaged or cannot be played."""
+    """Read a build back from the manifest in its directory.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Directory that ``build`` wrote.
+
+    Returns
+    -------
+    StoredBuild
+        The program that a device plays, and what the manifest says of it.
+
+    Raises
+    ------
+    NotABuild
+        The manifest is missing, damaged, or cannot be played.
+
+    Examples
+    --------
+    >>> _ = tablegen.build("scan.toml", "build")
+    >>> tablegen.read_build("build").program.x.ticks
+    1250
+    """
     path = Path(folder) / MANIFEST
     try:
         content = read_bytes(path, MANIFEST_KIND)

@@ -30,14 +30,42 @@ def verify(
 ) -> Report:
     """Hold a build's files, and what its own sequencer plays, against its manifest.
 
-    ``target`` is "verilog" where the build has it, else "c", else "files", which plays nothing; "cortex-m" plays the C
-    on an emulator. ``axis`` and ``fourier`` say how the Verilog is placed. ``keep`` is a directory to play in, which is
-    kept. A build of another version of tablegen fails unless ``other_version``: then only what is played can tell
-    whether its runtime is right. What the directory of the build holds is compiled and run. The report's ``failures``
-    are empty if all is well.
+    Parameters
+    ----------
+    folder : str or Path
+        Directory of a build, or of a program of a library. What it holds is compiled and run.
+    target : {"files", "c", "cortex-m", "verilog"}, optional
+        What plays it: "verilog" where the build has it, else "c", else "files", which plays nothing.
+    simulator, axis, fourier : optional
+        How the Verilog is simulated and placed.
+    ticks, seed : int, optional
+        Most ticks to play, and the random seed of the session.
+    keep : str or Path, optional
+        Directory to play in, which is kept.
+    other_version : bool
+        True to accept a build of another version, whose runtime is then not compared.
+    progress : callable
+        Called with what is being done.
 
-    Raises ``NotABuild`` where there is no build, ``ToolMissing`` without a simulator or compiler, ``OSError`` where
-    nothing can be written. A program of a library is played with the runtime of the library.
+    Returns
+    -------
+    Report
+        ``failures`` is empty if all is well.
+
+    Raises
+    ------
+    NotABuild
+        The directory holds no build.
+    ToolMissing
+        A simulator or compiler is not installed.
+    OSError
+        Nothing can be written.
+
+    Examples
+    --------
+    >>> _ = tablegen.build("scan.toml", "build")
+    >>> tablegen.verify("build", "files").failures
+    []
     """
     folder = Path(folder)
     chosen, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)

@@ -67,7 +67,7 @@ def own_axes(setup: Setup) -> tuple[str, ...]:
     return tuple(name for name in ("x", "y") if isinstance(_table(setup, name), OperatorModel))
 
 
-def simulate_own(setup: Setup, seed: int, tell: Callable[[str], None] = lambda _: None) -> list[OwnRun]:
+def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda _: None) -> list[OwnRun]:
     """Simulate every axis with an operator, with the models that the scanner file allows; without refinement.
 
     Raises ``Rejected`` where the scan cannot be built with the operator, and ``Unphysical`` where a departure makes a
@@ -86,7 +86,7 @@ def simulate_own(setup: Setup, seed: int, tell: Callable[[str], None] = lambda _
     return [replace(run, refined=getattr(scan, run.axis).refinement is not None) for run in runs]
 
 
-def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], None]) -> OwnRun:
+def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], object]) -> OwnRun:
     table = _table(setup, name)
     assert isinstance(table, OperatorModel)
     line_of_model = operator_line(line)

@@ -26,7 +26,7 @@ def test_the_code_of_the_page_runs(
         if language == "python" and not skipped:
             exec(compile(code, "docs/python.md", "exec"), names)
             ran += 1
-    assert ran == 11
+    assert ran == 14
     printed = capsys.readouterr().out
     (shown,) = (code for language, _, code in BLOCKS if language == "text")
     assert shown in printed

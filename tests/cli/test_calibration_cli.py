@@ -14,7 +14,7 @@ from building import REPOSITORY
 from calibrating import AMPLITUDES, CASES, DRIVES, FREQUENCIES, OFFSETS, RESPONSE, Scanner, actual, apparent, trials
 from editing import SCANNER, Outcome, run, write_pair
 
-from tablegen.cli.calibrate.text import figures
+from tablegen.calibration.fit_text import figures
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
 from tablegen.fitting.estimate import Estimate

@@ -13,8 +13,8 @@ from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.emit.constants import storage_bits
 from tablegen.fixedpoint.table_shape import MODES
+from tablegen.html_report.table_costs import CELLS, COUNTS, INSTRUCTIONS, MeasuredRun
 from tablegen.planning.line_plan import make_plan
-from tablegen.report.table_costs import CELLS, COUNTS, INSTRUCTIONS, MeasuredRun
 
 AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
 

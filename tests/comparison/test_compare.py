@@ -24,8 +24,8 @@ from tablegen.comparison.difference import _merged, pairs
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scans import scan_quantities
 from tablegen.compensation.operator.file import operator_text
+from tablegen.html_report.subject import Subject
 from tablegen.manifest.fields import Manifest
-from tablegen.report.subject import Subject
 
 LARGER = ("x.size_nm = 300.0", "timing.settle_lines = 4")
 

@@ -12,8 +12,8 @@ from building import REPOSITORY
 from editing import SCAN, edited, run, write_pair
 
 from tablegen.config.load import load
+from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.report.table_costs import CELLS, COUNTS, MeasuredRun
 
 PAGE = (REPOSITORY / "docs" / "tables.md").read_text("utf-8")
 ROWS = [row for row in PAGE.splitlines() if re.match(r"\| (?:[xy]|\d+ bits, \d+ ticks) \|", row)]

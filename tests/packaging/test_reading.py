@@ -40,7 +40,7 @@ ALLOWED = {
     ("verification/checks/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",
     ("verification/verilog/target.py", "shutil.copyfile"): "as in directory.py",
     ("link/transport.py", "open"): "a serial port",
-    ("report/document.py", "read_text"): "its template, style and script, which ship with the package",
+    ("html_report/document.py", "read_text"): "its template, style and script, which ship with the package",
     ("calibration/tables/csv_blocks.py", "np.loadtxt"): "bytes that were read already",
     ("images/formats/picture.py", "Pillow.open"): "bytes that were read already",
 }

@@ -29,7 +29,7 @@ def shipped_files() -> set[str]:
         for kind in ("v", "j2")
         for path in REPOSITORY.glob(f"tablegen/library/*.{kind}")
     }
-    found |= {f"tablegen/report/page.{kind}" for kind in ("css", "html.j2", "js")}
+    found |= {f"tablegen/html_report/page.{kind}" for kind in ("css", "html.j2", "js")}
     found |= {f"tablegen/virtual/{path.name}" for path in REPOSITORY.glob("tablegen/virtual/*.toml")}
     for language in (REPOSITORY / "firmware_templates").iterdir():
         if language.is_dir() and language.name != "__pycache__":

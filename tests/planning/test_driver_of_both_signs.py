@@ -20,10 +20,10 @@ from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.config.load import Setup, from_values, load
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, triangle
+from tablegen.html_report.subject import PlannedScan
+from tablegen.html_report.usable import largest_sizes
 from tablegen.numerics.driver import Driver
 from tablegen.planning.line_plan import make_plan
-from tablegen.report.subject import PlannedScan
-from tablegen.report.usable import largest_sizes
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scaling import scaled_to
 from tablegen.virtual.scanner import VirtualScanner

@@ -106,7 +106,7 @@ def test_faults_of_a_chart_are_found(changed: dict[str, object], fault: str) -> 
 
 def test_the_page_and_files_have_the_same_colours() -> None:
     """The light scheme of the style sheet."""
-    sheet = (resources.files("tablegen.report") / "page.css").read_text("utf-8")
+    sheet = (resources.files("tablegen.html_report") / "page.css").read_text("utf-8")
     light = sheet.split("prefers-color-scheme")[0]
     for role, look in style.ROLES.items():
         assert f"--{role}:{look.stroke};" in light, role

@@ -12,7 +12,7 @@ from foreign_plants import SIX, ForeignPlant, ManyPlays, record
 from html_page import Page, well_formed
 
 from tablegen.fitting.estimate import Curve
-from tablegen.report.fitted import drawn_curves
+from tablegen.html_report.fitted import drawn_curves
 
 NOISE = 1.0 + 0.002 * np.random.default_rng(11).standard_normal(100)
 

@@ -19,10 +19,10 @@ from sets import quick
 
 from tablegen.base.input_errors import Problem
 from tablegen.charts.png import grey_png
-from tablegen.report.page import charts_of, page, sections
-from tablegen.report.planned_scan import planned_scan
-from tablegen.report.ranking import ranked
-from tablegen.report.subject import Subject
+from tablegen.html_report.page import charts_of, page, sections
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.ranking import ranked
+from tablegen.html_report.subject import Subject
 
 
 def report(path: Path, *options: str | Path, status: int = 0) -> tuple[bytes, Page]:
@@ -309,7 +309,7 @@ def test_a_curve_in_the_page_is_the_drive(found: tuple[bytes, Page], example: Pa
 
 def test_the_simulated_mismatch_is_what_the_certificate_expects(subject: Subject) -> None:
     """Two ways to it: emitted codes on the loop of their stroke here, the float waveform on it there."""
-    from tablegen.report.playing import played_axes
+    from tablegen.html_report.playing import played_axes
     from tablegen.virtual.own_run import measured
 
     x, _ = played_axes(subject.planned)  # type: ignore[arg-type]
@@ -326,7 +326,7 @@ def test_the_simulated_mismatch_is_what_the_certificate_expects(subject: Subject
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_usable_area_is_what_check_accepts(subject: Subject, tmp_path: Path, axis: str) -> None:
     """Just inside of the curve a scan is accepted, and outside it is not, on both slopes of the driver's range."""
-    from tablegen.report.usable import largest_sizes
+    from tablegen.html_report.usable import largest_sizes
 
     planned = subject.planned
     assert planned is not None

@@ -1,6 +1,5 @@
 """``tablegen calibrate images``: trace and retrace images to (17)-(22)."""
 
-from functools import partial
 from pathlib import Path
 
 import click
@@ -13,17 +12,16 @@ from tablegen.cli.calibrate.options import (
     turn_option,
     window_option,
 )
-from tablegen.cli.calibrate.run import Common, driver_of, finish, shared_options
+from tablegen.cli.calibrate.run import Common, ended_by_input, put, scanner_options, shared_options
 from tablegen.cli.images.pairs import (
     CommandOfPairs,
     channel_option,
     frame_option,
     pair_option,
-    read_both,
+    require_readers,
     retrace_channel_option,
 )
-from tablegen.cli.shared.common import fail
-from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.progress import Progress
 
 
 @click.command(cls=CommandOfPairs, short_help="Fit beta_max, rho, u_peak to trace and retrace images.")
@@ -70,22 +68,23 @@ def images(
       tablegen calibrate images --axis x --v-max 100 --pair 50 t1.npy r1.npy --pair 100 t2.npy r2.npy
       tablegen calibrate images --axis x --v-max 100 --pair 50 1.ibw --pair 100 2.ibw --channel Height
     """
-    from tablegen.base.input_errors import Rejected
-    from tablegen.calibration.laws.images import Pair, fit_images
-    from tablegen.images.scan_angle import require_fast_axis
+    from tablegen.api.calibrate import calibrate_images
 
-    read = [read_both(trace, retrace, channel, retrace_channel, frame) for _, trace, retrace in pairs]
-    files = [image for both in read for image in both]
-    try:
-        require_fast_axis(files, common.axis)
-    except Rejected as rejected:
-        fail(rejected.problems, ExitStatus.WRONG_INPUT)
-    driver = driver_of(common)
-    taken = [
-        Pair(
-            " and ".join(dict.fromkeys((trace.source.name, retrace.source.name))), volts, trace.heights, retrace.heights
+    require_readers({path for _, *files in pairs for path in files})
+    with ended_by_input(), Progress() as progress:
+        progress.now("fitting")
+        found = calibrate_images(
+            [(volts, trace, retrace) for volts, trace, retrace in pairs],
+            axis=common.axis,
+            points=points,
+            channel=channel,
+            retrace_channel=retrace_channel,
+            frame=frame,
+            retrace_mirrored=retrace_mirrored,
+            window=window,
+            turn=turn,
+            delay_pixels=delay_pixels,
+            rho=rho,
+            **scanner_options(common),
         )
-        for (volts, *_), (trace, retrace) in zip(pairs, read, strict=True)
-    ]
-    fit = partial(fit_images, taken, driver, rho, turn, window, retrace_mirrored, delay_pixels)
-    return finish(common, files, fit, points)
+    return put(common, found)

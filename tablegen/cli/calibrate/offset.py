@@ -6,14 +6,19 @@ from typing import Any
 import click
 
 from tablegen.cli.calibrate.options import optional_data
-from tablegen.cli.calibrate.run import Common, driver_of, finish, read_columns, shared_options, size_law
+from tablegen.cli.calibrate.run import (
+    Common,
+    driver_of,
+    finish,
+    of_sample_images,
+    read_columns,
+    shared_options,
+    size_law,
+)
 from tablegen.cli.images.samples import (
     CommandOfOffsetImages,
-    acquisition_of,
     image_option,
-    read_sample_image,
     refuse_sample,
-    sample_of,
     sample_options,
 )
 from tablegen.cli.shared.common import fail
@@ -72,7 +77,7 @@ def offset(
     if images:
         if data is not None or size_v is not None:
             raise click.UsageError("DATA.CSV and --size-v are for sizes in a table, and --image for images")
-        return _of_images(common, images, given)
+        return of_sample_images("offset", common, images, given)
     if data is None:
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS OFFSET_V TRACE [RETRACE]")
     refuse_sample(given)
@@ -81,37 +86,13 @@ def offset(
     if SIZE in table:
         if size_v is not None:
             raise click.UsageError(f"--size-v is for files without the column size_v; {table.file} has it")
-        law = size_law(common, driver, f"the column size_v of {table.file}")
+        law = size_law(common, f"the column size_v of {table.file}")
         return finish(
             common, [table], lambda: fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], driver, law)
         )
     of_file = None
     if size_v is not None:
-        of_file = size_law(common, driver, "--size-v")
+        of_file = size_law(common, "--size-v")
         if not size_v <= driver.span:
             fail([f"--size-v {size_v:g} is above {driver.full_scale}"], ExitStatus.WRONG_INPUT)
     return finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], driver, of_file, size_v))
-
-
-def _of_images(common: Common, images: tuple[tuple[float, float, Path, Path], ...], given: dict[str, Any]) -> int:
-    from dataclasses import replace
-
-    import numpy as np
-
-    from tablegen.calibration.laws.image_sizes import apparent_of, sizes_of
-    from tablegen.calibration.laws.offset import OffsetFit
-    from tablegen.calibration.laws.offset_sizes import OffsetSizesFit, fit_offset_sizes
-
-    sample, acquisition = sample_of(given), acquisition_of(given)
-    read = [read_sample_image(size, offset, trace, retrace, given) for size, offset, trace, retrace in images]
-    driver = driver_of(common)
-    law = size_law(common, driver, "--image")
-    size_v, offset_v = (np.array([row[i] for row in images]) for i in (0, 1))
-
-    def fit() -> OffsetFit | OffsetSizesFit:
-        found = sizes_of([image for image, _ in read], driver, sample, acquisition)
-        apparent, errors = apparent_of(found, law, driver, sample)
-        one = fit_offset_sizes(offset_v, apparent, size_v, driver, law, errors)
-        return replace(one, images=found.images, remarks=found.remarks + one.remarks)
-
-    return finish(common, [one for _, files in read for one in files], fit)

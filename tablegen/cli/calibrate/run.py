@@ -1,34 +1,35 @@
 """What all calibrations of the command line share: options, reading, and what is done with a fit."""
 
-import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import click
 
+from tablegen.cli.images.samples import check_sample, named_images
 from tablegen.cli.shared.common import OutputFile, fail, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import check_plot, plot_option, put_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from tablegen.api.calibrate import Calibrated
+    from tablegen.api.known_scanner import KnownScanner
     from tablegen.calibration.tables.columns import Column
     from tablegen.calibration.tables.table import MeasuredTable
     from tablegen.charts.picture_file import PlottedCharts
-    from tablegen.compensation.dynamics import Response
-    from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
     from tablegen.fitting.estimate import Fit
     from tablegen.images.files import ScanImage
     from tablegen.numerics.driver import Driver
 
 F = TypeVar("F", bound=Callable[..., Any])
+_NO_RANGE = "give --scanner FILE, or --v-max V, the driver's maximum output"
 _REQUIRED_MODULES = ("scipy", "tomlkit")
 
 
@@ -36,7 +37,7 @@ _REQUIRED_MODULES = ("scipy", "tomlkit")
 class Common:
     """The options that all calibrations share."""
 
-    axis: str
+    axis: Literal["x", "y"]
     scanner: Path | None
     v_max: float | None
     v_min: float
@@ -88,7 +89,7 @@ def shared_options(command: F) -> F:
     ]
 
     def run(
-        axis: str,
+        axis: Literal["x", "y"],
         scanner: Path | None,
         v_max: float | None,
         v_min: float,
@@ -144,133 +145,102 @@ def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTab
     )
 
 
-def _scanner_values(common: Common) -> dict[str, Any]:
-    """What the scanner file says now; nothing where it is to be made."""
-    from tablegen.base.input_errors import Rejected
-    from tablegen.base.toml import read_toml
-    from tablegen.config.like import inherited
+def scanner_options(common: Common) -> dict[str, Any]:
+    """The keywords of a calibrating function that say what is known of the scanner; no range ends the command."""
+    begun = common.scanner is None or (common.write and not common.scanner.exists())
+    if begun and common.v_max is None:
+        raise click.UsageError(_NO_RANGE)
+    # Of a file that is missing and is not begun, reading says what is wrong.
+    known = begun or (common.scanner is not None and common.scanner.exists())
+    return {"scanner": common.scanner, "v_max": common.v_max if known else None, "v_min": common.v_min}
 
-    if common.scanner is None or (common.write and not common.scanner.exists()):
-        return {}
+
+@contextmanager
+def ended_by_input() -> "Iterator[None]":
+    """End the command where the input is wrong, or is of no scanner; messages name the file."""
+    from tablegen.api.known_scanner import NoRange
+    from tablegen.base.input_errors import Rejected, Unphysical
+
     try:
-        return inherited(*read_toml(common.scanner, str(common.scanner)))[0]
+        yield
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    except Unphysical as reason:
+        fail([reason], ExitStatus.WRONG_INPUT)
+    except NoRange:
+        raise click.UsageError(_NO_RANGE) from None
+    except OSError as error:
+        fail([f"{error.filename}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+
+
+def known_scanner(common: Common) -> "KnownScanner":
+    """What the scanner file says now, and the range of the driver; what is wrong with it ends the command."""
+    from tablegen.api.known_scanner import KnownScanner
+
+    with ended_by_input():
+        return KnownScanner.read(common.scanner, common.axis, common.v_max, common.v_min, common.write)
 
 
 def driver_of(common: Common) -> "Driver":
     """The range of the scanner file, or as given where there is none."""
-    from tablegen.numerics.driver import Driver
-
-    values = _scanner_values(common)
-    found = values.get("v_max")
-    if isinstance(found, int | float) and not isinstance(found, bool) and found > 0.0:
-        if common.v_max is not None and common.v_max != found:
-            fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], ExitStatus.WRONG_INPUT)
-        low = values.get("v_min", 0.0)
-        if isinstance(low, bool) or not isinstance(low, int | float) or not low <= 0.0:
-            fail([f"{common.scanner}: v_min: not a voltage of 0 or less"], ExitStatus.WRONG_INPUT)
-        if common.v_min not in (0.0, low):
-            fail([f"{common.scanner}: v_min: {low:g} there, and --v-min {common.v_min:g}"], ExitStatus.WRONG_INPUT)
-        return Driver(float(found), float(low))
-    if values:
-        fail([f"{common.scanner}: v_max: missing, or not a voltage"], ExitStatus.WRONG_INPUT)
-    if common.v_max is None:
-        raise click.UsageError("give --scanner FILE, or --v-max V, the driver's maximum output")
-    return Driver(common.v_max, common.v_min)
+    known = known_scanner(common)
+    with ended_by_input():
+        return known.driver
 
 
 def in_file(common: Common, kind: str, key: str) -> float | None:
     """A number of the scanner file as it is, or None; no length or frequency is 0 or less."""
-    values: Any = _scanner_values(common)
-    for name in (common.axis, kind, key):
-        values = values.get(name) if isinstance(values, dict) else None
-    return float(values) if isinstance(values, int | float) and values > 0.0 else None
+    return known_scanner(common).number(kind, key)
 
 
-def size_law(common: Common, driver: "Driver", source: str) -> "SizeLaw":
+def size_law(common: Common, source: str) -> "SizeLaw":
     """The size law of the scanner file, for ``source`` of scan voltages; the rest of the file may be incomplete."""
-    from tablegen.base.input_errors import Unphysical
-    from tablegen.planning.laws import size_law_of
-
-    path = f"{common.axis}.size"
-    if in_file(common, "size", "k_nm_per_v") is None:
-        fail([f"{source} takes {path} of --scanner FILE; calibrate the size first"], ExitStatus.WRONG_INPUT)
-    try:
-        return size_law_of(_tables(common, "size")[path], driver)
-    except Unphysical as reason:
-        fail([f"{common.scanner}: {path}: {reason}"], ExitStatus.WRONG_INPUT)
-
-
-def _tables(common: Common, *names: str) -> dict[str, Any]:
-    """These tables of the axis as the scanner file has them, by path; a fault in one of them ends the command."""
-    from tablegen.api.calibrate import scanner_tables
-
-    assert common.scanner is not None
-    tables, problems = scanner_tables(common.scanner)
-    found = [problem for problem in problems if problem.key.startswith(f"{common.axis}.")]
-    used = [problem for problem in found if problem.key.split(".")[1] in names]
-    if used:
-        fail(used, ExitStatus.WRONG_INPUT)
-    return tables
-
-
-def scanner_axis(common: Common, driver: "Driver") -> "tuple[Response | None, OffsetLaw]":
-    """The dynamics of the scanner file, and its offset law for small scans; without them, none and a constant."""
-    from tablegen.base.input_errors import Unphysical
-    from tablegen.compensation.offset import OffsetLaw
-    from tablegen.compensation.size import SizeLaw
-    from tablegen.planning.laws import dynamics_of, offset_surface, size_law_of
-
-    if common.scanner is None or not common.scanner.exists():
-        return None, OffsetLaw()
-    tables = _tables(common, "offset", "resonance")
-    resonance, offset, size = (tables.get(f"{common.axis}.{name}") for name in ("resonance", "offset", "size"))
-    try:
-        response = None if resonance is None else dynamics_of(resonance, common.scanner.parent)
-        law = SizeLaw(1.0, 0.0, 1.0) if size is None else size_law_of(size, driver)
-        return response, OffsetLaw() if offset is None else offset_surface(offset, driver, law).small
-    except Unphysical as reason:
-        fail([f"{common.scanner}: {common.axis}: {reason}"], ExitStatus.WRONG_INPUT)
+    with ended_by_input():
+        return known_scanner(common).size_law(source)
 
 
 def finish(
     common: Common, tables: "Sequence[MeasuredTable | ScanImage]", run: "Callable[[], Fit]", points: bool = False
 ) -> int:
-    """Fit, print, draw and write; with ``points`` hysteresis, or a response, as measured.
-
-    A fit that says nothing is printed with its doubts, and not written unless forced.
-    """
+    """Fit, print, draw and write; with ``points`` hysteresis, or a response, as measured."""
     from tablegen.api.calibrate import Calibrated
     from tablegen.base.input_errors import Unphysical
-    from tablegen.calibration.fit_warnings import fit_findings
-    from tablegen.cli.calibrate.text import calibration_text
-    from tablegen.images.scan_angle import angle_remarks
 
     try:
         with Progress() as progress:
             progress.now("fitting")
             fit = run()
-            remarks = angle_remarks(tables, common.axis)
-            fit = replace(fit, remarks=(*remarks, *fit.remarks)) if remarks else fit
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
-    sources = list(dict.fromkeys(table.source for table in tables))  # images may stand in one file
-    found = Calibrated(fit, common.axis, tuple(sources), points)
+    return put(common, Calibrated(fit, common.axis, tuple(tables), points))
+
+
+def of_sample_images(
+    kind: 'Literal["size", "offset"]', common: Common, images: "Sequence[tuple[Any, ...]]", given: dict[str, Any]
+) -> int:
+    """Fit sizes, or sizes at several offsets, to images of a sample of known constant, and do with it as ``put``."""
+    from tablegen.api.calibrate import calibrate
+
+    check_sample(given)
+    rows = named_images(images)
+    with ended_by_input(), Progress() as progress:
+        progress.now("fitting")
+        found = calibrate(kind, axis=common.axis, images=rows, **given, **scanner_options(common))
+    return put(common, found)
+
+
+def put(common: Common, found: "Calibrated") -> int:
+    """Print, draw and write a fit. One that says nothing is printed with its doubts, and not written unless forced."""
     if common.as_json:
-        click.echo(json.dumps(found.record, indent=2, allow_nan=False))
+        click.echo(found.to_json())
+        plot_fit(common, found.charts)
     else:
-        click.echo("\n".join(calibration_text(fit, common.axis, tables)))
-    plot_fit(common, lambda: _charts(fit, common.axis))
-    places = [_place(fit, tables[0], tables[0].file, at) for at in fit.outliers]
-    if not common.as_json:
-        for finding in fit_findings(fit, places, points):
+        click.echo("\n".join(found.table()))
+        plot_fit(common, found.charts)
+        for finding in found.findings():
             click.echo(finding.line)
     if common.report is not None:
-        from tablegen.report.fitted import fit_page
-
-        names = [_place(fit, tables[0], tables[0].source.name, at) for at in fit.outliers]
-        written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, names, points)})
+        written(common.report.parent, {common.report.name: found.page()})
     if common.write:
         meaningless = found.doubts
         if meaningless and not common.force:
@@ -284,21 +254,6 @@ def finish(
 def plot_fit(common: Common, charts: "Callable[[], PlottedCharts]") -> None:
     """Draw as the options say."""
     put_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
-
-
-def _charts(fit: "Fit", axis: str) -> "PlottedCharts":
-    from tablegen.report.fitted import fit_charts
-
-    return fit_charts(fit, axis)
-
-
-def _place(fit: "Fit", table: "MeasuredTable | ScanImage", name: str, at: int) -> str:
-    """File, as it is called, and line of a point, or its image."""
-    from tablegen.calibration.tables.table import MeasuredTable
-
-    if fit.images:
-        return fit.images[at].name
-    return f"{name}:{table.lines[at]}" if isinstance(table, MeasuredTable) else name
 
 
 def _write(common: Common, found: "Calibrated") -> None:

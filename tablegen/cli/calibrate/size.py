@@ -6,14 +6,19 @@ from typing import Any, Literal
 import click
 
 from tablegen.cli.calibrate.options import optional_data
-from tablegen.cli.calibrate.run import Common, driver_of, finish, in_file, read_columns, shared_options
+from tablegen.cli.calibrate.run import (
+    Common,
+    driver_of,
+    finish,
+    in_file,
+    of_sample_images,
+    read_columns,
+    shared_options,
+)
 from tablegen.cli.images.samples import (
     CommandOfImages,
-    acquisition_of,
     image_option,
-    read_sample_image,
     refuse_sample,
-    sample_of,
     sample_options,
 )
 from tablegen.cli.shared.common import fail
@@ -89,7 +94,7 @@ def size(
     if images:
         if data is not None or k is not None or noise != "relative":
             raise click.UsageError("DATA.CSV, --k and --noise are for sizes in a table, and --image for images")
-        return _of_images(common, images, base_nm, threshold, given)
+        return of_sample_images("size", common, images, {**given, "base_nm": base_nm, "threshold": threshold})
     if data is None:
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS TRACE [RETRACE]")
     refuse_sample(given)
@@ -107,31 +112,3 @@ def size(
     driver = driver_of(common)
     base = base_nm or in_file(common, "size", "base_nm") or 200.0
     return finish(common, [table], lambda: fit_size(drive, actual, driver, base, threshold, noise))
-
-
-def _of_images(
-    common: Common,
-    images: tuple[tuple[float, Path, Path], ...],
-    base_nm: float | None,
-    threshold: float | None,
-    given: dict[str, Any],
-) -> int:
-    from dataclasses import replace
-
-    import numpy as np
-
-    from tablegen.calibration.laws.image_sizes import sizes_of
-    from tablegen.calibration.laws.size import SizeFit, fit_size
-
-    sample, acquisition = sample_of(given), acquisition_of(given)
-    read = [read_sample_image(volts, None, trace, retrace, given) for volts, trace, retrace in images]
-    driver = driver_of(common)
-    base = base_nm or in_file(common, "size", "base_nm") or 200.0
-    drive = np.array([image.v_scan for image, _ in read])
-
-    def fit() -> SizeFit:
-        found = sizes_of([image for image, _ in read], driver, sample, acquisition)
-        law = fit_size(drive, found.nm, driver, base, threshold, errors_nm=found.errors_nm, shared=found.shared)
-        return replace(law, images=found.images, remarks=found.remarks + law.remarks)
-
-    return finish(common, [one for _, files in read for one in files], fit)

@@ -16,8 +16,7 @@ from tablegen.cli.shared.progress import Progress
 from tablegen.cli.shared.progress_bar import Bar
 
 if TYPE_CHECKING:
-    from tablegen.correction.job import Images
-    from tablegen.correction.straight import StraightScan
+    from tablegen.api.correct import Corrected
 
 F = TypeVar("F", bound=Callable[..., Any])
 _OUTPUTS = (".gwy", ".tif", ".tiff", ".npy", ".png")
@@ -176,10 +175,10 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
             with nullcontext() if bar is not None else Progress() as progress:
                 if progress is not None:
                     progress.now(f"correcting {trace.name}")
-                found, taken = _corrected(trace, retrace, options)
+                found = _corrected(trace, retrace, options)
             if bar is not None:
                 bar.hide()
-            records.append(_put(found, taken, targets[number], suffix, options))
+            records.append(_put(found, targets[number], suffix, options))
         except _Refused as reason:
             refused += reason.lines
     if bar is not None:
@@ -276,17 +275,17 @@ def _targets(
     return [(output, name) for name in names]
 
 
-def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "tuple[StraightScan, Images]":
-    from tablegen.api.correct import choice_of, straight, taken_of
+_OPTIONS_OF_OUTPUT = ("output", "each", "pairs", "suffix", "plot", "force", "as_json")
+
+
+def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "Corrected":
+    from tablegen.api.correct import correct as put_straight
     from tablegen.base.input_errors import Rejected, Unphysical
-    from tablegen.correction.job import read_scan
 
     names = str(trace) if retrace is None else f"{trace}, {retrace}"
-    constants = options["pitch_nm"], options["lattice_nm"]
     try:
-        choice, taken = choice_of(options), taken_of(options)
-        images = read_scan(trace, retrace, choice)
-        return straight(images, options["scanner"], options["scan"], taken, *constants), images
+        how = {name: value for name, value in options.items() if name not in _OPTIONS_OF_OUTPUT}
+        return put_straight(trace, retrace, **how)
     except Rejected as rejected:
         raise _Refused(rejected.problems) from None
     except Unphysical as reason:
@@ -296,16 +295,15 @@ def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "t
 
 
 def _put(
-    found: "StraightScan", taken: "Images", target: tuple[Path, str] | None, suffix: str | None, options: dict[str, Any]
+    found: "Corrected", target: tuple[Path, str] | None, suffix: str | None, options: dict[str, Any]
 ) -> dict[str, Any]:
     """Print, draw and write one scan; its record."""
-    from tablegen.cli.images.correct_text import correct_text
     from tablegen.correction.output_files import files_of
 
     files: dict[str, bytes] = {}
     if target is not None:
         assert suffix is not None
-        files = files_of(found, target[1], suffix)
+        files = files_of(found.scan, target[1], suffix)
         sources = {(Path(options["scanner"] or ".")).resolve()}
         for name in files:
             path = target[0] / name
@@ -314,11 +312,8 @@ def _put(
             if path.resolve() in sources:
                 raise _Refused([f"{path}: is the scanner file"])
     if not options["as_json"]:
-        click.echo("\n".join(correct_text(found, taken)))
-    if options["plot"] is not None:
-        from tablegen.report.corrected import correction_charts
-
-        put_plot(options["plot"], lambda: correction_charts(found, taken.first.file))
+        click.echo(found.summary())
+    put_plot(options["plot"], found.charts)
     if target is not None:
         written(target[0], files)
         for name in files:

@@ -5,13 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.shared.common import fail, require
-from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.common import require
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from tablegen.images.files import ScanImage
 
 _PAIR = "--pair"
 
@@ -60,17 +57,3 @@ def require_readers(paths: "Iterable[Path]") -> None:
 
     needed = {MODULES.get(path.suffix.lower()) for path in paths} - {None}
     require(*sorted(filter(None, needed)), extra="images")
-
-
-def read_both(
-    trace: Path, retrace: Path, channel: str | None, retrace_channel: str | None, frame: int | None = None
-) -> "tuple[ScanImage, ScanImage]":
-    """Trace and retrace; what is wrong with them ends the command."""
-    from tablegen.base.input_errors import Rejected
-    from tablegen.images.files import read_pair
-
-    require_readers((trace, retrace))
-    try:
-        return read_pair(trace, retrace, channel, retrace_channel, frame)
-    except Rejected as rejected:
-        fail(rejected.problems, ExitStatus.WRONG_INPUT)

@@ -1,13 +1,11 @@
 """``tablegen refine``: a trace or images of the running scan to a layer over the model, by iterative learning."""
 
-import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from tablegen.base.warnings import of_remarks, worst_first
 from tablegen.cli.images.refine_images import ImageArguments, image_options
 from tablegen.cli.images.samples import CommandOfRunningImages
 from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
@@ -17,8 +15,6 @@ from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.api.refine import RefinedScan
-    from tablegen.charts.picture_file import PlottedCharts
-    from tablegen.refinement.round import Options, Round
 
 
 @click.command(
@@ -139,30 +135,26 @@ def refine(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     require("scipy", "tomlkit", extra="calibrate")
     check_plot(plot, as_json)
-    from tablegen.refinement.round import Options
-
-    options = Options(gain, harmonics, period_s, delay_s, settle, drift)
     files = images.names if trace is None else str(trace)
     with Progress() as progress:
         progress.now("reading and learning")
-        refined = images.learn(scan, axis, options) if trace is None else _learn(scan, trace, axis, triggered, options)
-    found, sources = refined.round, list(refined.sources)
-    from tablegen.cli.images.refine_text import refine_record, refine_text
-
-    name = found.setup.scan.name
+        if trace is None:
+            refined = _learn(scan, files, axis=axis, gain=gain, harmonics=harmonics, **images.keywords())
+        else:
+            recorder = {"period_s": period_s, "delay_s": delay_s, "settle_periods": settle, "drift_order": drift}
+            how = {"trace": trace, "gain": gain, "harmonics": harmonics, **recorder}
+            refined = _learn(scan, files, axis=axis, triggered=triggered, **how)
     if as_json:
-        click.echo(json.dumps(refine_record(found, name, sources), indent=2, allow_nan=False))
+        click.echo(refined.to_json())
     else:
-        click.echo("\n".join(refine_text(found, name, sources)))
-    put_plot(plot, lambda: _charts(found), by_default=not (as_json or no_plot))
+        click.echo("\n".join(refined.table()))
+    put_plot(plot, refined.charts, by_default=not (as_json or no_plot))
     if not as_json:
-        for finding in worst_first(of_remarks(found.remarks)):
+        for finding in refined.findings():
             click.echo(finding.line)
     refused = refined.refused
     if report is not None:
-        from tablegen.report.learnt import round_page
-
-        written(report.parent, {report.name: round_page(found, name, sources, refined.earlier, refused)})
+        written(report.parent, {report.name: refined.page()})
     if refused and not force:
         fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
     if refined.stopped and not force:
@@ -172,27 +164,19 @@ def refine(
     return ExitStatus.OK
 
 
-def _learn(scan: Path, trace: Path, axis: Literal["x", "y"], triggered: bool, options: "Options") -> "RefinedScan":
+def _learn(scan: Path, files: str, **how: Any) -> "RefinedScan":
     """The round; what is wrong ends the command."""
-    from dataclasses import asdict
-
     from tablegen.api.refine import refine as learn
     from tablegen.base.input_errors import Rejected, Unphysical
 
     try:
-        return learn(scan, trace, axis=axis, triggered=triggered, **asdict(options))
+        return learn(scan, **how)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:
-        fail([f"{trace}: {reason}"], ExitStatus.WRONG_INPUT)
+        fail([f"{files}: {reason}"], ExitStatus.WRONG_INPUT)
     except OSError as error:
         fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-
-
-def _charts(found: "Round") -> "PlottedCharts":
-    from tablegen.report.learnt import round_charts
-
-    return round_charts(found, found.setup.scan.name)
 
 
 def _write(scan: Path, axis: str, refined: "RefinedScan", force: bool, quiet: bool) -> None:

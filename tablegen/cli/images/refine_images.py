@@ -1,23 +1,16 @@
-"""``tablegen refine --images``: its options, and the round that trace and retrace of the running scan give."""
+"""``tablegen refine --images``: its options."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import click
 
-from tablegen.base.reading import CONFIGURATION, read_text
 from tablegen.cli.calibrate.options import delay_pixels_option, mirrored_option
-from tablegen.cli.images.pairs import channel_option, frame_option, read_both, retrace_channel_option
-from tablegen.cli.images.samples import NO_RETRACE, constant_options, sample_of
-from tablegen.cli.shared.common import fail
-from tablegen.cli.shared.exit_status import ExitStatus
-
-if TYPE_CHECKING:
-    from tablegen.api.refine import RefinedScan
-    from tablegen.refinement.round import Options, Round
+from tablegen.cli.images.pairs import channel_option, frame_option, require_readers, retrace_channel_option
+from tablegen.cli.images.samples import NO_RETRACE, check_sample, constant_options
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -67,44 +60,21 @@ class ImageArguments:
         if self.mismatch and self.knows_constant:
             raise click.UsageError("--mismatch is for a sample without a period; it has no constant")
 
-    def learn(self, scan: Path, axis: Literal["x", "y"], options: "Options") -> "RefinedScan":
-        """The round; what is wrong ends the command."""
-        from tablegen.api.refine import RefinedScan
-        from tablegen.base.input_errors import Rejected, Unphysical
-        from tablegen.config.load import load
-        from tablegen.images.scan_angle import running_scan_remarks
-        from tablegen.refinement.image_round import refine_images, refine_mismatch
-        from tablegen.refinement.lattice_line import ImageOptions
-
-        sample = sample_of(self.constant) if self.knows_constant else None
-        read = [
-            read_both(
-                trace, trace if retrace == NO_RETRACE else retrace, self.channel, self.retrace_channel, self.frame
-            )
-            for trace, retrace in self.pairs
-        ]
-        heights = [(trace.heights, retrace.heights) for trace, retrace in read]
-        sources = [image.source for pair in read for image in pair]
-        taken = ImageOptions(self.retrace_mirrored, self.delay_pixels)
-        found: Round
-        try:
-            setup = load(scan)
-            if setup.scan.y.off:
-                raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, which takes no images")])
-            text = read_text(scan, CONFIGURATION)
-            if self.mismatch:
-                found = refine_mismatch(setup, axis, heights, options, taken)
-            else:
-                found = refine_images(setup, axis, heights, options, taken, sample)
-        except Rejected as rejected:
-            fail(rejected.problems, ExitStatus.WRONG_INPUT)
-        except Unphysical as reason:
-            fail([f"{self.names}: {reason}"], ExitStatus.WRONG_INPUT)
-        except OSError as error:
-            fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-        remarks = running_scan_remarks(image for pair in read for image in pair)
-        found = replace(found, remarks=(*remarks, *found.remarks))
-        return RefinedScan(found, tuple(sources), scan, text)
+    def keywords(self) -> dict[str, Any]:
+        """What ``tablegen.refine`` takes of images."""
+        if self.knows_constant:
+            check_sample(self.constant)
+        require_readers({path for pair in self.pairs for path in pair} - {NO_RETRACE})
+        return {
+            "images": [(trace,) if retrace == NO_RETRACE else (trace, retrace) for trace, retrace in self.pairs],
+            "retrace_mirrored": self.retrace_mirrored,
+            "delay_pixels": self.delay_pixels,
+            "channel": self.channel,
+            "retrace_channel": self.retrace_channel,
+            "frame": self.frame,
+            "mismatch": self.mismatch,
+            **self.constant,
+        }
 
 
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (

@@ -1,20 +1,14 @@
 """Images of a sample of known constant on the command line: what the sample is, and how images were taken."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
 from tablegen.cli.calibrate.options import delay_pixels_option, mirrored_option, turn_option, window_option
 from tablegen.cli.images.pairs import channel_option, frame_option, require_readers, retrace_channel_option
-from tablegen.cli.shared.common import fail
-from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import PlottingCommand
-
-if TYPE_CHECKING:
-    from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage
-    from tablegen.images.files import ScanImage
 
 F = TypeVar("F", bound=Callable[..., Any])
 IMAGE_NAMES = ("--image", "--images")
@@ -130,12 +124,8 @@ def sample_options(command: F) -> F:
     return command
 
 
-def sample_of(given: dict[str, Any]) -> "KnownSample":
-    """The sample of the options; none of them ends the command."""
-    from tablegen.calibration.laws.image_sizes import KnownSample
-    from tablegen.fitting.estimate import Estimate
-    from tablegen.images.line_length import Cell, Grating
-
+def check_sample(given: dict[str, Any]) -> None:
+    """End the command where the options of the sample contradict each other, or none is given."""
     constant, cell, pitch, angle = (given[name] for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
     if constant is None and cell is None and pitch is None:
         raise click.UsageError("images need the constant of their sample: --lattice-nm NM, --cell, or --pitch-nm NM")
@@ -143,12 +133,6 @@ def sample_of(given: dict[str, Any]) -> "KnownSample":
         raise click.UsageError("--lattice-nm and --cell are two lattices; give one")
     if angle is not None and pitch is None:
         raise click.UsageError("--angle-deg is for a grating, of --pitch-nm; a lattice shows its angle")
-    lattice = None
-    if cell is not None:
-        lattice = Cell(cell[0], cell[1], cell[2], "given")
-    elif constant is not None:
-        lattice = (Cell.square if given["lattice"] == "square" else Cell.hexagonal)(constant)
-    return KnownSample(lattice, None if pitch is None else Grating(pitch, None if angle is None else Estimate(*angle)))
 
 
 def refuse_sample(given: dict[str, Any]) -> None:
@@ -158,51 +142,7 @@ def refuse_sample(given: dict[str, Any]) -> None:
             raise click.UsageError(f"--{name.replace('_', '-')} is for images, of --image")
 
 
-def acquisition_of(given: dict[str, Any]) -> "Acquisition":
-    """How images were taken, by the options."""
-    from tablegen.calibration.laws.image_sizes import Acquisition
-
-    return Acquisition(
-        given["turn"], given["window"], given["retrace_mirrored"], given["delay_pixels"], given["aspect"]
-    )
-
-
-def read_sample_image(
-    v_scan: float, v_offset: float | None, trace: Path, retrace: Path, given: dict[str, Any]
-) -> "tuple[SampleImage, list[ScanImage]]":
-    """An image, with its retrace where one is named, or in the same file; what is wrong with it ends the command."""
-    from tablegen.base.input_errors import Rejected
-    from tablegen.calibration.laws.image_sizes import SampleImage
-    from tablegen.images.files import read_image, read_pair
-
-    channel, retrace_channel, frame = (given[name] for name in ("channel", "retrace_channel", "frame"))
-    require_readers({trace} if retrace == NO_RETRACE else {trace, retrace})
-    try:
-        if retrace == NO_RETRACE and retrace_channel is None and not _has_retrace(trace, channel):
-            read = [read_image(trace, channel, "trace", frame)]
-        else:
-            second = None if retrace == NO_RETRACE else retrace
-            read = list(read_pair(trace, second, channel, retrace_channel, frame))
-    except Rejected as rejected:
-        fail(rejected.problems, ExitStatus.WRONG_INPUT)
-    first = read[0]
-    ratio = None
-    if first.width_nm and first.height_nm:
-        low, high = given["window"]
-        ratio = first.height_nm / (first.width_nm / (high - low))
-    name = " and ".join(dict.fromkeys(one.file for one in read))
-    heights = [one.heights for one in read]
-    return SampleImage(name, v_scan, v_offset, heights[0], heights[1] if len(read) > 1 else None, ratio), read
-
-
-def _has_retrace(path: Path, channel: str | None) -> bool:
-    """Whether a file has the retrace of the trace that would be read."""
-    from tablegen.base.input_errors import Rejected
-    from tablegen.images.files import channels_of
-    from tablegen.images.formats.channel import choose, partner
-
-    try:
-        channels = channels_of(path)
-        return partner(channels, choose(channels, channel, "trace")) is not None
-    except (Rejected, ValueError):
-        return False  # told where it is read
+def named_images(rows: Sequence[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+    """The images of ``--image``, without a RETRACE that was left out; a library that is missing ends the command."""
+    require_readers({path for *_, trace, retrace in rows for path in (trace, retrace)} - {NO_RETRACE})
+    return [row[:-1] if row[-1] == NO_RETRACE else row for row in rows]

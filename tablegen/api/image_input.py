@@ -1,0 +1,137 @@
+"""Images as scripts have them: the path of a file, an array of heights, or what ``read_image`` gave."""
+
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from tablegen.api.read_image import Image
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage
+from tablegen.fitting.estimate import Estimate
+from tablegen.images.files import ScanImage, channels_of, read_image, read_pair
+from tablegen.images.formats.channel import Direction, choose, partner
+from tablegen.images.line_length import Cell, Grating
+from tablegen.numerics.arrays import Floats
+
+ImageSource: TypeAlias = str | Path | Floats | Image
+_SAMPLE = ("lattice_nm", "lattice", "cell", "pitch_nm", "angle_deg")
+_ACQUISITION = ("turn", "window", "retrace_mirrored", "delay_pixels", "aspect")
+_CHANNEL = ("channel", "retrace_channel", "frame")
+IMAGE_OPTIONS = (*_SAMPLE, *_ACQUISITION, *_CHANNEL)
+
+
+def check_names(how: dict[str, Any], names: Sequence[str]) -> None:
+    """Raise ``TypeError`` for a keyword that is none of these."""
+    if unknown := [name for name in how if name not in names]:
+        raise TypeError(f"{unknown[0]} is none of {', '.join(names)}")
+
+
+def read_trace_and_retrace(
+    trace: ImageSource, retrace: ImageSource | None, how: dict[str, Any]
+) -> tuple[ScanImage, ScanImage]:
+    """Trace and retrace of one scan; one file, or one image that was read, may have both. Raises ``Rejected``."""
+    found = read_trace_and_perhaps_retrace(trace, retrace, how, both=True)
+    return found[0], found[1]
+
+
+def read_trace_and_perhaps_retrace(
+    trace: ImageSource, retrace: ImageSource | None, how: dict[str, Any], both: bool = False
+) -> list[ScanImage]:
+    """The trace, and the retrace where one is given or stands in the same file; ``both`` makes it an error to miss it.
+
+    Raises ``Rejected`` with every fault.
+    """
+    channel, retrace_channel, frame = (how.get(name) for name in _CHANNEL)
+    if isinstance(trace, str | Path) and (retrace is None or isinstance(retrace, str | Path)):
+        first, second = Path(trace), None if retrace is None else Path(retrace)
+        if not both and second is None and retrace_channel is None and not _has_retrace(first, channel):
+            return [read_image(first, channel, "trace", frame)]
+        return list(read_pair(first, second, channel, retrace_channel, frame))
+    if isinstance(trace, Image) and retrace is None:
+        retrace = trace.retrace
+    if retrace is None:
+        if both:
+            raise Rejected([Problem("retrace", 0, "", "missing; both directions are needed")])
+        return [_given(trace, "trace", how)]
+    pair = [_given(trace, "trace", how), _given(retrace, "retrace", how)]
+    if pair[0].heights.shape != pair[1].heights.shape:
+        raise Rejected([Problem("retrace", 0, "", "has another shape than the trace")])
+    return pair
+
+
+def _given(image: ImageSource, direction: Direction, how: dict[str, Any]) -> ScanImage:
+    if isinstance(image, Image):
+        return image.scan
+    if isinstance(image, str | Path):
+        return read_image(Path(image), how.get("channel"), direction, how.get("frame"))
+    heights = np.ascontiguousarray(image, dtype=np.float64)
+    if heights.ndim != 2 or min(heights.shape) < 2:
+        why = f"has the shape {heights.shape}; it takes (rows, columns)"
+        raise Rejected([Problem(direction, 0, "", why)])
+    source = Source(direction, sha256(heights.tobytes()).hexdigest()[:16])
+    return ScanImage(direction, source, heights, direction)
+
+
+def _has_retrace(path: Path, channel: str | None) -> bool:
+    """True if a file has the retrace of the trace that would be read."""
+    try:
+        channels = channels_of(path)
+        return partner(channels, choose(channels, channel, "trace")) is not None
+    except (Rejected, ValueError):
+        return False  # the reader says what is wrong
+
+
+def known_sample(
+    *,
+    lattice_nm: float | None = None,
+    lattice: Literal["hexagonal", "square"] = "hexagonal",
+    cell: tuple[float, float, float] | None = None,
+    pitch_nm: float | None = None,
+    angle_deg: tuple[float, float] | None = None,
+) -> KnownSample:
+    """The sample of these constants. Raises ``TypeError`` where they contradict each other, or none is given."""
+    if lattice_nm is None and cell is None and pitch_nm is None:
+        raise TypeError("images need the constant of their sample: lattice_nm, cell, or pitch_nm")
+    if lattice_nm is not None and cell is not None:
+        raise TypeError("lattice_nm and cell are two lattices; give one")
+    if angle_deg is not None and pitch_nm is None:
+        raise TypeError("angle_deg is for a grating, of pitch_nm; a lattice shows its angle")
+    unit_cell = None
+    if cell is not None:
+        unit_cell = Cell(*cell, "given")
+    elif lattice_nm is not None:
+        unit_cell = (Cell.square if lattice == "square" else Cell.hexagonal)(lattice_nm)
+    angle = None if angle_deg is None else Estimate(*angle_deg)
+    return KnownSample(unit_cell, None if pitch_nm is None else Grating(pitch_nm, angle))
+
+
+def sample_of(how: dict[str, Any]) -> KnownSample:
+    """The sample that keywords of a function, or of a command, describe. Raises as ``known_sample`` does."""
+    return known_sample(**_chosen(how, _SAMPLE))
+
+
+def acquisition_of(how: dict[str, Any]) -> Acquisition:
+    """How images were taken, by keywords of a function or of a command."""
+    return Acquisition(**_chosen(how, _ACQUISITION))
+
+
+def _chosen(how: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    return {name: how[name] for name in names if name in how}
+
+
+def sample_image(
+    v_scan: float, v_offset: float | None, trace: ImageSource, retrace: ImageSource | None, how: dict[str, Any]
+) -> tuple[SampleImage, list[ScanImage]]:
+    """An image of a sample of known constant, and what was read for it. Raises ``Rejected``."""
+    images = read_trace_and_perhaps_retrace(trace, retrace, how)
+    first, ratio = images[0], None
+    if first.width_nm and first.height_nm:
+        low, high = acquisition_of(how).window
+        ratio = first.height_nm / (first.width_nm / (high - low))
+    name = " and ".join(dict.fromkeys(one.file for one in images))
+    heights = [one.heights for one in images]
+    return SampleImage(name, v_scan, v_offset, heights[0], heights[1] if len(images) > 1 else None, ratio), images

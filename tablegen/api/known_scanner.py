@@ -1,0 +1,114 @@
+"""What a calibration needs to know of the scanner beside the measurements: the driver's range, and other laws."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
+from tablegen.base.toml import read_toml
+from tablegen.compensation.dynamics import Response
+from tablegen.compensation.offset import OffsetLaw
+from tablegen.compensation.size import SizeLaw
+from tablegen.config.decode import decode
+from tablegen.config.like import inherited
+from tablegen.config.scanner import Scanner
+from tablegen.numerics.driver import Driver
+from tablegen.planning.laws import dynamics_of, offset_surface, size_law_of
+
+
+class NoRange(ValueError):
+    """Neither a scanner file nor ``v_max`` says how many volts the driver gives."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownScanner:
+    """A scanner file that may be incomplete, or none, for one ``axis``.
+
+    ``values`` are its keys as they are written, empty where the file is to be begun; ``v_max`` and ``v_min`` in V are
+    what was given beside it.
+    """
+
+    path: Path | None
+    axis: str
+    values: dict[str, Any]
+    v_max: float | None
+    v_min: float
+
+    @classmethod
+    def read(cls, path: Path | None, axis: str, v_max: float | None, v_min: float, new: bool) -> "KnownScanner":
+        """Read the file, which may be missing if it is ``new``. Raises ``Rejected`` where it cannot be read."""
+        begun = path is None or (new and not path.exists())
+        values = {} if path is None or begun else inherited(*read_toml(path, str(path)))[0]
+        return cls(path, axis, values, v_max, v_min)
+
+    @cached_property
+    def driver(self) -> Driver:
+        """The range of the driver.
+
+        Raises ``Rejected`` for a file that contradicts ``v_max`` or ``v_min``, ``NoRange`` where nothing gives a range.
+        """
+        return _driver(str(self.path), self.values, self.v_max, self.v_min)
+
+    def number(self, kind: str, key: str) -> float | None:
+        """A positive number of the file as it is, or None."""
+        value: Any = self.values
+        for name in (self.axis, kind, key):
+            value = value.get(name) if isinstance(value, dict) else None
+        return float(value) if isinstance(value, int | float) and value > 0.0 else None
+
+    def size_law(self, source: str) -> SizeLaw:
+        """The size law of the file, for the scan voltages that ``source`` gives. Raises as ``axis_laws`` does."""
+        path = f"{self.axis}.size"
+        if self.number("size", "k_nm_per_v") is None:
+            raise Unphysical(f"{source} takes {path} of the scanner file; calibrate the size first")
+        try:
+            return size_law_of(self._tables("size")[path], self.driver)
+        except Unphysical as reason:
+            raise Unphysical(f"{self.path}: {path}: {reason}") from None
+
+    def axis_laws(self) -> tuple[Response | None, OffsetLaw]:
+        """The dynamics, and the offset law for small scans; without them none, and a constant.
+
+        Raises ``Rejected`` for faults of the tables that are read, ``Unphysical`` for values that no scanner has.
+        """
+        if self.path is None or not self.values:
+            return None, OffsetLaw()
+        tables = self._tables("offset", "resonance")
+        resonance, offset, size = (tables.get(f"{self.axis}.{name}") for name in ("resonance", "offset", "size"))
+        try:
+            response = None if resonance is None else dynamics_of(resonance, self.path.parent)
+            law = SizeLaw(1.0, 0.0, 1.0) if size is None else size_law_of(size, self.driver)
+            return response, OffsetLaw() if offset is None else offset_surface(offset, self.driver, law).small
+        except Unphysical as reason:
+            raise Unphysical(f"{self.path}: {self.axis}: {reason}") from None
+
+    def _tables(self, *names: str) -> dict[str, Any]:
+        """The tables of the file that are whole, by path such as "x.size"; none of ``names`` may have a fault."""
+        assert self.path is not None
+        values, document = inherited(*read_toml(self.path, str(self.path)))
+        tables: dict[str, Any] = {}
+        problems = Problems()
+        decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
+        used = {(self.axis, name) for name in names}
+        wrong = [one for one in problems.entries if tuple(one.key.split(".")[:2]) in used]
+        if wrong:
+            raise Rejected(wrong)
+        return tables
+
+
+def _driver(file: str, values: dict[str, Any], v_max: float | None, v_min: float) -> Driver:
+    if not values:
+        if v_max is None or not v_max > 0.0:
+            raise NoRange("give v_max, the driver's maximum output in V, or a scanner file that has it")
+        return Driver(v_max, v_min)
+    high, low = values.get("v_max"), values.get("v_min", 0.0)
+    if not isinstance(high, int | float) or isinstance(high, bool) or not high > 0.0:
+        raise Rejected([Problem(file, 0, "v_max", "missing, or not a voltage")])
+    if v_max is not None and v_max != high:
+        raise Rejected([Problem(file, 0, "v_max", f"{high:g} there, and --v-max {v_max:g}")])
+    if isinstance(low, bool) or not isinstance(low, int | float) or not low <= 0.0:
+        raise Rejected([Problem(file, 0, "v_min", "not a voltage of 0 or less")])
+    if v_min not in (0.0, low):
+        raise Rejected([Problem(file, 0, "v_min", f"{low:g} there, and --v-min {v_min:g}")])
+    return Driver(float(high), float(low))

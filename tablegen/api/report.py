@@ -1,0 +1,118 @@
+"""A scan or a build as one HTML page, and its charts."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tablegen.api.result import Result
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.warnings import Finding
+from tablegen.charts.chart import Chart
+from tablegen.charts.picture_file import PlottedCharts
+from tablegen.emit.write import write_files
+from tablegen.html_report.page import charts_of, page, sections
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.ranking import ranked
+from tablegen.html_report.subject import Subject, of_directory
+from tablegen.html_report.verify_record import read_record
+
+
+def report(
+    source: str | Path,
+    *,
+    verified: str | Path | None = None,
+    progress: Callable[[str], object] = lambda _: None,
+) -> "ReportPage":
+    """Make the HTML page of a scan or of a build: findings, certificate, charts, calibration and files.
+
+    Parameters
+    ----------
+    source : str or Path
+        Scan file, or directory of a build; of a build the page has neither limits nor errors on the scanner.
+    verified : str or Path, optional
+        What ``tablegen verify DIR --junit FILE`` wrote, to show it too.
+    progress : callable
+        Called with what is being done.
+
+    Returns
+    -------
+    ReportPage
+        ``content`` is the page, ``findings`` what spoils the image first, ``broken`` the limits that are exceeded.
+
+    Raises
+    ------
+    Rejected
+        The scan or ``verified`` is wrong.
+    NotABuild
+        The directory holds no build.
+
+    Examples
+    --------
+    >>> page = tablegen.report("scan.toml")
+    >>> page.write("report.html")
+    ['report.html']
+    """
+    source, record = Path(source), None
+    if verified is not None:
+        try:
+            record = read_record(Path(verified))
+        except OSError as error:
+            raise Rejected([Problem(str(verified), 0, "", f"cannot be read: {error.strerror or error}")]) from None
+        except ValueError as error:
+            raise Rejected([Problem(str(verified), 0, "", str(error))]) from None
+    subject = of_directory(source, record) if source.is_dir() else planned_scan(source, record, progress)
+    return ReportPage(subject, progress)
+
+
+class ReportPage(Result):
+    """The page of a scan or of a build: ``content`` in HTML, and every chart by its name in ``figures``."""
+
+    def __init__(self, subject: Subject, progress: Callable[[str], object] = lambda _: None) -> None:
+        found = sections(subject, progress)
+        self.subject = subject
+        self.content = page(subject, found)
+        """The page: one file that needs no network and no other file."""
+        self.figures: dict[str, Chart] = charts_of(found)
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What to know before the image is trusted, the worst first."""
+        return ranked(self.subject)
+
+    @property
+    def broken(self) -> tuple[str, ...]:
+        """Limits of the scan file that the certificate exceeds; empty for a build, which has none."""
+        return () if self.subject.planned is None else tuple(map(str, self.subject.planned.broken))
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Name and hash of the plan, the findings, the limits that are exceeded, and the names of the charts."""
+        manifest = self.subject.manifest
+        return {
+            "name": manifest.name,
+            "hash": manifest.hash,
+            "findings": [{"weight": one.weight, **one.record()} for one in self.findings],
+            "broken": list(self.broken),
+            "figures": list(self.figures),
+        }
+
+    def summary(self) -> str:
+        """Return the findings of the page, the worst first."""
+        return "\n".join(one.line for one in self.findings) or "no findings"
+
+    def charts(self) -> PlottedCharts:
+        """Give all charts of the page."""
+        return PlottedCharts(self.subject.manifest.name, tuple(self.figures.values()))
+
+    def write(self, path: str | Path) -> list[str]:
+        """Write the page, and return the name if the file changed. Raises ``CannotWrite``, ``Rejected`` for a .toml."""
+        path = Path(path)
+        if path.suffix == ".toml":
+            why = "the page would replace a scan or a scanner file; give a name in .html"
+            raise Rejected([Problem(str(path), 0, "", why)])
+        return write_files(path.parent, {path.name: self.content})
+
+    def _lines(self) -> Sequence[str]:
+        first = self.findings[0].text if self.findings else "no findings"
+        size = f"{len(self.content) / 1000:.0f} kB, {len(self.figures)} charts"
+        return f"report of {self.subject.manifest.name!r}: {size}", f"{len(self.findings)} findings, the first:", first

@@ -1,0 +1,89 @@
+"""The corrections of both axes step by step, each with its equation, its factor and the volts after it."""
+
+import numpy as np
+
+from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark
+from tablegen.compensation import models
+from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
+from tablegen.html_report.number_text import hertz
+from tablegen.html_report.subject import Subject
+from tablegen.manifest.fields import ManifestAxis
+from tablegen.planning.line_plan import LinePlan
+
+_HEAD = ("", "equation", "factor", "after it")
+
+
+def corrections(subject: Subject) -> Section:
+    """Show a table an axis, and the shape of the hysteresis that is applied."""
+    tables, charts = [], []
+    for at, (axis, entry) in enumerate(subject.axes):
+        line = None if subject.planned is None else subject.planned.plan.lines[at]
+        tables.append(Grid(f"{axis} axis", _HEAD, tuple(_steps(entry, line))))
+        if line is not None and line.drive.hysteresis.compensates:
+            charts.append(shape_chart(line))
+    return Section("corrections", "The corrections, step by step", (*tables, Charts(tuple(charts))))
+
+
+def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, ...]]:
+    drive, fourier, rows = entry.drive, entry.fourier, []
+    if line is not None:
+        share = drive.size_nm / line.drive.size_law.size_nm(1e-6) * 1e-6 * line.drive.driver.span
+        rows.append(row("asked for", "", "", f"{drive.size_nm:.6g} nm line, {share:.6g} V at the slope of small scans"))
+        rows.append(row("size", "(9), (12)", f"{drive.v_scan / share:.5f}", f"V_scan = {drive.v_scan:.6g} V"))
+    else:
+        rows.append(row("size", "(9), (12)", "", f"{drive.size_nm:.6g} nm: V_scan = {drive.v_scan:.6g} V"))
+    rows += [
+        row("offset, m", "(1)-(4)", f"{drive.m:.5f}", f"{drive.m * drive.v_scan:.6g} V at {drive.v_offset:.6g} V"),
+        row("line rate, g", "(23)", f"{drive.g:.5f}", f"{drive.v_amplitude:.6g} V peak to peak"),
+    ]
+    kind = models.get(drive.model) if drive.model in models.names() else None  # of another package, it may be missing
+    for side in ("forward", "backward"):
+        branch = getattr(drive, side)
+        text = f"peak residual of the {drive.model} model at u = {branch.u_peak:.3f}"
+        applied = kind is None or kind.compensates
+        equation = "" if kind is None or not applied else kind.purpose
+        text = text if applied else "not compensated"
+        rows.append(row(f"hysteresis {side}", equation, f"{branch.beta:+.5f}", text))
+    rate = entry.line.rate_exact[0] / entry.line.rate_exact[1]
+    (low, high), error = fourier.window, fourier.max_scaling_error_percent
+    rows.append(
+        row(
+            "band limit",
+            fourier.band_limit,
+            f"{fourier.harmonics}",
+            f"harmonics, up to {hertz(fourier.harmonics * rate)}; straight over {low:g}..{high:g} {fourier.directions}"
+            + (f"; least acceleration at {error:g} % of scaling error" if error is not None else ""),
+        )
+    )
+    if fourier.refinement is not None:
+        rows.append(row("refinement", "learnt", f"{len(fourier.refinement.a)}", "harmonics from traces of this scan"))
+    if drive.resonance is not None:
+        limited = len(fourier.held_harmonics)
+        text = f"inverse of the resonance at {hertz(drive.resonance.hz)}"
+        rows.append(
+            row("dynamics", "1 / H(f)", "", text + (f"; {limited} harmonics held back by max_boost_db" * (limited > 0)))
+        )
+    hold_us = 5e5 / rate * entry.line.hold_ticks / entry.line.ticks
+    rows.append(row("converter's hold", "", "", f"played {hold_us:.4g} us ahead, half of what a code is held"))
+    volts = abs(entry.output.v_per_code)
+    rows.append(
+        row("rounding", "", f"{1e3 * volts:.4g} mV", f"an LSB; {drive.v_amplitude / volts:.6g} codes peak to peak")
+    )
+    return rows
+
+
+def shape_chart(line: LinePlan) -> Chart:
+    """By how much the drive is bent away from a straight line."""
+    x = np.linspace(0.0, 1.0, 301)
+    low, high = line.band_limit.window
+    shape = line.drive.shape
+    forward, backward = (shape.value(shape.times(side, x)) - x for side in ("forward", "backward"))
+    return Chart(
+        f"shape-{line.axis}",
+        f"{line.axis}: how the drive is bent",
+        POSITION,
+        "drive less line [% of V_scan]",
+        (DrawnCurve("forward", "forward", x, 100.0 * forward), DrawnCurve("backward", "backward", x, 100.0 * backward)),
+        (Band(low, high, "imaged"),),
+        (Mark(0.0, "", "y"),),
+    )

@@ -1,0 +1,83 @@
+"""The page of a scan or a build: its sections in order, and the verdict above them."""
+
+from collections.abc import Callable
+
+from tablegen.charts.chart import Chart
+from tablegen.html_report.asked import asked, files, verification
+from tablegen.html_report.basis import basis
+from tablegen.html_report.blocks import Charts, Section, TableCell
+from tablegen.html_report.corrections import corrections
+from tablegen.html_report.document import document
+from tablegen.html_report.lattice import lattice
+from tablegen.html_report.lines import lines
+from tablegen.html_report.playing import played_axes
+from tablegen.html_report.promises import certificate
+from tablegen.html_report.ranking import Finding, ranked
+from tablegen.html_report.scan_errors import errors
+from tablegen.html_report.spectrum import quantisation, spectrum
+from tablegen.html_report.subject import Subject
+from tablegen.html_report.usable import usable
+
+Tell = Callable[[str], object]
+
+
+def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
+    """All that the page shows, what tells most of the image first."""
+    planned = subject.planned
+    if planned is None:
+        parts = [asked(subject), certificate(subject), lines(subject, None), spectrum(subject), quantisation(subject)]
+        return [*parts, corrections(subject), verification(subject), files(subject)]
+    tell("playing the scan on what the scanner file says")
+    axes = played_axes(planned)
+    tell("drawing")
+    picture = lattice(planned, axes)
+    return [
+        *([] if picture is None else [picture]),
+        certificate(subject),
+        asked(subject),
+        lines(subject, axes),
+        errors(planned, axes),
+        spectrum(subject),
+        quantisation(subject),
+        corrections(subject),
+        usable(planned),
+        basis(planned),
+        verification(subject),
+        files(subject),
+    ]
+
+
+def charts_of(parts: list[Section]) -> dict[str, Chart]:
+    """Every chart of a page by its key."""
+    blocks = (block for section in parts for block in section.blocks if isinstance(block, Charts))
+    return {chart.key: chart for block in blocks for chart in block.charts}
+
+
+def page(subject: Subject, parts: list[Section]) -> bytes:
+    """Render the page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
+    manifest, planned = subject.manifest, subject.planned
+    findings = ranked(subject)
+    notice = ""
+    if planned is None:
+        notice = (
+            "This page is made of a build alone. Give `tablegen report` the scan file to see limits, errors on the "
+            "scanner, the usable area and the calibration as well."
+        )
+    title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
+    foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is worked out from the scan; nothing is measured."
+    return document(title, _verdict(subject, findings), findings, parts, notice, foot)
+
+
+def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:
+    """All of the page in a sentence."""
+    broken, spoils = (sum(one.weight == weight for one in findings) for weight in ("limit", "spoils"))
+    if broken:
+        which = "the first point below is" if broken == 1 else f"the first {broken} points below are"
+        return TableCell(f"\u2717 Do not use it before {which} mended.", "bad")
+    if spoils:
+        what = "one thing spoils" if spoils == 1 else f"{spoils} things spoil"
+        return TableCell(f"! It can be played, but {what} the image.", "warn")
+    if subject.planned is None:
+        return TableCell("\u2713 No warning.", "good")
+    limits = "within all limits of the scan file" if subject.planned.limited else "the scan file sets no limits"
+    return TableCell(f"\u2713 No warning; {limits}.", "good")

@@ -1,0 +1,157 @@
+"""Both axes played on what the scanner file says of the scanner, with and without correction: a simulation.
+
+On an axis with an operator that is the operator. On others it is the law: (17) at the stroke that is really played,
+which is smaller than the line that was corrected, since turnarounds are rounded. So trace and retrace do not meet
+although each branch was inverted; the distance is the one that the certificate expects.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+
+from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.compensation import models
+from tablegen.compensation.line import LineShape
+from tablegen.compensation.models.operator import OperatorLine
+from tablegen.config.load import Setup
+from tablegen.html_report.subject import PlannedScan
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.virtual.own_scanner import OwnAxis
+from tablegen.virtual.simulation import AxisRun, SettledAxis, run_on_each, with_model
+
+MOST_TICKS = 1 << 13  # of a period that are played
+
+
+@dataclass(frozen=True, eq=False)
+class LawAxis:
+    """An axis that does what the laws of the scanner file say at the stroke that it is given; nm from its lower turn.
+
+    A layer of ``tablegen refine`` is for what the laws do not know, and is left out.
+    """
+
+    line: LinePlan
+
+    def settled(self, volts: Floats, tick_s: float) -> Floats:
+        """Where the axis is, in the middle of each tick of a period that has been played for ever, (ticks,)."""
+        line, count = self.line, len(volts)
+        drive = line.drive
+        w = self._behind_dynamics((volts - drive.v_offset) / drive.v_amplitude + 0.5, tick_s)
+        if line.layer is not None:
+            w = w - line.layer.value((np.arange(count) + 0.5) / count)
+        bottom, top = int(np.argmin(w)), int(np.argmax(w))
+        low, high = float(w[bottom]), float(w[top])
+        shape: LineShape | None = drive.line_at(drive.v_scan_normalised * (high - low))
+        shape = drive.shape if shape is None else shape
+        rising = (np.arange(count) - bottom) % count < (top - bottom) % count
+        u = (w - low) / (high - low)
+        place = np.where(rising, shape.forward.inverse(u), 1.0 - shape.backward.inverse(1.0 - u))
+        return drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) * place
+
+    def _behind_dynamics(self, w: Floats, tick_s: float) -> Floats:
+        response, count = self.line.drive.response, len(w)
+        if response is None:
+            return w
+        spectrum = np.fft.rfft(w)
+        n = np.arange(1, min(self.line.series.harmonics, (count - 1) // 2) + 1)
+        real, imaginary = response.inverse(n / (count * tick_s))
+        spectrum[n] /= real + 1j * imaginary
+        return np.fft.irfft(spectrum, count)
+
+
+@dataclass(frozen=True)
+class PlayedCorrection:
+    """One correction of an axis on the scanner of the scanner file: "uncompensated", "laws", "operator"."""
+
+    name: str
+    run: AxisRun
+
+    @property
+    def title(self) -> str:
+        """As headings have it."""
+        return "without correction" if self.name == "uncompensated" else f"with the {self.name}"
+
+
+@dataclass(frozen=True)
+class PlayedAxis:
+    """An axis with all of its corrections, what a build emits the last; ``rejected`` says why others are missing."""
+
+    axis: Literal["x", "y"]
+    on_operator: bool
+    corrections: tuple[PlayedCorrection, ...]
+    rejected: tuple[str, ...]
+
+    @property
+    def emitted(self) -> AxisRun | None:
+        """What a build emits."""
+        last = self.corrections[-1] if self.corrections else None
+        return last.run if last is not None and last.name != "uncompensated" else None
+
+    @property
+    def before(self) -> AxisRun | None:
+        """Without the correction of hysteresis."""
+        first = self.corrections[0] if self.corrections else None
+        return first.run if first is not None and first.name == "uncompensated" else None
+
+
+def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
+    """Play the axes that move."""
+    setup = without_refinement(planned.setup)
+    plain = planned.plan if setup is planned.setup else make_plan(setup)
+    others = {model: _planned(setup, model) for model in _models(planned)}
+    both = zip(planned.plan.moving, plain.moving, strict=True)
+    return tuple(_played(line, bare, others) for line, bare in both)
+
+
+def without_refinement(setup: Setup) -> Setup:
+    """Return the same scan without its layers, which were learnt on the scanner itself."""
+    scan = setup.scan
+    if scan.x.refinement is None and scan.y.refinement is None:
+        return setup
+    bare = {name: msgspec.structs.replace(getattr(scan, name), refinement=None) for name in ("x", "y")}
+    return replace(setup, scan=msgspec.structs.replace(scan, **bare))
+
+
+def _models(planned: PlannedScan) -> list[str]:
+    """List the models to compare with: without correction, and beside an operator the laws."""
+    names = [models.UNCOMPENSATED]
+    for line in planned.plan.lines:
+        if isinstance(line.drive.shape, OperatorLine):
+            table = line.drive.hysteresis
+            served = [kind for kind in models.own() if kind.like(table) is not None and kind.order < table.order]
+            best = max(served, key=lambda kind: kind.order, default=None)
+            if best is not None and best.model() not in names and getattr(table, "branches", None):
+                names.append(best.model())
+    return names
+
+
+def _planned(setup: Setup, model: str) -> tuple[LinePlan, LinePlan] | str:
+    """Plan the lines of another model, or return why there are none."""
+    try:
+        return make_plan(with_model(setup, model)).lines
+    except Rejected as rejected:
+        return f"{model}: {rejected.problems[0].why}"
+
+
+def _played(line: LinePlan, plain: LinePlan, others: dict[str, tuple[LinePlan, LinePlan] | str]) -> PlayedAxis:
+    own = isinstance(plain.drive.shape, OperatorLine)
+    axis: SettledAxis = OwnAxis.of(plain) if own else LawAxis(plain)
+    corrections, rejected = [], []
+    for model, lines in others.items():
+        if isinstance(lines, str):
+            rejected.append(lines)
+        elif model == models.UNCOMPENSATED or own:
+            name = "uncompensated" if model == models.UNCOMPENSATED else "laws"
+            corrections.append((name, lines[0 if line.axis == "x" else 1]))
+    if plain.drive.hysteresis.compensates:
+        corrections.append((plain.drive.model if own else "laws", plain))
+    played = []
+    for name, one in corrections:
+        try:
+            played.append(PlayedCorrection(name, run_on_each(one, [axis], MOST_TICKS)[0]))
+        except (Unphysical, ValueError) as reason:
+            rejected.append(f"{name}: {reason}")
+    return PlayedAxis(line.axis, own, tuple(played), tuple(rejected))

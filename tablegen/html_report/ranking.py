@@ -1,0 +1,72 @@
+"""What to know before the image is trusted: what spoils it first comes first, small print last."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from tablegen.base.input_errors import Problem
+from tablegen.base.warnings import Axis, Finding, Weight, worst_first
+from tablegen.certificate.scan_notes import expected_mismatch, note_findings
+from tablegen.html_report.subject import Subject
+from tablegen.html_report.verify_record import VerifyRecord
+from tablegen.manifest.fields import ManifestAxis
+
+_CHORD = 0.05  # of the line: a scaling error over it is a place that is wrong by so much of it
+
+
+def ranked(subject: Subject) -> list[Finding]:
+    """All that is known, the worst first."""
+    return worst_first(_findings(subject))
+
+
+def _findings(subject: Subject) -> Iterator[Finding]:
+    for state in subject.files:
+        if state.wrong:
+            yield Finding("limit", 1000.0, f"{state.name} {state.wrong}; build it again", code="changed-file")
+    yield from _verified(subject.verified, subject)
+    planned, stated = subject.planned, set[tuple[str, str]]()
+    groups: list[list[Finding]] = [[finding for axis, entry in subject.axes for finding in _expected(axis, entry)]]
+    if planned is not None:
+        broken = [_of_problem("limit", 100.0, problem) for problem in planned.broken]
+        warnings = [_of_problem("spoils", percent, problem) for percent, problem in planned.warnings]
+        groups = [broken, warnings, note_findings(planned.plan), *groups]
+    for group in groups:  # what a group with more weight has is not said again
+        yield from (finding for finding in group if (finding.code, finding.axis) not in stated)
+        stated |= {(finding.code, finding.axis) for finding in group}
+
+
+def _of_problem(weight: Weight, percent: float, problem: Problem) -> Finding:
+    return Finding(weight, percent, str(problem), code=problem.code, axis=problem.axis)
+
+
+def _expected(axis: Axis, entry: ManifestAxis) -> Iterator[Finding]:
+    """Yield what to expect of an axis."""
+    certificate = entry.certificate
+    expected = certificate.expected
+    if expected is not None and expected.mismatch_percent is not None:
+        figure = expected.mismatch_percent
+        yield expected_mismatch(axis, expected.basis, figure.value, figure.uncertainty)
+    for side, error in (certificate.scaling_error_percent or {}).items():
+        text = f"{axis} {side}: the waveform itself has {error.get('total', 0.0):.3g} % of scaling error"
+        if error.get("uncompensated", 0.0) > 0.0005:
+            text += f"; without correction it would be {error['uncompensated']:.3g} %"
+        yield Finding("expect", _CHORD * error.get("total", 0.0), text, code="scaling-error", axis=axis)
+
+
+def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding]:
+    if record is None:
+        return
+    if record.digest != subject.digest:
+        text = "the record of verify is of another build, or does not say of which"
+        yield Finding("limit", 900.0, text, code="other-verify-record")
+    failed = [check for check in record.checks if check.failure]
+    if failed:
+        text = f"verify found {len(failed)} of {len(record.checks)} checks failed"
+        yield Finding("limit", 950.0, text, code="failed-check")
+
+
+def without_folder(problem: Problem) -> Problem:
+    """Return a problem at its place in the file without the folder, which another machine does not have."""
+    return problem._replace(file=Path(problem.file).name)
+
+
+__all__ = ["Finding", "ranked", "without_folder"]

@@ -1,0 +1,136 @@
+"""Residual and scaling error inside the windows, before and after, over the line and over time."""
+
+import numpy as np
+
+from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark, Role
+from tablegen.html_report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.playing import PlayedAxis, PlayedCorrection
+from tablegen.html_report.subject import PlannedScan
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan
+from tablegen.virtual.line_error import BranchError
+from tablegen.virtual.own_run import measured
+from tablegen.virtual.simulation import AxisRun
+
+SIDES: tuple[Role, Role] = ("forward", "backward")
+
+
+def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
+    """Residual and scaling error of both axes."""
+    charts, rows, words = [], [], []
+    for line, played in zip(planned.plan.moving, axes, strict=True):
+        for correction in played.corrections:
+            charts += _charts(line, correction)
+            rows.append(_row(played.axis, correction))
+        words += [f"{played.axis} {why}" for why in played.rejected]
+        charts += _refinement(line)
+    blocks: list[Paragraph | Grid | Charts] = [
+        Grid(
+            "In the image, about the best straight line through the imaged windows; the worse direction",
+            (
+                "",
+                "rms residual [% of the line]",
+                "scaling error [%, peak to peak]",
+                "trace to retrace [% of the line]",
+                "size error [%]",
+            ),
+            tuple(rows),
+        ),
+        Charts(tuple(charts)),
+    ]
+    blocks += [Paragraph(f"Not played: {why}", "warn") for why in words]
+    return Section(
+        "errors",
+        "Residual and scaling error",
+        tuple(blocks),
+        "The emitted integers, played on what the scanner file says of the scanner. This is a simulation. It shows "
+        "what a correction leaves if the scanner file is right, and it cannot show whether it is. Each chart has "
+        "a scale of its own.",
+    )
+
+
+def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
+    rms, scaling, mismatch, size = measured(correction.run)
+    apart = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
+    return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", apart, f"{size:+.3g}")
+
+
+def inside(branch: BranchError) -> tuple[Floats, Floats]:
+    """Position and residual within the window."""
+    low, high = branch.window
+    inside_window = (branch.position >= low - 1e-9) & (branch.position <= high + 1e-9)
+    return branch.position[inside_window], branch.residual[inside_window]
+
+
+def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
+    """Draw what is left in the image, about the best straight line through it."""
+    run = correction.run
+    return Chart(
+        f"residual-{axis}-{correction.name}",
+        f"{axis} residual, {correction.title}",
+        POSITION,
+        "residual [% of the line]",
+        tuple(DrawnCurve(side, side, *inside(getattr(run.imaged, side))) for side in SIDES if side in run.directions),
+        marks=(Mark(0.0, "", "y"),),
+    )
+
+
+def _charts(line: LinePlan, correction: PlayedCorrection) -> list[Chart]:
+    run = correction.run
+    errors = [(side, getattr(run.imaged, side)) for side in SIDES if side in run.directions]
+    scaling = Chart(
+        f"scaling-{line.axis}-{correction.name}",
+        f"{line.axis} scaling error, {correction.title}",
+        POSITION,
+        "scaling error [%]",
+        tuple(DrawnCurve(side, side, one.scaling_position, one.scaling) for side, one in errors),
+        marks=(Mark(0.0, "", "y"),),
+    )
+    return [residual_chart(line.axis, correction), scaling]
+
+
+def _refinement(line: LinePlan) -> list[Chart]:
+    """By how much the layer moves the piezo."""
+    if line.layer is None:
+        return []
+    low, high = line.band_limit.window
+    x = np.linspace(low, high, 401)
+    curves = []
+    for side in SIDES[: 2 if line.band_limit.directions == "both" else 1]:
+        shape = line.drive.shape
+        branch = shape.forward if side == "forward" else shape.backward
+        steepness = branch.slope(x if side == "forward" else 1.0 - x)
+        curves.append(DrawnCurve(side, side, x, 100.0 * line.layer.value(shape.times(side, x)) / steepness))
+    return [
+        Chart(
+            f"refinement-{line.axis}",
+            f"{line.axis}: what the refinement adds",
+            POSITION,
+            "moved by [% of the line]",
+            tuple(curves),
+            caption="Learnt from traces of the running scan. The scanner file does not know of it, so the curves of "
+            "the residual are without it.",
+        )
+    ]
+
+
+def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
+    """Return the imaged stretches of a period, in its unit of time."""
+    sides = SIDES if line.band_limit.directions == "both" else SIDES[:1]
+    low, high = line.band_limit.window
+    bands = []
+    for side in sides:
+        first, last = sorted(float(t) for t in line.drive.shape.times(side, np.array([low, high])))
+        bands.append(Band(first * period, last * period, "imaged"))
+    return tuple(bands)
+
+
+def over_time(run: AxisRun, line: LinePlan, period: float) -> list[DrawnCurve]:
+    """Return the curves of the residual in nm over time."""
+    curves = []
+    for side in (side for side in SIDES if side in run.directions):
+        x, residual = inside(getattr(run.imaged, side))
+        times = np.asarray(line.drive.shape.times(side, x)) * period
+        order = np.argsort(times)
+        curves.append(DrawnCurve(side, side, times[order], 0.01 * residual[order] * run.nominal_nm))
+    return curves

@@ -1,0 +1,100 @@
+"""What a report is about: a scan that was planned just now, or a build as its directory has it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from tablegen.base.input_errors import Problem
+from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
+from tablegen.certificate.certificate import Certificate
+from tablegen.config.load import Setup
+from tablegen.html_report.verify_record import VerifyRecord
+from tablegen.manifest.fields import Manifest, ManifestAxis
+from tablegen.manifest.format import MANIFEST, read_json
+from tablegen.manifest.read import read_build
+from tablegen.planning.line_plan import Plan
+from tablegen.waveform.series import FourierSeries
+
+
+@dataclass(frozen=True)
+class FileState:
+    """A file of the build: its SHA-256 as the manifest has it, and what is wrong with the one in the directory."""
+
+    name: str
+    sha256: str
+    wrong: str = ""
+
+
+@dataclass(frozen=True)
+class PlannedScan:
+    """What is known of a scan and not of a directory.
+
+    ``broken`` are limits that the certificate exceeds, ``warnings`` errors above what goes without saying, each with
+    its percentage.
+    """
+
+    setup: Setup
+    plan: Plan
+    certificates: Mapping[str, Certificate]
+    broken: tuple[Problem, ...] = ()
+    warnings: tuple[tuple[float, Problem], ...] = ()
+
+    @property
+    def limited(self) -> bool:
+        """Whether the scan file sets a limit."""
+        limits = self.plan.limits
+        return limits.max_error_lsb is not None or limits.max_scaling_error_percent is not None
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The build as its manifest has it; ``planned`` is None where nothing but a directory was given."""
+
+    manifest: Manifest
+    digest: str
+    files: tuple[FileState, ...]
+    planned: PlannedScan | None = None
+    verified: VerifyRecord | None = None
+
+    @property
+    def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
+        """The axes that move with their names, the fast one first."""
+        both: tuple[tuple[Literal["x", "y"], ManifestAxis], ...] = (
+            ("x", self.manifest.axes.x),
+            ("y", self.manifest.axes.y),
+        )
+        return tuple(one for one in both if not one[1].resting)
+
+
+def series_of(axis: ManifestAxis) -> FourierSeries:
+    """Return the waveform w(t) that is played."""
+    fourier = axis.fourier
+    return FourierSeries(fourier.a0, np.array(fourier.a), np.array(fourier.b))
+
+
+def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRecord | None = None) -> Subject:
+    """Return a scan and the files that a build of it writes, the manifest among them."""
+    content = files[MANIFEST]
+    manifest = msgspec.convert(read_json(content), Manifest)
+    states = tuple(FileState(name, sha256(data).hexdigest()) for name, data in sorted(files.items()))
+    return Subject(manifest, sha256(content).hexdigest(), states, planned, verified)
+
+
+def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
+    """Read the build in a directory. Raises ``NotABuild``."""
+    manifest = read_build(folder).manifest
+    digest = sha256(read_bytes(folder / MANIFEST, MANIFEST_KIND)).hexdigest()
+    states = [FileState(MANIFEST, digest)]
+    for name, promised in manifest.files.items():
+        try:
+            wrong = "" if file_sha256(folder / name, BUILD_FILE) == promised else "differs from the manifest"
+        except OSError as error:
+            wrong = f"cannot be read: {error.strerror or error}"
+        states.append(FileState(name, promised, wrong))
+    return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)

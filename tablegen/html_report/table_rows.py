@@ -1,0 +1,159 @@
+"""The tables that an axis could have, with what each errs by and takes: as data, for text, JSON and a chart."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any, Literal
+
+import numpy as np
+
+from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.config.load import Setup
+from tablegen.emit.constants import storage_bits
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.spline import WORDS_BEHIND
+from tablegen.fixedpoint.synthesis import WORD_BITS
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
+from tablegen.planning.line_plan import LinePlan
+from tablegen.planning.other_table import with_table
+from tablegen.planning.table_front import table_front
+from tablegen.waveform.sampler import Sampler
+
+_CHUNK_TICKS = 1 << 16  # that are worked out together
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A table with its errors over all ticks, in LSB of the converter; of shaped output before the rounding.
+
+    ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
+    ``run`` is what its instructions depend on, if no word of the other axis is wider.
+    """
+
+    shape: TableShape
+    max_error_lsb: float
+    rms_error_lsb: float
+    stored_bits: int
+    chosen: bool
+    planned: bool
+    run: MeasuredRun
+
+    @property
+    def instructions(self) -> dict[str, float]:
+        """A sample in C that is not shaped, by processor."""
+        return COUNTS[self.run][self.shape.mode]
+
+    @property
+    def cells(self) -> int:
+        """One axis in Verilog."""
+        return CELLS[self.shape.mode]
+
+
+@dataclass(frozen=True)
+class AxisTables:
+    """The tables of one axis by memory, the one that is chosen, and Fourier words that a device renders into another.
+
+    ``rendered`` is None where no table that a device renders keeps the error. ``shaped`` is whether the output is.
+    """
+
+    axis: Literal["x", "y"]
+    harmonics: int
+    ticks: int
+    max_error_lsb: float
+    rows: tuple[TableRow, ...]
+    rendered: TableShape | None
+    shaped: bool
+
+    @property
+    def chosen(self) -> TableRow:
+        """The least memory within the error."""
+        return next(row for row in self.rows if row.chosen)
+
+    @property
+    def upload_bits(self) -> int:
+        """Bits of the Fourier words."""
+        return (2 * self.harmonics + 1) * WORD_BITS
+
+    def record(self) -> dict[str, Any]:
+        """As JSON."""
+        fourier = None
+        if self.rendered is not None:
+            fourier = {"upload_bits": self.upload_bits, "rendered": _shape(self.rendered)}
+        return {
+            "axis": self.axis,
+            "harmonics": self.harmonics,
+            "ticks": self.ticks,
+            "max_error_lsb": self.max_error_lsb,
+            "shaped": self.shaped,
+            "tables": [
+                {
+                    **_shape(row.shape),
+                    "stored_bits": row.stored_bits,
+                    "max_error_lsb": float(f"{row.max_error_lsb:.6g}"),
+                    "rms_error_lsb": float(f"{row.rms_error_lsb:.6g}"),
+                    "instructions": row.instructions,
+                    "hx8k_cells": row.cells,
+                    "chosen": row.chosen,
+                    "planned": row.planned,
+                }
+                for row in self.rows
+            ],
+            "fourier_words": fourier,
+        }
+
+
+def _shape(shape: TableShape) -> dict[str, Any]:
+    return {"mode": shape.mode, "length": shape.length, "bits": shape.bits, "memory_bits": shape.memory_bits}
+
+
+def _behind(shape: TableShape) -> int:
+    """Words that stand behind the last one in C."""
+    return WORDS_BEHIND if shape.mode == "cubic" else 1
+
+
+def _run(shape: TableShape, output: Output) -> MeasuredRun:
+    """Return the class of a table and a converter by which instructions are measured."""
+    shifted = output.align == "left" and output.word_bits > output.dac_bits
+    coded = shifted or output.coding == "twos-complement"
+    return MeasuredRun(storage_bits(shape.bits), storage_bits(output.word_bits), coded)
+
+
+def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
+    """List the tables of a planned axis. Raises ``Unphysical`` where none keeps the requested error."""
+    front = table_front(setup, line)
+
+    def rows() -> Iterator[TableRow]:
+        for shape in front.shapes:
+            yield TableRow(
+                shape,
+                *_errors(with_table(line, shape)),
+                (shape.length + _behind(shape)) * storage_bits(shape.bits),
+                shape == front.chosen,
+                shape == front.planned,
+                _run(shape, line.program.output),
+            )
+
+    return AxisTables(
+        line.axis,
+        line.series.harmonics,
+        line.program.ticks,
+        front.max_error_lsb,
+        tuple(rows()),
+        front.rendered,
+        line.program.output.shaping.order > 0,
+    )
+
+
+def _errors(line: LinePlan) -> tuple[float, float]:
+    """Largest and rms; of shaped output of what is rounded, since the table is to blame for that."""
+    program = line.program
+    if not program.output.shaping.order:
+        played = EmittedPeriod(line)
+        return played.largest_error(), sqrt(played.error_moments()[1])
+    sampler, largest, squares = Sampler(line.series, program.phase.ticks), 0.0, 0.0
+    for first in range(0, program.ticks, _CHUNK_TICKS):
+        k = np.arange(first, min(first + _CHUNK_TICKS, program.ticks), dtype=np.int64)
+        error = program.output.unrounded(program.samples(k)) - line.float_codes(sampler.at(k // program.hold))
+        largest, squares = max(largest, float(np.max(np.abs(error)))), squares + float(np.sum(error * error))
+    return largest, sqrt(squares / program.ticks)

@@ -1,0 +1,354 @@
+"""A sweep: which programs are up to date, what becomes of the others, and the index of those that are there."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from tablegen.api.build import BrokenLimit
+from tablegen.api.result import Result
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.interruption import ENDINGS, defer_signals
+from tablegen.base.reading import BUILD_FILE, file_sha256, holds, read_bytes
+from tablegen.base.workers import results
+from tablegen.charts.picture_file import PlottedCharts
+from tablegen.config.names import of_the_runtime
+from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.config.variants import Variant
+from tablegen.emit.formats import UnknownFormat
+from tablegen.emit.write import CannotWrite, names_of_build, write_files
+from tablegen.library.entry import Entry, changed_files, is_whole, parse_entry, read_record
+from tablegen.library.index import is_indexed, listed_files, make_index
+from tablegen.manifest.format import INDEX, MANIFEST, RECORD
+from tablegen.manifest.read import NotABuild, StoredBuild, read_build
+from tablegen.sweeping.inputs import Inputs
+from tablegen.sweeping.job import Doubtful, Job, Made, make
+from tablegen.sweeping.written_records import WrittenRecords
+
+_SHOWN = 20  # scans with the same reason, by name
+Kind = Literal["wrong input", "limit", "error"]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A scan that could not be built, and why."""
+
+    variant: Variant
+    kind: Kind
+    reasons: list[str]
+
+
+@dataclass(repr=False)
+class ScanLibrary(Result):
+    """The scans of a library, and what became of them."""
+
+    library: str
+    variants: list[Variant]
+    folder: Path
+    entries: dict[str, Entry] = field(default_factory=dict)
+    """What can be played, by name."""
+    built: list[str] = field(default_factory=list)
+    current: list[str] = field(default_factory=list)
+    """What was up to date."""
+    failed: list[Failed] = field(default_factory=list)
+    different: list[str] = field(default_factory=list)
+    """With ``only_check``: paths that a sweep would write or remove, below ``folder``."""
+    notes: list[str] = field(default_factory=list)
+    removed: list[str] = field(default_factory=list)
+    """Programs of an earlier sweep that nobody asked for now."""
+    memories: dict[tuple[str, str], bytes] = field(default_factory=dict)
+    """With ``only_check``: memory files that stand on no disk, by program and name."""
+
+    @property
+    def done(self) -> int:
+        """How many scans are dealt with."""
+        return len(self.built) + len(self.current) + len(self.failed)
+
+    @property
+    def in_order(self) -> list[Entry]:
+        """What can be played, as the index numbers it."""
+        return [self.entries[variant.name] for variant in self.variants if variant.name in self.entries]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Names of the scans by what became of them, and the reasons of those that failed."""
+        failed = [{"name": one.variant.name, "kind": one.kind, "reasons": one.reasons} for one in self.failed]
+        return {
+            "library": self.library,
+            "folder": str(self.folder),
+            "scans": [variant.name for variant in self.variants],
+            "built": self.built,
+            "current": self.current,
+            "failed": failed,
+            "removed": self.removed,
+            "different": self.different,
+            "notes": self.notes,
+        }
+
+    def verdict(self) -> str:
+        """Return what became of the scans in one line, as ``tablegen sweep`` prints it."""
+        count, failed = len(self.variants), len(self.failed)
+        parts = [f"{len(self.built)} built"] * bool(self.built)
+        parts += [f"{len(self.current)} up to date"] * bool(self.current)
+        parts += [f"{failed} failed"] * bool(failed) + [f"{len(self.removed)} removed"] * bool(self.removed)
+        return f"{self.folder}: {count} scan{'s' if count != 1 else ''}: {', '.join(parts)}"
+
+    def remarks(self) -> list[str]:
+        """Return warnings, the reasons of scans that failed, and notes, as ``tablegen sweep`` prints them."""
+        warnings = [f"warning: {entry.name}: {text}" for entry in self.in_order for text in entry.warnings]
+        return [*warnings, *self._reasons(), *(f"note: {note}" for note in self.notes)]
+
+    def _reasons(self) -> list[str]:
+        """Each reason once, with the scans that it holds for."""
+        by_reason: dict[str, list[str]] = {}
+        for failed in self.failed:
+            by_reason.setdefault("\n".join(failed.reasons), []).append(failed.variant.name)
+        lines = []
+        for reason, names in by_reason.items():
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            lines.append(f"failed: {', '.join(names[:_SHOWN])}{more}:\n  " + reason.replace("\n", "\n  "))
+        return lines
+
+    def summary(self) -> str:
+        """Return what ``tablegen sweep`` prints."""
+        return "\n".join([*self.remarks(), self.verdict()])
+
+    def charts(self) -> PlottedCharts:
+        """Give the largest scaling error of each program, in the order of the index."""
+        from tablegen.charts.chart import Chart, DrawnCurve
+
+        errors = [max(axis.scaling_error_percent for axis in entry.axes) for entry in self.in_order]
+        numbers = np.arange(float(len(errors)))
+        curve = DrawnCurve("", "before", numbers, np.array(errors), "points")
+        chart = Chart("scaling", "scaling error of each program", "program [number]", "scaling error [%]", (curve,))
+        return PlottedCharts(self.library, (chart,))
+
+    def _lines(self) -> Sequence[str]:
+        names = ", ".join(variant.name for variant in self.variants[:4])
+        more = f" and {len(self.variants) - 4} more" if len(self.variants) > 4 else ""
+        return f"library {self.library!r}", self.verdict(), names + more
+
+
+def state(
+    sweep: ScanLibrary, variant: Variant, formats: Sequence[str] | None, inputs: Inputs, written: WrittenRecords
+) -> Entry | tuple[Any, str]:
+    """Return the entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
+
+    Its record has to be one that a sweep of this user has written, whatever else stands in the directory. Raises
+    ``Rejected``.
+    """
+    setup, digest = _inputs(variant, formats, inputs)
+    folder = sweep.folder / variant.name
+    record = read_record(folder)
+    entry = parse_entry(record, folder)
+    if entry is None or record is None or entry.library != sweep.library or entry.inputs != digest:
+        return setup, digest
+    return entry if record in written and is_whole(folder, entry) else (setup, digest)
+
+
+def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> tuple[Any, str]:
+    """Load the setup of a scan, and compute the digest of its inputs. Raises ``Rejected``."""
+    setup = variant.setup
+    names = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
+    try:
+        return setup, inputs.digest(setup, variant.values, names)
+    except UnknownFormat as error:
+        raise Rejected([Problem("formats", 0, "", str(error))]) from None
+    except OSError:
+        return setup, ""  # the build says what is wrong
+
+
+def run(
+    sweep: ScanLibrary,
+    *,
+    formats: Sequence[str] | None = None,
+    jobs: int,
+    strict: bool = False,
+    only_check: bool = False,
+    progress: Callable[[int, int], object] = lambda _done, _all: None,
+) -> None:
+    """Build what is missing or has changed, and write the index. ``progress`` is told how many of all are done.
+
+    With ``only_check`` every program is made again and compared, whatever the directory says of itself. Raises
+    ``CannotWrite`` where the directory cannot be written. Whatever ends it, programs that were built stay, and no
+    index: it exists only where all programs that it lists are as it says.
+    """
+    pending: list[Variant] = []
+    before = listed_files(sweep.folder)
+    inputs, written = Inputs(), WrittenRecords()
+
+    def tasks() -> Iterator[tuple[Job]]:
+        for variant in sweep.variants:
+            try:
+                if only_check:
+                    found: Entry | tuple[Any, str] = _inputs(variant, formats, inputs)
+                else:
+                    found = state(sweep, variant, formats, inputs, written)
+            except Rejected as rejected:
+                sweep.failed.append(Failed(variant, "wrong input", list(map(str, rejected.problems))))
+                continue
+            if isinstance(found, Entry):
+                _current(sweep, variant, found, strict)
+                progress(sweep.done, len(sweep.variants))
+                continue
+            setup, digest = found
+            if not pending and not only_check:
+                _remove_index(sweep.folder, before)
+            pending.append(variant)
+            chosen = None if formats is None else tuple(formats)
+            folder = sweep.folder / variant.name
+            yield (Job(sweep.library, setup, variant.settings, folder, chosen, digest, strict, only_check),)
+
+    progress(0, len(sweep.variants))
+    for number, found in results(make, tasks(), jobs):
+        _note(sweep, pending[number], found, only_check)
+        progress(sweep.done, len(sweep.variants))
+    _finish(sweep, before, only_check)
+    written.prune()
+
+
+def _current(sweep: ScanLibrary, variant: Variant, entry: Entry, strict: bool) -> None:
+    if strict and entry.warnings:
+        sweep.failed.append(Failed(variant, "limit", entry.warnings))
+        return
+    sweep.entries[variant.name] = entry
+    sweep.current.append(variant.name)
+
+
+def _note(sweep: ScanLibrary, variant: Variant, result: "Made | Exception", only_check: bool) -> None:
+    """Note the result of a worker for a program."""
+    match result:
+        case Made():
+            sweep.entries[variant.name] = result.entry
+            (sweep.built if result.different else sweep.current).append(variant.name)
+            if only_check:
+                sweep.different += [f"{variant.name}/{name}" for name in result.different]
+                _note_leftovers(sweep, [f"{variant.name}/{name}" for name in result.leftovers], only_check)
+                sweep.memories |= {(variant.name, name): text for name, text in result.memories.items()}
+        case CannotWrite():
+            raise result
+        case Doubtful():
+            sweep.failed.append(Failed(variant, "limit", result.warnings))
+        case Rejected():
+            kind: Kind = "limit" if isinstance(result, BrokenLimit) else "wrong input"
+            sweep.failed.append(Failed(variant, kind, list(map(str, result.problems))))
+        case Exception():
+            sweep.failed.append(Failed(variant, "error", [f"{type(result).__name__}: {result}"]))
+
+
+def _note_leftovers(sweep: ScanLibrary, names: Sequence[str], only_check: bool) -> None:
+    """Say what no sweep makes and none removes, and what a compiler that is given a pattern would take in."""
+    sweep.notes += [f"{sweep.folder / name}: is not of this library; remove it" for name in names]
+    if only_check:
+        sweep.different += names
+
+
+def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> None:
+    """Write the index and the runtime, and remove what an earlier sweep has left; or say what would be."""
+    order = {variant.name: number for number, variant in enumerate(sweep.variants)}
+    sweep.failed.sort(key=lambda failed: order[failed.variant.name])
+    entries = sweep.in_order
+    formats = list(dict.fromkeys(name for entry in entries for name in entry.formats))
+    failed = [
+        {"name": one.variant.name, "settings": one.variant.settings, "reasons": one.reasons} for one in sweep.failed
+    ]
+
+    def content(program: str, name: str) -> bytes:
+        memory = sweep.memories.get((program, name))
+        return read_bytes(sweep.folder / program / name, BUILD_FILE) if memory is None else memory
+
+    index = make_index(sweep.library, entries, failed, formats, content)
+    sweep.notes += index.notes
+    outdated = [name for name, digest in before.items() if name not in index.files]
+    outdated = [name for name in outdated if _digest(sweep.folder / name) == before[name]]
+    dropped, others = _dropped(sweep)
+    if only_check:
+        sweep.different += [name for name, text in index.files.items() if not holds(sweep.folder / name, text)]
+        sweep.different += [*outdated, *(f"{entry.name}/{RECORD}" for entry in dropped)]
+    _note_leftovers(sweep, [*others, *_unlisted(sweep, {*index.files, *outdated})], only_check)
+    if only_check:
+        return
+    for entry in dropped:
+        _remove_program(sweep, entry)
+    with defer_signals(*ENDINGS) as came:
+        write_files(sweep.folder, index.files, outdated)
+    if came:
+        raise KeyboardInterrupt
+
+
+def _remove_index(folder: Path, listed: dict[str, str]) -> None:
+    """Remove the index of an earlier sweep, but not the runtime: its programs are about to change."""
+    for name in (INDEX, *(name for name in listed if "_library" in name)):
+        with suppress(FileNotFoundError):
+            (folder / name).unlink()
+
+
+def _dropped(sweep: ScanLibrary) -> tuple[list[Entry], list[str]]:
+    """Programs in the directory that are not among the scans: those of this library, and folders of all others.
+
+    Folders without a build are passed over.
+    """
+    names = {variant.name for variant in sweep.variants}
+    try:
+        folders = sorted(path for path in sweep.folder.iterdir() if path.name not in names and path.is_dir())
+    except OSError:
+        return [], []
+    dropped, others = [], []
+    for path in folders:
+        entry, stored = parse_entry(read_record(path), path), _stored(path)
+        if entry is not None and _is_of(sweep, path, entry, stored):
+            dropped.append(entry)
+        elif stored is not None or (path / RECORD).is_file():
+            others.append(path.name)
+    return dropped, others
+
+
+def _is_of(sweep: ScanLibrary, folder: Path, entry: Entry, stored: StoredBuild | None) -> bool:
+    """Whether a sweep of this library has made a folder: its manifest is one of ours, of the plan that the record has.
+
+    A link is followed nowhere: what it leads to is not in the directory.
+    """
+    if stored is None or entry.library != sweep.library or folder.is_symlink():
+        return False
+    return stored.own_hash == stored.manifest.hash == entry.hash and stored.manifest.name == entry.name
+
+
+def _stored(folder: Path) -> StoredBuild | None:
+    try:
+        return read_build(folder)
+    except NotABuild:
+        return None
+
+
+def _unlisted(sweep: ScanLibrary, files: Collection[str]) -> list[str]:
+    """Files that are called as those of this library's index or of the runtime are, and are none of these files."""
+    try:
+        present = sorted(path.name for path in sweep.folder.iterdir() if path.is_file() and path.name not in files)
+    except OSError:
+        return []
+    alike = (name for name in present if name.startswith(f"{sweep.library}_library") or of_the_runtime(name))
+    return [name for name in alike if is_indexed(name)]
+
+
+def _remove_program(sweep: ScanLibrary, entry: Entry) -> None:
+    folder = sweep.folder / entry.name
+    edited = changed_files(folder, entry)
+    own = {MANIFEST, *names_of_build(entry.name, entry.files)}
+    for name in [*(name for name in entry.files if name in own and name not in edited), RECORD]:
+        (folder / name).unlink(missing_ok=True)
+    try:
+        folder.rmdir()
+    except OSError:
+        sweep.notes.append(f"{folder}: left over from an earlier sweep, and has other files or edited ones; remove it")
+        return
+    sweep.removed.append(entry.name)
+
+
+def _digest(path: Path) -> str | None:
+    try:
+        return file_sha256(path)
+    except OSError:
+        return None
