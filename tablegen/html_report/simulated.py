@@ -19,7 +19,7 @@ def stage_charts(name: str, stages: Sequence[SimulationStage]) -> PlottedCharts:
             (f"{axis}, {_titled(stage, run, axis)}", f"{axis}-{stage.name}-{run.model}", getattr(run, axis))
             for number, stage in enumerate(stages)
             for run in stage.runs
-            if axis in run.asked or (number == 0 and run.model == models.UNCOMPENSATED)
+            if axis in run.configured or (number == 0 and run.model == models.UNCOMPENSATED)
         ]
         row = [_residual(*one) for one in shown]
         residuals += row
@@ -29,7 +29,7 @@ def stage_charts(name: str, stages: Sequence[SimulationStage]) -> PlottedCharts:
 
 
 def _titled(stage: SimulationStage, run: Run, axis: str) -> str:
-    if run.model == models.UNCOMPENSATED and axis not in run.asked:
+    if run.model == models.UNCOMPENSATED and axis not in run.configured:
         return "without correction"
     return f"{run.model}, file as {stage.name}"
 

@@ -1,4 +1,4 @@
-"""What a simulation on the scanner file's own operator says, as text and as plain data."""
+"""The report of a simulation on the scanner file's own operator, as text and as plain data."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -68,7 +68,7 @@ def _called(row: OwnRow) -> str:
 
 
 def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str, Any]:
-    """Return the report for JSON: by axis and correction; ``null`` where one cannot be played, and why."""
+    """Return the report for JSON, by axis and correction; ``null`` with a reason where one cannot be played."""
 
     def row(one: OwnRow) -> dict[str, Any]:
         return {
