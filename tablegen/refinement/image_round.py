@@ -1,4 +1,4 @@
-"""A round from images of the running scan to what goes into the scan file, and whether it should."""
+"""A round from images of the running scan to the new layer, and whether it should be written."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,9 +24,9 @@ from tablegen.refinement.window_line import WindowLine, averaged
 
 _MIN_EXPLAINED = 0.03  # share of the variance of an image
 _LITTLE_EXPLAINED = 0.5
-_SURE_LAG = 0.2  # standard error with which the order of time is told
+_SURE_LAG = 0.2  # standard error below which the order of time is determined
 _FAR_APART = 0.35  # periods
-_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: what gets a remark
+_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: a larger size error gets a remark
 _MIN_PIXELS_PER_PERIOD = 4.0
 
 
@@ -34,17 +34,17 @@ _MIN_PIXELS_PER_PERIOD = 4.0
 class ImageRound(Round):
     """Round learnt from trace and retrace.
 
-    ``size`` is x's, where the constant of the sample is known, and ``asked_nm`` the requested size of x.
+    ``size`` is that of x, where the constant of the sample is known, and ``requested_nm`` the requested size of x.
     """
 
     frames: tuple[LatticeLine, ...]
     measured: WindowLine
     size: LineSize | None
-    asked_nm: float
+    requested_nm: float
 
     @property
     def periods(self) -> float:
-        """In the whole line of x, of the wave that has most."""
+        """Periods in the whole line of x, of the wave that has most."""
         return float(np.max(np.abs(self.frames[0].fit.state.q)))
 
     @property
@@ -61,13 +61,22 @@ def refine_images(
     images: ImageOptions | None = None,
     sample: KnownSample | None = None,
 ) -> ImageRound:
-    """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
+    """Learn from images of a grating or a lattice that the running scan images.
 
-    ``pairs`` are trace and retrace of frames that follow each other, one or more. Rows are in the order of time,
-    columns those of the scan's imaging window. With a ``sample`` of known constant the size of the line is compared as
-    well; it is not learnt. Raises ``Rejected`` where the scan, or
-    the scan with the new layer, cannot be planned, and ``Unphysical`` for images that are not of this scan, or that
-    bounds forbid.
+    Parameters
+    ----------
+    pairs
+        Trace and retrace of one or more consecutive frames: heights in any unit, (rows, columns) each. Rows are in the
+        order of time, columns those of the scan's imaging window.
+    sample
+        A sample of known constant, with which the size of the line is compared; the size is not learnt.
+
+    Raises
+    ------
+    Rejected
+        If the scan, or the scan with the new layer, cannot be planned.
+    Unphysical
+        If the images are not of this scan, or a bound forbids learning.
     """
     plan = make_plan(setup)
     line: LinePlan = getattr(plan, axis)
@@ -89,7 +98,7 @@ def refine_images(
         frames=frames,
         measured=measured,
         size=size,
-        asked_nm=plan.x.drive.size_nm,
+        requested_nm=plan.x.drive.size_nm,
     )
 
 
@@ -112,8 +121,8 @@ def _check_shape(plan: Plan, trace: Floats) -> None:
         )
 
 
-def _check(seen: LatticeLine) -> None:
-    fit = seen.fit
+def _check(frame: LatticeLine) -> None:
+    fit = frame.fit
     least = min(fit.explained)
     if least < _MIN_EXPLAINED:
         name = "trace" if fit.explained[0] < fit.explained[1] else "retrace"
@@ -121,7 +130,7 @@ def _check(seen: LatticeLine) -> None:
             f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
             f"else, or trace and retrace are not of one scan"
         )
-    if len(fit.state.q) < 2 or not seen.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
+    if len(fit.state.q) < 2 or not frame.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
         return
     between, along = (lag < 0.0 for lag, _ in fit.lags)
     if between or along:
@@ -137,7 +146,13 @@ def _check(seen: LatticeLine) -> None:
 
 
 def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> LineSize:
-    """Of x, the mean of the frames. Raises ``Unphysical`` where the sample is another, or the size is."""
+    """Return the size of x, the mean over the frames.
+
+    Raises
+    ------
+    Unphysical
+        If the sample is another one, or the size is implausible.
+    """
     x, y = plan.x, plan.y
     low, high = y.band_limit.window
     aspect = y.drive.size_nm * (high - low) / x.drive.size_nm
@@ -177,9 +192,9 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate)
     return tuple(texts + _learning_remarks(update))
 
 
-def _remarks_of(seen: LatticeLine) -> list[Remark]:
+def _remarks_of(frame: LatticeLine) -> list[Remark]:
     remarks: list[Remark] = []
-    fit, geometry = seen.fit, seen.geometry
+    fit, geometry = frame.fit, frame.geometry
     explained = min(fit.explained)
     if explained < _LITTLE_EXPLAINED:
         remarks.append(
@@ -190,22 +205,22 @@ def _remarks_of(seen: LatticeLine) -> list[Remark]:
         remarks.append(
             Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
         )
-    if seen.start.apart > _FAR_APART:
+    if frame.start.mismatch > _FAR_APART:
         remarks.append(
             spoils(
-                f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be "
-                f"taken for the next one; calibrate first, or take a sample of a longer period"
+                f"trace and retrace are {frame.start.mismatch:.2g} periods apart, and beyond half a period they would "
+                f"be taken for the next one; calibrate first, or take a sample of a longer period"
             )
         )
     if fit.loud:
-        shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
-        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
+        row_numbers = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
+        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {row_numbers}); they counted less"))
     return remarks
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MismatchRound(Round):
-    """What trace and retrace of a sample without a period say: residuals are half of what the two differ by."""
+    """Round learnt from trace and retrace of a sample without a period: residuals are half of their mismatch."""
 
     frames: tuple[SweepMismatch, ...]
     measured: WindowLine
@@ -223,9 +238,21 @@ def refine_mismatch(
     options: Options,
     images: ImageOptions | None = None,
 ) -> MismatchRound:
-    """Learn from heights of any sample what trace and retrace differ by, half in each; see ``refine_images``.
+    """Learn the mismatch of trace and retrace of any sample, half in each; see ``refine_images``.
 
-    What both directions share stays as it is: no sample without a period tells it.
+    An error that both directions share stays: no sample without a period shows it.
+
+    Parameters
+    ----------
+    pairs
+        Trace and retrace of one or more frames: heights in any unit, (rows, columns) each.
+
+    Raises
+    ------
+    Rejected
+        If the scan, or the scan with the new layer, cannot be planned.
+    Unphysical
+        If the axis is y, the images are not of this scan, or a bound forbids learning.
     """
     plan = make_plan(setup)
     if axis == "y":
@@ -239,7 +266,7 @@ def refine_mismatch(
     refinement, changed = with_layer_update(setup, plan.x, update, "mismatch")
     remarks = [
         spoils(
-            "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
+            "only the mismatch of trace and retrace was measured and is corrected, half in each; an error that both "
             "share stays, and is in none of these figures"
         ),
         *_learning_remarks(update),

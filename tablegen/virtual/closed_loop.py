@@ -93,7 +93,7 @@ def size_map(
 
     Returns
     -------
-        Errors in percent, shape (offsets, sizes).
+    Errors in percent, shape (offsets, sizes).
 
     Raises
     ------

@@ -40,7 +40,7 @@ class Lag:
 
         Returns
         -------
-            Power coefficients in nm, lowest first, shapes (len(below),) and (len(above),).
+        Power coefficients in nm, lowest first, shapes (len(below),) and (len(above),).
         """
         return -_relaxed(self.below, -self.rise), _relaxed(self.above, self.fall)
 
@@ -49,7 +49,7 @@ class Lag:
 
         Returns
         -------
-            Lag in nm, of the shape of ``drive`` (0..1).
+        Lag in nm, of the shape of ``drive`` (0..1).
         """
         polyval = np.polynomial.polynomial.polyval
         pulled = self.fall * polyval(drive, powers_of(self.above)) - self.rise * polyval(drive, powers_of(self.below))
@@ -61,7 +61,7 @@ class Lag:
 
         Returns
         -------
-            Lags in nm at each of ``POINTS``, shape (201,) each.
+        Lags in nm at each of ``POINTS``, shape (201,) each.
         """
         low, high = self.balance(POINTS), self.balance(POINTS)
         solutions = [np.polynomial.polynomial.polyval(POINTS, solution) for solution in self.towards]
@@ -88,7 +88,7 @@ class Lag:
 
         Returns
         -------
-            Lag in nm, of the shape of ``drive``.
+        Lag in nm, of the shape of ``drive``.
         """
         rate, solution = (self.rise, self.towards[0]) if up else (self.fall, self.towards[1])
         away = z - float(np.polynomial.polynomial.polyval(turned, solution))
@@ -155,7 +155,7 @@ class Duhem:
 
         Returns
         -------
-            Displacement in nm, of the shape of ``drive`` (0..1).
+        Displacement in nm, of the shape of ``drive`` (0..1).
         """
         lags = sum(lag.balance(drive) for lag in self.lags) - sum(self.rest.nm)
         return np.asarray(np.polynomial.polynomial.polyval(drive, self._integral) + lags, dtype=np.float64)
@@ -172,7 +172,7 @@ class Duhem:
 
         Returns
         -------
-            Displacement in nm, shape (ticks,), and the state.
+        Displacement in nm, shape (ticks,), and the state.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class Duhem:
 
         Returns
         -------
-            Displacement in nm, shape (ticks,).
+        Displacement in nm, shape (ticks,).
 
         Raises
         ------

@@ -53,7 +53,7 @@ def sensor_trace(
 
     Returns
     -------
-        ``time_s``, ``drive_v``, ``displacement_nm``, each of shape (periods * samples,).
+    ``time_s``, ``drive_v``, ``displacement_nm``, each of shape (periods * samples,).
 
     Raises
     ------
@@ -89,7 +89,7 @@ def apparent_sizes(
 
     Returns
     -------
-        ``offset_v`` and ``apparent_nm``, each of shape (offsets,).
+    ``offset_v`` and ``apparent_nm``, each of shape (offsets,).
 
     Raises
     ------
@@ -122,7 +122,7 @@ def actual_sizes(
 
     Returns
     -------
-        ``nominal_nm`` and ``actual_nm``, each of shape (sizes,).
+    ``nominal_nm`` and ``actual_nm``, each of shape (sizes,).
 
     Raises
     ------
@@ -148,7 +148,7 @@ def frequency_response(
 
     Returns
     -------
-        ``frequency_hz``, ``gain`` and ``phase_deg``, each of shape (frequencies,).
+    ``frequency_hz``, ``gain`` and ``phase_deg``, each of shape (frequencies,).
     """
     f = np.asarray(frequency_hz, dtype=np.float64)
     generator = np.random.default_rng(seed)

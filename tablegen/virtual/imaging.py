@@ -96,7 +96,7 @@ def image_pair(
 
     Returns
     -------
-        Heights, shape (lines, pixels) each, the left end of the line first in both.
+    Heights, shape (lines, pixels) each, the left end of the line first in both.
 
     Raises
     ------

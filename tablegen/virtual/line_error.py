@@ -94,7 +94,7 @@ def ideal_triangle(ticks: int, turn: float, first: float = 0.0) -> Floats:
 
     Returns
     -------
-        Positions of 0..1, shape (ticks,).
+    Positions of 0..1, shape (ticks,).
     """
     t = (np.arange(ticks) + first) / ticks
     return np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))

@@ -29,7 +29,7 @@ class Modes:
 
         Returns
         -------
-            Complex gains, of the shape of ``f_hz``.
+        Complex gains, of the shape of ``f_hz``.
         """
         s = 2j * pi * np.asarray(f_hz, dtype=np.float64)
         out = np.full(s.shape, complex(self.direct))
@@ -55,7 +55,7 @@ class Modes:
 
         Returns
         -------
-            Mean over each tick, in the unit of ``drive``, shape (ticks,).
+        Mean over each tick, in the unit of ``drive``, shape (ticks,).
         """
         if not self.poles:
             return self.direct * drive
@@ -83,7 +83,7 @@ class Modes:
 
         Returns
         -------
-            Mean over each tick, in the unit of ``drive``, shape (ticks,).
+        Mean over each tick, in the unit of ``drive``, shape (ticks,).
         """
         if not self.poles:
             return self.direct * drive
@@ -153,7 +153,7 @@ def delayed(drive: Floats, ticks: float, before: float | None = None) -> Floats:
 
     Returns
     -------
-        Mean over each tick, in the unit of ``drive``, shape (ticks,).
+    Mean over each tick, in the unit of ``drive``, shape (ticks,).
     """
     whole = int(ticks)
     part = ticks - whole

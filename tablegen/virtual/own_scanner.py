@@ -45,7 +45,7 @@ class DepartingField(Field):
 
         Returns
         -------
-            Row, shape (columns,).
+        Row, shape (columns,).
         """
         near = covariance(np.array([[stroke, centre]]), self.places, _ALIKE)[0]
         departure = near @ self.departures / np.sqrt(np.sum(near * near))
@@ -89,7 +89,7 @@ class OwnAxis:
 
         Returns
         -------
-            Position in nm, shape (ticks,).
+        Position in nm, shape (ticks,).
 
         Raises
         ------

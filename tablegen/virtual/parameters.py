@@ -170,6 +170,6 @@ def sensitivity(coefficients: Sequence[float], p: FloatsLike) -> Floats:
 
     Returns
     -------
-        Relative sensitivities, of the shape of ``p`` (-1..1).
+    Relative sensitivities, of the shape of ``p`` (-1..1).
     """
     return np.asarray(np.polynomial.polynomial.polyval(p, [1.0, *coefficients]), dtype=np.float64)

@@ -22,7 +22,7 @@ def normalised(drive: Floats) -> Floats:
 
     Returns
     -------
-        Drives of 0..1, of the same shape.
+    Drives of 0..1, of the same shape.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def monotonic(drive: Floats) -> list[tuple[int, int]]:
 
     Returns
     -------
-        First and end index of each piece in drive[1:].
+    First and end index of each piece in drive[1:].
     """
     steps = np.sign(np.diff(drive))
     moving = np.flatnonzero(steps)
@@ -61,7 +61,7 @@ def one_minus(n: int) -> Floats:
 
     Returns
     -------
-        Coefficients of 1, x, ..., x^n, shape (n + 1,).
+    Coefficients of 1, x, ..., x^n, shape (n + 1,).
     """
     return np.array([(-1.0) ** k * comb(n, k) for k in range(n + 1)])
 
@@ -76,7 +76,7 @@ def powers_of(bernstein: Sequence[float]) -> Floats:
 
     Returns
     -------
-        Coefficients, lowest power first, shape (n + 1,).
+    Coefficients, lowest power first, shape (n + 1,).
     """
     n = len(bernstein) - 1
     out = np.zeros(n + 1)

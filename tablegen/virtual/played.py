@@ -32,7 +32,7 @@ class PlayedDrive:
 
         Returns
         -------
-            Times in s, shape (ticks,).
+        Times in s, shape (ticks,).
         """
         return self.period_s * self.turns
 
@@ -42,7 +42,7 @@ class PlayedDrive:
 
         Returns
         -------
-            Times in periods, 0..1, shape (ticks,).
+        Times in periods, 0..1, shape (ticks,).
         """
         return (np.arange(len(self.codes)) + 0.5) / len(self.codes)
 
@@ -73,7 +73,7 @@ def intended(line: LinePlan, drive: PlayedDrive) -> Floats:
 
     Returns
     -------
-        Positions of 0..1, shape (ticks,).
+    Positions of 0..1, shape (ticks,).
     """
     shape, t = line.drive.shape, drive.turns
     w = Sampler(line.described, 2 * len(t)).at(2 * np.arange(len(t), dtype=np.int64) + 1)

@@ -49,7 +49,7 @@ class Preisach:
 
         Returns
         -------
-            e[p, q] of alpha^p beta^q, in nm, shape (size, size).
+        e[p, q] of alpha^p beta^q, in nm, shape (size, size).
         """
         n, m = len(self.density) - 1, len(self.reversible)
         size = max(n + 3, m + 1)
@@ -73,7 +73,7 @@ class Preisach:
 
         Returns
         -------
-            Displacement in nm, of that shape.
+        Displacement in nm, of that shape.
         """
         return np.asarray(np.polynomial.polynomial.polyval2d(high, low, self.everett), dtype=np.float64)
 
@@ -82,7 +82,7 @@ class Preisach:
 
         Returns
         -------
-            Displacement in nm, of the shape of ``drive`` (0..1).
+        Displacement in nm, of the shape of ``drive`` (0..1).
         """
         full, none = np.ones_like(drive, dtype=np.float64), np.zeros_like(drive, dtype=np.float64)
         return 0.5 * (self.branch(drive, none) + self.branch(full, none) - self.branch(full, drive))
@@ -99,7 +99,7 @@ class Preisach:
 
         Returns
         -------
-            Displacement in nm, shape (ticks,), and the turning points.
+        Displacement in nm, shape (ticks,), and the turning points.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Preisach:
 
         Returns
         -------
-            Displacement in nm, shape (ticks,).
+        Displacement in nm, shape (ticks,).
 
         Raises
         ------

@@ -36,7 +36,7 @@ def running_trace(
 
     Returns
     -------
-        ``time_s``, ``drive_v``, ``displacement_nm``, each of shape (round(periods * samples),).
+    ``time_s``, ``drive_v``, ``displacement_nm``, each of shape (round(periods * samples),).
 
     Raises
     ------

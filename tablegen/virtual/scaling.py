@@ -28,7 +28,7 @@ class ScaledAxis(VirtualAxis):
 
         Returns
         -------
-            Displacement in nm, shape (ticks,).
+        Displacement in nm, shape (ticks,).
         """
         return self.times * super().settled(volts, tick_s)
 
@@ -37,7 +37,7 @@ class ScaledAxis(VirtualAxis):
 
         Returns
         -------
-            Displacement in nm, shape (ticks,).
+        Displacement in nm, shape (ticks,).
         """
         return self.times * super().follow(volts, tick_s, mean_v)
 

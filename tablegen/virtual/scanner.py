@@ -37,7 +37,7 @@ class HysteresisOperator(Protocol):
 
         Returns
         -------
-            Displacement in nm, shape (ticks,), and the state.
+        Displacement in nm, shape (ticks,), and the state.
         """
 
     def settled(self, drive: Floats) -> Floats:
@@ -45,7 +45,7 @@ class HysteresisOperator(Protocol):
 
         Returns
         -------
-            Displacement in nm, of the shape (ticks,) of ``drive``.
+        Displacement in nm, of the shape (ticks,) of ``drive``.
         """
 
     def middle(self, drive: FloatsLike) -> Floats:
@@ -53,7 +53,7 @@ class HysteresisOperator(Protocol):
 
         Returns
         -------
-            Displacement in nm, of the shape of ``drive`` (0..1).
+        Displacement in nm, of the shape of ``drive`` (0..1).
         """
 
 
@@ -104,7 +104,7 @@ class VirtualAxis:
 
         Returns
         -------
-            Mean displacement in nm over each tick, shape (ticks,).
+        Mean displacement in nm over each tick, shape (ticks,).
 
         Raises
         ------
@@ -132,7 +132,7 @@ class VirtualAxis:
 
         Returns
         -------
-            Mean displacement in nm over each tick, shape (ticks,).
+        Mean displacement in nm over each tick, shape (ticks,).
 
         Raises
         ------
@@ -159,7 +159,7 @@ class VirtualAxis:
 
         Returns
         -------
-            Complex gains, of the shape of ``f_hz``.
+        Complex gains, of the shape of ``f_hz``.
         """
         late = np.exp(-2j * pi * self.dead_time_s * np.asarray(f_hz, dtype=np.float64))
         linear = self.amplifier.response(f_hz) * self.creep.response(f_hz) * self.resonance.response(f_hz)

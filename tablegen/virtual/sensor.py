@@ -25,7 +25,7 @@ class Sensor:
 
         Returns
         -------
-            Readings in nm, shape (samples,).
+        Readings in nm, shape (samples,).
         """
         noise = np.random.default_rng(self.seed).standard_normal(displacement_nm.shape)
         return displacement_nm + self.drift_nm_per_s * time_s + self.noise_nm * noise

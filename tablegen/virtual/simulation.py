@@ -67,7 +67,7 @@ class SettledAxis(Protocol):
 
         Returns
         -------
-            Displacement in nm, shape (ticks,).
+        Displacement in nm, shape (ticks,).
         """
 
 
