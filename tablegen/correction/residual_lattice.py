@@ -101,7 +101,7 @@ def _strongest(flat: Floats) -> list[tuple[float, float]]:
     return waves
 
 
-def _phase(flat: Floats, seen: Bools, wave: tuple[float, float]) -> tuple[Floats, Bools]:
+def _phase(flat: Floats, imaged: Bools, wave: tuple[float, float]) -> tuple[Floats, Bools]:
     """Return the phase less the wave's own in periods, unwrapped, and where it is reliable."""
     rows, columns = flat.shape
     y, x = np.mgrid[:rows, :columns]
@@ -115,7 +115,7 @@ def _phase(flat: Floats, seen: Bools, wave: tuple[float, float]) -> tuple[Floats
     good = np.zeros(flat.shape, bool)
     good[room : rows - room, room : columns - room] = True
     good &= np.abs(mean) > _STRONG * float(np.median(np.abs(mean)))
-    full = gaussian_filter(seen.astype(np.float64), sigma) > 0.999
+    full = gaussian_filter(imaged.astype(np.float64), sigma) > 0.999
     return phase / (2.0 * np.pi), good & full
 
 

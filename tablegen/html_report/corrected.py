@@ -1,4 +1,4 @@
-"""A corrected scan as charts: before, after, how far it was moved, and what is left."""
+"""A corrected scan as charts: before, after, the displacement, and the residual."""
 
 from typing import Literal
 
@@ -11,11 +11,11 @@ from tablegen.correction.straight import ScanPicture, StraightScan
 from tablegen.numerics.arrays import Floats, Ints
 
 _ARROWS = 12  # along and across
-_MOST_PIXELS = 256  # of a picture, along and across: more are not seen, and a file would have them all
+_MOST_PIXELS = 256  # of a picture, along and across: more would not be visible, but enlarge the file
 
 
 def correction_charts(scan: StraightScan, name: str) -> PlottedCharts:
-    """Up to six: those of a comparison where there is a retrace, that of the lattice where there is one."""
+    """Return up to six charts: comparisons if there is a retrace, the residual lattice if there is one."""
     trace = scan.reference[0]
     charts = [
         height_chart("before", scan.raw[trace], None, "before: trace"),
@@ -50,7 +50,7 @@ def _shown(
     label: str,
     arrows: Arrows | None = None,
 ) -> Chart:
-    """Values over a picture, as one sees it: upwards from below in nm, or in pixels."""
+    """Draw values over a picture: upwards from below in nm, or in pixels."""
     rows, columns = values.shape
     width, height = size_nm or (float(columns), float(rows))
     unit = "pixels" if size_nm is None else "nm"
@@ -60,7 +60,7 @@ def _shown(
 
 
 def _moved(scan: StraightScan) -> Chart:
-    """Shades for how far, arrows for where to, in true proportion to the picture."""
+    """Draw the displacement in shades, with arrows in true proportion to the picture."""
     first = scan.raw[scan.reference[0]]
     x, y = scan.distortion.displacement(first.forward)
     x, y = (values - float(np.nanmean(values)) for values in (x, y))
@@ -74,7 +74,7 @@ def _moved(scan: StraightScan) -> Chart:
 
 
 def _lattice(scan: StraightScan) -> Chart:
-    """How far the sample is off a perfect lattice after the correction; arrows show the direction, much too long."""
+    """Draw the deviation from a perfect lattice after the correction; arrows show the direction, much too long."""
     assert scan.lattice is not None
     picture = scan.pictures[scan.reference[0]]
     rows, columns = picture.heights.shape
@@ -90,7 +90,7 @@ def _lattice(scan: StraightScan) -> Chart:
 
 
 def _arrows(right: Floats, down: Floats, bottom_first: bool, scale: float) -> Arrows:
-    """Select some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
+    """Return some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
     rows, columns = right.shape
     at_row, at_column = _places(rows), _places(columns)
     grid = np.ix_(at_row, at_column)
@@ -106,7 +106,7 @@ def _places(count: int) -> Ints:
 
 
 def _difference(scan: StraightScan) -> Chart:
-    """Trace less retrace: the left half before, the right half after."""
+    """Draw trace less retrace: the left half before, the right half after."""
     assert scan.agreement is not None
     trace, retrace = scan.reference
     raw, straight = (

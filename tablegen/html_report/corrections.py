@@ -14,7 +14,7 @@ _HEAD = ("", "equation", "factor", "after it")
 
 
 def corrections(subject: Subject) -> Section:
-    """Show a table an axis, and the shape of the hysteresis that is applied."""
+    """Return a table per axis, and the shape of the hysteresis correction."""
     tables, charts = [], []
     for at, (axis, entry) in enumerate(subject.axes):
         line = None if subject.planned is None else subject.planned.plan.lines[at]
@@ -73,7 +73,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
 
 
 def shape_chart(line: LinePlan) -> Chart:
-    """By how much the drive is bent away from a straight line."""
+    """Draw the deviation of the drive from a straight line."""
     x = np.linspace(0.0, 1.0, 301)
     low, high = line.band_limit.window
     shape = line.drive.shape

@@ -16,7 +16,7 @@ SIDES: tuple[Role, Role] = ("forward", "backward")
 
 
 def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
-    """Residual and scaling error of both axes."""
+    """Return residual and scaling error of both axes."""
     charts, rows, words = [], [], []
     for line, played in zip(planned.plan.moving, axes, strict=True):
         for correction in played.corrections:
@@ -51,19 +51,24 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
 
 def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
     rms, scaling, mismatch, size = measured(correction.run)
-    apart = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
-    return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", apart, f"{size:+.3g}")
+    mismatch_text = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
+    return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", mismatch_text, f"{size:+.3g}")
 
 
 def inside(branch: BranchError) -> tuple[Floats, Floats]:
-    """Position and residual within the window."""
+    """Return the residual within the window.
+
+    Returns
+    -------
+    Position on the line, 0..1, and residual in percent of the line, shape (points,) each.
+    """
     low, high = branch.window
     inside_window = (branch.position >= low - 1e-9) & (branch.position <= high + 1e-9)
     return branch.position[inside_window], branch.residual[inside_window]
 
 
 def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
-    """Draw what is left in the image, about the best straight line through it."""
+    """Draw the residual in the image, about the best straight line through it."""
     run = correction.run
     return Chart(
         f"residual-{axis}-{correction.name}",
@@ -90,7 +95,7 @@ def _charts(line: LinePlan, correction: PlayedCorrection) -> list[Chart]:
 
 
 def _refinement(line: LinePlan) -> list[Chart]:
-    """By how much the layer moves the piezo."""
+    """Draw the displacement of the piezo by the layer."""
     if line.layer is None:
         return []
     low, high = line.band_limit.window
