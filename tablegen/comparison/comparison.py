@@ -79,7 +79,7 @@ class SideBySide:
     def verdict(self) -> str:
         """The result in a sentence."""
         if not self.differing:
-            damaged = "" if self.same else ", but files of a build are not as its manifest says"
+            damaged = "" if self.same else ", but files of a build do not agree with its manifest"
             return f"no difference in {len(self.pairs)} quantities{damaged}"
         return f"{len(self.differing)} of {len(self.pairs)} quantities differ"
 

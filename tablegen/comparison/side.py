@@ -103,7 +103,7 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
         subject = of_directory(path)
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
-        text = f"{path.name or path}: not as its manifest says: {names}"
+        text = f"{path.name or path}: does not agree with its manifest: {names}"
         damage = (Finding("note", 0.0, text, code="damaged-build"),) if wrong else ()
         return ComparedSide(path, kind, scan_quantities(subject), damage, subject)
     if kind == "scan":

@@ -78,7 +78,7 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
     first, last = scan.distortion.left_out
     rows, columns = images.shape
     if first or last:
-        text = f"{first + last} rows were taken while the slow axis still went back after its turn; they are left out"
+        text = f"{first + last} rows are from the end of the slow axis's way back, after its turn; they are left out"
         notes.append(Finding("expect", 100.0 * (first + last) / rows, text))
     file_size = _of_file(images)
     if file_size is not None and scan.size_nm is not None:

@@ -37,7 +37,7 @@ def basis(planned: PlannedScan) -> Section:
             elif key not in commented:
                 rows.append(row(key, TableCell("no comment of `tablegen calibrate`: origin not known", "quiet"), "-"))
     blocks: list[Grid | Paragraph] = [
-        Grid("Where it is from", ("", "fit", "measurements, with the beginning of their SHA-256"), tuple(rows)),
+        Grid("Origin", ("", "fit", "measurements, with the beginning of their SHA-256"), tuple(rows)),
     ]
     for line in planned.plan.lines:
         blocks += _traces(line)
@@ -50,7 +50,7 @@ def basis(planned: PlannedScan) -> Section:
     )
     values = tuple(row(key, value) for key, value in _values(setup))
     blocks.append(Grid(f"Values of the scanner file {setup.scanner.name!r}", ("key", "value"), values, folded=True))
-    return Section("calibration", "The calibration it stands on", tuple(blocks))
+    return Section("calibration", "The calibration", tuple(blocks))
 
 
 def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
@@ -92,7 +92,7 @@ def _traces(line: LinePlan) -> list[Grid]:
         for one in line.drive.shape.operator.lines
     )
     head = ("trace", "stroke [V]", "centre [V]", "rate [Hz]", "rms [%]", "scaling [%]", "mismatch [%]", "size [%]")
-    return [Grid(f"{line.axis}: by how much the operator misses each trace when that is left out", head, rows)]
+    return [Grid(f"{line.axis}: error of the operator on each trace when that is left out", head, rows)]
 
 
 def _values(setup: Setup) -> Iterator[tuple[str, str]]:

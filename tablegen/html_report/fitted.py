@@ -34,12 +34,12 @@ def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[st
     kind = change(fit, []).kind
     meaningless = doubts(fit, points)
     findings = fit_findings(fit, places, points)
-    verdict = TableCell("\u2713 Nothing speaks against this fit.", "good")
+    verdict = TableCell("\u2713 No warning for this fit.", "good")
     if meaningless:
-        verdict = TableCell("\u2717 This fit means nothing as it is; measure again.", "bad")
+        verdict = TableCell("\u2717 This fit is insignificant; measure again.", "bad")
     elif places:
         many = "one outlier" if len(places) == 1 else f"{len(places)} outliers"
-        verdict = TableCell(f"! Look at {many} first.", "warn")
+        verdict = TableCell(f"! Check {many} first.", "warn")
     sections = [
         _parameters(fit),
         Section("data", "Data and fit", (Charts(fit_charts(fit, axis).charts),)),
@@ -159,7 +159,7 @@ def operator_page(
     errors = (f"{name}, {where}" for where in ("fit", "out") for name in ("rms", "scaling", "mismatch"))
     head = ("trace", "size [V]", "offset [V]", "rate [Hz]", *errors, "size, out")
     rows = tuple(row(name, *(f"{value:.3g}" for value in figures)) for name, figures in traces)
-    caption = "Percent of the line over x = 0.1..0.9: in the fit, and out, where the operator is made without the trace"
+    caption = "Percent of the line over x = 0.1..0.9: in the fit, and out, with an operator without the trace"
     families = Grid("Families that were compared", ("", "mean rms of a trace left out [%]"), _candidates(candidates))
     numbers = np.arange(1.0, len(traces) + 1.0)
     inside, left_out = (np.array([figures[at] for _, figures in traces], dtype=np.float64) for at in (3, 6))
@@ -182,7 +182,7 @@ def operator_page(
     ]
     worst = max(range(len(traces)), key=lambda at: left_out[at])
     verdict = TableCell(
-        f"Left out, a trace is missed by {float(np.median(left_out)):.2g} % rms in the median.", "quiet"
+        f"The median error on a trace that is left out is {float(np.median(left_out)):.2g} % rms.", "quiet"
     )
     note = f"the worst is {traces[worst][0]}, {left_out[worst]:.2g} % rms where it is left out"
     findings = [Finding("expect", 1.0, note), Finding("note", 0.0, further)]

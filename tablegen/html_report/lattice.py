@@ -55,7 +55,7 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
 def _remark(axes: tuple[PlayedAxis, ...]) -> str:
     both = " Both pictures have the corrections of offset, size and rate."
     if all(one.on_operator for one in axes):
-        return "What the operator is wrong by is not in the picture; the certificate has it as uncertainty." + both
+        return "The operator's own error is not in the picture; the certificate has it as uncertainty." + both
     return "The picture is as right as the scanner file. `tablegen simulate` plays the scan on another scanner." + both
 
 

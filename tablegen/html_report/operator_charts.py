@@ -87,7 +87,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
     )
     return Chart(
         "expected",
-        "What to expect of other scans; blank: refused",
+        "Expected error of other scans; blank: refused",
         "offset [V]",
         "size [V]",
         curves,

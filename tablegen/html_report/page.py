@@ -33,7 +33,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
             quantisation(subject),
         ]
         return [*parts, corrections(subject), verification(subject), files(subject)]
-    tell("playing the scan on what the scanner file says")
+    tell("simulating the scan on the scanner of the scanner file")
     axes = played_axes(planned)
     tell("drawing")
     picture = lattice(planned, axes)
@@ -79,7 +79,7 @@ def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:
     broken, spoils = (sum(one.weight == weight for one in findings) for weight in ("limit", "spoils"))
     if broken:
         which = "the first point below is" if broken == 1 else f"the first {broken} points below are"
-        return TableCell(f"\u2717 Do not use it before {which} mended.", "bad")
+        return TableCell(f"\u2717 Do not use it before {which} corrected.", "bad")
     if spoils:
         what = "one thing spoils" if spoils == 1 else f"{spoils} things spoil"
         return TableCell(f"! It can be played, but {what} the image.", "warn")

@@ -42,9 +42,7 @@ def request_section(subject: Subject) -> Section:
     y = subject.manifest.axes.y
     if y.resting:
         rows.append(row("y", "off", f"rests at {y.drive.v_offset:.6g} V, code {y.output.offset_code}"))
-    return Section(
-        "asked", "What was asked for, and what will be played", (Grid("", ("", "asked", "played"), tuple(rows)),)
-    )
+    return Section("request", "Requested and played", (Grid("", ("", "requested", "played"), tuple(rows)),))
 
 
 def schedule_hz(subject: Subject) -> float:
@@ -87,7 +85,7 @@ def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
 
 def verification(subject: Subject) -> Section:
     """Return the checks of a record, or how to get one."""
-    record, title = subject.verified, "What verify found"
+    record, title = subject.verified, "Verification"
     if record is None:
         text = "No record was given. `tablegen verify DIR --junit verify.xml` makes one, `tablegen report --verified "
         return Section("verify", title, (Paragraph(text + "verify.xml` shows it here."),))

@@ -25,9 +25,9 @@ def round_page(round_: Round, name: str, sources: Sequence[Source], earlier: Seq
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:
         findings.insert(0, Finding("limit", 1.0, refused, "\u2717 not used"))
-        verdict = TableCell("\u2717 This trace is not learnt from.", "bad")
+        verdict = TableCell("\u2717 This measurement is not used.", "bad")
     elif not update.harmonics:
-        verdict = TableCell("Nothing was learnt: what is left is noise.", "quiet")
+        verdict = TableCell("Nothing was learnt: the residual is noise.", "quiet")
     parts = [_errors(round_), _layer(round_)]
     if earlier:
         rows = tuple(row(str(number), text) for number, text in enumerate(earlier, 1))
@@ -79,7 +79,7 @@ def _layer(round_: Round) -> Section:
         f"response of the scanner is below {bound.largest_gain:.3g} times the modelled one, or off by less than "
         f"{bound.phase_deg:.3g} degrees."
     )
-    return Section("layer", "What was learnt", (Paragraph(text), Charts((_layer_chart(round_),))))
+    return Section("layer", "The layer", (Paragraph(text), Charts((_layer_chart(round_),))))
 
 
 def _layer_chart(round_: Round) -> Chart:

@@ -43,9 +43,8 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
         "errors",
         "Residual and scaling error",
         tuple(blocks),
-        "The emitted integers, played on what the scanner file says of the scanner. This is a simulation. It shows "
-        "what a correction leaves if the scanner file is right, and it cannot show whether it is. Each chart has "
-        "a scale of its own.",
+        "A simulation: the emitted integers on the scanner that the scanner file describes. It shows the residual of a "
+        "correction if the scanner file is right; it cannot show whether it is. Each chart has a scale of its own.",
     )
 
 
@@ -109,7 +108,7 @@ def _refinement(line: LinePlan) -> list[Chart]:
     return [
         Chart(
             f"refinement-{line.axis}",
-            f"{line.axis}: what the refinement adds",
+            f"{line.axis}: effect of the refinement",
             POSITION,
             "moved by [% of the line]",
             tuple(curves),

@@ -103,7 +103,7 @@ def quantisation(subject: Subject) -> Section:
                 f"{axis} error of the codes",
                 f"time [{unit}]",
                 "error [LSB]",
-                (DrawnCurve("emitted less asked", "other", times * period_s * k / entry.line.ticks, error),),
+                (DrawnCurve("emitted less requested", "other", times * period_s * k / entry.line.ticks, error),),
                 marks=() if shaped else _certified(entry.certificate.max_error_lsb),
                 x_range=(0.0, times * period_s),
             )

@@ -56,7 +56,7 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
     ]
     chart = Chart(
         f"usable-{line.axis}",
-        f"{line.axis}: which scans fit",
+        f"{line.axis}: usable scans",
         "offset [V]",
         "size of the line [nm]",
         tuple(curves),

@@ -164,7 +164,7 @@ def fit_displacement(
             wave *= once
         if order:
             out[1 + 2 * count] = s
-        for n in range(2, order + 1):  # 0 at both ends, and so nearly apart from the line
+        for n in range(2, order + 1):  # 0 at both ends, and so nearly independent of the line
             out[2 * count + n] = s**n - s ** (n % 2)
         return out
 

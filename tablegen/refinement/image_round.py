@@ -112,7 +112,7 @@ def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> 
 def _check_shape(plan: Plan, trace: Floats) -> None:
     """Check that a column is a pixel of the imaging window."""
     if plan.x.band_limit.directions != "both":
-        raise Unphysical("this scan images forward only; a retrace image says nothing of it: image both directions")
+        raise Unphysical("this scan images forward only, and a retrace is not of it; image both directions")
     columns, pixels = trace.shape[-1], plan.schedule.pixels
     if columns != pixels:
         raise Unphysical(
@@ -185,8 +185,8 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate)
     if line.axis == "y" and len(frames) == 1:
         texts.append(
             spoils(
-                "a drift that becomes faster or slower counts as an error of y; give two frames that follow each "
-                "other, which tell it"
+                "a drift that becomes faster or slower counts as an error of y; give two consecutive frames, "
+                "which separate the two"
             )
         )
     return tuple(texts + _learning_remarks(update))
@@ -256,7 +256,7 @@ def refine_mismatch(
     """
     plan = make_plan(setup)
     if axis == "y":
-        raise Unphysical("trace and retrace say nothing of y; it needs a sample with a period")
+        raise Unphysical("trace and retrace do not show the error of y; it needs a sample with a period")
     limits = allowed(plan.x, options)
     for trace, _ in pairs:
         _check_shape(plan, trace)

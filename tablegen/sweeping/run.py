@@ -49,18 +49,18 @@ class ScanLibrary(Result):
     variants: list[Variant]
     folder: Path
     entries: dict[str, Entry] = field(default_factory=dict)
-    """What can be played, by name."""
+    """Existing programs, by name."""
     built: list[str] = field(default_factory=list)
     current: list[str] = field(default_factory=list)
-    """What was up to date."""
+    """Names of programs that were up to date."""
     failed: list[Failed] = field(default_factory=list)
     different: list[str] = field(default_factory=list)
     """With ``only_check``: paths that a sweep would write or remove, below ``folder``."""
     notes: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
-    """Programs of an earlier sweep that nobody asked for now."""
+    """Programs of an earlier sweep that are not in this one."""
     memories: dict[tuple[str, str], bytes] = field(default_factory=dict)
-    """With ``only_check``: memory files that stand on no disk, by program and name."""
+    """With ``only_check``: memory files that are on no disk, by program and name."""
 
     @property
     def done(self) -> int:
@@ -162,7 +162,7 @@ def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> 
     except UnknownFormat as error:
         raise Rejected([Problem("formats", 0, "", str(error))]) from None
     except OSError:
-        return setup, ""  # the build says what is wrong
+        return setup, ""  # the build reports the error
 
 
 def run(

@@ -50,7 +50,7 @@ def sweep(
     Raises
     ------
     Rejected
-        The scan file cannot be read, or a setting is wrong. What is wrong with one scan stands in ``failed``.
+        The scan file cannot be read, or a setting is wrong. Errors of single scans are in ``failed``.
     CannotWrite
         The directory cannot be written.
 

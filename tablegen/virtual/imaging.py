@@ -20,7 +20,7 @@ _TICKS = 16384  # ticks per line
 _STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip
 _DUTY = 0.3
 _ROUGH_WAVES = 40
-_FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is looked at
+_FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is evaluated
 
 Position = Callable[[Floats], Floats]  # where an axis is, in nm, at times in its periods
 Surface = Callable[[Floats, Floats], Floats]  # height at x and y in nm

@@ -19,7 +19,7 @@ from tablegen.virtual.own_scanner import OwnAxis, operator_line
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 SEEDS = 20
-_MOST_TICKS = 1 << 13  # of a period that are looked at
+_MOST_TICKS = 1 << 13  # of a period that are evaluated
 MEASURES = ("rms", "scaling", "mismatch", "size")
 
 

@@ -141,7 +141,7 @@ class Preisach:
             out[:] = reached[-1]
             return
         up = end > turning[-1]
-        if len(turning) > 1 and (turning[-1] > turning[-2]) == up:  # it goes on where it went before
+        if len(turning) > 1 and (turning[-1] > turning[-2]) == up:  # it continues in the previous direction
             del turning[-1], reached[-1]
         start = 0
         while start < len(drive):

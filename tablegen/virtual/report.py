@@ -32,7 +32,7 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
     first = next(run for stage in stages for run in stage.runs)
     lines = [
         f"{name}: {LABEL} ({truth.name!r}); "
-        f"{first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y asked for",
+        f"{first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y requested",
         "",
         "                  size    residual in the window [% of the line]               in the image       "
         "scaling error",

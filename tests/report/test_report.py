@@ -53,7 +53,17 @@ def test_the_page_is_well_formed_and_needs_no_network(found: tuple[bytes, Page])
     content, read = found
     well_formed(content, read)
     assert read.verdicts == ["good"]
-    parts = ("ranked", "lattice", "certificate", "asked", "lines", "errors", "spectrum", "quantisation", "corrections")
+    parts = (
+        "ranked",
+        "lattice",
+        "certificate",
+        "request",
+        "lines",
+        "errors",
+        "spectrum",
+        "quantisation",
+        "corrections",
+    )
     assert [*parts, "usable", "calibration", "verify", "files"] == [i for i in read.ids if not i.startswith("chart-")]
 
 
@@ -115,7 +125,7 @@ def test_an_operator_with_hostile_traces(tmp_path: Path) -> None:
     content, read = report(scan)
     well_formed(content, read)
     assert "img" not in read.tags
-    assert "by how much the operator misses each trace" in read.said
+    assert "error of the operator on each trace" in read.said
     for name in ("x without correction", "x with the laws", "x with the operator", "y with the laws"):
         assert name in read.said
 
