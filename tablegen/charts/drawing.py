@@ -28,7 +28,7 @@ _TITLE_LETTERS = 50  # of a row
 
 @dataclass(frozen=True)
 class Box:
-    """A rectangle."""
+    """A rectangle with a style."""
 
     style: str
     x: float
@@ -124,7 +124,7 @@ class _Frame:
             self.width, self.height = unit * abs(self.x1 - self.x0), unit * abs(self.y1 - self.y0)
 
     def x(self, values: Floats | float) -> Floats:
-        """Return horizontal positions.
+        """Return the horizontal positions of values.
 
         Returns
         -------
@@ -136,7 +136,7 @@ class _Frame:
         return np.clip((at - low) / (high - low) * self.width, -_FAR, _FAR)
 
     def y(self, values: Floats | float) -> Floats:
-        """Return vertical positions, downwards.
+        """Return the vertical positions of values, downwards.
 
         Returns
         -------

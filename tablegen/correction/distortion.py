@@ -25,7 +25,7 @@ _FINEST = 0.02  # of the mean step: closer pixels are at one position
 
 @dataclass(frozen=True, eq=False)
 class Sweep1D:
-    """The columns of one direction, the left one first: their x, and their time in the line, 0..1 of its period."""
+    """The columns of one direction, the left one first: their x, and their time in the line, 0..1; (columns,) each."""
 
     x: Floats
     time: Floats

@@ -83,7 +83,7 @@ class Images:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
+        """The number of rows and columns."""
         rows, columns = self.channels[0].heights.shape
         return rows, columns
 

@@ -14,7 +14,7 @@ def figure(value: float, digits: int = 4, signed: bool = False) -> str:
 
 
 def hertz(value: float) -> str:
-    """Format a frequency."""
+    """Format a frequency with its unit."""
     for least, unit in ((1e6, "MHz"), (1e3, "kHz")):
         if value >= least:
             return f"{value / least:.4g} {unit}"

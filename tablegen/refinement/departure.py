@@ -95,8 +95,8 @@ def requested_position(line: LinePlan, times: Floats) -> Floats:
 class Departure:
     """Departure of the reached line from the requested one.
 
-    ``error`` is reached less requested at the points, in lines; ``size_nm`` is that of the best line, negative where
-    the sensor counts the other way.
+    ``error`` is reached less requested at the points, in lines, (points,); ``size_nm`` is that of the best line,
+    negative where the sensor counts the other way.
     """
 
     points: Imaged

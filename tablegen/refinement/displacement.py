@@ -37,11 +37,11 @@ class Displacement:
 
     @property
     def detail(self) -> int:
-        """The highest harmonic."""
+        """The highest harmonic of the series."""
         return self.series.harmonics
 
     def value(self, times: Floats) -> Floats:
-        """Return the displacement.
+        """Return the displacement at times.
 
         Parameters
         ----------

@@ -49,7 +49,7 @@ class ImageRound(Round):
 
     @property
     def recorded(self) -> str:
-        """Frames, pixels and periods."""
+        """The number of frames, pixels and periods, in words."""
         return f"{_pixels(self.frames)}, {self.periods:.4g} periods in the line"
 
 
@@ -227,7 +227,7 @@ class MismatchRound(Round):
 
     @property
     def recorded(self) -> str:
-        """Frames and pixels."""
+        """The number of frames and pixels, in words."""
         return f"{_pixels(self.frames)}, trace against retrace"
 
 

@@ -62,7 +62,7 @@ class LatticeLine:
 
     @property
     def waves(self) -> Floats:
-        """The base waves.
+        """The base waves of the sample.
 
         Returns
         -------

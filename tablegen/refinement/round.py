@@ -78,7 +78,7 @@ class TraceRound(Round):
 
     @property
     def recorded(self) -> str:
-        """Periods and samples."""
+        """The number of periods and samples, in words."""
         displacement = self.displacement
         return f"{displacement.periods:.4g} periods of {self.phase.period_s:.6g} s, {displacement.samples} samples"
 

@@ -16,9 +16,9 @@ Parts = Literal["forward", "both", "difference"]
 class WindowLine:
     """The reached line in the imaged windows: the requested one, and an error in polynomials along the window.
 
-    ``requested`` takes times in periods to the line, 0..1; ``unit_nm`` is nm per line. ``coefficients`` are of the
-    error in lines, those common to both directions before those of their difference, each from the lowest degree on;
-    ``line_covariance`` is theirs. Times are those of the windows: no image shows the turnarounds.
+    ``requested`` takes times in periods to the line, 0..1; ``unit_nm`` is nm per line. ``coefficients``, (modes,), are
+    of the error in lines, those common to both directions before those of their difference, each from the lowest degree
+    on; ``line_covariance``, (modes, modes), is theirs. Times are those of the windows: no image shows the turnarounds.
     """
 
     requested: Callable[[Floats], Floats]

@@ -47,7 +47,7 @@ class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     lags: Annotated[list[LagTruth], Meta(max_length=4, description="duhem: lags that add up")] = []
 
     def operator(self) -> Preisach | Duhem:
-        """Return the operator.
+        """Build the hysteresis operator.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Creep(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class ResonanceTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The first resonance."""
+    """Parameters of the first resonance."""
 
     frequency_hz: Annotated[Hertz, Meta(description="undamped")]
     quality: Annotated[float, Meta(ge=0.6, le=1e4, description="quality factor")]
@@ -108,7 +108,7 @@ class AmplifierTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A virtual scanner."""
+    """Parameters of a virtual scanner."""
 
     name: Annotated[Name, Meta(description="for reports")]
     identified_on: Annotated[Name, Meta(description="what the parameters come from")] = "nothing that its file names"

@@ -24,7 +24,7 @@ class ScaledAxis(VirtualAxis):
     times: float = 1.0
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Return ``VirtualAxis.settled``, scaled.
+        """Return the displacement of ``VirtualAxis.settled``, ``times`` as large.
 
         Returns
         -------
@@ -33,7 +33,7 @@ class ScaledAxis(VirtualAxis):
         return self.times * super().settled(volts, tick_s)
 
     def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
-        """Return ``VirtualAxis.follow``, scaled.
+        """Return the displacement of ``VirtualAxis.follow``, ``times`` as large.
 
         Returns
         -------

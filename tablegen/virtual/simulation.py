@@ -20,7 +20,7 @@ from tablegen.virtual.scanner import VirtualScanner
 
 @dataclass(frozen=True, eq=False)
 class AxisRun:
-    """One axis of a scan: the drive, and the displacement of the virtual scanner, in nm above rest at 0 V.
+    """One axis of a scan: the drive, and ``displacement_nm`` of the virtual scanner, (ticks,), above rest at 0 V.
 
     ``error`` takes the line's ends for exact, as the paper does; ``imaged`` is about the best line through the windows
     that are imaged.
