@@ -16,7 +16,7 @@ from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
-from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
+from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.images.scan_angle import is_turned
@@ -449,4 +449,4 @@ def _corrected(
     check_order(images, distortion)
     if images.left_out:
         record["left_out"] = list(images.left_out)
-    return put_straight(images.pictures, distortion, size, images.reference, record)
+    return corrected_scan(images.pictures, distortion, size, images.reference, record)

@@ -58,7 +58,7 @@ class StraightScan:
         return spreads[0], spreads[1]
 
 
-def put_straight(
+def corrected_scan(
     raw: Sequence[ScanPicture],
     distortion: Distortion,
     size_nm: tuple[float, float] | None,

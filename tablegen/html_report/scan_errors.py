@@ -9,7 +9,7 @@ from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.virtual.line_error import BranchError
-from tablegen.virtual.own_run import measured
+from tablegen.virtual.own_run import image_errors
 from tablegen.virtual.simulation import AxisRun
 
 SIDES: tuple[Role, Role] = ("forward", "backward")
@@ -49,7 +49,7 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
 
 
 def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
-    rms, scaling, mismatch, size = measured(correction.run)
+    rms, scaling, mismatch, size = image_errors(correction.run)
     mismatch_text = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
     return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", mismatch_text, f"{size:+.3g}")
 

@@ -18,7 +18,15 @@ from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import LayerUpdate, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
-from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_layer_update
+from tablegen.refinement.round import (
+    Options,
+    Round,
+    divergence_reason,
+    learning_bound,
+    mostly_noise,
+    stop,
+    with_layer_update,
+)
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
 
@@ -80,7 +88,7 @@ def refine_images(
     """
     plan = make_plan(setup)
     line: LinePlan = getattr(plan, axis)
-    limits = allowed(line, options)
+    limits = learning_bound(line, options)
     frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     size = None if sample is None else _size(plan, frames, sample)
@@ -92,7 +100,7 @@ def refine_images(
         update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, update),
+        worse=divergence_reason(setup, axis, update),
         **stop(setup, line, update),
         remarks=(*_size_remarks(plan, size), *_remarks(line, frames, update)),
         frames=frames,
@@ -257,7 +265,7 @@ def refine_mismatch(
     plan = make_plan(setup)
     if axis == "y":
         raise Unphysical("trace and retrace do not show the error of y; it needs a sample with a period")
-    limits = allowed(plan.x, options)
+    limits = learning_bound(plan.x, options)
     for trace, _ in pairs:
         _check_shape(plan, trace)
     frames = tuple(mismatch(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
@@ -277,7 +285,7 @@ def refine_mismatch(
         update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, update, "mismatch"),
+        worse=divergence_reason(setup, axis, update, "mismatch"),
         **stop(setup, plan.x, update, "mismatch"),
         remarks=tuple(remarks),
         frames=frames,
@@ -289,7 +297,7 @@ def _learning_remarks(update: LayerUpdate) -> list[Remark]:
     remarks: list[Remark] = []
     if update.harmonics == 0:
         remarks.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
-    elif finished(update):
+    elif mostly_noise(update):
         remarks.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
     return [*remarks, Remark("images do not show that the build of this scan file was running")]
 

@@ -109,7 +109,7 @@ def refine(
     """
     check_spans(time_s, displacement_nm, drive_v)
     line: LinePlan = getattr(make_plan(setup), axis)
-    limits = allowed(line, options)
+    limits = learning_bound(line, options)
     if drive_v is None:
         phase = phase_by_trigger(line, time_s, options.period_s, options.delay_s)
     else:
@@ -125,7 +125,7 @@ def refine(
         update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, update),
+        worse=divergence_reason(setup, axis, update),
         **stop(setup, line, update),
         remarks=_remarks(line, measured, update, phase, time_s),
         phase=phase,
@@ -179,7 +179,7 @@ def with_refinement(setup: Setup, axis: str, refinement: Refinement | None) -> S
     return replace(setup, scan=msgspec.structs.replace(setup.scan, **{axis: changed}))
 
 
-def allowed(line: LinePlan, options: Options) -> Bound:
+def learning_bound(line: LinePlan, options: Options) -> Bound:
     """Compute the bound for the requested gain and harmonics.
 
     Raises
@@ -200,7 +200,7 @@ def allowed(line: LinePlan, options: Options) -> Bound:
     return limits
 
 
-def why_worse(setup: Setup, axis: str, update: LayerUpdate, before_of: BeforeOf | None = None) -> str:
+def divergence_reason(setup: Setup, axis: str, update: LayerUpdate, before_of: BeforeOf | None = None) -> str:
     """Return why the layer that was played made the residual grow since the measurement before; empty where it did not.
 
     Only measurements of the same kind are compared.
@@ -275,7 +275,7 @@ def _remarks(
         remarks.append(
             Remark("the error is within the noise of the sensor: there is nothing more to learn from this trace")
         )
-    elif finished(update):
+    elif mostly_noise(update):
         remarks.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
     if measured.correlated > 3.0:
         remarks.append(
@@ -292,7 +292,7 @@ def _remarks(
     return tuple(remarks)
 
 
-def finished(update: LayerUpdate) -> bool:
+def mostly_noise(update: LayerUpdate) -> bool:
     """Return true if most of the remaining error is noise."""
     return update.after.rms_percent > _FINISHED_RATIO * update.before.rms_percent
 

@@ -139,7 +139,7 @@ def side_by_side(first: Modes, second: Modes, share: float) -> Modes:
     return Modes((1.0 - share) * first.direct + share * second.direct, first.poles + second.poles, residues)
 
 
-def delayed(drive: Floats, ticks: float, before: float | None = None) -> Floats:
+def delay(drive: Floats, ticks: float, before: float | None = None) -> Floats:
     """Delay a held drive: periodic, or after a long rest.
 
     Parameters

@@ -109,7 +109,7 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
             rows.append(OwnRow(correction, model, rejected="; ".join(map(str, faults.problems))))
             continue
         runs = _on_each(played, plants)
-        rows.append(OwnRow(correction, model, tuple(map(measured, runs)), example=runs[0]))
+        rows.append(OwnRow(correction, model, tuple(map(image_errors, runs)), example=runs[0]))
     nearest = min(abs(one.centre - centre) for one in operator.lines)
     return OwnRun(name, line.drive.size_nm, operator.lines, nearest, False, tuple(rows))
 
@@ -122,7 +122,7 @@ def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, .
     Unphysical
         If a departure makes a branch run backwards.
     """
-    return tuple(map(measured, _on_each(line, plants)))
+    return tuple(map(image_errors, _on_each(line, plants)))
 
 
 def _on_each(line: LinePlan, plants: Sequence[OwnAxis]) -> list[AxisRun]:
@@ -132,7 +132,7 @@ def _on_each(line: LinePlan, plants: Sequence[OwnAxis]) -> list[AxisRun]:
         raise Unphysical(f"{line.axis}: with a random departure of its own uncertainty, {reason}") from None
 
 
-def measured(run: AxisRun) -> tuple[float, float, float, float]:
+def image_errors(run: AxisRun) -> tuple[float, float, float, float]:
     """Return rms and scaling error of the worse direction, mismatch (NaN of one direction), size error, in percent."""
     branches = [getattr(run.imaged, side) for side in run.directions]
     low, high = branches[0].window

@@ -15,7 +15,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.driver import Driver
 from tablegen.virtual import parameters
 from tablegen.virtual.creep import logarithmic_creep
-from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side
+from tablegen.virtual.modes import Modes, delay, low_pass, second_order, side_by_side
 from tablegen.virtual.parameters import Truth, sensitivity
 
 _STRAIGHT = Modes(1.0)
@@ -111,7 +111,7 @@ class VirtualAxis:
         ValueError
             If the drive leaves the range of the driver.
         """
-        late = delayed(volts, self.dead_time_s / tick_s)
+        late = delay(volts, self.dead_time_s / tick_s)
         drive = self._normalised(self.amplifier.settled(late, tick_s))
         mean_v: FloatsLike = float(np.mean(volts)) if self.memory is None else self.memory.settled(late, tick_s)
         displacement = self._with_sensitivity(self.hysteresis.settled(drive), mean_v)
@@ -140,7 +140,7 @@ class VirtualAxis:
             If the drive leaves the range of the driver.
         """
         first = float(volts[0])
-        late = delayed(volts, self.dead_time_s / tick_s, first)
+        late = delay(volts, self.dead_time_s / tick_s, first)
         drive = self._normalised(self.amplifier.follow(late, tick_s))
         rest, memory = self.hysteresis.play(self._normalised(volts[:1]))
         bias: FloatsLike
