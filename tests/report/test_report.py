@@ -320,14 +320,14 @@ def test_a_curve_in_the_page_is_the_drive(found: tuple[bytes, Page], example: Pa
 def test_the_simulated_mismatch_is_what_the_certificate_expects(subject: Subject) -> None:
     """Two ways to it: emitted codes on the loop of their stroke here, the float waveform on it there."""
     from tablegen.html_report.playing import played_axes
-    from tablegen.virtual.own_run import measured
+    from tablegen.virtual.own_run import image_errors
 
     x, _ = played_axes(subject.planned)  # type: ignore[arg-type]
     expected = subject.manifest.axes.x.certificate.expected
-    _, scaling, mismatch, _ = measured(x.emitted)  # type: ignore[arg-type]
+    _, scaling, mismatch, _ = image_errors(x.emitted)  # type: ignore[arg-type]
     assert mismatch == pytest.approx(expected.mismatch_percent.value, abs=0.02)  # type: ignore[union-attr]
     assert scaling < 1.0
-    before = measured(x.before)  # type: ignore[arg-type]
+    before = image_errors(x.before)  # type: ignore[arg-type]
     worst = max(one["uncompensated"] for one in subject.manifest.axes.x.certificate.scaling_error_percent.values())  # type: ignore[union-attr]
     assert before[1] == pytest.approx(worst, rel=0.1)
     assert before[2] > 5.0 * mismatch
