@@ -79,7 +79,7 @@ def draw(scan: StraightScan) -> None:
     """The trace before and after, and how far it was moved."""
     figure, panels = plt.subplots(1, 3, figsize=(12.6, 4.3), layout="constrained")
     for panel, picture, title in (
-        (panels[0], scan.taken[0], "as taken"),
+        (panels[0], scan.raw[0], "as taken"),
         (panels[1], scan.pictures[0], "put straight by the operator"),
     ):
         shown = picture.heights[::1, ::2]
@@ -87,7 +87,7 @@ def draw(scan: StraightScan) -> None:
         panel.set(title=title, xticks=[], yticks=[])
     place = (np.arange(PIXELS) + 0.5) / PIXELS
     for forward, style in ((True, "-"), (False, "--")):
-        x, y = scan.distortion.moved(forward)
+        x, y = scan.distortion.displacement(forward)
         name = "trace" if forward else "retrace"
         along, down = (np.nanmean(one, axis=axis) for one, axis in ((x, 0), (y, 1)))
         panels[2].plot(place, 100.0 * along / PIXELS, style, color=np.array(BLUE) / 255, label=f"x, {name}")

@@ -133,12 +133,12 @@ class Corrected(Result):
     @property
     def trace(self) -> Floats:
         """Heights of the trace, or of whatever there is, (rows, columns); NaN where nothing was imaged."""
-        return self.scan.pictures[self.scan.judged[0]].heights
+        return self.scan.pictures[self.scan.reference[0]].heights
 
     @property
     def retrace(self) -> Floats | None:
         """Those of the retrace, on the same places; None without one."""
-        return self.scan.pictures[self.scan.judged[1]].heights if len(self.scan.judged) > 1 else None
+        return self.scan.pictures[self.scan.reference[1]].heights if len(self.scan.reference) > 1 else None
 
     @property
     def size_nm(self) -> tuple[float, float] | None:

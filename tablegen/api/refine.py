@@ -240,13 +240,13 @@ class RefinedScan(Result):
 
     def charts(self) -> PlottedCharts:
         """Give the charts that ``tablegen refine --plot`` draws."""
-        from tablegen.html_report.learnt import round_charts
+        from tablegen.html_report.round_page import round_charts
 
         return round_charts(self.round, self._name)
 
     def page(self) -> bytes:
         """Return the HTML page that ``tablegen refine --report`` writes."""
-        from tablegen.html_report.learnt import round_page
+        from tablegen.html_report.round_page import round_page
 
         return round_page(self.round, self._name, list(self.sources), self.earlier, self.refused)
 

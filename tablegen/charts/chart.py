@@ -1,4 +1,4 @@
-"""What a chart shows, apart from how it is drawn: curves, bands, marks, and the numbers on its axes."""
+"""The contents of a chart, independent of how it is drawn: curves, bands, marks, and the ticks of its axes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 Role = Literal["forward", "backward", "before", "other", "limit"]
-_BINS = 400  # of a curve with more points than twice that: the least and the largest of each are drawn
+_BINS = 400  # of a curve with more than twice as many points: the least and the largest of each are drawn
 POSITION = "position on the line [share]"
 _ROOM = 0.06  # above and below the curves, of their range
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnCurve:
-    """Values over a coordinate, (n,) each; NaN breaks the line. ``role`` decides colour and line style.
+    """Values over a coordinate, (n,) each; NaN breaks the line. ``role`` determines colour and line style.
 
-    A curve without a name is not in the legend. A ``faint`` one is of the same direction and matters less.
+    A curve without a name is not in the legend. A ``faint`` one has the same direction and less weight.
     """
 
     name: str
@@ -32,7 +32,7 @@ class DrawnCurve:
 
 @dataclass(frozen=True)
 class Band:
-    """A shaded stretch of x."""
+    """A shaded range of x."""
 
     low: float
     high: float
@@ -41,7 +41,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Mark:
-    """A straight line at a value of x or y, with a word."""
+    """A straight line at a value of x or y, with a label."""
 
     at: float
     name: str
@@ -50,9 +50,9 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """An image: values of shape (rows, columns), the first row on top, NaN left out; ``low`` to ``high`` are shaded.
+    """An image: values of shape (rows, columns), the first row on top, NaN left out; shades span ``low`` to ``high``.
 
-    It spans ``x``, from left to right, and ``y``, from below to above. ``label`` is that of the scale of its shades,
+    It spans ``x``, from left to right, and ``y``, from bottom to top. ``label`` is that of the scale of its shades,
     with the unit; without one there is no scale.
     """
 
@@ -79,7 +79,7 @@ class Arrows:
 class Chart:
     """One chart. ``key`` is its id in the page and its name as a file; labels contain the unit.
 
-    ``equal``: a step of x is as long as one of y.
+    ``equal`` is true if x and y have the same scale.
     """
 
     key: str
@@ -99,14 +99,14 @@ class Chart:
 
     @property
     def x_limits(self) -> tuple[float, float]:
-        """What the horizontal axis spans."""
+        """The range of the horizontal axis."""
         if self.raster is not None and self.x_range is None:
             return self.raster.x
         return self.x_range or _range([curve.x for curve in self.curves], [], 0.0)
 
     @property
     def y_limits(self) -> tuple[float, float]:
-        """What the vertical axis spans, from below to above."""
+        """The range of the vertical axis, from bottom to top."""
         if self.raster is not None and self.y_range is None:
             return self.raster.y
         marks = [mark.at for mark in self.marks if mark.of == "y"]
@@ -119,7 +119,7 @@ class Chart:
 
     @property
     def needed_legend(self) -> list[DrawnCurve]:
-        """The same, but none of a single curve that has no direction: the title says what it is."""
+        """The same, but empty for a single curve without a direction, which the title describes."""
         entries = self.legend
         return entries if len(entries) > 1 or any(curve.role in ("forward", "backward") for curve in entries) else []
 
@@ -138,7 +138,12 @@ def _range(values: list[Floats], more: list[float], room: float) -> tuple[float,
 
 
 def runs(curve: DrawnCurve) -> Iterator[tuple[Floats, Floats]]:
-    """Yield the stretches of a curve without NaN, thinned to what can be seen; extremes stay."""
+    """Yield the stretches of a curve without NaN, thinned to the visible resolution; extremes stay.
+
+    Yields
+    ------
+    x and y of a stretch, shape (points,) each.
+    """
     good = np.isfinite(curve.x) & np.isfinite(curve.y)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -157,14 +162,14 @@ def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return x[at], y[at]
 
 
-def ticks(low: float, high: float, log: bool = False, wanted: int = 5) -> list[tuple[float, str]]:
-    """Round values within a range, and their text: 1, 2 or 5 times a power of ten, or the powers of a logarithm."""
+def ticks(low: float, high: float, log: bool = False, count: int = 5) -> list[tuple[float, str]]:
+    """Return round values within a range, and their text: 1, 2 or 5 times a power of ten, or powers of ten."""
     if log:
         powers = range(ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9) + 1)
         return [(10.0**power, _power(power)) for power in powers]
     if not (isfinite(low) and isfinite(high)) or high <= low:
         return []
-    raw = (high - low) / wanted
+    raw = (high - low) / count
     power = floor(log10(raw))
     step = next(size for size in (1.0, 2.0, 5.0, 10.0) if size * 10.0**power >= raw * 0.999) * 10.0**power
     digits = max(0, -floor(log10(step) + 1e-9))

@@ -1,6 +1,6 @@
-"""A chart as lines, words and areas at their places: the one drawing that pages, SVG, PNG and PDF show.
+"""A chart as lines, texts and areas at their positions: the one drawing that pages, SVG, PNG and PDF show.
 
-Places are in pixels from the upper left. What is ``Inside`` a chart has places of its own, and is cut at its edges.
+Positions are in pixels from the upper left. Parts of a ``Clip`` have positions of their own, and are cut at its edges.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,23 +12,23 @@ from typing import Literal
 import numpy as np
 
 from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark, Raster, runs, ticks
-from tablegen.charts.style import palette, shaded
+from tablegen.charts.style import palette, shades_of
 from tablegen.numerics.arrays import Floats
 
 WIDTH, HEIGHT = 536, 290
 PICTURE_HEIGHT = 430  # of charts whose axes have one scale, as images have
 _LEFT, _RIGHT, _TOP, _BOTTOM = 70, 20, 16, 44
 _SCALE_ROOM, _SCALE_WIDTH = 78, 14  # of the scale of shades, on the right
-_FAR = 10_000.0  # nothing is drawn farther out than that
+_FAR = 10_000.0  # positions are clipped to this distance
 _HEAD = 4.0  # of an arrow
 _ROW = 18  # of a legend
-_LETTER = 7.1  # about as wide as one is
+_LETTER = 7.1  # the mean width of one
 _TITLE_LETTERS = 50  # of a row
 
 
 @dataclass(frozen=True)
 class Box:
-    """A rectangle."""
+    """A rectangle with a style."""
 
     style: str
     x: float
@@ -38,7 +38,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Ruled:
+class Segments:
     """Straight lines, each from (x, y) to (x, y)."""
 
     style: str
@@ -46,7 +46,7 @@ class Ruled:
 
 
 @dataclass(frozen=True)
-class Words:
+class Text:
     """A text; ``upright`` is turned to read from below."""
 
     style: str
@@ -58,8 +58,8 @@ class Words:
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
-    """A curve in stretches of places; areas and stems reach to ``base``."""
+class CurvePath:
+    """A curve as stretches of positions; areas and stems reach to ``base``."""
 
     curve: DrawnCurve
     stretches: tuple[tuple[Floats, Floats], ...]
@@ -79,16 +79,16 @@ class Shades:
 
 
 @dataclass(frozen=True)
-class Together:
-    """Parts that belong together."""
+class Group:
+    """Parts with a common style."""
 
     style: str
     parts: "tuple[Part, ...]"
 
 
 @dataclass(frozen=True)
-class Inside:
-    """Parts within the frame of a chart."""
+class Clip:
+    """Parts that are clipped to the frame of a chart."""
 
     x: float
     y: float
@@ -98,19 +98,19 @@ class Inside:
 
 
 @dataclass(frozen=True)
-class Moved:
-    """A whole drawing at another place."""
+class Translation:
+    """Parts at a displaced origin."""
 
     x: float
     y: float
     parts: "tuple[Part, ...]"
 
 
-Part = Box | Ruled | Words | Trail | Shades | Together | Inside | Moved
+Part = Box | Segments | Text | CurvePath | Shades | Group | Clip | Translation
 
 
 class _Frame:
-    """Where the axes of a chart are, and from values to places within them."""
+    """The frame of the axes of a chart, and the map from values to positions in it."""
 
     def __init__(self, chart: Chart, height: float) -> None:
         self.x0, self.x1 = chart.x_limits
@@ -124,44 +124,54 @@ class _Frame:
             self.width, self.height = unit * abs(self.x1 - self.x0), unit * abs(self.y1 - self.y0)
 
     def x(self, values: Floats | float) -> Floats:
-        """Horizontal."""
+        """Return the horizontal positions of values.
+
+        Returns
+        -------
+        Pixels from the left edge, of the shape of ``values``.
+        """
         low, high, at = self.x0, self.x1, np.asarray(values, dtype=np.float64)
         if self.log:
             low, high, at = log10(low), log10(high), np.log10(np.maximum(at, 1e-300))
         return np.clip((at - low) / (high - low) * self.width, -_FAR, _FAR)
 
     def y(self, values: Floats | float) -> Floats:
-        """Vertical, downwards."""
+        """Return the vertical positions of values, downwards.
+
+        Returns
+        -------
+        Pixels from the upper edge, of the shape of ``values``.
+        """
         share = (self.y1 - np.asarray(values, dtype=np.float64)) / (self.y1 - self.y0)
         return np.clip(share * self.height, -_FAR, _FAR)
 
 
 def height_of(chart: Chart) -> int:
-    """Of its drawing."""
+    """Return the height of the drawing of a chart, in pixels."""
     return PICTURE_HEIGHT if chart.equal else HEIGHT
 
 
 def drawing(chart: Chart) -> tuple[Part, ...]:
-    """Draw the chart without its title and legend: axes, and what is in them. WIDTH by ``height_of`` pixels."""
+    """Draw the axes and the contents of a chart, without title and legend: WIDTH by ``height_of`` pixels."""
     frame = _Frame(chart, height_of(chart))
     inner: list[Part] = []
     if chart.raster is not None:
         inner.append(_image(chart.raster, frame))
     for band in chart.bands:
-        left, right = float(frame.x(band.low)), float(frame.x(band.high))
-        inner.append(Box("band", left, 0.0, right - left, frame.height))
+        x_low, x_high = float(frame.x(band.low)), float(frame.x(band.high))
+        inner.append(Box("band", x_low, 0.0, x_high - x_low, frame.height))
     for mark in chart.marks:
-        inner.append(Ruled("mark", (_line(mark, frame),)))
+        inner.append(Segments("mark", (_line(mark, frame),)))
     inner += [_trail(curve, frame) for curve in chart.curves]
     if chart.arrows is not None:
-        inner.append(Ruled("arrow", tuple(_arrows(chart, frame))))
+        inner.append(Segments("arrow", tuple(_arrows(chart, frame))))
     return (
         Box("plot", _LEFT, _TOP, frame.width, frame.height),
-        Together("ticks", tuple(_ticks(chart, frame))),
-        Inside(_LEFT, _TOP, frame.width, frame.height, tuple(inner)),
-        Together("words", tuple(_mark_words(chart, frame))),
-        Words("label", _LEFT + frame.width / 2, _TOP + frame.height + 36, chart.x_label, "middle"),
-        Words("label", 20, _TOP + frame.height / 2, chart.y_label, "middle", upright=True),
+        Group("ticks", tuple(_ticks(chart, frame))),
+        Clip(_LEFT, _TOP, frame.width, frame.height, tuple(inner)),
+        Group("words", tuple(_mark_words(chart, frame))),
+        Text("label", _LEFT + frame.width / 2, _TOP + frame.height + 36, chart.x_label, "middle"),
+        Text("label", 20, _TOP + frame.height / 2, chart.y_label, "middle", upright=True),
         *(_scale(chart.raster, frame) if chart.raster is not None and chart.raster.label else ()),
     )
 
@@ -169,12 +179,12 @@ def drawing(chart: Chart) -> tuple[Part, ...]:
 def _ticks(chart: Chart, frame: _Frame) -> Iterator[Part]:
     for value, text in ticks(min(chart.x_limits), max(chart.x_limits), log=chart.log_x):
         x = _LEFT + float(frame.x(value))
-        yield Ruled("tick", ((x, _TOP, x, _TOP + frame.height),))
-        yield Words("tick", x, _TOP + frame.height + 16, text, "middle")
+        yield Segments("tick", ((x, _TOP, x, _TOP + frame.height),))
+        yield Text("tick", x, _TOP + frame.height + 16, text, "middle")
     for value, text in ticks(min(chart.y_limits), max(chart.y_limits)):
         y = _TOP + float(frame.y(value))
-        yield Ruled("tick", ((_LEFT, y, _LEFT + frame.width, y),))
-        yield Words("tick", _LEFT - 6, y + 4, text, "end")
+        yield Segments("tick", ((_LEFT, y, _LEFT + frame.width, y),))
+        yield Text("tick", _LEFT - 6, y + 4, text, "end")
 
 
 def _line(mark: Mark, frame: _Frame) -> tuple[float, float, float, float]:
@@ -186,7 +196,7 @@ def _line(mark: Mark, frame: _Frame) -> tuple[float, float, float, float]:
 
 
 def _mark_words(chart: Chart, frame: _Frame) -> Iterator[Part]:
-    """Draw the words of marks, each a row lower where the one before it is near."""
+    """Draw the labels of marks, each a row lower where the one before it is near."""
     row, last = 0, -1e9
     for mark in sorted((mark for mark in chart.marks if mark.of == "x"), key=lambda one: one.at):
         x = float(frame.x(mark.at))
@@ -195,37 +205,37 @@ def _mark_words(chart: Chart, frame: _Frame) -> Iterator[Part]:
         row = row + 1 if x - last < _LETTER * len(mark.name) else 0
         last, right = x, x > 0.6 * frame.width
         place = _LEFT + x + (-4 if right else 4)
-        yield Words("word", place, _TOP + 13 + 13 * row, mark.name, "end" if right else "start")
+        yield Text("word", place, _TOP + 13 + 13 * row, mark.name, "end" if right else "start")
     for mark in (mark for mark in chart.marks if mark.of == "y" and mark.name):
-        yield Words("word", _LEFT + frame.width - 4, _TOP + float(frame.y(mark.at)) - 4, mark.name, "end")
+        yield Text("word", _LEFT + frame.width - 4, _TOP + float(frame.y(mark.at)) - 4, mark.name, "end")
 
 
-def _trail(curve: DrawnCurve, frame: _Frame) -> Trail:
+def _trail(curve: DrawnCurve, frame: _Frame) -> CurvePath:
     base = frame.height if curve.kind == "stems" else float(np.clip(frame.y(0.0), 0.0, frame.height))
-    return Trail(curve, tuple((frame.x(x), frame.y(y)) for x, y in runs(curve)), base)
+    return CurvePath(curve, tuple((frame.x(x), frame.y(y)) for x, y in runs(curve)), base)
 
 
 def _image(raster: Raster, frame: _Frame) -> Shades:
-    (left, right), (below, above) = (
+    (x_low, x_high), (below, above) = (
         (float(scale(ends[0])), float(scale(ends[1]))) for scale, ends in ((frame.x, raster.x), (frame.y, raster.y))
     )
-    return Shades(shaded(raster), palette(raster.shades), left, above, right - left, below - above)
+    return Shades(shades_of(raster), palette(raster.shades), x_low, above, x_high - x_low, below - above)
 
 
 def _scale(raster: Raster, frame: _Frame) -> Iterator[Part]:
-    """Draw the shades with their values, on the right."""
-    left = _LEFT + frame.width + 14
+    """Draw the scale of shades with its values, on the right."""
+    x = _LEFT + frame.width + 14
     column = np.arange(254, -1, -1, dtype=np.uint8)[:, None]
-    yield Shades(column, palette(raster.shades), left, _TOP, _SCALE_WIDTH, frame.height)
-    yield Box("plot", left, _TOP, _SCALE_WIDTH, frame.height)
+    yield Shades(column, palette(raster.shades), x, _TOP, _SCALE_WIDTH, frame.height)
+    yield Box("plot", x, _TOP, _SCALE_WIDTH, frame.height)
     for value, text in ticks(raster.low, raster.high):
         share = (raster.high - value) / ((raster.high - raster.low) or 1.0)
-        yield Words("tick", left + _SCALE_WIDTH + 5, _TOP + share * frame.height + 4, text)
-    yield Words("label", left + _SCALE_WIDTH + 58, _TOP + frame.height / 2, raster.label, "middle", upright=True)
+        yield Text("tick", x + _SCALE_WIDTH + 5, _TOP + share * frame.height + 4, text)
+    yield Text("label", x + _SCALE_WIDTH + 58, _TOP + frame.height / 2, raster.label, "middle", upright=True)
 
 
 def _arrows(chart: Chart, frame: _Frame) -> Iterator[tuple[float, float, float, float]]:
-    """Shaft and two strokes of the head of each arrow."""
+    """Yield the shaft and the two strokes of the head of each arrow."""
     assert chart.arrows is not None
     one = chart.arrows
     x0, y0, x1, y1 = frame.x(one.x), frame.y(one.y), frame.x(one.x + one.dx), frame.y(one.y + one.dy)
@@ -239,7 +249,7 @@ def _arrows(chart: Chart, frame: _Frame) -> Iterator[tuple[float, float, float, 
 
 
 def legend_rows(chart: Chart) -> list[list[tuple[float, DrawnCurve | Band]]]:
-    """Arrange the entries of a legend in rows, each with its place from the left."""
+    """Arrange the entries of a legend in rows, each with its position from the left."""
     rows: list[list[tuple[float, DrawnCurve | Band]]] = []
     bands = {band.name: band for band in chart.bands if band.name}
     x = float(WIDTH)
@@ -261,36 +271,36 @@ def _title_rows(chart: Chart) -> list[str]:
 
 def _with_title(chart: Chart, titles: int, rows: int) -> tuple[Part, ...]:
     """Draw a chart below its title and a legend, which have room for some rows."""
-    parts: list[Part] = [Words("title", _LEFT, 20 + _ROW * at, text) for at, text in enumerate(_title_rows(chart))]
+    parts: list[Part] = [Text("title", _LEFT, 20 + _ROW * at, text) for at, text in enumerate(_title_rows(chart))]
     for number, entries in enumerate(legend_rows(chart)):
         y = 20.0 + _ROW * (titles + number)
         for x, one in entries:
-            left = _LEFT + x
-            parts += [_swatch(one, left, y), Words("legend", left + 38, y + 4, one.name)]
-    return (*parts, Moved(0, 8 + _ROW * (titles + rows), drawing(chart)))
+            entry_x = _LEFT + x
+            parts += [_swatch(one, entry_x, y), Text("legend", entry_x + 38, y + 4, one.name)]
+    return (*parts, Translation(0, 8 + _ROW * (titles + rows), drawing(chart)))
 
 
-def _swatch(one: DrawnCurve | Band, left: float, y: float) -> Part:
-    """Draw a piece of what a legend names."""
+def _swatch(one: DrawnCurve | Band, x: float, y: float) -> Part:
+    """Draw a sample of the line of a legend's entry."""
     if isinstance(one, Band):
-        return Box("band", left, y - 7, 30, 14)
-    across = np.array([left + 15.0] if one.kind == "points" else [left, left + 30.0])
+        return Box("band", x, y - 7, 30, 14)
+    across = np.array([x + 15.0] if one.kind == "points" else [x, x + 30.0])
     piece = one if one.kind == "points" else replace(one, kind="line")
-    return Trail(piece, ((across, np.full(len(across), y)),))
+    return CurvePath(piece, ((across, np.full(len(across), y)),))
 
 
 def sheet(heading: str, charts: Sequence[Chart], columns: int) -> tuple[int, int, tuple[Part, ...]]:
-    """Width, height and parts of charts beside and below each other, with a heading over all unless it is empty."""
+    """Return width, height and parts of charts in rows, with a heading unless it is empty."""
     y = 0
     parts: list[Part] = []
     if heading:
-        parts.append(Words("heading", 20, 26, heading))
+        parts.append(Text("heading", 20, 26, heading))
         y = 40
     columns = min(columns, len(charts))
     for first in range(0, len(charts), columns):
         row = charts[first : first + columns]
         titles = max(len(_title_rows(chart)) for chart in row)
         rows = max(len(legend_rows(chart)) for chart in row)
-        parts += [Moved(WIDTH * at, y, _with_title(chart, titles, rows)) for at, chart in enumerate(row)]
+        parts += [Translation(WIDTH * at, y, _with_title(chart, titles, rows)) for at, chart in enumerate(row)]
         y += 8 + _ROW * (titles + rows) + max(map(height_of, row))
     return WIDTH * columns, y, tuple(parts)

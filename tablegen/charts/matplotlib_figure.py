@@ -1,4 +1,4 @@
-"""A drawing as PNG or PDF, by matplotlib: the same lines, words and areas at the same places as in the SVG."""
+"""A drawing as PNG or PDF, by matplotlib: the same lines, texts and areas at the same positions as in the SVG."""
 
 from collections.abc import Iterable, Sequence
 from io import BytesIO
@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tablegen.charts.chart import Chart
-from tablegen.charts.drawing import Box, Inside, Moved, Part, Ruled, Shades, Together, Trail, Words, sheet
+from tablegen.charts.drawing import Box, Clip, CurvePath, Group, Part, Segments, Shades, Text, Translation, sheet
 from tablegen.charts.style import LOOKS, Look, look_of, spot_of
 
 _POINTS = 0.72  # of a pixel, where 100 pixels are an inch
@@ -18,8 +18,8 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-def drawn(charts: Sequence[Chart], kind: Literal["png", "pdf"], heading: str = "", columns: int = 2) -> bytes:
-    """Render the file. Without a date, so that the same charts give the same bytes."""
+def render(charts: Sequence[Chart], kind: Literal["png", "pdf"], heading: str = "", columns: int = 2) -> bytes:
+    """Render the file, without a date, so that the same charts give the same bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -37,41 +37,41 @@ def drawn(charts: Sequence[Chart], kind: Literal["png", "pdf"], heading: str = "
 
 
 class _Painter:
-    """Puts parts of a drawing on axes whose units are its pixels."""
+    """Draws the parts of a drawing on axes whose units are its pixels."""
 
     def __init__(self, axes: Any) -> None:
         self.axes = axes
         self.order = 0
 
     def paint(self, parts: Iterable[Part], x: float, y: float, frame: Any) -> None:
-        """Parts from a place on; what lies outside ``frame`` is cut off."""
+        """Draw parts at an origin, clipped to ``frame``."""
         for part in parts:
-            self.order += 1  # what comes later is drawn above
+            self.order += 1  # later parts are render above
             match part:
-                case Moved():
+                case Translation():
                     self.paint(part.parts, x + part.x, y + part.y, frame)
-                case Together():
+                case Group():
                     self.paint(part.parts, x, y, frame)
-                case Inside():
+                case Clip():
                     self._inside(part, x, y)
                 case Box():
                     self._box(part, x, y, frame)
-                case Ruled():
+                case Segments():
                     for x0, y0, x1, y1 in part.lines:
                         self._line([x + x0, x + x1], [y + y0, y + y1], LOOKS[part.style], frame)
-                case Words():
+                case Text():
                     self._words(part, x, y)
-                case Trail():
+                case CurvePath():
                     self._trail(part, x, y, frame)
                 case Shades():
                     self._shades(part, x, y)
 
-    def _inside(self, part: Inside, x: float, y: float) -> None:
+    def _inside(self, part: Clip, x: float, y: float) -> None:
         from matplotlib.patches import Rectangle
 
-        left, top = x + part.x, y + part.y
-        edge = Rectangle((left, top), part.width, part.height, transform=self.axes.transData)
-        self.paint(part.parts, left, top, edge)
+        x0, y0 = x + part.x, y + part.y
+        edge = Rectangle((x0, y0), part.width, part.height, transform=self.axes.transData)
+        self.paint(part.parts, x0, y0, edge)
 
     def _box(self, part: Box, x: float, y: float, frame: Any) -> None:
         from matplotlib.patches import Rectangle
@@ -112,7 +112,7 @@ class _Painter:
         if frame is not None:
             line.set_clip_path(frame)
 
-    def _words(self, part: Words, x: float, y: float) -> None:
+    def _words(self, part: Text, x: float, y: float) -> None:
         look = LOOKS[part.style]
         self.axes.text(
             x + part.x,
@@ -129,7 +129,7 @@ class _Painter:
             zorder=self.order,
         )
 
-    def _trail(self, part: Trail, x: float, y: float, frame: Any) -> None:
+    def _trail(self, part: CurvePath, x: float, y: float, frame: Any) -> None:
         look = look_of(part.curve)
         for across, down in part.stretches:
             px, py = x + across, y + down

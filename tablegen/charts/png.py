@@ -1,4 +1,4 @@
-"""A picture in shades as PNG. Nothing is compressed, so that every machine writes the same bytes."""
+"""A picture in shades as PNG, uncompressed, so that every machine writes the same bytes."""
 
 import struct
 import zlib
@@ -12,13 +12,29 @@ _MOST = 65535  # bytes of a stored block
 
 
 def grey_png(heights: Floats, low: float, high: float) -> bytes:
-    """Heights, rows x columns, the first row on top: ``low`` is black and ``high`` white."""
+    """Return heights as a grey PNG.
+
+    Parameters
+    ----------
+    heights
+        Heights, shape (rows, columns), the first row on top, without NaN.
+    low, high
+        The heights of black and white.
+    """
     shades = np.clip(np.rint(255.0 * (heights - low) / (high - low)), 0, 255).astype(np.uint8)
     return _png(shades, 0)
 
 
 def indexed_png(shades: np.typing.NDArray[np.uint8], palette: np.typing.NDArray[np.uint8]) -> bytes:
-    """Shades, rows x columns, each of which is a colour of the palette, (256, 3)."""
+    """Return shades as a PNG with a palette.
+
+    Parameters
+    ----------
+    shades
+        Indices into the palette, shape (rows, columns), the first row on top.
+    palette
+        RGB of each shade, shape (256, 3).
+    """
     return _png(shades, 3, (b"PLTE", palette.tobytes()))
 
 
@@ -31,7 +47,7 @@ def _png(shades: np.typing.NDArray[np.uint8], colours: int, *more: tuple[bytes, 
 
 
 def data_address(png: bytes) -> str:
-    """Return the picture as an address within a page."""
+    """Return the picture as a data URL."""
     return f"data:image/png;base64,{b64encode(png).decode('ascii')}"
 
 

@@ -1,4 +1,4 @@
-"""How a picture looks: colours that all eyes tell apart, line styles that need no colour, and shades of images.
+"""Colours that people with any colour vision can distinguish, line styles for print without colour, shades of images.
 
 Colours are for a white page; report/page.css has those of the page, which may be dark.
 """
@@ -14,7 +14,7 @@ from tablegen.numerics.arrays import Floats
 
 @dataclass(frozen=True)
 class Look:
-    """Lines: colour, width in pixels, lengths of dashes and gaps. Areas: ``fill``. Words: ``size``, colour ``fill``."""
+    """The style of lines (colour, width in pixels, dashes), of areas (``fill``) and of texts (``size``, ``fill``)."""
 
     stroke: str = ""
     width: float = 1.0
@@ -56,12 +56,12 @@ SPOT, SMALL_SPOT = 8.0, 4.0  # pixels across
 
 
 def look_of(curve: DrawnCurve) -> Look:
-    """Colour and line style of a curve."""
+    """Return colour and line style of a curve."""
     return (_FAINT if curve.faint else ROLES)[curve.role]
 
 
 def spot_of(curve: DrawnCurve) -> tuple[float, Literal["round", "square"]]:
-    """How large the points of a curve are, and their form: squares are backward."""
+    """Return the size in pixels of the points of a curve, and their form: squares are backward."""
     small = curve.role == "before" or curve.faint
     return SMALL_SPOT if small else SPOT, "square" if curve.role == "backward" else "round"
 
@@ -71,12 +71,17 @@ _ENDS = {
     "heat": ("#1b0b3b", "#6a176e", "#bc3754", "#f37819", "#fcffa4"),
     "signed": ("#2166ac", "#92c5de", "#f7f7f7", "#f4a582", "#b2182b"),
 }
-LEFT_OUT = 255  # the shade of what has no value
+LEFT_OUT = 255  # the shade of missing values
 _MISSING = "#ffd9d0"
 
 
 def palette(shades: str) -> np.typing.NDArray[np.uint8]:
-    """Colours of the shades 0..254 and of what is left out, (256, 3)."""
+    """Return the colours of the shades 0..254 and of missing values.
+
+    Returns
+    -------
+    RGB, shape (256, 3).
+    """
     ends = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in _ENDS[shades]], dtype=np.float64)
     at = np.linspace(0.0, len(ends) - 1.0, LEFT_OUT)
     colours = np.stack([np.interp(at, np.arange(len(ends)), ends[:, i]) for i in range(3)], axis=1)
@@ -84,8 +89,13 @@ def palette(shades: str) -> np.typing.NDArray[np.uint8]:
     return np.vstack([np.rint(colours), missing]).astype(np.uint8)
 
 
-def shaded(raster: Raster) -> np.typing.NDArray[np.uint8]:
-    """Each value as a shade, (rows, columns)."""
+def shades_of(raster: Raster) -> np.typing.NDArray[np.uint8]:
+    """Return the shade of each value of an image.
+
+    Returns
+    -------
+    Shades 0..254, ``LEFT_OUT`` for NaN, shape (rows, columns).
+    """
     share = (raster.values - raster.low) / ((raster.high - raster.low) or 1.0)
     whole: Floats = np.rint(np.clip(np.nan_to_num(share), 0.0, 1.0) * (LEFT_OUT - 1))
     return np.where(np.isfinite(raster.values), whole, LEFT_OUT).astype(np.uint8)

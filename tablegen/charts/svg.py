@@ -1,7 +1,7 @@
-"""A drawing as SVG, without a library: for the page, whose style sheet has its looks, and as a file of its own.
+"""A drawing as SVG, without a library: for the page, whose style sheet has its styles, and as a separate file.
 
 Curves lie in a nested drawing, so that a script can zoom without redrawing them; positions within it are whole
-hundredths of a pixel. Everything that is text is escaped here.
+hundredths of a pixel. All text is escaped here.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -13,14 +13,14 @@ from tablegen.charts.chart import Chart, DrawnCurve
 from tablegen.charts.drawing import (
     WIDTH,
     Box,
-    Inside,
-    Moved,
+    Clip,
+    CurvePath,
+    Group,
     Part,
-    Ruled,
+    Segments,
     Shades,
-    Together,
-    Trail,
-    Words,
+    Text,
+    Translation,
     drawing,
     height_of,
     sheet,
@@ -34,7 +34,7 @@ _Attributes = Callable[[Part], Markup]
 
 
 def svg(chart: Chart) -> Markup:
-    """Render the chart for the page: without its title and legend, which stand beside it as text that wraps."""
+    """Render the chart for the page, without title and legend, which stand beside it as text that wraps."""
     return Markup(
         '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}" tabindex="0" data-x="{!r} {!r}" '
         'data-y="{!r} {!r}" data-log="{}">{}</svg>'
@@ -50,7 +50,7 @@ def svg(chart: Chart) -> Markup:
 
 
 def standalone(charts: Sequence[Chart], heading: str = "", columns: int = 2) -> str:
-    """Charts as a file of its own, with their titles and legends. No style sheet: it would be that of a whole page."""
+    """Render charts as a file, with titles and legends; without a style sheet, which would apply to a whole page."""
     space = Markup(' xmlns="http://www.w3.org/2000/svg"')
     return f'<?xml version="1.0" encoding="utf-8"?>\n{_alone(charts, heading, columns, space)}\n'
 
@@ -69,10 +69,10 @@ def _alone(charts: Sequence[Chart], heading: str, columns: int, space: Markup) -
 
 
 def swatch(curve: DrawnCurve) -> Markup:
-    """Draw a piece of a curve, for a legend of the page."""
+    """Draw a sample of a curve, for a legend of the page."""
     return Markup(
         '<svg class="swatch" viewBox="0 0 30 10" width="30" height="10" aria-hidden="true"><path{} d="{}"/></svg>'
-    ).format(_classes(Trail(curve, ())), "M15 5h0" if curve.kind == "points" else "M0 5h30")
+    ).format(_classes(CurvePath(curve, ())), "M15 5h0" if curve.kind == "points" else "M0 5h30")
 
 
 def _all(parts: Iterable[Part], attributes: _Attributes, fine: int = 1) -> Markup:
@@ -84,11 +84,11 @@ def _part(part: Part, attributes: _Attributes, fine: int) -> Markup:
         case Box():
             places = [_number(fine * value, fine) for value in (part.x, part.y, part.width, part.height)]
             return Markup('<rect{} x="{}" y="{}" width="{}" height="{}"/>').format(attributes(part), *places)
-        case Ruled():
+        case Segments():
             lines = ([_number(fine * value, fine) for value in line] for line in part.lines)
             path = "".join("M{} {}L{} {}".format(*line) for line in lines)
             return Markup('<path{} d="{}"/>').format(attributes(part), path)
-        case Words():
+        case Text():
             place = Markup('x="{}" y="{}"').format(_number(part.x, 1), _number(part.y, 1))
             if part.upright:
                 place = Markup('transform="translate({} {}) rotate(-90)"').format(
@@ -97,7 +97,7 @@ def _part(part: Part, attributes: _Attributes, fine: int) -> Markup:
             return Markup('<text{} {} text-anchor="{}">{}</text>').format(
                 attributes(part), place, part.anchor, part.text
             )
-        case Trail():
+        case CurvePath():
             return Markup('<path{} data-name="{}" d="{}"/>').format(
                 attributes(part), part.curve.name, _path(part, fine)
             )
@@ -107,13 +107,13 @@ def _part(part: Part, attributes: _Attributes, fine: int) -> Markup:
                 '<image x="{}" y="{}" width="{}" height="{}" preserveAspectRatio="none" '
                 'style="image-rendering:pixelated" href="{}"/>'
             ).format(*places, data_address(indexed_png(part.shades, part.palette)))
-        case Together():
+        case Group():
             return Markup('<g class="{}">{}</g>').format(part.style, _all(part.parts, attributes, fine))
-        case Moved():
+        case Translation():
             return Markup('<g transform="translate({} {})">{}</g>').format(
                 _number(part.x, 1), _number(part.y, 1), _all(part.parts, attributes, fine)
             )
-        case Inside():
+        case Clip():
             width, height = (_number(_FINE * value, _FINE) for value in (part.width, part.height))
             return Markup(
                 '<svg class="inner" x="{}" y="{}" width="{}" height="{}" viewBox="0 0 {} {}" '
@@ -127,11 +127,11 @@ def _part(part: Part, attributes: _Attributes, fine: int) -> Markup:
 
 
 def _number(value: float, fine: int) -> str:
-    """Tenths of a pixel, or whole numbers of a fine grid; no more digits than needed."""
+    """Format tenths of a pixel, or whole numbers of a fine grid, with no more digits than needed."""
     return f"{value:.0f}" if fine > 1 else f"{value:.1f}".removesuffix(".0")
 
 
-def _path(trail: Trail, fine: int) -> str:
+def _path(trail: CurvePath, fine: int) -> str:
     parts = []
     for x, y in trail.stretches:
         px, py = (np.rint(values * fine).astype(np.int64) for values in (x, y))
@@ -153,20 +153,20 @@ def _steps(x: Ints, y: Ints) -> str:
 
 
 def _classes(part: Part) -> Markup:
-    """As the style sheet of the page knows it."""
+    """Return the classes of a part for the style sheet of the page."""
     match part:
-        case Trail():
+        case CurvePath():
             faint = " faint" if part.curve.faint else ""
             return Markup(' class="curve {} {}{}"').format(part.curve.role, part.curve.kind, faint)
-        case Box() | Ruled() | Words() if part.style not in ("tick", "word"):
+        case Box() | Segments() | Text() if part.style not in ("tick", "word"):
             return Markup(' class="{}"').format(part.style)
     return Markup("")
 
 
 def _looks(part: Part) -> Markup:
-    """As attributes."""
+    """Return the style of a part as attributes."""
     match part:
-        case Trail():
+        case CurvePath():
             look = look_of(part.curve)
             if part.curve.kind == "points":
                 size, form = spot_of(part.curve)
@@ -177,14 +177,14 @@ def _looks(part: Part) -> Markup:
                 look = Look(look.stroke, look.width)
             fill = LOOKS["area"] if part.curve.kind == "area" else None
             return _stroke(look, fill)
-        case Words():
+        case Text():
             look = LOOKS[part.style]
             weight = Markup(' font-weight="bold"') if look.bold else Markup("")
             return Markup(' fill="{}" font-size="{}"').format(look.fill, _number(look.size, 1)) + weight
         case Box() if LOOKS[part.style].fill:
             look = LOOKS[part.style]
             return Markup(' fill="{}" fill-opacity="{}"').format(look.fill, look.opacity)
-        case Box() | Ruled():
+        case Box() | Segments():
             return _stroke(LOOKS[part.style])
     return Markup("")
 

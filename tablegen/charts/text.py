@@ -1,7 +1,7 @@
 """A chart in characters, for a terminal: the same axes, units, legend and bands as in a picture.
 
-Curves are drawn in dots, 2 by 4 in a character, and have marks on them, by which they are told apart without colour:
-``>`` is forward and ``<`` is backward. Without Unicode they are drawn in their marks alone.
+Curves are drawn in dots, 2 by 4 in a character, with marks that distinguish them without colour: ``>`` is forward and
+``<`` is backward. Without Unicode only the marks are drawn.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ _LEAST, _MOST = 40, 200  # characters of a line
 
 
 def text_plot(chart: Chart, width: int, unicode: bool) -> list[list[Span]]:
-    """Lines of at most ``width`` characters, each in spans with a style."""
+    """Return lines of at most ``width`` characters, each in spans with a style."""
     return _TextPlot(chart, min(max(width, _LEAST), _MOST), unicode).lines()
 
 
@@ -36,7 +36,7 @@ class _TextPlot:
         self.height = min(max(rows, 9), 16)
         if chart.raster is not None:
             self.height = min(max(round(width / 4.5), 12), 26)
-        self.y_ticks = ticks(min(self.y0, self.y1), max(self.y0, self.y1), wanted=1 + self.height // 3)
+        self.y_ticks = ticks(min(self.y0, self.y1), max(self.y0, self.y1), count=1 + self.height // 3)
         self.margin = max((len(text) for _, text in self.y_ticks), default=1) + 1
         self.width = width - self.margin - 2
         if chart.equal:
@@ -45,7 +45,7 @@ class _TextPlot:
         self.styles = [[""] * self.width for _ in range(self.height)]
 
     def lines(self) -> list[list[Span]]:
-        """All of the plot."""
+        """Return all lines of the plot."""
         self._draw()
         chart, blank = self.chart, " " * self.margin
         at_row = {self._row(value): text for value, text in self.y_ticks}
@@ -70,7 +70,7 @@ class _TextPlot:
         for mark in self.chart.marks:
             self._name(mark)
         lines = [curve for curve in self.chart.curves if curve.kind != "points"]
-        lines.sort(key=lambda curve: curve.role != "before")  # what is compared with lies below
+        lines.sort(key=lambda curve: curve.role != "before")  # the reference curve lies below
         if self.unicode:
             for curve in lines:
                 self._dots(curve)
@@ -81,7 +81,7 @@ class _TextPlot:
                 self._points(curve)
 
     def _x(self, values: Floats | float) -> Floats:
-        """0 to 1 from left to right."""
+        """Return the position from left to right, 0 to 1."""
         low, high, at = self.x0, self.x1, np.asarray(values, dtype=np.float64)
         if self.chart.log_x:
             low, high, at = np.log10(low), np.log10(high), np.log10(np.maximum(at, 1e-300))
@@ -89,7 +89,7 @@ class _TextPlot:
         return fraction
 
     def _y(self, values: Floats | float) -> Floats:
-        """0 to 1 from above."""
+        """Return the position from above, 0 to 1."""
         fraction: Floats = (self.y1 - np.asarray(values, dtype=np.float64)) / (self.y1 - self.y0)
         return fraction
 
@@ -104,14 +104,14 @@ class _TextPlot:
             self.cells[row][column], self.styles[row][column] = text, style
 
     def _shade(self, raster: Raster) -> None:
-        """Each character is the value in its middle."""
+        """Draw in each character the value at its middle."""
         ramp = _UNICODE_RAMP if self.unicode else _ASCII_RAMP
-        (left, right), (below, above), (rows, columns) = raster.x, raster.y, raster.values.shape
+        (x_low, x_high), (below, above), (rows, columns) = raster.x, raster.y, raster.values.shape
         for row in range(self.height):
             y = self.y1 - (self.y1 - self.y0) * (row + 0.5) / self.height
             for column in range(self.width):
                 x = self.x0 + (self.x1 - self.x0) * (column + 0.5) / self.width
-                i, j = int((above - y) / (above - below) * rows), int((x - left) / (right - left) * columns)
+                i, j = int((above - y) / (above - below) * rows), int((x - x_low) / (x_high - x_low) * columns)
                 if 0 <= i < rows and 0 <= j < columns and np.isfinite(raster.values[i, j]):
                     share = (raster.values[i, j] - raster.low) / ((raster.high - raster.low) or 1.0)
                     text = ramp[int(min(max(share, 0.0), 0.999) * len(ramp))]
@@ -127,7 +127,7 @@ class _TextPlot:
                 self._put(row, self._column(mark.at), "\u250a" if self.unicode else ":", "faint")
 
     def _name(self, mark: Mark) -> None:
-        """Write the word of a line: at its right end, or beside it in the first row that is free there."""
+        """Write the label of a line: at its right end, or beside it in the first row that is free there."""
         if mark.of == "y":
             self._word(self._row(mark.at), self.width - len(mark.name), mark.name)
             return
@@ -147,7 +147,7 @@ class _TextPlot:
             self._put(row, column + i, letter, "faint")
 
     def _cells_of(self, curve: DrawnCurve, fine: tuple[int, int]) -> Iterator[tuple[int, int]]:
-        """Row and column of each step along a curve, on a grid of so many to a character."""
+        """Yield row and column of each step along a curve, on a grid of so many to a character."""
         tall, wide = self.height * fine[0], self.width * fine[1]
         for x, y in runs(curve):
             across, down = self._x(x) * wide, self._y(y) * tall
@@ -174,15 +174,15 @@ class _TextPlot:
                 self._put(row // 4, column // 2, chr(dots | _BRAILLE[row % 4][column % 2]), _style(curve))
 
     def _marks(self, curve: DrawnCurve, first: int) -> None:
-        """Without dots at every place of a line, with them at some."""
-        seen = list(dict.fromkeys(self._cells_of(curve, (1, 1))))
+        """Draw the marks of a line: at every position without dots, at some with them."""
+        steps = list(dict.fromkeys(self._cells_of(curve, (1, 1))))
         if curve.kind == "stems" and self.unicode:
             return
         every = _EVERY if self.unicode else 1
-        for row, column in seen[first if self.unicode else 0 :: every]:
+        for row, column in steps[first if self.unicode else 0 :: every]:
             occupied = not self.unicode and 0 <= row < self.height and 0 <= column < self.width
             if occupied and self.cells[row][column] not in " -:" and column % 2:
-                continue  # where two curves are one, both are seen
+                continue  # where two curves coincide, both stay visible
             self._put(row, column, mark_of(curve), _style(curve))
 
     def _points(self, curve: DrawnCurve) -> None:
@@ -193,7 +193,7 @@ class _TextPlot:
                     self._put(row, column, mark_of(curve), _style(curve))
 
     def _legend(self) -> list[list[Span]]:
-        """List marks with their names, in as many lines as they take; also of bands, and of shades."""
+        """List marks with their names, in as many lines as needed; also of bands, and of shades."""
         entries: list[Span] = []
         entries += [(f"{mark_of(curve)} {curve.name}", _style(curve)) for curve in self.chart.needed_legend]
         entries += [
@@ -213,9 +213,9 @@ class _TextPlot:
             else:
                 lines[-1].append(("   ", ""))
                 used += 3
-            shown = _cut(text, self.total - self.margin)
-            lines[-1].append((shown, style))
-            used += len(shown)
+            entry = _cut(text, self.total - self.margin)
+            lines[-1].append((entry, style))
+            used += len(entry)
         return lines
 
     @property
@@ -223,7 +223,7 @@ class _TextPlot:
         return "\u2550" if self.unicode else "="
 
     def _axis(self) -> list[Span]:
-        """Draw the horizontal axis with its ticks; what bands span is doubled."""
+        """Draw the horizontal axis with its ticks, and bands as double lines."""
         line, corner, tick = ("\u2500", "\u2514", "\u252c") if self.unicode else ("-", "+", "+")
         cells = [line] * self.width
         for band in self.chart.bands:
@@ -237,7 +237,7 @@ class _TextPlot:
 
     def _x_ticks(self) -> list[tuple[float, str]]:
         low, high = sorted((self.x0, self.x1))
-        return ticks(low, high, log=self.chart.log_x, wanted=max(2, self.width // 14))
+        return ticks(low, high, log=self.chart.log_x, count=max(2, self.width // 14))
 
     def _x_texts(self) -> str:
         row = [" "] * self.width
@@ -264,7 +264,7 @@ def _cut(text: str, most: int) -> str:
 
 
 def _spans(cells: Sequence[str], styles: Sequence[str]) -> list[Span]:
-    """Characters of one style together; without blanks at the end."""
+    """Join characters of one style, without trailing blanks."""
     last = max((i for i, cell in enumerate(cells) if cell != " "), default=-1)
     spans: list[Span] = []
     for cell, style in zip(cells[: last + 1], styles, strict=False):

@@ -1,1 +1,1 @@
-"""Two scans, builds or calibrations side by side: their numbers, what differs, and overlaid charts."""
+"""Comparison of two scans, builds or calibrations: their numbers, the differences, and overlaid charts."""

@@ -7,7 +7,7 @@ HEAD = ("A", "B", "B less A", "change")
 
 
 def cells(pair: ComparedPair) -> tuple[str, str, str, str]:
-    """Return A, B, the difference with its unit, and its percentage or how it compares with the standard errors."""
+    """Return A, B, the difference with its unit, and its percentage or its size in standard errors."""
     difference, change = "", ""
     if not pair.same and pair.difference is not None:
         difference = f"{pair.difference:+.5g}{_unit(pair)}"
@@ -23,8 +23,8 @@ def _value(one: ComparedQuantity | None) -> str:
         return "-"
     if isinstance(one.value, str):
         return one.value
-    shown = f"{one.value:.7g}" if isinstance(one.value, float) else str(one.value)
-    return shown if one.error is None else f"{shown} \u00b1 {one.error:.2g}"
+    text = f"{one.value:.7g}" if isinstance(one.value, float) else str(one.value)
+    return text if one.error is None else f"{text} \u00b1 {one.error:.2g}"
 
 
 def _unit(pair: ComparedPair) -> str:

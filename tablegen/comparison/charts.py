@@ -1,4 +1,4 @@
-"""A and B in the same charts: grey and dotted is A, green and solid is B, in every one of them."""
+"""A and B in the same charts: A is grey and dotted, B green and solid."""
 
 from collections.abc import Iterator, Sequence
 
@@ -8,7 +8,7 @@ from tablegen.charts.chart import POSITION, Chart, Mark
 from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.law_charts import law_charts
 from tablegen.comparison.operators import SIDES, ComparedOperator, Place, residuals
-from tablegen.comparison.overlay import overlaid
+from tablegen.comparison.overlay import overlay
 from tablegen.compensation.operator.loop import POINTS
 from tablegen.html_report.blocks import Charts as ChartsBlock
 from tablegen.html_report.blocks import Section
@@ -23,7 +23,7 @@ _MOST_LOOPS = 4
 
 
 def comparison_charts(both: SideBySide) -> list[Chart]:
-    """Every chart of two sides; those that only one of them could have are left out."""
+    """Return every chart that both sides can have."""
     if both.a.subject is not None and both.b.subject is not None:
         return [*_scans(both.a.subject, both.b.subject)]
     charts = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
@@ -34,7 +34,7 @@ def comparison_charts(both: SideBySide) -> list[Chart]:
 
 
 def differing_charts(charts: Sequence[Chart]) -> list[Chart]:
-    """Those in which A and B are not one curve."""
+    """Return the charts in which A and B are not one curve."""
     return [chart for chart in charts if not _alike(chart)]
 
 
@@ -52,10 +52,10 @@ def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
     others = dict(b.axes)
     for axis, one in a.axes:
         other = others.get(axis)
-        if other is None:  # one of both is a line scan
+        if other is None:  # one side is a line scan
             continue
         yield _drive(axis, one, other)
-        yield _apart(axis, one, other)
+        yield _difference(axis, one, other)
         yield _spectrum(axis, one, other)
     if a.planned is not None and b.planned is not None:
         played = {one.axis: one for one in played_axes(b.planned)}
@@ -71,13 +71,13 @@ def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
     times, unit = (1e3, "ms") if max(periods) < 1.0 else (1.0, "s")
     curves = [(times * period * t, _volts(entry, t)) for entry, period in zip((a, b), periods, strict=True)]
     what = "line" if axis == "x" else "frame"
-    return overlaid(f"drive-{axis}", f"{axis} drive, one {what}", f"time [{unit}]", "drive at the piezo [V]", *curves)
+    return overlay(f"drive-{axis}", f"{axis} drive, one {what}", f"time [{unit}]", "drive at the piezo [V]", *curves)
 
 
-def _apart(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
+def _difference(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
     """Draw the difference of two drives that an overlay cannot show."""
     t = np.linspace(0.0, 1.0, _POINTS)
-    return overlaid(
+    return overlay(
         f"apart-{axis}",
         f"{axis} drive, B less A",
         "time [periods]",
@@ -98,11 +98,11 @@ def _spectrum(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
         volts = entry.drive.v_amplitude * np.hypot(series.a, series.b)
         curves.append((rate * np.arange(1.0, series.harmonics + 1.0), 20.0 * np.log10(np.maximum(volts, 1e-9))))
     title = f"{axis} harmonics of the drive"
-    return overlaid(f"spectrum-{axis}", title, "frequency [Hz]", "amplitude [dB of 1 V]", *curves, log_x=True)
+    return overlay(f"spectrum-{axis}", title, "frequency [Hz]", "amplitude [dB of 1 V]", *curves, log_x=True)
 
 
 def _errors(a: PlayedAxis, b: PlayedAxis) -> Iterator[Chart]:
-    """Residual and scaling error on what each scanner file says of the scanner, as `tablegen report` plays them."""
+    """Draw residual and scaling error on the scanner of each scanner file, as `tablegen report` simulates them."""
     one, other = (side.emitted or side.before for side in (a, b))
     if one is None or other is None:
         return
@@ -114,27 +114,27 @@ def _errors(a: PlayedAxis, b: PlayedAxis) -> Iterator[Chart]:
         residual, scaling = f"residual-{key}", f"scaling-{key}"
         curves = [inside(branch) for branch in branches]
         title = f"{a.axis} residual {side}, simulated"
-        yield overlaid(residual, title, place, "residual [% of the line]", *curves, marks=zero)
+        yield overlay(residual, title, place, "residual [% of the line]", *curves, marks=zero)
         curves = [(branch.scaling_position, branch.scaling) for branch in branches]
         title = f"{a.axis} scaling error {side}, simulated"
-        yield overlaid(scaling, title, place, "scaling error [%]", *curves, marks=zero)
+        yield overlay(scaling, title, place, "scaling error [%]", *curves, marks=zero)
 
 
 def _loops(name: str, a: ComparedOperator, b: ComparedOperator) -> Iterator[Chart]:
-    """Both branches of the largest lines at which either was measured, less a straight line."""
+    """Draw both branches of the largest lines at which either side was measured, less a straight line."""
     places = sorted({*a.places, *b.places}, reverse=True)
     prefix = f"{name}-" if name else ""
-    drawn: list[Place] = []
+    loop_places: list[Place] = []
     for place in places:
         loops = [operator.loop(place) for operator in (a, b)]
-        if None in loops or len(drawn) == _MOST_LOOPS:
+        if None in loops or len(loop_places) == _MOST_LOOPS:
             continue
-        drawn.append(place)
+        loop_places.append(place)
         both = [residuals(loop) for loop in loops if loop is not None]
         share = np.arange(POINTS) / (POINTS - 1)
         for at, side in enumerate(SIDES):
-            yield overlaid(
-                f"{prefix}loop-{len(drawn)}-{side}",
+            yield overlay(
+                f"{prefix}loop-{len(loop_places)}-{side}",
                 f"{f'{name} ' if name else ''}{side}, {place[0]:g} V at {place[1]:g} V",
                 "drive [share of the line's]",
                 "position less straight line [%]",
@@ -144,6 +144,6 @@ def _loops(name: str, a: ComparedOperator, b: ComparedOperator) -> Iterator[Char
 
 
 def chart_section(charts: Sequence[Chart]) -> Section:
-    """All of them, for a page."""
+    """Return the section of a page with all charts."""
     lead = "Drag across a chart to zoom, press Escape to come back; the arrow keys step along the curves."
     return Section("charts", "A and B in one chart", (ChartsBlock(tuple(charts)),), lead)

@@ -10,7 +10,7 @@ _WORD = 20  # characters; longer words are cut
 
 
 def compare_text(both: SideBySide, everything: bool) -> list[str]:
-    """Both names, a table with what differs or with everything, and what to know of it."""
+    """Format both names, a table of the differences or of everything, the notes and the verdict."""
     lines = [f"{name}  {side.path}, {WORDS[side.kind]}" for name, side in (("A", both.a), ("B", both.b))]
     return [*lines, *_table(both, everything), "", *(f"note: {note}" for note in both.notes), both.verdict]
 

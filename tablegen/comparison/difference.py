@@ -1,4 +1,4 @@
-"""Two sides quantity by quantity: what differs, by how much, and whether by more than the standard errors say."""
+"""Two sides quantity by quantity: the differences, and whether they exceed the standard errors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SURE = 2.0  # standard errors of a difference: beyond it, chance alone is one ca
 
 @dataclass(frozen=True)
 class ComparedPair:
-    """A quantity of A and of B; None where that side has none of it."""
+    """A quantity of A and of B; None where that side does not have it."""
 
     section: str
     name: str
@@ -27,7 +27,7 @@ class ComparedPair:
 
     @property
     def same(self) -> bool:
-        """Whether both have it, and the same."""
+        """True if both sides have the same value."""
         return self.a is not None and self.b is not None and self.a.value == self.b.value
 
     @property
@@ -57,13 +57,13 @@ class ComparedPair:
 
     @property
     def verdict(self) -> str:
-        """What the standard errors say; empty where they are not known or where nothing differs."""
+        """The comparison with the standard errors; empty where they are unknown or the values are the same."""
         if self.errors is None or self.same:
             return ""
         return "more than the errors" if self.errors > SURE else "within the errors"
 
     def record(self) -> dict[str, Any]:
-        """As plain data."""
+        """Return the pair as plain data."""
         sides = {
             side: None if one is None else one.value if one.error is None else {"value": one.value, "error": one.error}
             for side, one in (("a", self.a), ("b", self.b))
@@ -74,9 +74,9 @@ class ComparedPair:
 
 
 def pairs(a: Sequence[ComparedQuantity], b: Sequence[ComparedQuantity], of_scan: bool) -> list[ComparedPair]:
-    """Every quantity of either side, sections and names in the order of A; what only B has goes behind its neighbours.
+    """Return every quantity of either side, in the order of A; those of B alone follow their neighbours.
 
-    Without ``of_scan`` what only a scan can know is left out.
+    Without ``of_scan`` quantities that only a scan has are left out.
     """
     sides = [{(one.section, one.name): one for one in side if of_scan or not one.of_scan} for side in (a, b)]
     sections = _merged([key[0] for key in sides[0]], [key[0] for key in sides[1]])
@@ -90,13 +90,13 @@ def pairs(a: Sequence[ComparedQuantity], b: Sequence[ComparedQuantity], of_scan:
 
 
 def _merged(a: Sequence[str], b: Sequence[str]) -> list[str]:
-    """Each once, in the order of both as far as that is one."""
-    merged, known, waiting = list(dict.fromkeys(a)), set(a), list[str]()
+    """Merge two lists without repetition, in the order of both as far as they agree."""
+    merged, in_a, pending = list(dict.fromkeys(a)), set(a), list[str]()
     for one in dict.fromkeys(b):
-        if one not in known:
-            waiting.append(one)
-        elif waiting:
+        if one not in in_a:
+            pending.append(one)
+        elif pending:
             at = merged.index(one)
-            merged[at:at] = waiting
-            waiting = []
-    return merged + waiting
+            merged[at:at] = pending
+            pending = []
+    return merged + pending

@@ -8,7 +8,7 @@ import numpy as np
 from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.charts.chart import POSITION, Chart, Mark
 from tablegen.comparison.operators import SIDES
-from tablegen.comparison.overlay import overlaid
+from tablegen.comparison.overlay import overlay
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import LineRequest, LineShape
@@ -26,7 +26,7 @@ Pair = tuple[Floats, Floats]
 
 
 def law_charts(a: Scanner, b: Scanner) -> Iterator[Chart]:
-    """Each law that both files have."""
+    """Yield a chart of each law that both files have."""
     for axis in ("x", "y"):
         one, other = getattr(a, axis), getattr(b, axis)
         sides = (one, a.driver), (other, b.driver)
@@ -46,7 +46,7 @@ def _chart(
     key: str, title: str, x_label: str, y_label: str, both: list[Pair | None] | list[Pair], **more: object
 ) -> Iterator[Chart]:
     if all(curve is not None for curve in both):
-        yield overlaid(key, title, x_label, y_label, both[0], both[1], **more)
+        yield overlay(key, title, x_label, y_label, both[0], both[1], **more)
 
 
 def _size(axis: ScannerAxis, driver: Driver) -> Pair | None:
@@ -84,7 +84,7 @@ def _gain(axis: ScannerAxis, hz: Floats) -> Floats:
 
 
 def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
-    """How the drive is bent, of a small line and of one of full scale, at a turn that both have."""
+    """Draw the branches of a small line and of one of full scale, at a turn that both files have."""
     tables = [getattr(side, axis).hysteresis for side in (a, b)]
     if not all(isinstance(table, WithBranches) and table.branches for table in tables):
         return
@@ -101,7 +101,7 @@ def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
 
 
 def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape | None:
-    """Return the line of a model that works with branches; an operator's table has them too, for its laws."""
+    """Return the line of a model with branches; an operator's table has them too, for its laws."""
     from tablegen.compensation.models.harmonic import HarmonicModel
     from tablegen.compensation.models.operator import OperatorModel
 

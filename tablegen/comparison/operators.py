@@ -1,4 +1,4 @@
-"""What is compared of an operator: its numbers, and what it says of the lines at which either side was measured."""
+"""The compared quantities of an operator: its numbers, and its lines where either side was measured."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,27 +31,33 @@ class ComparedOperator:
 
     @classmethod
     def read(cls, path: Path) -> "ComparedOperator":
-        """Read an operator file. Raises ``Rejected``."""
+        """Read an operator file.
+
+        Raises
+        ------
+        Rejected
+            If it cannot be read.
+        """
         return cls(*read_operator(path, str(path)))
 
     @property
     def places(self) -> list[Place]:
-        """Strokes and centres of its traces in V, rounded to what a file of traces means."""
+        """Strokes and centres of its traces in V, to four digits."""
         driver = self.driver
         places = ((driver.span * one.stroke, driver.volts(one.centre)) for one in self.file.lines)
         return list(dict.fromkeys((_short(stroke), _short(centre)) for stroke, centre in places))
 
     @property
     def driver(self) -> Driver:
-        """The range that its shares are of."""
+        """The range to which its shares refer."""
         return Driver(self.file.v_max, self.file.v_min)
 
     def shares(self, place: Place) -> tuple[float, float]:
-        """Stroke and centre as shares of the range."""
+        """Return stroke and centre as shares of the range."""
         return place[0] / self.driver.span, self.driver.share(place[1])
 
     def loop(self, place: Place) -> Loop | None:
-        """Compute the settled loop there; None where the operator has none."""
+        """Compute the settled loop at a place; None where the operator has none."""
         stroke, centre = self.shares(place)
         low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
         if low < -1e-9 or high > 1.0 + 1e-9:
@@ -63,9 +69,9 @@ class ComparedOperator:
 
 
 def operator_quantities(one: ComparedOperator, places: Sequence[Place], section: str = "") -> list[ComparedQuantity]:
-    """List the numbers of the file but for its traces, and size, residual and mismatch of the line at each place.
+    """List the numbers of the file except its traces, and size, residual and mismatch of the line at each place.
 
-    Errors are standard errors by the traces that were left out, which hold within 90 % of lines.
+    Errors are standard errors from the traces that were left out, which hold for 90 % of lines.
     """
     plain = msgspec.to_builtins(one.file)
     tables = {key: value for key, value in plain.items() if key not in ("lines", "axis", "version")}
@@ -91,12 +97,17 @@ def _line(one: ComparedOperator, place: Place, section: str) -> Iterator[Compare
         residue = residual[inside] - np.polynomial.polynomial.polyval(x[inside], straight)
         yield ComparedQuantity(name, f"rms residual {side}", float(np.sqrt(np.mean(residue * residue))), "%", rms)
         yield ComparedQuantity(name, f"largest residual {side}", float(residual[np.argmax(np.abs(residual))]), "%")
-    apart = float(np.max(np.abs(both[0] - both[1])[inside]))
-    yield ComparedQuantity(name, "forward to backward", apart, "%", mismatch)
+    largest = float(np.max(np.abs(both[0] - both[1])[inside]))
+    yield ComparedQuantity(name, "forward to backward", largest, "%", mismatch)
 
 
 def residuals(loop: Loop) -> tuple[Floats, Floats]:
-    """Position less straight line over the drive, on the way there and on the way back, in percent, (POINTS,) each."""
+    """Return the position less a straight line over the drive.
+
+    Returns
+    -------
+    Residuals of the rising and of the falling branch in percent of the line, shape (POINTS,) each.
+    """
     x = np.arange(POINTS) / (POINTS - 1)
     return 100.0 * (loop.rising - x), 100.0 * (loop.falling - x)
 

@@ -1,4 +1,4 @@
-"""Two curves in a chart."""
+"""A chart with a curve of each side."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ A_ROLE: Role = "before"
 B_ROLE: Role = "other"
 
 
-def overlaid(
+def overlay(
     key: str,
     title: str,
     x_label: str,
@@ -18,7 +18,13 @@ def overlaid(
     b: tuple[Floats, Floats] | None,
     **more: Any,
 ) -> Chart:
-    """Curves of A and of B, as (x, y) each; ``more`` goes to the chart."""
+    """Return a chart of A and B; ``more`` goes to the chart.
+
+    Parameters
+    ----------
+    a, b
+        Coordinates and values in the units of the labels, shape (n,) each; None leaves the curve out.
+    """
     sides: tuple[tuple[str, Role, tuple[Floats, Floats] | None], ...] = (("A", A_ROLE, a), ("B", B_ROLE, b))
     curves = tuple(DrawnCurve(name, role, *curve) for name, role, curve in sides if curve is not None)
     return Chart(key, title, x_label, y_label, curves, **more)

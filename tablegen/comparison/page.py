@@ -14,7 +14,7 @@ from tablegen.version import __version__
 
 
 def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
-    """Render what differs, the charts, and folded up everything that was compared."""
+    """Render the differences, the charts, and, folded, everything that was compared."""
     sides = tuple(
         row(name, f"{side.title}: {WORDS[side.kind]}", side.path.name or str(side.path))
         for name, side in (("A", both.a), ("B", both.b))
@@ -27,12 +27,12 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
     ]
     verdict = TableCell(f"{both.verdict}.", "good" if both.same else "quiet")
     title = "{} and {}".format(*both.titles)
-    foot = f"Made by tablegen {__version__}. All is worked out from the files; nothing is measured."
+    foot = f"Made by tablegen {__version__}. All is computed from the files; nothing is measured."
     return document(title, verdict, both.findings, sections, "", foot)
 
 
 def _grids(pairs: Sequence[ComparedPair], folded: bool = False) -> list[Grid]:
-    """Make a table for each section."""
+    """Return a table for each section."""
     return [
         Grid(
             section,

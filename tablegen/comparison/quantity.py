@@ -1,11 +1,11 @@
-"""A number or a word of one side, with its unit and its standard error, and the keys of a file as such quantities."""
+"""A number or a word of one side, with its unit and its standard error; and the keys of a file as such quantities."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
-_SHOWN = 8  # numbers of a list that are told one by one
+_SHOWN = 8  # numbers of a list that are listed one by one
 _UNITS = {
     "nm_per_v": "nm/V",
     "v_per_s": "V/s",
@@ -22,9 +22,9 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class ComparedQuantity:
-    """``value`` of ``name`` in a ``section``. ``error`` is a standard error: twice of it covers the truth in 95 %.
+    """``value`` of ``name`` in a ``section``, with its standard error; two of them cover the truth in 95 % of cases.
 
-    ``of_scan`` marks what a scan file or a scanner file says and no build has.
+    ``of_scan`` marks a value of a scan file or a scanner file that no build has.
     """
 
     section: str
@@ -46,7 +46,7 @@ def _begins(name: str, end: str) -> bool:
 
 
 def keys_of(section: str, key: str, value: Any, of_scan: bool = True) -> Iterator[ComparedQuantity]:
-    """Yield all keys of a table, nested ones flattened: of long lists of numbers their length and a digest."""
+    """Yield all keys of a table, nested ones flattened; a long list of numbers gives its length and a digest."""
     if isinstance(value, dict):
         for name, inner in value.items():
             yield from keys_of(section, f"{key}.{name}" if key else name, inner, of_scan)

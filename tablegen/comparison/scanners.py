@@ -1,4 +1,4 @@
-"""What is compared of a scanner file: its parameters, with the standard errors that calibrations left beside them."""
+"""The compared quantities of a scanner file: its parameters, with the standard errors beside them in comments."""
 
 import re
 from collections.abc import Iterator
@@ -19,10 +19,9 @@ _TABLE = re.compile(r"([xy])\.(size|offset|frequency|resonance|hysteresis\.branc
 
 
 def scanner_quantities(file: Document, scanner: Scanner) -> list[ComparedQuantity]:
-    """Every value of a scanner file; with its standard error where `tablegen calibrate` wrote one.
+    """Return every value of a scanner file, with its standard error where `tablegen calibrate` wrote one.
 
-    An error belongs to the value that stands beside it in the comment. Where somebody edited the value since, its
-    error is not known.
+    An error belongs to the value beside it in the comment. If the value was edited since, its error is unknown.
     """
     errors, plain = dict(_errors(file)), msgspec.to_builtins(scanner)
     quantities = [*keys_of("scanner", "", {key: value for key, value in plain.items() if key not in ("x", "y")})]
@@ -37,7 +36,7 @@ def scanner_quantities(file: Document, scanner: Scanner) -> list[ComparedQuantit
 
 
 def _errors(file: Document) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Keys with the value and the standard error of the comments above their tables."""
+    """Yield keys with the value and the standard error from the comments above their tables."""
     if file.lines is None:
         return
     try:

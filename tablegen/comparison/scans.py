@@ -1,4 +1,4 @@
-"""What is compared of a scan or a build: what was asked, what is played, what is promised, what it takes."""
+"""The compared quantities of a scan or a build: the request, the waveform, the certificate, the memory."""
 
 from collections.abc import Iterator
 
@@ -21,8 +21,8 @@ _PARTS = (
 
 
 def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
-    """Every quantity of a scan or a build, in the order in which they are told."""
-    quantities = [*_asked(subject.planned)] if subject.planned is not None else []
+    """Return every quantity of a scan or a build, in the order of the report."""
+    quantities = [*_request(subject.planned)] if subject.planned is not None else []
     quantities += _rates(subject.manifest.sequence)
     axes = (("x", subject.manifest.axes.x), ("y", subject.manifest.axes.y))
     for axis, entry in axes:
@@ -49,8 +49,8 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
     return quantities
 
 
-def _asked(planned: PlannedScan) -> Iterator[ComparedQuantity]:
-    """Yield the keys of the scan file but for the path of the scanner file, whose values are compared."""
+def _request(planned: PlannedScan) -> Iterator[ComparedQuantity]:
+    """Yield the keys of the scan file except the path of the scanner file, whose values are compared."""
     values = msgspec.to_builtins(planned.setup.scan)
     yield from keys_of("asked for", "", {key: value for key, value in values.items() if key not in ("name", "scanner")})
 
@@ -81,7 +81,7 @@ def _rates(sequence: ManifestSequence) -> Iterator[ComparedQuantity]:
 
 
 def _corrections(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """From the size to the volts at the piezo, factor by factor."""
+    """Yield the factors from the size to the volts at the piezo."""
     section, drive = f"{axis} drive", entry.drive
     numbers = (
         ("line", drive.size_nm, "nm"),
@@ -114,8 +114,8 @@ def _waveform(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     yield ComparedQuantity(section, "window from", fourier.window[0])
     yield ComparedQuantity(section, "window to", fourier.window[1])
     yield ComparedQuantity(section, "harmonics held back", len(fourier.held_harmonics))
-    learnt = fourier.refinement
-    yield ComparedQuantity(section, "harmonics of the refinement", 0 if learnt is None else len(learnt.a))
+    refinement = fourier.refinement
+    yield ComparedQuantity(section, "harmonics of the refinement", 0 if refinement is None else len(refinement.a))
     yield ComparedQuantity(section, "coefficients", digest([fourier.a0, fourier.a, fourier.b]))
     yield ComparedQuantity(section, "Fourier words", digest([int(word) for word in entry.fourier_words]))
 
@@ -126,8 +126,8 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
         for part, name in _PARTS:
             if part in errors:
                 yield ComparedQuantity(section, name.format(side), errors[part], "%")
-    for side, moved in (certificate.refinement_percent or {}).items():
-        for part, value in moved.items():
+    for side, changes in (certificate.refinement_percent or {}).items():
+        for part, value in changes.items():
             yield ComparedQuantity(section, f"refinement {side}, {part}", value, "%")
     if certificate.position is not None:
         for side, value in certificate.position.scaling_error_percent.items():
@@ -157,7 +157,7 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
 
 
 def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """Yield what the model expects on the scanner; the uncertainty holds for 90 % of scans."""
+    """Yield the errors that the model expects on the scanner; the uncertainty holds for 90 % of scans."""
     expected = entry.certificate.expected
     if expected is None:
         return
@@ -181,7 +181,7 @@ def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
 
 
 def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
-    """Yield what a device stores. Tables in C have one type for both axes, and one word more than they play."""
+    """Yield the memory of a device. Tables in C have one type for both axes, and one word more than they play."""
     axes = subject.manifest.axes.x, subject.manifest.axes.y
     tables = [entry.table for entry in axes]
     bits = storage_bits(max(table.bits for table in tables))
@@ -199,7 +199,7 @@ def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
 
 
 def _output(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """Yield the converter and the limits that the device keeps."""
+    """Yield the converter and the limits that the device enforces."""
     section, output = f"{axis} limits", entry.output
     numbers = (
         ("lowest code allowed", output.code_min, ""),

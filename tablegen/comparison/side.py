@@ -32,7 +32,7 @@ _TOGETHER = ({"scan", "build"}, {"scanner"}, {"operator"})
 
 @dataclass(frozen=True, eq=False)
 class ComparedSide:
-    """What was read: of scans and builds ``subject``, of scanner files ``scanner``, of both files ``operators``.
+    """One side: ``subject`` of a scan or build, ``scanner`` of a scanner file, and ``operators``.
 
     ``operators`` has those of a scanner file by axis, that of an operator file as "".
     """
@@ -47,7 +47,7 @@ class ComparedSide:
 
     @property
     def damaged(self) -> bool:
-        """Whether a file of a build is not as its manifest says."""
+        """True if a file of a build does not agree with its manifest."""
         return self.subject is not None and any(state.wrong for state in self.subject.files)
 
     @property
@@ -59,7 +59,13 @@ class ComparedSide:
 
 
 def kind_of(path: Path) -> Kind:
-    """Return the kind of a path, by its content. Raises ``Rejected``."""
+    """Return the kind of a path, by its content.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read, or is of none of the kinds.
+    """
     if path.is_dir():
         return "build"
     values, file = read_toml(path, str(path))
@@ -78,18 +84,26 @@ def folder_of(path: Path) -> Path:
     return path.parent if path.name == MANIFEST else path
 
 
-def together(a: Kind, b: Kind) -> bool:
-    """Whether two kinds can be compared."""
+def comparable(a: Kind, b: Kind) -> bool:
+    """Return true if two kinds can be compared."""
     return any({a, b} <= kinds for kinds in _TOGETHER)
 
 
 def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: None) -> ComparedSide:
-    """Read one side; a scan is planned and certified. Raises ``Rejected`` and ``NotABuild``."""
+    """Read one side; a scan is planned and certified.
+
+    Raises
+    ------
+    Rejected
+        If a file is faulty.
+    NotABuild
+        If a directory is not a build.
+    """
     if kind == "build":
         subject = of_directory(path)
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
-        text = f"{path.name or path}: not as its manifest says: {names}"
+        text = f"{path.name or path}: does not agree with its manifest: {names}"
         damage = (Finding("note", 0.0, text, code="damaged-build"),) if wrong else ()
         return ComparedSide(path, kind, scan_quantities(subject), damage, subject)
     if kind == "scan":

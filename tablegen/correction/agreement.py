@@ -1,4 +1,4 @@
-"""How far trace and retrace agree, before and after: what a user can check without knowing the sample."""
+"""Agreement of trace and retrace, before and after: a check that needs no knowledge of the sample."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -8,62 +8,75 @@ import numpy as np
 from tablegen.correction.distortion import Distortion
 from tablegen.numerics.arrays import Bools, Floats
 
-_STRIPS = 16  # parts of the line that are registered by themselves, each as wide as two of them
+_STRIPS = 16  # steps of the overlapping strips that are registered, each two steps wide
 _MIN_STRIP = 12  # pixels
 _REACH = 6  # pixels: how far a strip is searched
-_STEPS = 8  # of Newton's way to the best shift
+_STEPS = 8  # of the Newton iteration to the best shift
 _LEAST_CONTRAST = 0.25  # of the variance of a strip that has to be the same in both images
 
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """Trace against retrace.
+    """Agreement of trace and retrace.
 
     ``difference`` is the rms of their difference over that of both, levelled by lines, before and after: 1 where they
-    have nothing in common, and never less than their noise. ``place`` and ``apart`` are the columns of the straight
-    image at which they were registered, and by how many pixels the retrace shows things further right: before, after.
+    have nothing in common, and never less than their noise. ``place`` are the columns of the straight image at which
+    they were registered, shape (strips,), and ``offsets`` the pixels by which the retrace shows the sample further
+    right, before and after, shape (strips,) each.
     """
 
     difference: tuple[float, float]
     place: Floats
-    apart: tuple[Floats, Floats]
+    offsets: tuple[Floats, Floats]
 
     @property
     def worst(self) -> tuple[float, float] | None:
-        """The largest distance in pixels, before and after; None where nothing could be registered."""
+        """The largest distance in pixels, before and after; None where no strip could be registered."""
         if not len(self.place):
             return None
-        before, after = (float(np.max(np.abs(one))) for one in self.apart)
+        before, after = (float(np.max(np.abs(one))) for one in self.offsets)
         return before, after
 
 
 def agreement(raw: tuple[Floats, Floats], straight: tuple[Floats, Floats], distortion: Distortion) -> Agreement:
-    """Of one channel, trace and retrace, as taken and straight, each rows x columns; NaN where nothing was imaged.
+    """Compare trace and retrace of one channel, before and after the correction.
 
-    What was apart before is what is apart afterwards and what both were moved by: a period too far, as a lattice
-    allows it, is not taken for a match.
+    The offset before is computed from that after and the displacement of both: a whole period of a lattice is not taken
+    for a match.
+
+    Parameters
+    ----------
+    raw, straight
+        Trace and retrace as recorded and corrected, shape (rows, columns) each; NaN where nothing was imaged.
     """
     trace, retrace = straight
     place, after = _registered(trace, retrace)
     columns = np.arange(trace.shape[1])
     with np.errstate(invalid="ignore"):
-        moved = [_mean_of_columns(distortion.moved(forward)[0]) for forward in (True, False)]
-    known = np.isfinite(moved[0]) & np.isfinite(moved[1])
-    by = np.interp(place, columns[known], (moved[1] - moved[0])[known])
+        displacements = [_mean_of_columns(distortion.displacement(forward)[0]) for forward in (True, False)]
+    imaged = np.isfinite(displacements[0]) & np.isfinite(displacements[1])
+    by = np.interp(place, columns[imaged], (displacements[1] - displacements[0])[imaged])
     return Agreement((difference(*raw), difference(*straight)), place, (after + by, after))
 
 
 def _mean_of_columns(values: Floats) -> Floats:
-    seen = np.isfinite(values)
-    count = np.sum(seen, axis=0)
-    total = np.sum(np.where(seen, values, 0.0), axis=0)
+    imaged = np.isfinite(values)
+    count = np.sum(imaged, axis=0)
+    total = np.sum(np.where(imaged, values, 0.0), axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def difference(one: Floats, other: Floats) -> float:
     """Compute the rms of the difference of two images over that of both, each line less its mean.
 
-    Pixels that are NaN in either image do not count.
+    Parameters
+    ----------
+    one, other
+        Heights of the same unit, shape (rows, columns); pixels that are NaN in either image do not count.
+
+    Returns
+    -------
+    The ratio; 0 if no pixel counts.
     """
     both: Bools = np.isfinite(one) & np.isfinite(other)
     first, second = (levelled(np.where(both, image, np.nan)) for image in (one, other))
@@ -72,15 +85,25 @@ def difference(one: Floats, other: Floats) -> float:
 
 
 def levelled(image: Floats) -> Floats:
-    """Each line less its mean; 0 where nothing was imaged, which is NaN."""
-    seen = np.isfinite(image)
-    count = np.maximum(np.sum(seen, axis=1, keepdims=True), 1)
-    mean = np.sum(np.where(seen, image, 0.0), axis=1, keepdims=True) / count
-    return np.where(seen, image - mean, 0.0)
+    """Subtract its mean from each line.
+
+    Parameters
+    ----------
+    image
+        Heights, shape (rows, columns); NaN where nothing was imaged.
+
+    Returns
+    -------
+    Levelled heights, of the same shape; 0 where nothing was imaged.
+    """
+    imaged = np.isfinite(image)
+    count = np.maximum(np.sum(imaged, axis=1, keepdims=True), 1)
+    mean = np.sum(np.where(imaged, image, 0.0), axis=1, keepdims=True) / count
+    return np.where(imaged, image - mean, 0.0)
 
 
 def _registered(trace: Floats, retrace: Floats) -> tuple[Floats, Floats]:
-    """Columns, and by how much the retrace shows what is there further right."""
+    """Return columns, and by how many pixels the retrace shows the same further right."""
     columns = trace.shape[1]
     width = max(columns // _STRIPS * 2, _MIN_STRIP)
     places, shifts = [], []
@@ -97,32 +120,32 @@ def _registered(trace: Floats, retrace: Floats) -> tuple[Floats, Floats]:
 
 
 def _shift(trace: Floats, retrace: Floats) -> float | None:
-    """Pixels, within ``_REACH``, for a strip with as many more columns on either side; None where nothing is alike."""
+    """Return the shift of a strip in pixels, with a margin for ``_REACH`` on either side; None without a match."""
     margin = _REACH + 1
     inner = trace.shape[1] - 2 * margin
-    seen = trace[:, margin : margin + inner]
-    seen = seen - np.mean(seen, axis=1, keepdims=True)
+    strip = trace[:, margin : margin + inner]
+    strip = strip - np.mean(strip, axis=1, keepdims=True)
 
-    def left(by: float) -> Floats:
+    def residual(by: float) -> Floats:
         at = margin + by + np.arange(inner)
         low = np.floor(at).astype(np.int64)
         low = np.minimum(low, retrace.shape[1] - 2)
         there = retrace[:, low] + (at - low) * (retrace[:, low + 1] - retrace[:, low])
-        return np.asarray(seen - (there - np.mean(there, axis=1, keepdims=True)), dtype=np.float64)
+        return np.asarray(strip - (there - np.mean(there, axis=1, keepdims=True)), dtype=np.float64)
 
-    costs = np.array([float(np.mean(left(by) ** 2)) for by in range(-_REACH, _REACH + 1)])
+    costs = np.array([float(np.mean(residual(by) ** 2)) for by in range(-_REACH, _REACH + 1)])
     dips = [i for i in range(1, len(costs) - 1) if costs[i] <= min(costs[i - 1], costs[i + 1])]
     low = float(np.min(costs))
     near = [i for i in dips if costs[i] <= 1.2 * low]
     if not near:
         return None
     shift = float(min(near, key=lambda i: abs(i - _REACH)) - _REACH)
-    alike = 1.0 - 0.5 * low / max(float(np.mean(seen**2)), 1e-300)
+    alike = 1.0 - 0.5 * low / max(float(np.mean(strip**2)), 1e-300)
     if alike < _LEAST_CONTRAST:
         return None
-    slope = np.gradient(seen, axis=1)
+    slope = np.gradient(strip, axis=1)
     power = float(np.sum(slope**2))
     for _ in range(_STEPS):
-        step = float(np.sum(slope * left(shift))) / max(power, 1e-300)
+        step = float(np.sum(slope * residual(shift))) / max(power, 1e-300)
         shift = float(np.clip(shift + step, -_REACH, _REACH))
     return shift

@@ -1,4 +1,4 @@
-"""What `tablegen correct` prints of a scan."""
+"""The terminal output of `tablegen correct`."""
 
 from tablegen.base.warnings import Finding, worst_first
 from tablegen.correction.job import Images
@@ -8,13 +8,13 @@ from tablegen.images.scan_angle import angle_text
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
 _OTHER = 1.4  # times the size of the file: another size
 _FEW_PERIODS = 8.0  # in the line
-_FAR = 1.0  # pixels of trace and retrace that stay apart
+_FAR = 1.0  # pixels of mismatch of trace and retrace that need a finding
 
 
-def correct_text(found: StraightScan, images: Images) -> list[str]:
-    """Lines of at most 120 characters, but for notes."""
+def correct_text(scan: StraightScan, images: Images) -> list[str]:
+    """Format a correction, in lines of at most 120 characters, except for notes."""
     rows, columns = images.shape
-    record = found.record
+    record = scan.record
     files = ", ".join(dict.fromkeys(one.file for one in images.channels))
     count = len(images.channels)
     lines = [f"{files}: {columns} x {rows} pixels, {count} channel{'s' if count > 1 else ''}"]
@@ -32,18 +32,18 @@ def correct_text(found: StraightScan, images: Images) -> list[str]:
                 f"{axis}             {one['model']}{its}, {one['drive_v']:.6g} V at {one['offset_v']:.6g} V, "
                 f"{one['rate_hz']:.4g} Hz, turn {one['turn']:g}"
             )
-    lines.append(f"size          {_size(found.size_nm)}; the file has {_size(_of_file(images))}")
-    x, y = found.moved_pixels
+    lines.append(f"size          {_size(scan.size_nm)}; the file has {_size(_of_file(images))}")
+    x, y = scan.moved_pixels
     lines.append(
         f"moved         up to {x:.3g} pixels ({100.0 * x / columns:.3g} %) along x, "
         f"{y:.3g} pixels ({100.0 * y / rows:.3g} %) along y"
     )
-    lines += _agreement(found)
-    if found.lattice is not None:
+    lines += _agreement(scan)
+    if scan.lattice is not None:
         across, along = record["lattice_off_percent"]
-        of_y = "" if found.lattice.y is None else f", {along:.2g} % along y"
+        of_y = "" if scan.lattice.y is None else f", {along:.2g} % along y"
         lines.append(f"lattice       off a perfect one by up to {across:.2g} % along x{of_y}, after")
-    return [*lines, *(finding.line for finding in _findings(found, images))]
+    return [*lines, *(finding.line for finding in _findings(scan, images))]
 
 
 def _size(size: tuple[float, float] | None) -> str:
@@ -55,12 +55,12 @@ def _of_file(images: Images) -> tuple[float, float] | None:
     return None if first.width_nm is None or first.height_nm is None else (first.width_nm, first.height_nm)
 
 
-def _agreement(found: StraightScan) -> list[str]:
-    if found.agreement is None:
-        return ["trace-retrace  there is no retrace; nothing tells whether this is right"]
-    before, after = found.agreement.difference
+def _agreement(scan: StraightScan) -> list[str]:
+    if scan.agreement is None:
+        return ["trace-retrace  there is no retrace to check this correction against"]
+    before, after = scan.agreement.difference
     lines = [f"trace-retrace  differ by {100.0 * before:.3g} % of the contrast before, {100.0 * after:.3g} % after"]
-    worst = found.agreement.worst
+    worst = scan.agreement.worst
     if worst is None:
         lines.append("               have too little in common to be registered")
     else:
@@ -68,39 +68,39 @@ def _agreement(found: StraightScan) -> list[str]:
     return lines
 
 
-def _findings(found: StraightScan, images: Images) -> list[Finding]:
-    """The worst first; percentages are of the picture."""
+def _findings(scan: StraightScan, images: Images) -> list[Finding]:
+    """Return the findings, the worst first; percentages are of the picture."""
     notes = [Finding("note", 0.0, f"left out: {text}") for text in images.left_out]
-    angle = found.record.get("scan_angle_deg")
-    if angle is not None and not found.record["by"].startswith("fit"):
+    angle = scan.record.get("scan_angle_deg")
+    if angle is not None and not scan.record["by"].startswith("fit"):
         text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
         notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
-    first, last = found.distortion.left_out
+    first, last = scan.distortion.left_out
     rows, columns = images.shape
     if first or last:
-        text = f"{first + last} rows were taken while the slow axis still went back after its turn; they are left out"
+        text = f"{first + last} rows are from the end of the slow axis's way back, after its turn; they are left out"
         notes.append(Finding("expect", 100.0 * (first + last) / rows, text))
-    said = _of_file(images)
-    if said is not None and found.size_nm is not None:
-        ratio = found.size_nm[0] / said[0]
+    file_size = _of_file(images)
+    if file_size is not None and scan.size_nm is not None:
+        ratio = scan.size_nm[0] / file_size[0]
         if not 1.0 / _OTHER < ratio < _OTHER:
             text = "the file has quite another size; is the drive that of this image?"
             notes.append(Finding("spoils", 100.0 * abs(ratio - 1.0), text))
-    periods = found.record.get("periods_in_the_line")
+    periods = scan.record.get("periods_in_the_line")
     if periods is not None and max(map(abs, periods)) < _FEW_PERIODS:
-        text = "with so few periods the line is only as straight as its waves are told apart; image more of them"
+        text = "with so few periods the waves, and with them the line, are poorly determined; image more of them"
         notes.append(Finding("spoils", 0.0, text))
-    agreement = found.agreement
+    agreement = scan.agreement
     if agreement is not None:
         worst = agreement.worst
-        apart = 0.0 if worst is None else 100.0 * worst[1] / columns
+        offset_percent = 0.0 if worst is None else 100.0 * worst[1] / columns
         if agreement.difference[1] > _WORSE * agreement.difference[0]:
             text = (
                 "trace and retrace differ more than before; are drive and scanner file those of this image, and "
                 "are trace and retrace not exchanged or mirrored?"
             )
-            notes.append(Finding("limit", apart, text))
+            notes.append(Finding("limit", offset_percent, text))
         elif worst is not None and worst[1] > _FAR:
             text = "trace and retrace are still apart; are drive, offset, rate, turn and window those of the image?"
-            notes.append(Finding("spoils", apart, text))
+            notes.append(Finding("spoils", offset_percent, text))
     return worst_first(notes)

@@ -1,9 +1,9 @@
-"""Where each pixel of a scan really was, and the same scan on a straight grid, resampled once.
+"""The position of each pixel of a scan, and the same scan on a straight grid, resampled once.
 
-x depends on the column alone, since a line is settled, but for a drift that depends on the row; y on the time in the
-frame, which goes on within a row. So what belongs to a place of the straight grid is found by two inversions in one
-dimension each. Where an axis goes back for a moment after a turn, as creep makes it, the pixels until there are left
-out: what they show is shown again.
+x depends on the column alone, since a line is settled, except for a drift that depends on the row; y depends on the
+time in the frame, which continues within a row. The source of a point of the straight grid therefore takes two
+inversions in one dimension each. Where creep lets an axis move back for a moment after a turn, the pixels of that
+stretch are left out: the axis passes it again.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Bools, Floats
 
 _ORDER = 3  # of the splines
-_MARGIN = 12  # pixels: what is further away does not matter to a spline
-_HALF = 0.5  # of a pixel: it is so far from its middle to its edge
+_MARGIN = 12  # pixels beyond which values do not matter to a spline
+_HALF = 0.5  # of a pixel: from its middle to its edge
 _ROUNDING = 1e-6  # of a pixel
 _OUTER = 0.25  # of a sweep at either end, where an axis may still go back
-_FINEST = 0.02  # of the mean step: below it two pixels are at one place
+_FINEST = 0.02  # of the mean step: closer pixels are at one position
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep1D:
-    """The columns of one direction, the left one first: their x, and when they are in the line, 0..1 of its period."""
+    """The columns of one direction, the left one first: their x, and their time in the line, 0..1; (columns,) each."""
 
     x: Floats
     time: Floats
@@ -33,11 +33,11 @@ class Sweep1D:
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """Where the pixels of a scan of rows x columns were, in any unit of length, the same for x and y or not.
+    """The positions of the pixels of a scan of rows x columns, in any unit of length, the same for x and y or not.
 
     ``forward`` and ``backward`` are the directions that were imaged. ``y`` and ``drift`` (of x) stand at ``rows`` + 1
-    times of the frame, the beginning of the first row to the end of the last one; ``lag`` is 1 where y moves on within
-    a row, 0 where it steps.
+    times of the frame, from the beginning of the first row to the end of the last one; ``lag`` is 1 where y moves
+    within a row, 0 where it steps.
     """
 
     rows: int
@@ -56,19 +56,19 @@ class Distortion:
         KeyError
             If the direction was not imaged.
         """
-        found = self.forward if forward else self.backward
-        if found is None:
+        sweep = self.forward if forward else self.backward
+        if sweep is None:
             raise KeyError(forward)
-        return found
+        return sweep
 
     @property
     def sides(self) -> list[tuple[bool, Sweep1D]]:
-        """Those that were imaged."""
+        """The directions that were imaged."""
         return [(way, one) for way, one in ((True, self.forward), (False, self.backward)) if one is not None]
 
     @cached_property
     def x_range(self) -> tuple[float, float]:
-        """Left and right edge of all that was imaged, drift aside, half a pixel beyond the outer pixels."""
+        """Left and right edge of the imaged area without drift, half a pixel beyond the outer pixels."""
         edges = [_edges(one.x[ascending(one.x)]) for _, one in self.sides]
         return min(low for low, _ in edges), max(high for _, high in edges)
 
@@ -86,14 +86,25 @@ class Distortion:
 
     @cached_property
     def grid(self) -> tuple[Floats, Floats]:
-        """Return x of the columns and y of the rows of the straight image, which has as many."""
+        """The positions of the straight image.
+
+        Returns
+        -------
+        x of the columns, shape (columns,), and y of the rows, shape (rows,), in the unit of the distortion.
+        """
         low, high = self.x_range
         first, last = self.y_range
         x = low + (high - low) * (np.arange(self.columns) + _HALF) / self.columns
         return x, first + (last - first) * (np.arange(self.rows) + _HALF) / self.rows
 
     def check(self) -> None:
-        """Raise ``Unphysical`` where pixels do not follow each other, as of branches that run backwards."""
+        """Check that the pixels follow each other.
+
+        Raises
+        ------
+        Unphysical
+            If an axis stands still or goes back, as with branches that run backwards.
+        """
         for way, one in self.sides:
             if (at := _standing(one.x)) is not None:
                 raise Unphysical(
@@ -107,15 +118,24 @@ class Distortion:
             )
 
     def sources(self, forward: bool) -> tuple[Floats, Floats, Bools]:
-        """For each pixel of the straight image the row and the column that it comes from, and which are in the image.
+        """Return the source of each pixel of the straight image.
 
-        Shapes (rows, columns). Nothing is taken from beyond the middles of the outer pixels.
+        No source lies beyond the middles of the outer pixels.
+
+        Returns
+        -------
+        Row and column in the recorded image, and whether it is inside, shape (rows, columns) each.
+
+        Raises
+        ------
+        KeyError
+            If the direction was not imaged.
         """
         side = self.side(forward)
         x, y = self.grid
         times = np.arange(self.rows + 1.0)
-        kept = ascending(self.y)
-        at = np.interp(y, self.y[kept], times[kept])  # when y is there, in rows of time
+        ascent = ascending(self.y)
+        at = np.interp(y, self.y[ascent], times[ascent])  # the time at which y is reached, in rows
         drift = np.interp(at, times, self.drift)
         column = _inverted(side.x, x[None, :] - drift[:, None])
         time = np.interp(column, np.arange(self.columns), side.time)
@@ -125,10 +145,17 @@ class Distortion:
         inside &= (column >= -_ROUNDING) & (column <= last_column + _ROUNDING)
         return np.clip(row, 0.0, last_row), np.clip(column, 0.0, last_column), inside
 
-    def moved(self, forward: bool) -> tuple[Floats, Floats]:
-        """By how many pixels of the straight image its parts were displaced in the taken one, in x and y; NaN outside.
+    def displacement(self, forward: bool) -> tuple[Floats, Floats]:
+        """Return by how many pixels the recorded image is displaced against the straight one.
 
-        Shapes (rows, columns).
+        Returns
+        -------
+        Displacement along x and y, shape (rows, columns) each; NaN outside the imaged area.
+
+        Raises
+        ------
+        KeyError
+            If the direction was not imaged.
         """
         row, column, inside = self.sources(forward)
         own_row, own_column = np.mgrid[: self.rows, : self.columns].astype(np.float64)
@@ -138,7 +165,7 @@ class Distortion:
 
 @dataclass(frozen=True, eq=False)
 class Resampler:
-    """One direction of a distortion, for any number of channels."""
+    """One direction of a distortion, to be applied to any number of channels; arrays of shape (rows, columns)."""
 
     row: Floats
     column: Floats
@@ -146,13 +173,28 @@ class Resampler:
 
     @classmethod
     def of(cls, distortion: Distortion, forward: bool) -> "Resampler":
-        """Return the resampler of one direction of an image."""
+        """Return the resampler of one direction of a distortion.
+
+        Raises
+        ------
+        KeyError
+            If the direction was not imaged.
+        """
         return cls(*distortion.sources(forward))
 
     def __call__(self, image: Floats) -> Floats:
-        """Resample an image, rows x columns; NaN where nothing was imaged. Cubic splines, used once.
+        """Resample an image by cubic splines.
 
-        They end as the image goes on if it is turned about its outer pixels: a slope is no edge then.
+        Beyond its edges an image is continued point-symmetrically about its outer pixels, so that a slope is no edge.
+
+        Parameters
+        ----------
+        image
+            Heights, shape (rows, columns).
+
+        Returns
+        -------
+        Heights of the same shape and unit; NaN where nothing was imaged.
         """
         wide = np.pad(image, _MARGIN, mode="reflect", reflect_type="odd")
         at = np.stack([self.row, self.column]) + _MARGIN
@@ -161,12 +203,18 @@ class Resampler:
 
 
 def _edges(x: Floats) -> tuple[float, float]:
-    """Half a pixel beyond the first and the last."""
+    """Return the positions half a pixel beyond the first and the last."""
     return float(1.5 * x[0] - 0.5 * x[1]), float(1.5 * x[-1] - 0.5 * x[-2])
 
 
 def ascending(values: Floats) -> slice:
-    """Return the part from the lowest value near the beginning to the highest one near the end."""
+    """Return the part from the lowest value near the beginning to the highest one near the end.
+
+    Parameters
+    ----------
+    values
+        Positions, shape (n,).
+    """
     outer = max(round(_OUTER * len(values)), 1)
     first = int(np.argmin(values[:outer]))
     last = len(values) - 1 - int(np.argmax(values[: -outer - 1 : -1]))
@@ -174,7 +222,7 @@ def ascending(values: Floats) -> slice:
 
 
 def _standing(values: Floats) -> int | None:
-    """Where the ascending part stands still or goes back; None where it does nowhere."""
+    """Return where the ascending part stands still or goes back; None if nowhere."""
     filled = ascending(values)
     step = np.diff(values[filled])
     at = int(np.argmin(step))
@@ -184,11 +232,11 @@ def _standing(values: Floats) -> int | None:
 
 
 def _inverted(x: Floats, at: Floats) -> Floats:
-    """Invert x: the columns at which x is ``at``; straight on for half a pixel at either end, then beyond it."""
-    kept = ascending(x)
-    part = x[kept]
+    """Invert x: the columns at which x is ``at``, extrapolated by half a pixel at either end."""
+    ascent = ascending(x)
+    part = x[ascent]
     low, high = _edges(part)
     count = len(part)
-    places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]]) + kept.start
+    places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]]) + ascent.start
     columns: Floats = np.interp(at, np.concatenate([[low], part, [high]]), places, left=-1.0, right=len(x))
     return columns

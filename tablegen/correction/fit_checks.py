@@ -1,7 +1,7 @@
-"""Reasons to refuse a correction by a fit: another cell would do, too large a displacement, no better agreement.
+"""Reasons to refuse a correction by a fit: an ambiguous cell, too large a displacement, no better agreement.
 
-Each check raises ``Unphysical`` with its cause and with what to try. A wrong displacement looks as smooth as a right
-one, so a correction that these checks do not support is not written.
+Each check raises ``Unphysical`` with the cause and a remedy. A wrong displacement looks as smooth as a right one, so a
+correction that fails these checks is not written.
 """
 
 from dataclasses import dataclass
@@ -15,35 +15,35 @@ from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
-_MOST_MOVED = 0.05  # of the picture, hysteresis aside
+_MOST_MOVED = 0.05  # of the picture, without the bow of hysteresis
 _MOST_BOWED = 0.12  # of the picture: the sagitta of a sweep; hysteresis of piezos stays below 0.1
-_BETTER = 0.95  # times the difference before: what counts as a better agreement
-_WORSE = 1.02  # times the difference before: more than noise and resampling change
+_BETTER = 0.95  # times the difference before: a better agreement
+_WORSE = 1.02  # times the difference before: more than noise and resampling explain
 _CLOSER = 0.5  # times the distance of trace and retrace before
-_CLOSE = 0.5  # pixels: trace and retrace that are no further apart agree
+_CLOSE = 0.5  # pixels: trace and retrace within this distance agree
 
 _CLIPPED = 1.0  # percent of the heights at either end: debris has power at all frequencies
-_LEAST_PERIODS = 2.5  # along the line; what is slower went with the levels and slopes of the rows
+_LEAST_PERIODS = 2.5  # along the line; levelling the rows removes slower waves
 _SLOWEST = 0.3  # of the slowest wave of the cell: cells of three times its sides have waves beyond that
 _FINEST = 0.42  # of the sampling rate
-_OWN_WAVE = 2.2, 3.0  # periods: how near to a wave of the cell power is its own, least and most
+_OWN_WAVE = 2.2, 3.0  # periods: radius around a wave of the cell that is its own, least and most
 _OWN_SHARE = 0.35  # of the slowest wave of the cell, within these
-_FEWEST = 2.0 * _OWN_WAVE[0]  # periods of a lattice: a wave of half the frequency is then apart from its own
-_BESIDE = 14.0  # periods: how far around a spot its background is taken
-_VISIBLE = 0.025  # of the strongest amplitude of the cell: weaker spots may be distortion that is left
+_FEWEST = 2.0 * _OWN_WAVE[0]  # periods of a lattice: a wave of half the frequency is then outside that radius
+_BESIDE = 14.0  # periods: radius around a spot in which its background is measured
+_VISIBLE = 0.025  # of the strongest amplitude of the cell: weaker spots may be residual distortion
 _STANDS_OUT = 4.0  # times the background's amplitude
 _HIDDEN = 0.2  # of the strongest amplitude: a background as strong as that hides spots
 _PADDING = 2
-_MOST_PARTS = 6  # of a wave of the cell that are recognised
+_MOST_PARTS = 6  # the largest denominator of a fraction of a wave that is recognised
 _NEAR_PART = 0.12  # of a wave of the cell
 
 
 @dataclass(frozen=True)
 class StrangeSpot:
-    """The strongest spot beside those of a cell.
+    """The strongest spot outside a cell.
 
     ``share`` is its amplitude over the strongest one of the cell, ``contrast`` over that of its background, ``index``
-    its place in waves of the cell.
+    its coordinates in waves of the cell.
     """
 
     share: float
@@ -52,7 +52,7 @@ class StrangeSpot:
 
     @property
     def area(self) -> int | None:
-        """How many times as large the smallest cell with this spot is; None where it is no small multiple."""
+        """The area of the smallest cell with this spot, in areas of the cell; None where it is no small multiple."""
         for parts in range(2, _MOST_PARTS + 1):
             if all(abs(parts * one - round(parts * one)) < parts * _NEAR_PART / 2.0 for one in self.index):
                 return parts
@@ -60,25 +60,30 @@ class StrangeSpot:
 
 
 def check_cell(fit: PeriodicScan, heights: Floats, forward: bool) -> None:
-    """Raise ``Unphysical`` where the image has spots beside those of the fitted cell, or hides them.
+    """Check that the image has no spots outside the fitted cell, nor hides them.
 
     Parameters
     ----------
     fit
         The fit, whose waves are straight in the picture that its distortion gives.
     heights
-        The judged image as taken, rows x columns.
+        The recorded image, shape (rows, columns).
     forward
         Its direction.
+
+    Raises
+    ------
+    Unphysical
+        If there is or may be such a spot, or the image has too few periods to show one.
     """
     distortion = fit.distortion
-    (left, right), (first, last) = distortion.x_range, distortion.y_range
-    waves = fit.waves * np.array([right - left, last - first])
+    (low_x, high_x), (low_y, high_y) = distortion.x_range, distortion.y_range
+    waves = fit.waves * np.array([high_x - low_x, high_y - low_y])
     if len(waves) > 1 and _slowest(waves) < _FEWEST:
         raise Unphysical(
             f"the cell may be a multiple or a root of the sample's: with {_slowest(waves):.2g} periods across the "
-            f"picture spots of a larger cell cannot be told from its own; image {_FEWEST:g} periods or more, or "
-            f"correct with --scanner"
+            f"picture spots of a larger cell cannot be distinguished from its own; image {_FEWEST:g} periods or more, "
+            f"or correct with --scanner"
         )
     spot = strange_spot(Resampler.of(distortion, forward)(heights), waves)
     if spot is None or (spot.share < _VISIBLE or (spot.contrast < _STANDS_OUT and spot.share < _HIDDEN)):
@@ -87,7 +92,7 @@ def check_cell(fit: PeriodicScan, heights: Floats, forward: bool) -> None:
     advice = "image more periods with less noise, choose another --channel, or correct with --scanner"
     if spot.contrast < _STANDS_OUT:
         raise Unphysical(
-            f"the cell may be a multiple or a root of the sample's: what is not periodic reaches "
+            f"the cell may be a multiple or a root of the sample's: the non-periodic part reaches "
             f"{100.0 * spot.share:.0f} % of the strongest spot and would hide weaker ones; {advice}"
         )
     larger = "" if spot.area is None else f" with {spot.area} times the area"
@@ -98,12 +103,12 @@ def check_cell(fit: PeriodicScan, heights: Floats, forward: bool) -> None:
 
 
 def strange_spot(picture: Floats, waves: Floats) -> StrangeSpot | None:
-    """Return the strongest spot of a straight picture that is none of a cell; None where nothing is searched.
+    """Return the strongest spot of a straight picture outside a cell; None where no frequency is searched.
 
     Parameters
     ----------
     picture
-        Rows x columns; NaN where nothing was imaged.
+        Heights, shape (rows, columns); NaN where nothing was imaged.
     waves
         Base vectors of the cell, in periods across the picture along x and y, shape (1 or 2, 2).
     """
@@ -140,34 +145,34 @@ def strange_spot(picture: Floats, waves: Floats) -> StrangeSpot | None:
 
 
 def _amplitudes(picture: Floats) -> Floats:
-    """Amplitudes of waves in a picture whose rows are levelled and whose highest and lowest heights are clipped."""
+    """Return amplitudes of waves in a picture with levelled rows and clipped extremes."""
     rows, columns = picture.shape
-    seen: Bools = np.isfinite(picture)
+    imaged: Bools = np.isfinite(picture)
     flat = levelled(picture)
-    ramp = levelled(np.where(seen, np.linspace(-1.0, 1.0, columns), np.nan))
+    ramp = levelled(np.where(imaged, np.linspace(-1.0, 1.0, columns), np.nan))
     slope = np.sum(flat * ramp, axis=1) / np.maximum(np.sum(ramp**2, axis=1), 1e-300)
     flat = flat - slope[:, None] * ramp
-    low, high = np.percentile(flat[seen], (_CLIPPED, 100.0 - _CLIPPED))
-    window = np.hanning(rows + 2)[1:-1, None] * np.hanning(columns + 2)[1:-1] * seen
+    low, high = np.percentile(flat[imaged], (_CLIPPED, 100.0 - _CLIPPED))
+    window = np.hanning(rows + 2)[1:-1, None] * np.hanning(columns + 2)[1:-1] * imaged
     spectrum = np.fft.rfft2(np.clip(flat, low, high) * window, (rows * _PADDING, columns * _PADDING))
     return np.asarray(2.0 * np.abs(spectrum) / np.sum(window), dtype=np.float64)
 
 
 def _slowest(waves: Floats) -> float:
-    """Periods of the slowest wave of a cell: of the base vectors, their sum and their difference."""
+    """Return the periods of the slowest wave of a cell: of the base vectors, their sum and their difference."""
     short = [waves[0]] if len(waves) == 1 else [waves[0], waves[1], waves[0] + waves[1], waves[0] - waves[1]]
     return min(float(np.hypot(*wave)) for wave in short)
 
 
 def _lattice(waves: Floats, rows: int, columns: int, reach: float) -> list[tuple[float, float]]:
-    """All waves of the cell that the pixels can show, and half a line more."""
+    """Return all waves of the cell that the pixels can show, and those within ``reach`` beyond."""
     most = max(rows, columns) / _slowest(waves)
     span = range(-int(min(most, 60.0)) - 1, int(min(most, 60.0)) + 2)
     count = np.array(list(product(span, repeat=len(waves))), dtype=np.float64)
     points = count @ waves
-    shown = (points[:, 0] > -reach) & (points[:, 0] < 0.5 * columns + reach)
-    shown &= np.abs(points[:, 1]) < 0.5 * rows + reach
-    return [(float(along), float(across)) for along, across in points[shown]]
+    visible = (points[:, 0] > -reach) & (points[:, 0] < 0.5 * columns + reach)
+    visible &= np.abs(points[:, 1]) < 0.5 * rows + reach
+    return [(float(along), float(across)) for along, across in points[visible]]
 
 
 def _around(rows: int, columns: int, along: float, across: float, reach: float) -> tuple[Ints, ...]:
@@ -179,7 +184,7 @@ def _around(rows: int, columns: int, along: float, across: float, reach: float) 
 
 
 def _background(amplitude: Floats, own: Bools, along: float, across: float, shape: tuple[int, int]) -> float:
-    """Return the rms amplitude around a spot, from the median, which does not see other spots."""
+    """Return the rms amplitude around a spot, from the median, which other spots do not affect."""
     part = _around(*shape, along, across, _BESIDE)
     inner = np.zeros(amplitude.shape, bool)
     inner[_around(*shape, along, across, _OWN_WAVE[1])] = True
@@ -188,39 +193,50 @@ def _background(amplitude: Floats, own: Bools, along: float, across: float, shap
 
 
 def check_moves(distortion: Distortion) -> None:
-    """Raise ``Unphysical`` where rows or columns would move further than drift and hysteresis explain.
+    """Check that no row or column moves further than drift and hysteresis explain.
 
     Hysteresis bows the sweep of a direction, more on one side than on the other: a polynomial of the third order, which
-    may be 12 % of the picture away from its chord. What is left beside it, a shear and a shift within the line
-    included, may be 5 %.
+    may be 12 % of the picture away from its chord. The remainder, including a shear and a shift within the line, may be
+    5 %.
+
+    Raises
+    ------
+    Unphysical
+        If a displacement is larger.
     """
     for axis, name, count in ((0, "columns", distortion.columns), (1, "rows", distortion.rows)):
-        moved = [distortion.moved(way)[axis] for way, _ in distortion.sides]
-        groups = moved if axis == 0 else [np.concatenate(moved, axis=1)]
+        displacements = [distortion.displacement(way)[axis] for way, _ in distortion.sides]
+        groups = displacements if axis == 0 else [np.concatenate(displacements, axis=1)]
         for one in groups:
             bowed, beside = _bow(one if axis == 0 else one.T)
             for share, most, what in ((bowed, _MOST_BOWED, "in a bow"), (beside, _MOST_MOVED, "beside the bow")):
                 if not share / count <= most:
                     raise Unphysical(
                         f"{name} would move by {100.0 * share / count:.1f} % of the picture {what} that hysteresis "
-                        f"makes, and at most {100.0 * most:.0f} % is believed; is the sample one lattice? Image more "
+                        f"makes, and at most {100.0 * most:.0f} % is plausible; is the sample one lattice? Image more "
                         f"periods with less drift, or correct with --scanner"
                     )
 
 
-def _bow(moved: Floats) -> tuple[float, float]:
-    """How far the best cubic along the columns is from its chord, and the most that it leaves of any pixel; pixels."""
-    lines, count = moved.shape
+def _bow(displacement: Floats) -> tuple[float, float]:
+    """Return the sagitta of the best cubic along the columns, and the largest deviation from the cubic, in pixels."""
+    lines, count = displacement.shape
     place = np.broadcast_to(np.linspace(-1.0, 1.0, count), (lines, count))
-    there = np.isfinite(moved)
-    cubic = np.polynomial.Polynomial.fit(place[there], moved[there], 3, domain=(-1.0, 1.0))
+    there = np.isfinite(displacement)
+    cubic = np.polynomial.Polynomial.fit(place[there], displacement[there], 3, domain=(-1.0, 1.0))
     bow = cubic(place[0])
     chord = np.linspace(bow[0], bow[-1], count)
-    return float(np.max(np.abs(bow - chord))), float(np.nanmax(np.abs(moved - cubic(place))))
+    return float(np.max(np.abs(bow - chord))), float(np.nanmax(np.abs(displacement - cubic(place))))
 
 
 def check_agreement(agreement: Agreement | None) -> None:
-    """Raise ``Unphysical`` where trace and retrace do not agree better than before; a trace alone passes."""
+    """Check that trace and retrace agree better than before; a trace alone passes.
+
+    Raises
+    ------
+    Unphysical
+        If they do not.
+    """
     if agreement is None:
         return
     before, after = agreement.difference

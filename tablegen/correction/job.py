@@ -1,4 +1,4 @@
-"""From files of images to a scan put straight: which channels, by what, and what the record says of it."""
+"""From image files to a corrected scan: the choice of channels, the correction, and its record."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
-from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
+from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.images.scan_angle import is_turned
@@ -24,14 +24,14 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
 
-_ALIKE = 0.3  # of the contrast: trace and retrace that differ by less are what they are said to be
-_BETTER = 0.6  # times the difference: how much better mirrored or exchanged images have to agree
+_ALIKE = 0.3  # of the contrast: trace and retrace that differ by less are stored as declared
+_BETTER = 0.6  # times the difference: the agreement that shows mirrored or exchanged images
 _OLD_TURN = 0.5  # of the slow axis of an instrument that scans up, then down
 
 
 @dataclass(frozen=True, kw_only=True)
 class OldAxis:
-    """How an axis was driven; what is None is not known, and taken as ``Conditions`` says."""
+    """The drive of an axis of an existing image; a value of None is unknown, and replaced as ``OldScan`` says."""
 
     size_v: float | None = None
     size_nm: float | None = None
@@ -42,11 +42,11 @@ class OldAxis:
 
 @dataclass(frozen=True, kw_only=True)
 class OldScan:
-    """How a scan was taken: volts at the piezo, peak to peak, of a triangle on each axis.
+    """The drive of an existing image: volts at the piezo, peak to peak, of a triangle on each axis.
 
     Instead of ``size_v`` the size in nm that a scan file would have: its volts come from the scanner file. The offset
     is in the middle of the driver's range unless given. The slow axis is driven as the fast one unless given; ``lines``
-    are those of its period, ``back`` that the rows are of its way back. Columns are ``delay_pixels`` late.
+    are those of its period, ``back`` is true if the rows are of its way back. Columns are ``delay_pixels`` late.
     """
 
     x: OldAxis = field(default_factory=OldAxis)
@@ -59,7 +59,7 @@ class OldScan:
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Which images of the files, and how they are stored; see ``tablegen calibrate images``."""
+    """The choice of images in the files, and how they are stored; see ``tablegen calibrate images``."""
 
     channel: str | None = None
     retrace_channel: str | None = None
@@ -69,34 +69,43 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """All channels of a scan, which of them are judged, trace first, and what was left out and why."""
+    """All channels of a scan.
+
+    ``reference`` are the numbers of the channels that are fitted and compared, trace first; ``left_out`` are channels
+    that cannot be read, with the reason.
+    """
 
     channels: tuple[ScanImage, ...]
     forward: tuple[bool, ...]
-    judged: tuple[int, ...]
+    reference: tuple[int, ...]
     left_out: tuple[str, ...]
     mirrored: bool
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
+        """The number of rows and columns."""
         rows, columns = self.channels[0].heights.shape
         return rows, columns
 
     @property
     def first(self) -> ScanImage:
-        """The trace that is judged, or whatever there is."""
-        return self.channels[self.judged[0]]
+        """The trace of the reference channels, or the only image."""
+        return self.channels[self.reference[0]]
 
     def heights(self, number: int) -> Floats:
-        """Of a channel, left on the left."""
-        found = self.channels[number].heights
+        """Return the heights of a channel.
+
+        Returns
+        -------
+        Heights in its unit, shape (rows, columns), the left end of the line first.
+        """
+        recorded = self.channels[number].heights
         mirrored = self.mirrored and not self.forward[number]
-        return np.ascontiguousarray(found[:, ::-1]) if mirrored else found
+        return np.ascontiguousarray(recorded[:, ::-1]) if mirrored else recorded
 
     @property
     def pictures(self) -> list[ScanPicture]:
-        """All of them."""
+        """All channels as pictures."""
         return [
             ScanPicture(one.channel, forward, self.heights(i), one.unit, one.first_row == "bottom")
             for i, (one, forward) in enumerate(zip(self.channels, self.forward, strict=True))
@@ -129,82 +138,82 @@ def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
     left_out: list[str] = []
     for path, forward in ((trace, True), (retrace, False)):
         if path is not None:
-            found, without = _channels(path, choice.frame)
-            groups.append((found, forward))
+            readable, without = _channels(path, choice.frame)
+            groups.append((readable, forward))
             left_out += without
     channels = [one for group, _ in groups for one in group]
     ways = [one.direction != "retrace" if one.direction else way for group, way in groups for one in group]
     _check_exchange(groups)
-    judged = _judged(channels, ways, choice, len(groups[0][0]))
-    if judged[0] >= 0 and len(judged) == 2 and choice.retrace_channel is not None:
-        ways[judged[1]] = False
-    shape = channels[judged[0]].heights.shape
+    reference = _reference(channels, ways, choice, len(groups[0][0]))
+    if reference[0] >= 0 and len(reference) == 2 and choice.retrace_channel is not None:
+        ways[reference[1]] = False
+    shape = channels[reference[0]].heights.shape
     for one in channels:
         if one.heights.shape != shape:
             sizes = " and ".join(f"{rows} x {columns}" for rows, columns in (shape, one.heights.shape))
             raise Rejected([Problem(one.file, 0, "", f"has {sizes} pixels; all channels must be of one scan")])
-    return Images(tuple(channels), tuple(ways), judged, tuple(left_out), choice.retrace_mirrored)
+    return Images(tuple(channels), tuple(ways), reference, tuple(left_out), choice.retrace_mirrored)
 
 
 def _channels(path: Path, frame: int | None) -> tuple[list[ScanImage], list[str]]:
-    """All channels of a file that can be read, and why others cannot."""
+    """Return all channels of a file that can be read, and why others cannot."""
     try:
         return read_channels(path, frame), []
     except Rejected as rejected:
         if len(channels := channels_of(path)) < 2:
             raise
-        found, without = [], []
+        readable, without = [], []
         for one in channels:
             try:
-                found.append(read_image(path, str(one.number), frame=frame))
+                readable.append(read_image(path, str(one.number), frame=frame))
             except Rejected as reason:
                 without += [str(problem) for problem in reason.problems]
-        if not found:
+        if not readable:
             raise rejected from None
-        return found, without
+        return readable, without
 
 
 def _check_exchange(groups: Sequence[tuple[list[ScanImage], bool]]) -> None:
-    """Where each direction has its own file, the names of channels must not say the contrary."""
+    """Check that the names of channels do not contradict files that hold one direction each."""
     if len(groups) < 2:
         return
     for group, forward in groups:
-        said = {one.direction for one in group} - {None}
-        if said == {"retrace" if forward else "trace"}:
+        directions = {one.direction for one in group} - {None}
+        if directions == {"retrace" if forward else "trace"}:
             have, need = ("retrace", "trace") if forward else ("trace", "retrace")
             why = f"its channels are the {have} by the file, and the {need} is needed here; are the files exchanged?"
             raise Rejected([Problem(group[0].file, 0, "", why)])
 
 
-def _judged(channels: Sequence[ScanImage], ways: Sequence[bool], choice: Choice, first: int) -> tuple[int, ...]:
-    """Return the trace and the retrace that are compared and fitted; one of them if there is no other."""
+def _reference(channels: Sequence[ScanImage], ways: Sequence[bool], choice: Choice, first: int) -> tuple[int, ...]:
+    """Return the trace and the retrace that are fitted and compared; one of them if there is no other."""
 
-    def named(wanted: str, among: range, way: bool | None) -> int:
-        found = [i for i in among if channels[i].channel == wanted and way in (None, ways[i])]
-        found = found or [i for i in among if channels[i].signal == wanted and way in (None, ways[i])]
-        found = found or [i for i in among if str(channels[i].number) == wanted]
-        if len(found) != 1:
+    def numbered(name: str, among: range, way: bool | None) -> int:
+        numbers = [i for i in among if channels[i].channel == name and way in (None, ways[i])]
+        numbers = numbers or [i for i in among if channels[i].signal == name and way in (None, ways[i])]
+        numbers = numbers or [i for i in among if str(channels[i].number) == name]
+        if len(numbers) != 1:
             there = ", ".join(f"{channels[i].number} ({channels[i].channel})" for i in among)
-            why = f"has {'no' if not found else 'more than one'} channel '{wanted}'; there is {there}"
+            why = f"has {'no' if not numbers else 'more than one'} channel '{name}'; there is {there}"
             raise Rejected([Problem(channels[among[0]].file, 0, "", why)])
-        return found[0]
+        return numbers[0]
 
     everything = range(len(channels))
     whole = range(first) if first < len(channels) else everything
     rest = range(first, len(channels)) if first < len(channels) else everything
     if choice.channel is not None:
-        trace = named(choice.channel, whole, True if any(ways[i] for i in whole) else None)
+        trace = numbered(choice.channel, whole, True if any(ways[i] for i in whole) else None)
     else:
         ranked = sorted(whole, key=lambda i: (not ways[i], not _partners(channels, ways, i), not _height(channels[i])))
         trace = ranked[0]
     if choice.retrace_channel is not None:
-        return trace, named(choice.retrace_channel, rest, None)
+        return trace, numbered(choice.retrace_channel, rest, None)
     partners = _partners(channels, ways, trace)
     return (trace, partners[0]) if partners else (trace,)
 
 
 def _partners(channels: Sequence[ScanImage], ways: Sequence[bool], of: int) -> list[int]:
-    """Channels of the other direction with the same signal; or the only one there is."""
+    """Return channels of the other direction with the same signal, or the only one there is."""
     if not ways[of]:
         return []
     others = [i for i, way in enumerate(ways) if not way]
@@ -216,7 +225,7 @@ def _height(channel: ScanImage) -> bool:
     return any(word in channel.channel.lower() for word in ("height", "topo", "zsensor", "z sensor"))
 
 
-def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
+def by_scanner(images: Images, scanner: Path, conditions: OldScan) -> StraightScan:
     """Correct images by a scanner file.
 
     Raises
@@ -224,27 +233,35 @@ def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
     Rejected
         If the scanner file is faulty.
     Unphysical
-        If the scan cannot have been taken so.
+        If the drive or the line rate is unknown, or such a scan is impossible.
     """
     model = _model(scanner)
-    rate_hz = taken.rate_hz or images.first.line_rate_hz
+    rate_hz = conditions.rate_hz or images.first.line_rate_hz
     if rate_hz is None:
         raise Unphysical("the file does not say at which line rate it was taken; give --rate-hz")
     rows, _ = images.shape
-    x = _axis(model, "x", taken.x, rate_hz)
-    slow = taken.y
+    x = _axis(model, "x", conditions.x, rate_hz)
+    slow = conditions.y
     if slow.size_v is None and slow.size_nm is None:
-        slow = replace(slow, size_v=taken.x.size_v, size_nm=taken.x.size_nm)
+        slow = replace(slow, size_v=conditions.x.size_v, size_nm=conditions.x.size_nm)
     if slow.offset_v is None:
-        slow = replace(slow, offset_v=taken.x.offset_v)
+        slow = replace(slow, offset_v=conditions.x.offset_v)
     y = _axis(model, "y", slow, rate_hz)
-    lines = taken.lines or lines_of(rows, y, taken.back)
+    lines = conditions.lines or lines_of(rows, y, conditions.back)
     y = replace(y, rate_hz=rate_hz / lines)
-    return _scanned(images, model, x, y, lines, taken, {})
+    return _scanned(images, model, x, y, lines, conditions, {})
 
 
-def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldScan) -> StraightScan:
-    """Correct an image of a build: the drive is that of the scan file, the scanner its own unless given."""
+def by_scan_file(images: Images, scan: Path, scanner: Path | None, conditions: OldScan) -> StraightScan:
+    """Correct an image of a build: the drive is that of the scan file, the scanner its own unless given.
+
+    Raises
+    ------
+    Rejected
+        If a file is faulty, or the scan is a line scan.
+    Unphysical
+        If the image has another number of rows than the scan.
+    """
     setup = load(scan)
     plan = make_plan(setup)
     model = (
@@ -252,7 +269,7 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldSca
     )
     if plan.y.drive.resting:
         raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, whose rows are one line of x")])
-    part = plan.schedule.down if taken.back else plan.schedule.up
+    part = plan.schedule.down if conditions.back else plan.schedule.up
     rows, _ = images.shape
     if rows != part.count:
         raise Unphysical(
@@ -260,9 +277,9 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldSca
             "as options"
         )
     x, y = (_played(line) for line in (plan.x, plan.y))
-    y = replace(y, window=_rows_window(part.first / plan.schedule.lines, y, taken.back))
+    y = replace(y, window=_rows_window(part.first / plan.schedule.lines, y, conditions.back))
     how = {"scan": {"file": scan.name, "sha256": file_sha256(scan, CONFIGURATION)}}
-    return _scanned(images, model, x, y, plan.schedule.lines, taken, how)
+    return _scanned(images, model, x, y, plan.schedule.lines, conditions, how)
 
 
 def _rows_window(first: float, y: AxisScan, back: bool) -> tuple[float, float]:
@@ -286,27 +303,27 @@ def _model(scanner: Path) -> ScannerModel:
     return ScannerModel(its, file, scanner.parent)
 
 
-def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: OldAxis, rate_hz: float) -> AxisScan:
+def _axis(model: ScannerModel, axis: Literal["x", "y"], conditions: OldAxis, rate_hz: float) -> AxisScan:
     """Return the scan of an axis that plays a triangle."""
     driver = model.scanner.driver
-    size_v = taken.size_v
-    if size_v is None and taken.size_nm is not None:
-        size_v = driver.span * size_law_of(getattr(model.scanner, axis).size, driver).voltage(taken.size_nm)
+    size_v = conditions.size_v
+    if size_v is None and conditions.size_nm is not None:
+        size_v = driver.span * size_law_of(getattr(model.scanner, axis).size, driver).voltage(conditions.size_nm)
     if size_v is None:
         raise Unphysical(
             "the drive is not known; give --size-v, the scan voltage at the piezo, or --size-nm, or --scan"
         )
-    offset_v = driver.middle if taken.offset_v is None else taken.offset_v
-    return AxisScan(triangle(size_v, offset_v, taken.turn), rate_hz, taken.turn, taken.window)
+    offset_v = driver.middle if conditions.offset_v is None else conditions.offset_v
+    return AxisScan(triangle(size_v, offset_v, conditions.turn), rate_hz, conditions.turn, conditions.window)
 
 
 def _scanned(
-    images: Images, model: ScannerModel, x: AxisScan, y: AxisScan, lines: int, taken: OldScan, how: dict[str, Any]
+    images: Images, model: ScannerModel, x: AxisScan, y: AxisScan, lines: int, conditions: OldScan, how: dict[str, Any]
 ) -> StraightScan:
     rows, columns = images.shape
     ways = tuple(sorted(set(images.forward), reverse=True))
-    found = scanner_distortion(model, x, y, rows, columns, lines, taken.back, ways, taken.delay_pixels)
-    size = found.x_range[1] - found.x_range[0], found.y_range[1] - found.y_range[0]
+    distortion = scanner_distortion(model, x, y, rows, columns, lines, conditions.back, ways, conditions.delay_pixels)
+    size = distortion.x_range[1] - distortion.x_range[0], distortion.y_range[1] - distortion.y_range[0]
     path = model.folder / Path(model.file.name).name
     record: dict[str, Any] = {
         "by": "scanner file",
@@ -333,38 +350,43 @@ def _scanned(
             ]
         record[name] = one
     record["lines"] = lines
-    return _made(images, found, size, record)
+    return _corrected(images, distortion, size, record)
 
 
 def by_fit(
-    images: Images, taken: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
+    images: Images, conditions: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
     """Correct images by a fit to a periodic sample; return the fit too.
 
-    Raises ``Unphysical`` where there is no fit, or where the image does not support the correction: another cell would
-    do as well, the displacement is too large, or trace and retrace do not agree better.
+    Raises
+    ------
+    Unphysical
+        If there is no fit, or the image does not support the correction: the cell is ambiguous, the displacement is too
+        large, or trace and retrace do not agree better.
     """
-    if not images.forward[images.judged[0]]:
+    if not images.forward[images.reference[0]]:
         raise Unphysical("is a retrace by the file; a fit needs the trace")
-    trace, retrace = (*(images.channels[i].heights for i in images.judged), None)[:2]
+    trace, retrace = (*(images.channels[i].heights for i in images.reference), None)[:2]
     if retrace is None and not all(images.forward):
-        raise Unphysical("has channels of the retrace, and none that is the judged one's; give --retrace-channel")
+        raise Unphysical("has channels of the retrace, but none of the fitted signal; give --retrace-channel")
     assert trace is not None
-    fit = periodic_scan(trace, retrace, taken.x.turn, taken.x.window, images.mirrored, taken.delay_pixels)
+    fit = periodic_scan(
+        trace, retrace, conditions.x.turn, conditions.x.window, images.mirrored, conditions.delay_pixels
+    )
     first, (rows, columns) = images.first, images.shape
     size: tuple[float, float] | None = None
-    found: Distortion = fit.distortion
+    distortion: Distortion = fit.distortion
     record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources, **images.angle}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
-            found = fit.of_lattice(lattice_nm)
+            distortion = fit.of_lattice(lattice_nm)
             record["lattice_nm"] = lattice_nm
         else:
-            known = first.width_nm is not None and first.height_nm is not None
-            aspect = (first.height_nm or 1.0) / (first.width_nm or 1.0) if known else rows / columns
-            found = fit.of_pitch(pitch_nm or 0.0, aspect)
+            has_size = first.width_nm is not None and first.height_nm is not None
+            aspect = (first.height_nm or 1.0) / (first.width_nm or 1.0) if has_size else rows / columns
+            distortion = fit.of_pitch(pitch_nm or 0.0, aspect)
             record["pitch_nm"] = pitch_nm
-        size = found.x_range[1] - found.x_range[0], found.y_range[1] - found.y_range[0]
+        size = distortion.x_range[1] - distortion.x_range[0], distortion.y_range[1] - distortion.y_range[0]
         if first.width_nm is not None:
             check_size(size[0], first.width_nm, "the file")
         if first.height_nm is not None and fit.tells_y and lattice_nm is not None:
@@ -372,52 +394,59 @@ def by_fit(
     elif first.width_nm is not None and first.height_nm is not None:
         size = first.width_nm, first.height_nm
     record |= {
-        "turn": taken.x.turn,
-        "window": list(taken.x.window),
+        "turn": conditions.x.turn,
+        "window": list(conditions.x.window),
         "periods_in_the_line": [round(float(q), 4) for q in fit.waves[:, 0]],
         "explained": round(fit.explained, 6),
         "slow_axis": "fitted" if fit.tells_y else "as taken: a grating does not tell it",
     }
-    scan = _made(images, found, size, record)
-    check_moves(found)
-    check_cell(fit, images.heights(images.judged[0]), True)
+    scan = _corrected(images, distortion, size, record)
+    check_moves(distortion)
+    check_cell(fit, images.heights(images.reference[0]), True)
     check_agreement(scan.agreement)
     return scan, fit
 
 
 def check_order(images: Images, distortion: Distortion) -> None:
-    """Raise ``Unphysical`` where trace and retrace agree far better mirrored, or exchanged.
+    """Check that trace and retrace do not agree far better mirrored or exchanged.
 
-    Each of both is put straight as the other one would be, and compared.
+    Each image is corrected with the distortion of the other direction, and compared.
+
+    Raises
+    ------
+    Unphysical
+        If they do.
     """
-    if len(images.judged) < 2:
+    if len(images.reference) < 2:
         return
-    trace, retrace = (images.heights(i) for i in images.judged)
+    trace, retrace = (images.heights(i) for i in images.reference)
     ways = [Resampler.of(distortion, way) for way in (True, False)]
 
-    def left(one: Floats, other: Floats) -> float:
+    def mismatch(one: Floats, other: Floats) -> float:
         return difference(ways[0](one), ways[1](other))
 
-    given = left(trace, retrace)
-    if given < _ALIKE:
+    as_stored = mismatch(trace, retrace)
+    if as_stored < _ALIKE:
         return
     turned = np.ascontiguousarray(retrace[:, ::-1])
-    if left(trace, turned) < _BETTER * given:
+    if mismatch(trace, turned) < _BETTER * as_stored:
         advice = "leave --retrace-mirrored out" if images.mirrored else "give --retrace-mirrored"
         raise Unphysical(f"the retrace agrees with the trace only when it is mirrored; {advice}")
-    if left(retrace, trace) < _BETTER * given:
+    if mismatch(retrace, trace) < _BETTER * as_stored:
         raise Unphysical(
             "trace and retrace agree only when they are exchanged; is the retrace the first of both files?"
         )
 
 
-def _made(images: Images, found: Distortion, size: tuple[float, float] | None, record: dict[str, Any]) -> StraightScan:
-    judged = [images.heights(i) for i in images.judged]
-    if len(judged) == 2:
-        check_pair(judged[0], judged[1])
+def _corrected(
+    images: Images, distortion: Distortion, size: tuple[float, float] | None, record: dict[str, Any]
+) -> StraightScan:
+    heights = [images.heights(i) for i in images.reference]
+    if len(heights) == 2:
+        check_pair(heights[0], heights[1])
     else:
-        check_heights("image", judged[0])
-    check_order(images, found)
+        check_heights("image", heights[0])
+    check_order(images, distortion)
     if images.left_out:
         record["left_out"] = list(images.left_out)
-    return put_straight(images.pictures, found, size, images.judged, record)
+    return corrected_scan(images.pictures, distortion, size, images.reference, record)

@@ -1,7 +1,7 @@
-"""Straight pictures as files: .gwy, .tif, .npy and .png, each with what was done to them.
+"""Corrected pictures as files: .gwy, .tif, .npy and .png, each with the record of its correction.
 
-What was not imaged is masked: a mask in .gwy, NaN in .tif and .npy, transparent in .png. Heights are those of the input
-but for .png, whose range stands in its text. gwyfile writes .gwy, tifffile .tif, Pillow .png.
+Pixels that were not imaged are masked: a mask in .gwy, NaN in .tif and .npy, transparent in .png. Heights are those of
+the input except in .png, whose range stands in its text. gwyfile writes .gwy, tifffile .tif, Pillow .png.
 """
 
 import json
@@ -23,12 +23,12 @@ _NM_PER_CM = 1e7
 
 
 def files_of(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
-    """Return the files of a scan by name: ``name`` and ``suffix``, and what goes beside it."""
+    """Return the files of a scan by name: ``name`` and ``suffix``, and their companions."""
     return _WRITERS[suffix](scan, name, suffix)
 
 
 def _shown(picture: ScanPicture) -> Floats:
-    """With the first row of the picture on top."""
+    """Return the heights with the first row of the picture on top."""
     return np.ascontiguousarray(picture.heights[::-1] if picture.bottom_first else picture.heights)
 
 
@@ -54,7 +54,7 @@ def _text(scan: StraightScan, **more: Any) -> str:
 
 
 def _npy(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
-    """One picture as a matrix, several as rows x columns each; the record beside it."""
+    """Return one picture as a matrix, several as rows x columns each; the record beside it."""
     heights = [picture.heights for picture in scan.pictures]
     out = BytesIO()
     np.save(out, heights[0] if len(heights) == 1 else np.stack(heights), allow_pickle=False)
@@ -99,17 +99,17 @@ def _png(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
     files = {}
     titles = _titles(scan.pictures)
     for title, picture in zip(titles, scan.pictures, strict=True):
-        shown = _shown(picture)
-        seen = np.isfinite(shown)
-        low, high = (float(one(shown[seen])) for one in (np.min, np.max))
-        grey = 1.0 + np.rint((shown - low) * ((_LEVELS - 1) / (high - low if high > low else 1.0)))
-        grey = np.where(seen, grey, 0.0)
+        heights = _shown(picture)
+        imaged = np.isfinite(heights)
+        low, high = (float(one(heights[imaged])) for one in (np.min, np.max))
+        grey = 1.0 + np.rint((heights - low) * ((_LEVELS - 1) / (high - low if high > low else 1.0)))
+        grey = np.where(imaged, grey, 0.0)
         info = PngInfo()
         scale = {"level_1": low, f"level_{_LEVELS}": high, "unit": picture.unit}
         info.add_itxt(_KEY, _text(scan, title=title, grey=scale))
         out = BytesIO()
         image = Pillow.fromarray(grey.astype(np.uint16))
-        more: dict[str, Any] = {} if seen.all() else {"transparency": 0}
+        more: dict[str, Any] = {} if imaged.all() else {"transparency": 0}
         image.save(out, "png", pnginfo=info, **more)
         part = "" if len(titles) == 1 else f"_{_plain(title)}"
         files[f"{name}{part}{suffix}"] = out.getvalue()
@@ -130,10 +130,10 @@ def _gwy(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
     x, y = (float(columns), float(rows)) if scan.size_nm is None else (1e-9 * value for value in scan.size_nm)
     across = "" if scan.size_nm is None else "m"
     for number, (title, picture) in enumerate(zip(_titles(scan.pictures), scan.pictures, strict=True)):
-        shown = _shown(picture)
-        seen = np.isfinite(shown)
+        heights = _shown(picture)
+        imaged = np.isfinite(heights)
         factor = _METRES.get(picture.unit)
-        values = np.where(seen, shown, np.mean(shown[seen])) * (1.0 if factor is None else factor)
+        values = np.where(imaged, heights, np.mean(heights[imaged])) * (1.0 if factor is None else factor)
         unit = picture.unit if factor is None else "m"
 
         def field(data: npt.NDArray[Any], height: str) -> Any:
@@ -141,8 +141,8 @@ def _gwy(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
 
         container[f"/{number}/data/title"] = title
         container[f"/{number}/data"] = field(values, unit)
-        if not seen.all():
-            container[f"/{number}/mask"] = field((~seen).astype(np.float64), "")
+        if not imaged.all():
+            container[f"/{number}/mask"] = field((~imaged).astype(np.float64), "")
         container[f"/{number}/meta"] = GwyContainer({_KEY: _text(scan)})
     out = BytesIO()
     container.tofile(out)

@@ -1,8 +1,8 @@
-"""Where a scan of a periodic sample really was, by a fit to its own images.
+"""The positions of a scan of a periodic sample, by a fit to its own images.
 
-The phase of the sample's waves is straight in x. The fit of ``calibrate images`` begins; then x of each direction is
-bent freely, by a series that follows what the branches of (17) leave, and the waves are fitted again. Of a lattice the
-phases of two waves also tell y from a drift of x. A grating tells neither, and its rows stay.
+The phase of the sample's waves is linear in x. The fit of ``calibrate images`` is the start; then x of each direction
+is corrected by a free series for the residual of the branches of (17), and the waves are fitted again. For a lattice
+the phases of two waves also separate y from a drift of x. A grating shows neither, and its rows stay.
 """
 
 from dataclasses import dataclass
@@ -20,27 +20,27 @@ from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
 from tablegen.numerics.arrays import Bools, Floats
 
 Complexes = npt.NDArray[np.complex128]
-_MOST_BENDS = 20  # terms of what the branches leave, in each direction
+_MOST_BENDS = 20  # terms for the residual of the branches, in each direction
 _LEAST_BENDS = 5
-_BENDS_A_PERIOD = 1.7  # terms; what is finer than a period passes for the shape of the sample
-_SAME_WAVE = 2.0  # periods in the line: nearer waves are not told apart by a line
+_BENDS_A_PERIOD = 1.7  # terms; a bend within a period cannot be distinguished from the shape of the sample
+_SAME_WAVE = 2.0  # periods in the line: one line does not separate nearer waves
 _AVERAGED = 0.45  # of a period against another wave: the standard deviation of a mean that leaves 2 % of it
-_ROW_BENDS = 20  # terms of what the polynomial in the rows leaves of a phase
-_FOLLOWING = 0.5  # of what a step of a phase differs from the one before
+_ROW_BENDS = 20  # terms for the residual of the phase polynomial in the rows
+_FOLLOWING = 0.5  # share of the change of a phase step that the next guess follows
 _ROUNDS = 40
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
-_STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of what a term does
-_MOST_BENT_LATTICE = 0.5  # by how much a frame may be higher than wide, or sheared, in all
-_LEAST_ANGLE = 0.2  # sine of the angle between two waves that tell y from x
+_STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
+_MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
+_LEAST_ANGLE = 0.2  # sine of the angle between two waves that separate y from x
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicScan:
-    """What a fit to images says of their scan.
+    """The result of a fit to images.
 
-    ``distortion`` has x in lines, 0..1 about, and y in frames. ``waves`` are the base vectors of the sample, in periods
-    a line and a frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
-    whether y is that of the sample and not of the rows.
+    ``distortion`` has x in lines, about 0..1, and y in frames. ``waves`` are the base vectors of the sample, in periods
+    per line and per frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
+    true if y is that of the sample and not of the rows.
     """
 
     distortion: Distortion
@@ -49,7 +49,7 @@ class PeriodicScan:
     tells_y: bool
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
-        """Return the distortion in nm, where bars of a grating, or densest rows of a lattice, are ``pitch_nm`` apart.
+        """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
 
         ``aspect`` is the height of the frame over the length of the line.
         """
@@ -73,8 +73,8 @@ class PeriodicScan:
             k = constant_nm * np.sin(np.radians(angle))
             turned = np.radians(angle)
             ideal = np.array([[1.0, 0.0], [np.cos(turned), np.sin(turned)]]) / k  # waves, periods a nm
-            apart = np.linalg.inv(ideal)
-            frame = apart @ self.waves  # from frames to nm, turned
+            lattice = np.linalg.inv(ideal)
+            frame = lattice @ self.waves  # from frames to nm, turned
             metric = np.linalg.cholesky(frame.T @ frame).T
             across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
             readings.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
@@ -88,7 +88,7 @@ class PeriodicScan:
 
 
 def _scaled(distortion: Distortion, across: float, along: float, shear: float) -> Distortion:
-    """Lines of a length and frames of a height in nm, the last line further right by ``shear``."""
+    """Scale lines to a length and frames to a height in nm, the last line further right by ``shear``."""
     drift = across * distortion.drift + shear * (distortion.y - 0.5 * (distortion.y[0] + distortion.y[-1]))
     sides = [
         None if one is None else Sweep1D(across * one.x, one.time) for one in (distortion.forward, distortion.backward)
@@ -106,7 +106,18 @@ def periodic_scan(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> PeriodicScan:
-    """Fit images, rows x columns of heights in any unit, rows in the order of time; or a trace alone.
+    """Fit trace and retrace of a periodic sample, or a trace alone.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns), rows in the order of time.
+    turn
+        Share of the period in which the line rises.
+    window
+        Part of each sweep that the columns span, 0..1.
+    delay_pixels
+        Delay of the columns against the position.
 
     Raises
     ------
@@ -124,16 +135,16 @@ def periodic_scan(
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:
-    """With x bent freely, both directions by themselves, and the phases along the rows too."""
+    """Fit a free series to x of each direction, and one to the phases along the rows."""
     free = free.copy()
-    free[:4] = False  # the branches stay; what bends more is added to them
+    free[:4] = False  # the branches stay; the series is added to them
     geometry = model.geometry
     q = float(model.q(state.parameters)[0])
     bends = _series(geometry.columns, int(np.clip(round(_BENDS_A_PERIOD * q), _LEAST_BENDS, _MOST_BENDS)))
     row_bends = _series(geometry.rows, _ROW_BENDS)
     waves = model.row_waves(state)
     phases = np.stack([_followed(_without_others(model, state, base, wave)) for base, wave in enumerate(waves)])
-    along = phases @ np.linalg.pinv(row_bends)  # coefficients of all that is added, for what keeps it smooth
+    along = phases @ np.linalg.pinv(row_bends)  # coefficients of the whole sum, which the penalty smooths
     across = [np.zeros(len(bends)) for _ in model.images]
     model = model.with_offsets(model.off, _less_line(along @ row_bends))
     state = settle(model, state.parameters, free)
@@ -160,7 +171,7 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
 
 
 def _series(count: int, terms: int) -> Floats:
-    """(terms, count): Chebyshev polynomials, which follow a sweep best where it turns."""
+    """Return Chebyshev polynomials, which follow a sweep best where it turns, (terms, count)."""
     place = (2.0 * np.arange(count) + 1.0) / count - 1.0
     series = np.polynomial.chebyshev.chebvander(place, min(terms, count // 3) - 1)
     return np.asarray(series.T, dtype=np.float64)
@@ -173,22 +184,22 @@ def _penalty(terms: int, normal: Floats) -> Floats:
     return penalty
 
 
-def _more_x(basis: Floats, residual: Floats, steep: Floats, known: Floats) -> Floats:
-    """By how much more of each term x of the columns is to have than ``known``, by least squares over all rows."""
+def _more_x(basis: Floats, residual: Floats, steep: Floats, current: Floats) -> Floats:
+    """Return the step of each term of x along the columns from ``current``, by least squares over all rows."""
     weight, aim = np.sum(steep**2, axis=0), np.sum(steep * residual, axis=0)
     normal = (basis * weight) @ basis.T
     penalty = _penalty(len(basis), normal)
-    step: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * known)
+    step: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * current)
     return step
 
 
 def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
-    """Less what all have in common as a line in x: that is the sample's place and its period."""
+    """Subtract the common line in x, which is the sample's position and period."""
     line = np.polyfit(np.concatenate(places), np.concatenate(more), 1)
     return [np.asarray(one - np.polyval(line, x), np.float64) for one, x in zip(more, places, strict=True)]
 
 
-def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
+def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Floats], current: Floats) -> Floats:
     """Return the step of the phase of each base vector along the rows: (bases, terms)."""
     count, bases = len(basis), len(slopes[0])
     normal, aim = np.zeros((bases * count, bases * count)), np.zeros(bases * count)
@@ -200,7 +211,7 @@ def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Float
                 weight = np.sum(slope[i] * slope[j], axis=1)
                 normal[part, j * count : (j + 1) * count] += (basis * weight) @ basis.T
     penalty = np.tile(_penalty(count, normal), bases)
-    step = np.linalg.solve(normal + np.diag(penalty), aim - penalty * known.ravel())
+    step = np.linalg.solve(normal + np.diag(penalty), aim - penalty * current.ravel())
     return np.asarray(step.reshape(bases, count), dtype=np.float64)
 
 
@@ -220,20 +231,20 @@ def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Comp
 
 def _followed(wave: Complexes) -> Floats:
     """Unwrap the phase of each row in periods, from the middle outwards: each step is near the one before."""
-    seen = np.angle(wave) / (2.0 * np.pi)
-    out = seen.copy()
-    middle = len(seen) // 2
+    wrapped = np.angle(wave) / (2.0 * np.pi)
+    out = wrapped.copy()
+    middle = len(wrapped) // 2
     for way in (1, -1):
         step = 0.0
-        for k in range(middle + way, len(seen) if way > 0 else -1, way):
+        for k in range(middle + way, len(wrapped) if way > 0 else -1, way):
             guess = out[k - way] + step
-            out[k] = seen[k] + np.round(guess - seen[k])
+            out[k] = wrapped[k] + np.round(guess - wrapped[k])
             step += _FOLLOWING * (out[k] - out[k - way] - step)
     return out
 
 
 def _less_line(phases: Floats) -> Floats:
-    """Each row less its best line."""
+    """Subtract its best line from each row."""
     rows = np.arange(phases.shape[1], dtype=np.float64)
     return np.stack([one - np.polyval(np.polyfit(rows, one, 1), rows) for one in phases])
 
@@ -273,7 +284,7 @@ def _scan(model: PeriodicModel, state: FitState) -> PeriodicScan:
 
 
 def _at_edges(values: Floats) -> Floats:
-    """At the edges of the rows what is known at their middles."""
+    """Interpolate values at the middles of the rows to their edges."""
     outer = 1.5 * values[[0, -1]] - 0.5 * values[[1, -2]]
     return np.concatenate([outer[:1], 0.5 * (values[1:] + values[:-1]), outer[1:]])
 
@@ -284,6 +295,6 @@ def _from(sweep: Sweep1D | None, edge: float) -> Sweep1D | None:
 
 
 def _independent(q: Floats, s: Floats) -> bool:
-    """Whether two waves differ enough in direction."""
+    """Return true if two waves differ enough in direction."""
     cross = float(q[0] * s[1] - q[1] * s[0])
     return abs(cross) > _LEAST_ANGLE * hypot(q[0], s[0]) * hypot(q[1], s[1])

@@ -1,4 +1,4 @@
-"""What is left of the bends of a periodic sample in a straight image: the phases of its waves, place by place."""
+"""The residual bends of a periodic sample in a straight image: the phases of its waves, pixel by pixel."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,9 @@ _STRONG = 0.4  # of the median amplitude: where the sample is there
 
 @dataclass(frozen=True, eq=False)
 class ResidualLattice:
-    """By how many pixels a periodic sample is off a perfect lattice, in x and, of a lattice, in y; NaN at the edges.
+    """The deviation of a periodic sample from a perfect lattice in pixels; NaN at the edges.
 
-    Shapes (rows, columns). ``y`` is None of a grating, whose ``x`` is what its bars show.
+    Shapes (rows, columns). ``y`` is None of a grating, whose ``x`` is the deviation of its bars.
     """
 
     x: Floats
@@ -30,25 +30,34 @@ class ResidualLattice:
 
     @property
     def worst(self) -> tuple[float, float]:
-        """The largest in pixels, along x and y; without the outermost thousandth."""
+        """The largest deviation in pixels, along x and y, without the outermost thousandth."""
         largest = [float(np.nanpercentile(np.abs(one), 99.9)) if one is not None else 0.0 for one in (self.x, self.y)]
         return largest[0], largest[1]
 
 
 def residual_lattice(image: Floats) -> ResidualLattice | None:
-    """Of a straight picture, NaN where nothing was imaged; None where no wave of a sample stands out.
+    """Measure the deviation of a straight picture from the lattice that fits it best.
 
-    The lattice is the one that fits best: its constants, angles and turn are not judged.
+    The constants, angles and turn of that lattice are not checked.
+
+    Parameters
+    ----------
+    image
+        Heights, shape (rows, columns); NaN where nothing was imaged.
+
+    Returns
+    -------
+    The deviation; None where no wave of a sample stands out.
     """
-    seen = np.isfinite(image)
+    imaged = np.isfinite(image)
     flat = levelled(image)
     waves = _strongest(flat)
     if not waves:
         return None
     phases = []
-    inside: Bools = seen
+    inside: Bools = imaged
     for wave in waves:
-        phase, good = _phase(flat, seen, wave)
+        phase, good = _phase(flat, imaged, wave)
         phases.append(phase)
         inside = inside & good
     if int(np.sum(inside)) < image.size // 8:
@@ -63,7 +72,7 @@ def residual_lattice(image: Floats) -> ResidualLattice | None:
 
 
 def _strongest(flat: Floats) -> list[tuple[float, float]]:
-    """One or two waves, in periods a pixel along x and y."""
+    """Return one or two waves, in periods per pixel along x and y."""
     rows, columns = flat.shape
     power = np.abs(np.fft.fft2(flat * np.hanning(rows)[:, None] * np.hanning(columns))) ** 2
     v, u = np.fft.fftfreq(rows)[:, None], np.fft.fftfreq(columns)[None, :]
@@ -92,7 +101,7 @@ def _strongest(flat: Floats) -> list[tuple[float, float]]:
     return waves
 
 
-def _phase(flat: Floats, seen: Bools, wave: tuple[float, float]) -> tuple[Floats, Bools]:
+def _phase(flat: Floats, imaged: Bools, wave: tuple[float, float]) -> tuple[Floats, Bools]:
     """Return the phase less the wave's own in periods, unwrapped, and where it is reliable."""
     rows, columns = flat.shape
     y, x = np.mgrid[:rows, :columns]
@@ -106,7 +115,7 @@ def _phase(flat: Floats, seen: Bools, wave: tuple[float, float]) -> tuple[Floats
     good = np.zeros(flat.shape, bool)
     good[room : rows - room, room : columns - room] = True
     good &= np.abs(mean) > _STRONG * float(np.median(np.abs(mean)))
-    full = gaussian_filter(seen.astype(np.float64), sigma) > 0.999
+    full = gaussian_filter(imaged.astype(np.float64), sigma) > 0.999
     return phase / (2.0 * np.pi), good & full
 
 

@@ -1,4 +1,4 @@
-"""Where a scan really was, by the scanner file: the drive of each axis, its settled loop, creep and dynamics."""
+"""The positions of a scan by the scanner file: the drive of each axis, its settled loop, creep and dynamics."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from tablegen.planning.laws import dynamics_of, offset_surface, outside_driver, 
 
 _COUNT = 8192  # drives of a period
 _HARMONICS = 512  # on which creep and dynamics act
-_ROUNDS = 30  # of a contraction that leaves less than a tenth of an error
+_ROUNDS = 30  # of a contraction that reduces an error to less than a tenth
 _BEYOND = 1e-3  # of the driver's range: by how much a drive may leave the driver's range in its last digits
 
 Waveform = Callable[[Floats], Floats]  # of times in periods, 0 where the sweep there begins
@@ -31,9 +31,15 @@ Waveform = Callable[[Floats], Floats]  # of times in periods, 0 where the sweep 
 
 @dataclass(frozen=True, eq=False)
 class AxisScan:
-    """What was played on one axis: volts at the piezo against the time in periods, and which part was imaged.
+    """The drive of one axis: volts at the piezo against the time in periods, and the imaged part.
 
-    ``turn`` is when the sweep back begins, in periods; ``window`` what the pixels span of each sweep.
+    ``turn`` is the time at which the sweep back begins, in periods; ``window`` the part of each sweep that the pixels
+    span.
+
+    Raises
+    ------
+    Unphysical
+        If the turn or the window is out of range.
     """
 
     volts: Waveform
@@ -49,12 +55,17 @@ class AxisScan:
             raise Unphysical(f"a window of {low:g}..{high:g} is no part of the sweep, 0..1")
 
     def drive(self) -> Floats:
-        """V at even times of a period."""
+        """Return the drive at even times of a period.
+
+        Returns
+        -------
+        Drive in V, shape (8192,).
+        """
         return self.volts(np.arange(_COUNT) / _COUNT)
 
 
 def triangle(size_v: float, offset_v: float, turn: float) -> Waveform:
-    """Return the waveform of an instrument without correction; (14), the turn at the end of a period for a saw."""
+    """Return the triangle (14) of an instrument without correction; a turn of 1 gives a sawtooth."""
 
     def volts(time: Floats) -> Floats:
         back = (1.0 - time) / max(1.0 - turn, 1e-12)
@@ -65,14 +76,18 @@ def triangle(size_v: float, offset_v: float, turn: float) -> Waveform:
 
 @dataclass(frozen=True, eq=False)
 class ScannerModel:
-    """A scanner file, where its keys stand, and the folder of the files that it names."""
+    """A scanner file, the positions of its keys, and the folder of the files that it names."""
 
     scanner: Scanner
     file: Document
     folder: Path
 
-    def moved(self, axis: Literal["x", "y"], scan: AxisScan) -> Floats:
-        """Return the position in nm at even times of a period, from near the lower turn on.
+    def position(self, axis: Literal["x", "y"], scan: AxisScan) -> Floats:
+        """Return the position at even times of a period.
+
+        Returns
+        -------
+        Position in nm from near the lower turn on, shape (8192,).
 
         Raises
         ------
@@ -141,7 +156,7 @@ class ScannerModel:
 
 
 def _scan_share(surface: OffsetSurface, p: float, gain: float, amplitude: float) -> float:
-    """V_scan of v_max where m g V_scan is ``amplitude``, since m may depend on V_scan."""
+    """Return V_scan as a share of v_max where m g V_scan is ``amplitude``, since m may depend on V_scan."""
     share = amplitude
     for _ in range(_ROUNDS):
         share = amplitude / (surface.at(share).factor(p) * gain)
@@ -159,10 +174,10 @@ def scanner_distortion(
     sides: tuple[bool, ...] = (True, False),
     delay_pixels: float = 0.0,
 ) -> Distortion:
-    """Compute where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
+    """Compute the positions of the pixels of a scan, in nm, 0 at the left edge and at the first row.
 
     Columns are evenly spread in time over the window of each sweep of ``x``; they show the sample ``delay_pixels``
-    late. Rows follow each other, ``lines`` in a period of ``y``, from where its window begins, on its way there, or
+    late. Rows follow each other, ``lines`` per period of ``y``, from the beginning of its window, on its way up, or
     ``back``; see ``lines_of``.
 
     Raises
@@ -170,9 +185,9 @@ def scanner_distortion(
     Rejected
         If the scanner file does not suit the scan.
     Unphysical
-        If the driver cannot put out the drive.
+        If the driver cannot put out the drive, or an axis stands still or goes back.
     """
-    moved = model.moved("x", x)
+    position_nm = model.position("x", x)
     low, high = x.window
     place = low + (high - low) * (np.arange(columns) + 0.5) / columns
     late = delay_pixels * (high - low) / columns
@@ -180,10 +195,10 @@ def scanner_distortion(
     for forward in sides:
         way = (place if forward else 1.0 - place) - late
         time = x.turn * way if forward else x.turn + (1.0 - x.turn) * way
-        sweeps[forward] = Sweep1D(_at(moved, time), time)
+        sweeps[forward] = Sweep1D(_at(position_nm, time), time)
     begin = y.turn + (1.0 - y.turn) * (1.0 - y.window[1]) if back else y.turn * y.window[0]
     frame = begin + np.arange(rows + 1) / (lines or lines_of(rows, y, back))
-    slow = _at(model.moved("y", y), frame) * (-1.0 if back else 1.0)
+    slow = _at(model.position("y", y), frame) * (-1.0 if back else 1.0)
     whole = Distortion(rows, columns, sweeps.get(True), sweeps.get(False), slow, np.zeros(rows + 1))
     whole.check()
     left_edge, top = whole.x_range[0], whole.y_range[0]
@@ -195,10 +210,10 @@ def scanner_distortion(
 
 
 def lines_of(rows: int, y: AxisScan, back: bool = False) -> int:
-    """Lines in a period of the slow axis of which the window of one way has so many rows."""
+    """Return the lines per period of the slow axis, of which the window of one way has so many rows."""
     return round(rows / ((1.0 - y.turn if back else y.turn) * (y.window[1] - y.window[0])))
 
 
-def _at(moved: Floats, time: Floats) -> Floats:
-    values: Floats = np.interp(time, np.arange(len(moved)) / len(moved), moved, period=1.0)
+def _at(position_nm: Floats, time: Floats) -> Floats:
+    values: Floats = np.interp(time, np.arange(len(position_nm)) / len(position_nm), position_nm, period=1.0)
     return values

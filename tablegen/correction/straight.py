@@ -1,4 +1,4 @@
-"""All channels of a scan put straight: what was taken, what came of it, and what was done, for the files."""
+"""The corrected channels of a scan, with the recorded ones and the record of the correction, for the files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -15,9 +15,9 @@ from tablegen.version import __version__
 
 @dataclass(frozen=True, eq=False)
 class ScanPicture:
-    """One channel of one direction, rows x columns, rows in the order of time, left on the left.
+    """One channel of one direction, (rows, columns), rows in the order of time, the left end of the line first.
 
-    ``bottom_first`` says that the first row in time is the lowest of the picture.
+    ``bottom_first`` is true if the first row in time is the lowest of the picture.
     """
 
     title: str
@@ -29,10 +29,11 @@ class ScanPicture:
 
 @dataclass(frozen=True, eq=False)
 class StraightScan:
-    """Pictures put straight, NaN where nothing was imaged; their size in nm, or None; and what was done.
+    """Corrected pictures, NaN where nothing was imaged; their size in nm, or None; and the record of the correction.
 
-    ``distortion`` is by what they were bent, ``agreement`` that of the channel that was judged, None without a retrace.
-    ``lattice`` is what is left of its bends, None without a period.
+    ``raw`` are the recorded pictures, ``reference`` the numbers of those that were compared. ``distortion`` is the one
+    that was corrected, ``agreement`` that of the reference pictures, None without a retrace. ``lattice`` has the
+    residual bends, None without a period.
     """
 
     pictures: tuple[ScanPicture, ...]
@@ -40,41 +41,43 @@ class StraightScan:
     distortion: Distortion
     agreement: Agreement | None
     lattice: ResidualLattice | None
-    taken: tuple[ScanPicture, ...]
-    judged: tuple[int, ...]
+    raw: tuple[ScanPicture, ...]
+    reference: tuple[int, ...]
     record: dict[str, Any] = field(default_factory=dict)
 
     @property
     def moved_pixels(self) -> tuple[float, float]:
-        """The largest displacement along x and y, the mean one aside."""
+        """The largest displacement along x and y, relative to the mean one."""
         spreads = []
         for axis in (0, 1):
-            parts = np.concatenate([self.distortion.moved(way)[axis].ravel() for way, _ in self.distortion.sides])
+            parts = np.concatenate(
+                [self.distortion.displacement(way)[axis].ravel() for way, _ in self.distortion.sides]
+            )
             parts = parts[np.isfinite(parts)]
             spreads.append(float(np.max(np.abs(parts - np.mean(parts)))))
         return spreads[0], spreads[1]
 
 
-def put_straight(
-    taken: Sequence[ScanPicture],
+def corrected_scan(
+    raw: Sequence[ScanPicture],
     distortion: Distortion,
     size_nm: tuple[float, float] | None,
-    judged: Sequence[int],
+    reference: Sequence[int],
     how: dict[str, Any],
 ) -> StraightScan:
-    """Every picture resampled once; ``judged`` are the numbers of the trace and the retrace that are compared.
+    """Resample every picture once; ``reference`` are the numbers of the trace and the retrace that are compared.
 
-    ``how`` is what was applied, for the record. All pictures have the rows and columns of the distortion.
+    ``how`` describes the correction, for the record. All pictures have the rows and columns of the distortion.
     """
-    ways = {way: Resampler.of(distortion, way) for way in {picture.forward for picture in taken}}
+    ways = {way: Resampler.of(distortion, way) for way in {picture.forward for picture in raw}}
     pictures = tuple(
-        ScanPicture(one.title, one.forward, ways[one.forward](one.heights), one.unit, one.bottom_first) for one in taken
+        ScanPicture(one.title, one.forward, ways[one.forward](one.heights), one.unit, one.bottom_first) for one in raw
     )
     match = None
-    if len(judged) == 2:
-        first, second = judged
-        raw, straight = ((group[first].heights, group[second].heights) for group in (tuple(taken), pictures))
-        match = agreement(raw, straight, distortion)
+    if len(reference) == 2:
+        first, second = reference
+        recorded, straight = ((group[first].heights, group[second].heights) for group in (tuple(raw), pictures))
+        match = agreement(recorded, straight, distortion)
     before_and_after: dict[str, Any] = {}
     if match is not None:
         names = ("before", "after")
@@ -82,7 +85,7 @@ def put_straight(
         if match.worst is not None:
             before_and_after["apart_pixels"] = dict(zip(names, (round(v, 4) for v in match.worst), strict=True))
     rows, columns = distortion.rows, distortion.columns
-    lattice = residual_lattice(pictures[judged[0]].heights)
+    lattice = residual_lattice(pictures[reference[0]].heights)
     record: dict[str, Any] = {
         "program": f"tablegen {__version__}",
         "command": "correct",
@@ -97,4 +100,4 @@ def put_straight(
     if lattice is not None:
         off = (100.0 * worst / count for worst, count in zip(lattice.worst, (columns, rows), strict=True))
         record["lattice_off_percent"] = [round(value, 4) for value in off]
-    return StraightScan(pictures, size_nm, distortion, match, lattice, tuple(taken), tuple(judged), record)
+    return StraightScan(pictures, size_nm, distortion, match, lattice, tuple(raw), tuple(reference), record)

@@ -1,1 +1,1 @@
-"""A scan or a build as one HTML page that needs no network and no script: charts, tables, and what to mend first."""
+"""A scan or a build as one HTML page that needs no network and no script: charts, tables, and ranked findings."""

@@ -1,4 +1,4 @@
-"""The calibration that a scan stands on: comments and values of the scanner file, and the traces of its operators."""
+"""The calibration of a scan: comments and values of the scanner file, and the traces of its operators."""
 
 import re
 from collections.abc import Iterator
@@ -22,10 +22,10 @@ _KINDS = ("size", "offset", "hysteresis", "frequency", "resonance")
 
 
 def basis(planned: PlannedScan) -> Section:
-    """Where each table is from, its values, and what an operator was wrong by."""
+    """Return the origin of each table, its values, and the errors of an operator on its traces."""
     setup = planned.setup
     comments = [*_comments(setup.scanner_file), *_comments(setup.scan_file)]
-    known = {key.split(".branches")[0] for key, _, _ in comments}
+    commented = {key.split(".branches")[0] for key, _, _ in comments}
     rows = [row(key, text, sources or "-") for key, text, sources in comments]
     for axis in ("x", "y"):
         tables = getattr(setup.scanner, axis)
@@ -34,23 +34,23 @@ def basis(planned: PlannedScan) -> Section:
             if getattr(tables, kind, None) is None:
                 tone: Tone = "quiet" if kind in ("frequency", "resonance") else "warn"
                 rows.append(row(key, TableCell("not in the scanner file: not corrected", tone), "-"))
-            elif key not in known:
+            elif key not in commented:
                 rows.append(row(key, TableCell("no comment of `tablegen calibrate`: origin not known", "quiet"), "-"))
     blocks: list[Grid | Paragraph] = [
-        Grid("Where it is from", ("", "fit", "measurements, with the beginning of their SHA-256"), tuple(rows)),
+        Grid("Origin", ("", "fit", "measurements, with the beginning of their SHA-256"), tuple(rows)),
     ]
     for line in planned.plan.lines:
         blocks += _traces(line)
     blocks.append(
         Paragraph(
-            "The scanner file keeps how many points a fit had, what they leave, which files they were, and standard "
+            "The scanner file has the number of points of a fit, their residuals, their files, and the standard "
             "errors, which `tablegen compare` reads. `tablegen calibrate` prints outliers, and `--report` shows them.",
             "quiet",
         )
     )
     values = tuple(row(key, value) for key, value in _values(setup))
     blocks.append(Grid(f"Values of the scanner file {setup.scanner.name!r}", ("key", "value"), values, folded=True))
-    return Section("calibration", "The calibration it stands on", tuple(blocks))
+    return Section("calibration", "The calibration", tuple(blocks))
 
 
 def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
@@ -61,17 +61,19 @@ def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
         text = read_text(file.name, CONFIGURATION)
     except (OSError, UnicodeDecodeError):  # it was read a moment ago
         return
-    waiting: list[tuple[str, list[str]]] = []
+    pending: list[tuple[str, list[str]]] = []
     for line in map(str.strip, text.splitlines()):
         if mark := _MARK.match(line):
-            waiting.append((f"{mark[1]} {mark[2]}: {mark[3]}", []))
-        elif line.startswith("# from ") and waiting:
-            waiting[-1][1].append(line.removeprefix("# from "))
+            pending.append((f"{mark[1]} {mark[2]}: {mark[3]}", []))
+        elif line.startswith("# from ") and pending:
+            pending[-1][1].append(line.removeprefix("# from "))
         elif header := _TABLE.match(line):
-            yield from ((header[1], shortened(said), shortened("; ".join(sources), 600)) for said, sources in waiting)
-            waiting = []
+            yield from (
+                (header[1], shortened(fit_text), shortened("; ".join(sources), 600)) for fit_text, sources in pending
+            )
+            pending = []
         elif not line.startswith("#"):
-            waiting = []
+            pending = []
 
 
 def _traces(line: LinePlan) -> list[Grid]:
@@ -90,7 +92,7 @@ def _traces(line: LinePlan) -> list[Grid]:
         for one in line.drive.shape.operator.lines
     )
     head = ("trace", "stroke [V]", "centre [V]", "rate [Hz]", "rms [%]", "scaling [%]", "mismatch [%]", "size [%]")
-    return [Grid(f"{line.axis}: by how much the operator misses each trace when that is left out", head, rows)]
+    return [Grid(f"{line.axis}: error of the operator on each trace when that is left out", head, rows)]
 
 
 def _values(setup: Setup) -> Iterator[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""What a page is made of: sections of texts, tables, charts and pictures, before any of it is HTML."""
+"""The contents of a page before they are HTML: sections of texts, tables, charts and pictures."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -9,7 +9,7 @@ from tablegen.charts.chart import Chart
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table; ``tone`` adds colour to what its text says already."""
+    """A cell of a table; ``tone`` is the colour of a state that its text has too."""
 
     text: str
     tone: Tone = ""
@@ -53,7 +53,7 @@ class Charts:
 
 @dataclass(frozen=True)
 class PagePicture:
-    """A picture with places where its features should be, in shares of width and height from the upper left."""
+    """A picture with the ideal positions of its features, in shares of width and height from the upper left."""
 
     title: str
     address: str
@@ -75,7 +75,7 @@ Block = Paragraph | Bullets | Grid | Charts | Pictures
 
 @dataclass(frozen=True)
 class Section:
-    """A heading, and what is below it."""
+    """A heading, and the blocks below it."""
 
     key: str
     title: str
@@ -84,5 +84,5 @@ class Section:
 
 
 def row(name: str, *cells: TableCell | str) -> tuple[TableCell, ...]:
-    """Make a row of a table; texts become cells without a tone."""
+    """Return a row of a table; texts become cells without a tone."""
     return (TableCell(name), *(cell if isinstance(cell, TableCell) else TableCell(cell) for cell in cells))

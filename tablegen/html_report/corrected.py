@@ -1,4 +1,4 @@
-"""A corrected scan as charts: before, after, how far it was moved, and what is left."""
+"""A corrected scan as charts: before, after, the displacement, and the residual."""
 
 from typing import Literal
 
@@ -11,14 +11,14 @@ from tablegen.correction.straight import ScanPicture, StraightScan
 from tablegen.numerics.arrays import Floats, Ints
 
 _ARROWS = 12  # along and across
-_MOST_PIXELS = 256  # of a picture, along and across: more are not seen, and a file would have them all
+_MOST_PIXELS = 256  # of a picture, along and across: more would not be visible, but enlarge the file
 
 
 def correction_charts(scan: StraightScan, name: str) -> PlottedCharts:
-    """Up to six: those of a comparison where there is a retrace, that of the lattice where there is one."""
-    trace = scan.judged[0]
+    """Return up to six charts: comparisons if there is a retrace, the residual lattice if there is one."""
+    trace = scan.reference[0]
     charts = [
-        height_chart("before", scan.taken[trace], None, "before: trace"),
+        height_chart("before", scan.raw[trace], None, "before: trace"),
         height_chart("after", scan.pictures[trace], scan.size_nm, "after: trace"),
         _moved(scan),
     ]
@@ -50,7 +50,7 @@ def _shown(
     label: str,
     arrows: Arrows | None = None,
 ) -> Chart:
-    """Values over a picture, as one sees it: upwards from below in nm, or in pixels."""
+    """Draw values over a picture: upwards from below in nm, or in pixels."""
     rows, columns = values.shape
     width, height = size_nm or (float(columns), float(rows))
     unit = "pixels" if size_nm is None else "nm"
@@ -60,9 +60,9 @@ def _shown(
 
 
 def _moved(scan: StraightScan) -> Chart:
-    """Shades for how far, arrows for where to, in true proportion to the picture."""
-    first = scan.taken[scan.judged[0]]
-    x, y = scan.distortion.moved(first.forward)
+    """Draw the displacement in shades, with arrows in true proportion to the picture."""
+    first = scan.raw[scan.reference[0]]
+    x, y = scan.distortion.displacement(first.forward)
     x, y = (values - float(np.nanmean(values)) for values in (x, y))
     far = np.hypot(x, y)
     arrows = _arrows(-x, -y, first.bottom_first, 1.0)
@@ -74,9 +74,9 @@ def _moved(scan: StraightScan) -> Chart:
 
 
 def _lattice(scan: StraightScan) -> Chart:
-    """How far the sample is off a perfect lattice after the correction; arrows show the direction, much too long."""
+    """Draw the deviation from a perfect lattice after the correction; arrows show the direction, much too long."""
     assert scan.lattice is not None
-    picture = scan.pictures[scan.judged[0]]
+    picture = scan.pictures[scan.reference[0]]
     rows, columns = picture.heights.shape
     x, y = scan.lattice.x, scan.lattice.y
     far = 100.0 * (np.abs(x) / columns if y is None else np.hypot(x / columns, y / rows))
@@ -90,7 +90,7 @@ def _lattice(scan: StraightScan) -> Chart:
 
 
 def _arrows(right: Floats, down: Floats, bottom_first: bool, scale: float) -> Arrows:
-    """Select some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
+    """Return some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
     rows, columns = right.shape
     at_row, at_column = _places(rows), _places(columns)
     grid = np.ix_(at_row, at_column)
@@ -106,18 +106,18 @@ def _places(count: int) -> Ints:
 
 
 def _difference(scan: StraightScan) -> Chart:
-    """Trace less retrace: the left half before, the right half after."""
+    """Draw trace less retrace: the left half before, the right half after."""
     assert scan.agreement is not None
-    trace, retrace = scan.judged
+    trace, retrace = scan.reference
     raw, straight = (
-        _levelled(group[trace].heights) - _levelled(group[retrace].heights) for group in (scan.taken, scan.pictures)
+        _levelled(group[trace].heights) - _levelled(group[retrace].heights) for group in (scan.raw, scan.pictures)
     )
     columns = raw.shape[1]
     both = np.concatenate([raw[:, : columns // 2], straight[:, columns // 2 :]], axis=1)
     most = float(np.nanpercentile(np.abs(raw), 99.5)) or 1.0
     first, last = (100.0 * share for share in scan.agreement.difference)
     title = f"trace less retrace: left before, {first:.3g} %, right after, {last:.3g} % of the contrast"
-    picture = scan.taken[trace]
+    picture = scan.raw[trace]
     unit = f"difference [{picture.unit or 'units of the file'}]"
     return _shown("difference", title, both, picture.bottom_first, (-most, most), None, "signed", unit)
 
@@ -127,10 +127,10 @@ def _apart(scan: StraightScan) -> Chart:
     assert agreement is not None
     title, curves = "trace and retrace have too little in common", []
     if len(agreement.place):
-        after = float(np.max(np.abs(agreement.apart[1])))
+        after = float(np.max(np.abs(agreement.offsets[1])))
         title = f"retrace right of the trace, after: {after:.2g} pixels"
-        before = DrawnCurve("before", "before", agreement.place, agreement.apart[0])
-        curves = [before, DrawnCurve("after", "other", agreement.place, agreement.apart[1])]
+        before = DrawnCurve("before", "before", agreement.place, agreement.offsets[0])
+        curves = [before, DrawnCurve("after", "other", agreement.place, agreement.offsets[1])]
     zero = (Mark(0.0, "", "y"),)
     return Chart("apart", title, "column [pixels]", "distance [pixels]", tuple(curves), marks=zero)
 

@@ -14,7 +14,7 @@ _HEAD = ("", "equation", "factor", "after it")
 
 
 def corrections(subject: Subject) -> Section:
-    """Show a table an axis, and the shape of the hysteresis that is applied."""
+    """Return a table per axis, and the shape of the hysteresis correction."""
     tables, charts = [], []
     for at, (axis, entry) in enumerate(subject.axes):
         line = None if subject.planned is None else subject.planned.plan.lines[at]
@@ -28,7 +28,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
     drive, fourier, rows = entry.drive, entry.fourier, []
     if line is not None:
         share = drive.size_nm / line.drive.size_law.size_nm(1e-6) * 1e-6 * line.drive.driver.span
-        rows.append(row("asked for", "", "", f"{drive.size_nm:.6g} nm line, {share:.6g} V at the slope of small scans"))
+        rows.append(row("request", "", "", f"{drive.size_nm:.6g} nm line, {share:.6g} V at the slope of small scans"))
         rows.append(row("size", "(9), (12)", f"{drive.v_scan / share:.5f}", f"V_scan = {drive.v_scan:.6g} V"))
     else:
         rows.append(row("size", "(9), (12)", "", f"{drive.size_nm:.6g} nm: V_scan = {drive.v_scan:.6g} V"))
@@ -64,7 +64,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
             row("dynamics", "1 / H(f)", "", text + (f"; {limited} harmonics held back by max_boost_db" * (limited > 0)))
         )
     hold_us = 5e5 / rate * entry.line.hold_ticks / entry.line.ticks
-    rows.append(row("converter's hold", "", "", f"played {hold_us:.4g} us ahead, half of what a code is held"))
+    rows.append(row("converter's hold", "", "", f"played {hold_us:.4g} us ahead, half of the zero-order hold"))
     volts = abs(entry.output.v_per_code)
     rows.append(
         row("rounding", "", f"{1e3 * volts:.4g} mV", f"an LSB; {drive.v_amplitude / volts:.6g} codes peak to peak")
@@ -73,14 +73,14 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
 
 
 def shape_chart(line: LinePlan) -> Chart:
-    """By how much the drive is bent away from a straight line."""
+    """Draw the deviation of the drive from a straight line."""
     x = np.linspace(0.0, 1.0, 301)
     low, high = line.band_limit.window
     shape = line.drive.shape
     forward, backward = (shape.value(shape.times(side, x)) - x for side in ("forward", "backward"))
     return Chart(
         f"shape-{line.axis}",
-        f"{line.axis}: how the drive is bent",
+        f"{line.axis}: bend of the drive",
         POSITION,
         "drive less line [% of V_scan]",
         (DrawnCurve("forward", "forward", x, 100.0 * forward), DrawnCurve("backward", "backward", x, 100.0 * backward)),

@@ -1,4 +1,4 @@
-"""Sections as HTML: one template, one style, one script, which the page lets run by its digest."""
+"""Sections as HTML: one template, one style, one script, which the page admits by its digest."""
 
 from base64 import b64encode
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ def document(
     notice: str = "",
     foot: str = "",
 ) -> bytes:
-    """Render the whole page as UTF-8. All texts are escaped here, whoever wrote them."""
+    """Render the whole page as UTF-8. All texts are escaped here, whatever their origin."""
     script = _resource("page.js")
     context = {
         "title": visible(title),

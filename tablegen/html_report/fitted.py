@@ -1,4 +1,4 @@
-"""A calibration as a page: parameters with standard errors, what they leave, outliers, and the data with the fit."""
+"""A calibration as a page: parameters with standard errors, residuals, outliers, and the data with the fit."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -20,23 +20,26 @@ from tablegen.html_report.document import document
 from tablegen.html_report.ranking import Finding
 from tablegen.version import __version__
 
-_LOG_SPAN = 30.0  # of frequencies: above it they are drawn over their logarithm
+_LOG_SPAN = 30.0  # of frequencies: a wider range is drawn over their logarithm
 _BESIDE = 0.08  # of the distance of two traces
 _FEW = 60  # points that are drawn large
 _FOOT = f"Made by tablegen {__version__} from measurements whose SHA-256 are above."
 
 
 def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[str], points: bool = False) -> bytes:
-    """Render the page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
+    """Render the page of a fit.
+
+    ``places`` are files and lines of its outliers; ``points`` is true if measured points would be written.
+    """
     kind = change(fit, []).kind
     meaningless = doubts(fit, points)
     findings = fit_findings(fit, places, points)
-    verdict = TableCell("\u2713 Nothing speaks against this fit.", "good")
+    verdict = TableCell("\u2713 No warning for this fit.", "good")
     if meaningless:
-        verdict = TableCell("\u2717 This fit means nothing as it is; measure again.", "bad")
+        verdict = TableCell("\u2717 This fit is insignificant; measure again.", "bad")
     elif places:
         many = "one outlier" if len(places) == 1 else f"{len(places)} outliers"
-        verdict = TableCell(f"! Look at {many} first.", "warn")
+        verdict = TableCell(f"! Check {many} first.", "warn")
     sections = [
         _parameters(fit),
         Section("data", "Data and fit", (Charts(fit_charts(fit, axis).charts),)),
@@ -51,13 +54,13 @@ def _parameters(fit: Fit) -> Section:
         for key, estimate, meaning in parameters(fit)
     )
     what = "position error, % of the scan" if isinstance(fit, HysteresisFit) else "scale error, %"
-    left = (
+    residuals = (
         f"{what}: up to {fit.before_percent:.2f} without the correction; left {fit.rms_percent:.2g} rms, "
         f"{fit.largest_percent:.2g} at most, of {fit.points} points"
     )
     blocks: list[Block] = [
         Grid("", ("", "value", "standard error", "meaning"), rows),
-        Paragraph(left),
+        Paragraph(residuals),
         Paragraph("Twice the standard error covers the truth in 95 % of measurements.", "quiet"),
     ]
     if isinstance(fit, HysteresisFit):
@@ -70,7 +73,7 @@ def _error(estimate: Estimate) -> str:
 
 
 def _traces(fit: HysteresisFit) -> Grid:
-    """List the results of each trace, or pair of images, by itself."""
+    """Return the results of each trace, or pair of images, separately."""
     rows = []
     for branch in fit.branches:
         for trace in branch.traces:
@@ -105,7 +108,7 @@ def _chart(number: int, curve: Curve) -> Chart:
 
 
 def drawn_curves(curve: Curve) -> list[DrawnCurve]:
-    """Measured points and the fitted line, of each direction that the curve has."""
+    """Return measured points and the fitted line, of each direction that the curve has."""
     kinds: tuple[Literal["points", "line"], ...] = ("points", "line")
     curves = []
     for name, kind, (x, y), at in zip(
@@ -143,14 +146,21 @@ def operator_page(
 ) -> bytes:
     """Render the page of an operator.
 
-    ``traces`` have a name, size and offset in V, rate in Hz; rms, scaling error and mismatch in percent as they are in
-    the fit; and the same with the size where the trace is left out. ``further`` says what to measure next.
+    Parameters
+    ----------
+    candidates
+        Name and mean rms of a trace left out, in percent of the line, of each family.
+    traces
+        Name of each trace; size and offset in V, rate in Hz; rms, scaling error and mismatch in percent of the line in
+        the fit; the same with the size where the trace is left out.
+    further
+        The advice for the next measurement.
     """
     errors = (f"{name}, {where}" for where in ("fit", "out") for name in ("rms", "scaling", "mismatch"))
     head = ("trace", "size [V]", "offset [V]", "rate [Hz]", *errors, "size, out")
     rows = tuple(row(name, *(f"{value:.3g}" for value in figures)) for name, figures in traces)
-    caption = "Percent of the line over x = 0.1..0.9: in the fit, and out, where the operator is made without the trace"
-    tried = Grid("Families that were tried", ("", "mean rms of a trace left out [%]"), _candidates(candidates))
+    caption = "Percent of the line over x = 0.1..0.9: in the fit, and out, with an operator without the trace"
+    families = Grid("Families that were compared", ("", "mean rms of a trace left out [%]"), _candidates(candidates))
     numbers = np.arange(1.0, len(traces) + 1.0)
     inside, left_out = (np.array([figures[at] for _, figures in traces], dtype=np.float64) for at in (3, 6))
     chart = Chart(
@@ -167,12 +177,12 @@ def operator_page(
     )
     sections = [
         Section("traces", "Traces", (Grid(caption, head, rows), Charts((chart,)))),
-        Section("family", "Family", (Paragraph(f"Chosen: {family}."), tried)),
+        Section("family", "Family", (Paragraph(f"Chosen: {family}."), families)),
         _sources(sources),
     ]
     worst = max(range(len(traces)), key=lambda at: left_out[at])
     verdict = TableCell(
-        f"Left out, a trace is missed by {float(np.median(left_out)):.2g} % rms in the median.", "quiet"
+        f"The median error on a trace that is left out is {float(np.median(left_out)):.2g} % rms.", "quiet"
     )
     note = f"the worst is {traces[worst][0]}, {left_out[worst]:.2g} % rms where it is left out"
     findings = [Finding("expect", 1.0, note), Finding("note", 0.0, further)]

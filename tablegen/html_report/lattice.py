@@ -1,4 +1,4 @@
-"""A lattice as the scan would image it, before and after: a simulation on what the scanner file says of the scanner."""
+"""A lattice as the scan would image it, before and after: a simulation on the scanner of the scanner file."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ _CONTRAST = 1.35
 
 
 def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | None:
-    """Trace and retrace, without and with the corrections; None where nothing could be played."""
+    """Return trace and retrace, without and with the corrections; None if none could be played."""
     if len(axes) < 2:  # a line scan makes no image
         return None
     x, y = axes
@@ -31,12 +31,12 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
     pictures, worst = [], []
     ratio = round(min(max(_size(planned.plan.y) / _size(planned.plan.x), 0.5), 2.0), 4)
     for name, one, other in pairs:
-        images, apart = _images(planned, one, other, ratio)
+        images, error_percent = _images(planned, one, other, ratio)
         for side, image in images:
             alternative = f"{side} image of a lattice, {name} the correction of hysteresis"
             title = f"{name} correction, {side} (simulation)"
             pictures.append(PagePicture(title, data_address(image[0]), alternative, image[1], ratio))
-        worst.append(f"{name} it by up to {apart:.3g} % of the image")
+        worst.append(f"{name} it by up to {error_percent:.3g} % of the image")
     grounds = [f"{'the operator' if one.on_operator else 'the laws of the scanner file'}" for one in axes]
     where = f"x on {grounds[0]}, y on {grounds[1]}" if grounds[0] != grounds[1] else f"both axes on {grounds[0]}"
     text = (
@@ -55,7 +55,7 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
 def _remark(axes: tuple[PlayedAxis, ...]) -> str:
     both = " Both pictures have the corrections of offset, size and rate."
     if all(one.on_operator for one in axes):
-        return "What the operator is wrong by is not in the picture; the certificate has it as uncertainty." + both
+        return "The operator's own error is not in the picture; the certificate has it as uncertainty." + both
     return "The picture is as right as the scanner file. `tablegen simulate` plays the scan on another scanner." + both
 
 
@@ -63,9 +63,9 @@ Image = tuple[bytes, tuple[tuple[float, float], ...]]
 
 
 def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple[list[tuple[str, Image]], float]:
-    """Each direction with its picture, and by how much the worst pixel is away from its place, in percent.
+    """Return each direction with its picture, and the largest position error of a pixel in percent.
 
-    The lattice is regular in the picture, whose height is ``ratio`` of its width whatever the window's is.
+    The lattice is regular in the picture, whose height is ``ratio`` of its width whatever that of the window is.
     """
     schedule = planned.plan.schedule
     line: LinePlan = planned.plan.x
@@ -74,7 +74,7 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple
     columns = np.unique(np.linspace(0, schedule.pixels - 1, min(schedule.pixels, _MOST_PIXELS)).astype(np.int64))
     places = pixel_places(schedule, line.drive.turn)
     sides = [("trace", places[0])] + ([("retrace", places[1])] if len(places[1]) else [])
-    turn, images, apart = line.drive.turn, [], 0.0
+    turn, images, error_percent = line.drive.turn, [], 0.0
     shifted = [_about_window(run, one) for run, one in ((x, planned.plan.x), (y, planned.plan.y))]
     for name, place in sides:
         if not len(place):
@@ -84,19 +84,19 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple
         at_x = np.interp(time, x.drive.turns, shifted[0], period=1.0)
         frame = (schedule.up.first + rows[:, None] + time) / schedule.lines
         at_y = np.interp(frame, y.drive.turns, shifted[1], period=1.0)
-        asked_x = (tau - float(np.mean(line.band_limit.window))) * planned.plan.x.drive.size_nm
+        ideal_x = (tau - float(np.mean(line.band_limit.window))) * planned.plan.x.drive.size_nm
         slow = planned.plan.y
-        asked_y = (frame / slow.drive.turn - float(np.mean(slow.band_limit.window))) * slow.drive.size_nm
-        apart = max(
-            apart,
-            100.0 * float(np.max(np.abs(at_x - asked_x))) / nominal[0],
-            100.0 * float(np.max(np.abs(at_y - asked_y))) / nominal[1],
+        ideal_y = (frame / slow.drive.turn - float(np.mean(slow.band_limit.window))) * slow.drive.size_nm
+        error_percent = max(
+            error_percent,
+            100.0 * float(np.max(np.abs(at_x - ideal_x))) / nominal[0],
+            100.0 * float(np.max(np.abs(at_y - ideal_y))) / nominal[1],
         )
-        shown_x, shown_y = at_x / nominal[0], at_y / nominal[1] * ratio
-        heights = _heights(np.broadcast_to(shown_x, shown_y.shape), shown_y, 1.0 / _ROWS)
+        image_x, image_y = at_x / nominal[0], at_y / nominal[1] * ratio
+        heights = _heights(np.broadcast_to(image_x, image_y.shape), image_y, 1.0 / _ROWS)
         sites = _sites((1.0, ratio), 1.0 / _ROWS)
         images.append((name, (grey_png(heights[::-1], -_CONTRAST, 3.0), sites)))
-    return images, apart
+    return images, error_percent
 
 
 def _size(line: LinePlan) -> float:
@@ -105,7 +105,7 @@ def _size(line: LinePlan) -> float:
 
 
 def _about_window(run: AxisRun, line: LinePlan) -> Floats:
-    """Displacement about its mean inside the window, in both directions that are imaged."""
+    """Return the displacement about its mean inside the window, over both imaged directions."""
     sides = [getattr(run.imaged, side) for side in run.directions]
     low, high = line.band_limit.window
     middle = 0.5 * (low + high)
@@ -135,7 +135,7 @@ def _heights(x: Floats, y: Floats, constant: float) -> Floats:
 
 
 def _sites(nominal: tuple[float, float], constant: float) -> tuple[tuple[float, float], ...]:
-    """Where the spots are, in shares of width and height from the upper left."""
+    """Return the positions of the spots, in shares of width and height from the upper left."""
     width, height = nominal
     sites = []
     rows = int(height / (constant * np.sqrt(0.75))) + 2

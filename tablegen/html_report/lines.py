@@ -17,7 +17,7 @@ _POINTS = 601
 
 
 def lines(subject: Subject, axes: tuple[PlayedAxis, ...] | None) -> Section:
-    """One line of x and one frame of y; of a directory the drive alone."""
+    """Return one line of x and one frame of y; of a directory the drive alone."""
     charts = []
     for at, (axis, entry) in enumerate(subject.axes):
         period_s = entry.line.rate_exact[1] / entry.line.rate_exact[0]
@@ -36,23 +36,23 @@ def lines(subject: Subject, axes: tuple[PlayedAxis, ...] | None) -> Section:
 
 
 class DriveFigures(Protocol):
-    """What a chart has to know of a drive: volts at the piezo, and the share of the period that is forward."""
+    """The properties of a drive that a chart needs: volts at the piezo, and the share of the period that is forward."""
 
     @property
     def v_offset(self) -> float:
-        """Offset in V."""
+        """The offset in V."""
 
     @property
     def v_amplitude(self) -> float:
-        """Peak to peak in V."""
+        """The peak-to-peak voltage in V."""
 
     @property
     def turn(self) -> float:
-        """Of the period."""
+        """The share of the period in which the drive rises."""
 
 
 def time_unit(period_s: float) -> tuple[float, str]:
-    """How many of the unit are a second, and its name."""
+    """Return the number of units in a second, and the name of the unit."""
     return (1e3, "ms") if period_s < 1.0 else (1.0, "s")
 
 
@@ -79,7 +79,7 @@ def drive_chart(
 
 
 def _sides(t: Floats, period: float, values: Floats, turn: float) -> tuple[DrawnCurve, DrawnCurve]:
-    """Values over a period by direction; both have the point at which they meet."""
+    """Split values over a period by direction; both have the point at which they meet."""
     forward, backward = t <= turn + 1e-12, t >= turn - 1e-12
     return (
         DrawnCurve("forward", "forward", t[forward] * period, values[forward]),
@@ -92,7 +92,7 @@ def _moved(planned: PlannedScan, played: PlayedAxis, at: int, period: float, lab
     run = played.emitted or played.before
     if run is None:
         return []
-    moved = run.displacement_nm - 0.5 * float(np.max(run.displacement_nm) + np.min(run.displacement_nm))
+    displacement_nm = run.displacement_nm - 0.5 * float(np.max(run.displacement_nm) + np.min(run.displacement_nm))
     axis, turns, what = line.axis, run.drive.turns, "on the operator" if played.on_operator else "by the laws"
     charts = [
         Chart(
@@ -100,7 +100,7 @@ def _moved(planned: PlannedScan, played: PlayedAxis, at: int, period: float, lab
             f"{axis} position, {what}",
             label,
             "from the centre [nm]",
-            _sides(turns, period, moved, line.drive.turn),
+            _sides(turns, period, displacement_nm, line.drive.turn),
             windows(line, period),
             x_range=(0.0, period),
         )

@@ -1,10 +1,10 @@
-"""Numbers and words as the page has them."""
+"""Formats of numbers and words on the page."""
 
 from markupsafe import Markup, escape
 
 
 def figure(value: float, digits: int = 4, signed: bool = False) -> str:
-    """Format a number in significant digits, without an exponent where none is needed; 0.000 for next to nothing."""
+    """Format a number in significant digits, without an exponent unless it is needed; 0.000 below 0.0005."""
     sign = "+" if signed and value >= 0.0005 else ""
     if abs(value) < 0.0005:
         return "0.000"
@@ -14,7 +14,7 @@ def figure(value: float, digits: int = 4, signed: bool = False) -> str:
 
 
 def hertz(value: float) -> str:
-    """Format a frequency."""
+    """Format a frequency with its unit."""
     for least, unit in ((1e6, "MHz"), (1e3, "kHz")):
         if value >= least:
             return f"{value / least:.4g} {unit}"
@@ -22,12 +22,12 @@ def hertz(value: float) -> str:
 
 
 def visible(text: str) -> str:
-    """Text of others without controls, and without what turns the direction of writing."""
+    """Escape control characters and those that change the direction of writing."""
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def coded(text: str) -> Markup:
-    """Text with what stands between backticks as code; everything is escaped."""
+    """Return text with parts between backticks as code; everything is escaped."""
     parts = visible(text).split("`")
     if len(parts) % 2 == 0:  # an odd one is no mark
         return escape(visible(text))

@@ -1,4 +1,4 @@
-"""An operator's fit as charts: what it misses of every trace, and where another one would help."""
+"""An operator's fit as charts: its errors on every trace, and where another trace would help."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ _SIDES: tuple[Role, Role] = ("forward", "backward")
 def operator_charts(
     fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver, axis: str
 ) -> PlottedCharts:
-    """Draw the map over size and offset, then a chart for each trace with its residual left out and in the fit."""
+    """Draw the map over size and offset, then a chart of each trace with its residual left out and in the fit."""
     where = _map(fit, lines, further, driver)
     traces = tuple(_trace(number, fit, line, driver) for number, line in enumerate(lines))
     worst = max(range(len(lines)), key=lambda at: fit.left_out[at].rms)
@@ -28,7 +28,7 @@ def operator_charts(
 
 
 def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) -> Chart:
-    """Left out is what a scan is off that was predicted from the other traces; in the fit is fainter."""
+    """Draw the error of a prediction from the other traces, and, fainter, that in the fit."""
     inside, outside = fit.in_fit[number], fit.left_out[number]
     curves = []
     for name, errors in (("in the fit", inside), ("left out", outside)):
@@ -51,18 +51,18 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) ->
 
 
 def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver) -> Chart:
-    """Draw the rms residual to expect, where the driver reaches and scans are not refused."""
+    """Draw the expected rms residual, where the driver reaches and scans are not refused."""
     span, ends = driver.span, (driver.v_min, driver.v_max)
     strokes, centres = np.linspace(1.0, 0.02, _GRID), np.linspace(0.0, 1.0, _GRID)
     points = np.array([(stroke, centre) for stroke in strokes for centre in centres])
     rms = expected_rms(fit, points).reshape(_GRID, _GRID)
-    known = np.array([line.centre for line in lines])
+    trace_centres = np.array([line.centre for line in lines])
     largest = max(line.stroke for line in lines) + STROKE_REACH
-    refused = (np.min(np.abs(centres[:, None] - known), axis=1) > CENTRE_REACH) | (strokes[:, None] > largest)
+    refused = (np.min(np.abs(centres[:, None] - trace_centres), axis=1) > CENTRE_REACH) | (strokes[:, None] > largest)
     beyond = 0.5 * strokes[:, None] > np.minimum(centres, 1.0 - centres)
-    shown = np.where(refused | beyond, np.nan, rms)
-    high = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
-    raster = Raster(shown, ends, (0.02 * span, span), 0.0, high, "heat", "expected rms [% of the line]")
+    visible = np.where(refused | beyond, np.nan, rms)
+    high = float(np.nanmax(visible)) if np.isfinite(visible).any() else 1.0
+    raster = Raster(visible, ends, (0.02 * span, span), 0.0, high, "heat", "expected rms [% of the line]")
     curves = (
         DrawnCurve(
             "largest size of the driver",
@@ -73,7 +73,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
         DrawnCurve(
             "traces",
             "other",
-            driver.volts(known),
+            driver.volts(trace_centres),
             span * np.array([line.stroke for line in lines]),
             "points",
         ),
@@ -87,7 +87,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
     )
     return Chart(
         "expected",
-        "What to expect of other scans; blank: refused",
+        "Expected error of other scans; blank: refused",
         "offset [V]",
         "size [V]",
         curves,

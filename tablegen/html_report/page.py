@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from tablegen.charts.chart import Chart
-from tablegen.html_report.asked import asked, files, verification
 from tablegen.html_report.basis import basis
 from tablegen.html_report.blocks import Charts, Section, TableCell
 from tablegen.html_report.corrections import corrections
@@ -13,6 +12,7 @@ from tablegen.html_report.lines import lines
 from tablegen.html_report.playing import played_axes
 from tablegen.html_report.promises import certificate
 from tablegen.html_report.ranking import Finding, ranked
+from tablegen.html_report.request import files, request_section, verification
 from tablegen.html_report.scan_errors import errors
 from tablegen.html_report.spectrum import quantisation, spectrum
 from tablegen.html_report.subject import Subject
@@ -22,19 +22,25 @@ Tell = Callable[[str], object]
 
 
 def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
-    """All that the page shows, what tells most of the image first."""
+    """Return all sections of the page, the most important first."""
     planned = subject.planned
     if planned is None:
-        parts = [asked(subject), certificate(subject), lines(subject, None), spectrum(subject), quantisation(subject)]
+        parts = [
+            request_section(subject),
+            certificate(subject),
+            lines(subject, None),
+            spectrum(subject),
+            quantisation(subject),
+        ]
         return [*parts, corrections(subject), verification(subject), files(subject)]
-    tell("playing the scan on what the scanner file says")
+    tell("simulating the scan on the scanner of the scanner file")
     axes = played_axes(planned)
     tell("drawing")
     picture = lattice(planned, axes)
     return [
         *([] if picture is None else [picture]),
         certificate(subject),
-        asked(subject),
+        request_section(subject),
         lines(subject, axes),
         errors(planned, axes),
         spectrum(subject),
@@ -48,13 +54,13 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
 
 
 def charts_of(parts: list[Section]) -> dict[str, Chart]:
-    """Every chart of a page by its key."""
+    """Return every chart of a page by its key."""
     blocks = (block for section in parts for block in section.blocks if isinstance(block, Charts))
     return {chart.key: chart for block in blocks for chart in block.charts}
 
 
 def page(subject: Subject, parts: list[Section]) -> bytes:
-    """Render the page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
+    """Render the page of a scan, without a date or a folder of this machine: the same subject gives the same bytes."""
     manifest, planned = subject.manifest, subject.planned
     findings = ranked(subject)
     notice = ""
@@ -64,16 +70,16 @@ def page(subject: Subject, parts: list[Section]) -> bytes:
             "scanner, the usable area and the calibration as well."
         )
     title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
-    foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is worked out from the scan; nothing is measured."
+    foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is computed from the scan; nothing is measured."
     return document(title, _verdict(subject, findings), findings, parts, notice, foot)
 
 
 def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:
-    """All of the page in a sentence."""
+    """Return the result of the page in a sentence."""
     broken, spoils = (sum(one.weight == weight for one in findings) for weight in ("limit", "spoils"))
     if broken:
         which = "the first point below is" if broken == 1 else f"the first {broken} points below are"
-        return TableCell(f"\u2717 Do not use it before {which} mended.", "bad")
+        return TableCell(f"\u2717 Do not use it before {which} corrected.", "bad")
     if spoils:
         what = "one thing spoils" if spoils == 1 else f"{spoils} things spoil"
         return TableCell(f"! It can be played, but {what} the image.", "warn")

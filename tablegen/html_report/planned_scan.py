@@ -26,11 +26,12 @@ def planned_scan(
     scan
         Path of the scan file.
     verified
-        What `tablegen verify --junit` recorded of its build.
+        The record of `tablegen verify --junit` of its build.
     progress
         Called with each stage, in words.
     remedies
-        Look for warnings, and for remedies of these and of limits that are exceeded: it takes most of the time.
+        True to look for warnings, and for remedies of these and of limits that are exceeded, which takes most of the
+        time.
 
     Raises
     ------

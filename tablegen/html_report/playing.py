@@ -1,8 +1,8 @@
-"""Both axes played on what the scanner file says of the scanner, with and without correction: a simulation.
+"""Simulation of both axes on the scanner of the scanner file, with and without correction.
 
-On an axis with an operator that is the operator. On others it is the law: (17) at the stroke that is really played,
-which is smaller than the line that was corrected, since turnarounds are rounded. So trace and retrace do not meet
-although each branch was inverted; the distance is the one that the certificate expects.
+The scanner is the operator of an axis that has one. Otherwise it is the law: (17) at the stroke that is really played,
+which is smaller than the corrected line, since turnarounds are rounded. Trace and retrace therefore do not meet
+although each branch was inverted; their distance is the one that the certificate expects.
 """
 
 from dataclasses import dataclass
@@ -28,15 +28,27 @@ MOST_TICKS = 1 << 13  # of a period that are played
 
 @dataclass(frozen=True, eq=False)
 class LawAxis:
-    """An axis that does what the laws of the scanner file say at the stroke that it is given; nm from its lower turn.
+    """An axis that follows the laws of the scanner file at the played stroke; nm from its lower turn.
 
-    A layer of ``tablegen refine`` is for what the laws do not know, and is left out.
+    A layer of ``tablegen refine`` corrects what the laws do not describe, and is left out.
     """
 
     line: LinePlan
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Where the axis is, in the middle of each tick of a period that has been played for ever, (ticks,)."""
+        """Return the settled position in the middle of each tick of a period.
+
+        Parameters
+        ----------
+        volts
+            One period in V, held tick by tick, shape (ticks,).
+        tick_s
+            Length of a tick in s.
+
+        Returns
+        -------
+        Position in nm, shape (ticks,).
+        """
         line, count = self.line, len(volts)
         drive = line.drive
         w = self._behind_dynamics((volts - drive.v_offset) / drive.v_amplitude + 0.5, tick_s)
@@ -71,13 +83,13 @@ class PlayedCorrection:
 
     @property
     def title(self) -> str:
-        """As headings have it."""
+        """The words for headings."""
         return "without correction" if self.name == "uncompensated" else f"with the {self.name}"
 
 
 @dataclass(frozen=True)
 class PlayedAxis:
-    """An axis with all of its corrections, what a build emits the last; ``rejected`` says why others are missing."""
+    """An axis with all of its corrections, the emitted one last; ``rejected`` says why others are missing."""
 
     axis: Literal["x", "y"]
     on_operator: bool
@@ -86,13 +98,13 @@ class PlayedAxis:
 
     @property
     def emitted(self) -> AxisRun | None:
-        """What a build emits."""
+        """The run of the emitted waveform."""
         last = self.corrections[-1] if self.corrections else None
         return last.run if last is not None and last.name != "uncompensated" else None
 
     @property
     def before(self) -> AxisRun | None:
-        """Without the correction of hysteresis."""
+        """The run without the correction of hysteresis."""
         first = self.corrections[0] if self.corrections else None
         return first.run if first is not None and first.name == "uncompensated" else None
 
@@ -116,7 +128,7 @@ def without_refinement(setup: Setup) -> Setup:
 
 
 def _models(planned: PlannedScan) -> list[str]:
-    """List the models to compare with: without correction, and beside an operator the laws."""
+    """Return the models to compare with: without correction, and beside an operator the laws."""
     names = [models.UNCOMPENSATED]
     for line in planned.plan.lines:
         if isinstance(line.drive.shape, OperatorLine):

@@ -1,4 +1,4 @@
-"""The certificate with its limits: what a build promises of both axes, and what the scanner is expected to do."""
+"""The certificate with its limits: the guarantees of a build for both axes, and the errors expected on the scanner."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ _HEAD = ("", "figure", "limit", "")
 
 
 def certificate(subject: Subject) -> Section:
-    """Show a table of the certificate for each axis."""
+    """Return a table of the certificate for each axis."""
     planned = subject.planned
     limits = Limits() if planned is None else planned.plan.limits
     tables = [
@@ -55,8 +55,8 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
     if certificate.shaped is not None:
         rows += _shaped(certificate.shaped)
     rows += _scaling(certificate, limits.max_scaling_error_percent)
-    for side, moved in (certificate.refinement_percent or {}).items():
-        text = f"moves {moved.get('position', 0.0):.3g} % of the line, removes {moved.get('scaling', 0.0):.3g} %"
+    for side, changes in (certificate.refinement_percent or {}).items():
+        text = f"moves {changes.get('position', 0.0):.3g} % of the line, removes {changes.get('scaling', 0.0):.3g} %"
         rows.append(row(f"refinement {side}", text, "", ""))
     if certificate.largest_step is not None:
         rows.append(_bounded("largest step", certificate.largest_step, output.max_step, "codes a tick"))
@@ -91,7 +91,7 @@ def _scaling(certificate: ManifestCertificate, most: float | None) -> list[tuple
 
 
 def _shaped(shaped: ManifestShaped) -> list[tuple[TableCell, ...]]:
-    """List what shaping is for, and what it costs, beside the same without it."""
+    """Return the effect and the cost of shaping, beside the same without it."""
     now, before, rounded = shaped.changes, shaped.rounded.changes, shaped.rounded
     rows = [row("the same without shaping", f"{figure(rounded.rms_error_lsb, 3)} LSB rms", "", "")]
     for side, value in rounded.scaling_error_percent.items():
@@ -107,7 +107,7 @@ _PARTS = ("uncompensated", "total", "band_limit", "quantisation", "model")
 
 
 def _parts(subject: Subject) -> Grid:
-    """List the parts of the scaling errors; their peaks are at different places, and do not add up."""
+    """Return the parts of the scaling errors; their peaks are at different places, and do not add up."""
     rows = []
     for axis, entry in subject.axes:
         for side, error in (entry.certificate.scaling_error_percent or {}).items():
@@ -119,15 +119,15 @@ def _parts(subject: Subject) -> Grid:
 def _bounded(
     name: str, value: float, limit: float | None, unit: str, advice: float | None = None, signed: bool = False
 ) -> tuple[TableCell, ...]:
-    """Show a figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
-    shown = f"{figure(value, 4, signed)} {unit}"
+    """Return a figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
+    text = f"{figure(value, 4, signed)} {unit}"
     if limit is not None:
         good = abs(value) <= limit
         cell = TableCell("\u2713 within", "good") if good else TableCell("\u2717 exceeded", "bad")
-        return row(name, shown, f"{figure(limit, 6)} {unit}", cell)
+        return row(name, text, f"{figure(limit, 6)} {unit}", cell)
     if advice is not None and abs(value) > advice:
-        return row(name, shown, "none", TableCell(f"! above {advice:g} {unit}", "warn"))
-    return row(name, shown, "none" if advice is not None else "", "")
+        return row(name, text, "none", TableCell(f"! above {advice:g} {unit}", "warn"))
+    return row(name, text, "none" if advice is not None else "", "")
 
 
 def _expected(certificate: ManifestCertificate, most: float | None) -> tuple[tuple[TableCell, ...], ...]:
@@ -158,6 +158,6 @@ def _expected(certificate: ManifestCertificate, most: float | None) -> tuple[tup
 
 
 def _figure(name: str, figure_: ManifestFigure, basis: str, signed: bool = False) -> tuple[TableCell, ...]:
-    shown = f"{figure(figure_.value, 3, signed)} %"
+    text = f"{figure(figure_.value, 3, signed)} %"
     by = "not known" if figure_.uncertainty is None else f"\u00b1 {figure_.uncertainty:.2g} %"
-    return row(name, shown, by, TableCell(basis, "quiet"))
+    return row(name, text, by, TableCell(basis, "quiet"))

@@ -1,4 +1,4 @@
-"""What to know before the image is trusted: what spoils it first comes first, small print last."""
+"""The findings of a report: errors that spoil the image come first."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,11 +10,11 @@ from tablegen.html_report.subject import Subject
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import ManifestAxis
 
-_CHORD = 0.05  # of the line: a scaling error over it is a place that is wrong by so much of it
+_CHORD = 0.05  # of the line: the position error of a scaling error over a chord is their product
 
 
 def ranked(subject: Subject) -> list[Finding]:
-    """All that is known, the worst first."""
+    """Return all findings, the worst first."""
     return worst_first(_findings(subject))
 
 
@@ -23,15 +23,15 @@ def _findings(subject: Subject) -> Iterator[Finding]:
         if state.wrong:
             yield Finding("limit", 1000.0, f"{state.name} {state.wrong}; build it again", code="changed-file")
     yield from _verified(subject.verified, subject)
-    planned, stated = subject.planned, set[tuple[str, str]]()
+    planned, reported = subject.planned, set[tuple[str, str]]()
     groups: list[list[Finding]] = [[finding for axis, entry in subject.axes for finding in _expected(axis, entry)]]
     if planned is not None:
         broken = [_of_problem("limit", 100.0, problem) for problem in planned.broken]
         warnings = [_of_problem("spoils", percent, problem) for percent, problem in planned.warnings]
         groups = [broken, warnings, note_findings(planned.plan), *groups]
-    for group in groups:  # what a group with more weight has is not said again
-        yield from (finding for finding in group if (finding.code, finding.axis) not in stated)
-        stated |= {(finding.code, finding.axis) for finding in group}
+    for group in groups:  # a finding of a group with more weight is not repeated
+        yield from (finding for finding in group if (finding.code, finding.axis) not in reported)
+        reported |= {(finding.code, finding.axis) for finding in group}
 
 
 def _of_problem(weight: Weight, percent: float, problem: Problem) -> Finding:
@@ -39,7 +39,7 @@ def _of_problem(weight: Weight, percent: float, problem: Problem) -> Finding:
 
 
 def _expected(axis: Axis, entry: ManifestAxis) -> Iterator[Finding]:
-    """Yield what to expect of an axis."""
+    """Yield the expected errors of an axis."""
     certificate = entry.certificate
     expected = certificate.expected
     if expected is not None and expected.mismatch_percent is not None:
@@ -65,7 +65,7 @@ def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding
 
 
 def without_folder(problem: Problem) -> Problem:
-    """Return a problem at its place in the file without the folder, which another machine does not have."""
+    """Return a problem with the name of its file without the folder, which another machine does not have."""
     return problem._replace(file=Path(problem.file).name)
 
 

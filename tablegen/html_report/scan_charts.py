@@ -1,4 +1,4 @@
-"""A planned scan as charts: its drive, how that is bent, and the error that is to be expected of it."""
+"""A planned scan as charts: its drive, the bend of the drive, and the expected error."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,7 @@ _POINTS = 321
 
 
 def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], brief: bool) -> PlottedCharts:
-    """Draw a row for each axis; ``brief`` is without its last chart, for which the scan is played."""
+    """Draw a row for each axis; ``brief`` leaves out its last chart, which takes a simulation."""
     rows = [[drive_of(line), *([shape_chart(line)] if _bent(line) else [])] for line in plan.moving]
     if not brief:
         for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
@@ -39,7 +39,7 @@ def drive_of(line: LinePlan) -> Chart:
 
 
 def modelled_error(line: LinePlan) -> Chart:
-    """Where the modelled piezo is less where it should be, inside the imaging windows; faint without compensation.
+    """Draw the modelled position less the requested one, inside the imaging windows; faint without compensation.
 
     To first order in the deviation between drive and branch: x - tau = (w - u) / u'.
     """

@@ -9,14 +9,14 @@ from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.virtual.line_error import BranchError
-from tablegen.virtual.own_run import measured
+from tablegen.virtual.own_run import image_errors
 from tablegen.virtual.simulation import AxisRun
 
 SIDES: tuple[Role, Role] = ("forward", "backward")
 
 
 def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
-    """Residual and scaling error of both axes."""
+    """Return residual and scaling error of both axes."""
     charts, rows, words = [], [], []
     for line, played in zip(planned.plan.moving, axes, strict=True):
         for correction in played.corrections:
@@ -43,27 +43,31 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
         "errors",
         "Residual and scaling error",
         tuple(blocks),
-        "The emitted integers, played on what the scanner file says of the scanner. This is a simulation. It shows "
-        "what a correction leaves if the scanner file is right, and it cannot show whether it is. Each chart has "
-        "a scale of its own.",
+        "A simulation: the emitted integers on the scanner that the scanner file describes. It shows the residual of a "
+        "correction if the scanner file is right; it cannot show whether it is. Each chart has a scale of its own.",
     )
 
 
 def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
-    rms, scaling, mismatch, size = measured(correction.run)
-    apart = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
-    return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", apart, f"{size:+.3g}")
+    rms, scaling, mismatch, size = image_errors(correction.run)
+    mismatch_text = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
+    return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", mismatch_text, f"{size:+.3g}")
 
 
 def inside(branch: BranchError) -> tuple[Floats, Floats]:
-    """Position and residual within the window."""
+    """Return the residual within the window.
+
+    Returns
+    -------
+    Position on the line, 0..1, and residual in percent of the line, shape (points,) each.
+    """
     low, high = branch.window
     inside_window = (branch.position >= low - 1e-9) & (branch.position <= high + 1e-9)
     return branch.position[inside_window], branch.residual[inside_window]
 
 
 def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
-    """Draw what is left in the image, about the best straight line through it."""
+    """Draw the residual in the image, about the best straight line through it."""
     run = correction.run
     return Chart(
         f"residual-{axis}-{correction.name}",
@@ -90,7 +94,7 @@ def _charts(line: LinePlan, correction: PlayedCorrection) -> list[Chart]:
 
 
 def _refinement(line: LinePlan) -> list[Chart]:
-    """By how much the layer moves the piezo."""
+    """Draw the displacement of the piezo by the layer."""
     if line.layer is None:
         return []
     low, high = line.band_limit.window
@@ -104,7 +108,7 @@ def _refinement(line: LinePlan) -> list[Chart]:
     return [
         Chart(
             f"refinement-{line.axis}",
-            f"{line.axis}: what the refinement adds",
+            f"{line.axis}: effect of the refinement",
             POSITION,
             "moved by [% of the line]",
             tuple(curves),

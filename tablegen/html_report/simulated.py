@@ -12,38 +12,38 @@ from tablegen.virtual.simulation import AxisRun, Run
 
 
 def stage_charts(name: str, stages: Sequence[SimulationStage]) -> PlottedCharts:
-    """Of each axis a row of residuals and a row of scaling errors: uncompensated, then each scanner file's model."""
+    """Draw a row of residuals and one of scaling errors per axis: uncompensated, then each scanner file's model."""
     residuals, rows = [], []
     for axis in ("x", "y"):
-        shown = [
+        entries = [
             (f"{axis}, {_titled(stage, run, axis)}", f"{axis}-{stage.name}-{run.model}", getattr(run, axis))
             for number, stage in enumerate(stages)
             for run in stage.runs
-            if axis in run.asked or (number == 0 and run.model == models.UNCOMPENSATED)
+            if axis in run.configured or (number == 0 and run.model == models.UNCOMPENSATED)
         ]
-        row = [_residual(*one) for one in shown]
+        row = [_residual(*one) for one in entries]
         residuals += row
-        rows += [*row, *(_scaling(*one) for one in shown)]
+        rows += [*row, *(_scaling(*one) for one in entries)]
     columns = max(1, len(rows) // 4)
     return PlottedCharts(f"{name}: {LABEL}", tuple(rows), columns, tuple(residuals))
 
 
 def _titled(stage: SimulationStage, run: Run, axis: str) -> str:
-    if run.model == models.UNCOMPENSATED and axis not in run.asked:
+    if run.model == models.UNCOMPENSATED and axis not in run.configured:
         return "without correction"
     return f"{run.model}, file as {stage.name}"
 
 
 def own_charts(name: str, runs: Sequence[OwnRun]) -> PlottedCharts:
-    """Draw what each correction leaves on the first of the scanners that depart from the operator."""
-    shown = [
+    """Draw the residual of each correction on the first of the scanners that depart from the operator."""
+    entries = [
         (f"{run.axis}, {row.correction}", f"{run.axis}-{row.correction}", row.example)
         for run in runs
         for row in run.rows
         if row.example is not None
     ]
-    residuals = [_residual(*one) for one in shown]
-    rows = [*residuals, *(_scaling(*one) for one in shown)]
+    residuals = [_residual(*one) for one in entries]
+    rows = [*residuals, *(_scaling(*one) for one in entries)]
     heading = f"{name}: simulation on the scanner file's own operator, the first of its departures"
     return PlottedCharts(heading, tuple(rows), max(1, len(residuals)), tuple(residuals))
 

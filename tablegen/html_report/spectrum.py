@@ -1,4 +1,4 @@
-"""The spectrum of what is played, with cutoff and resonance; and what rounding leaves of the codes."""
+"""The spectrum of the emitted waveform, with cutoff and resonance; and the rounding error of the codes."""
 
 from itertools import pairwise
 
@@ -19,14 +19,14 @@ _BINS = 300  # of the spectrum of the codes, evenly spread over the logarithm
 
 
 def spectrum(subject: Subject) -> Section:
-    """Harmonics of the drive, and the codes' own noise beyond them."""
+    """Return the harmonics of the drive, and the noise of the codes beyond them."""
     charts = tuple(_spectrum(axis, entry) for axis, entry in subject.axes)
     return Section(
         "spectrum",
         "Spectrum",
         (Charts(charts),),
-        "Power of each harmonic of the emitted waveform, relative to the first. Beyond the cutoff there is what "
-        "rounding to codes and tables makes.",
+        "Power of each harmonic of the emitted waveform, relative to the first. Beyond the cutoff there is the noise "
+        "of rounding to codes and tables.",
     )
 
 
@@ -35,19 +35,21 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
     n = np.arange(1.0, series.harmonics + 1.0)
     power = series.a**2 + series.b**2
     first = float(power[0]) or 1.0
-    shown = [DrawnCurve("emitted harmonics", "other", n * rate, _db(power / first), "stems")]
+    curves = [DrawnCurve("emitted harmonics", "other", n * rate, _db(power / first), "stems")]
     turn = entry.drive.turn
     triangle = (np.sin(np.pi * n * turn) / (np.pi * n) ** 2 / (turn * (1.0 - turn))) ** 2
-    seen = triangle > triangle[0] * 10.0 ** (0.1 * _FLOOR_DB)
-    shown.append(DrawnCurve("plain triangle", "before", n[seen] * rate, _db(triangle[seen] / triangle[0]), "points"))
+    visible = triangle > triangle[0] * 10.0 ** (0.1 * _FLOOR_DB)
+    curves.append(
+        DrawnCurve("plain triangle", "before", n[visible] * rate, _db(triangle[visible] / triangle[0]), "points")
+    )
     last = series.harmonics * rate
     ticks = entry.line.ticks
     if ticks <= _MOST_SPECTRUM_TICKS:
         codes = entry.program.played(0, ticks) * entry.output.v_per_code
-        found = np.abs(np.fft.rfft(codes - np.mean(codes))[1:]) ** 2 / ticks**2 * 4.0 / entry.drive.v_amplitude**2
-        noise = np.arange(1, len(found) + 1) > series.harmonics
-        f, worst = _worst_of_bins(np.arange(1.0, len(found) + 1.0)[noise] * rate, found[noise] / first)
-        shown.append(DrawnCurve("codes beyond the cutoff", "other", f, _db(worst), faint=True))
+        code_power = np.abs(np.fft.rfft(codes - np.mean(codes))[1:]) ** 2 / ticks**2 * 4.0 / entry.drive.v_amplitude**2
+        noise = np.arange(1, len(code_power) + 1) > series.harmonics
+        f, worst = _worst_of_bins(np.arange(1.0, len(code_power) + 1.0)[noise] * rate, code_power[noise] / first)
+        curves.append(DrawnCurve("codes beyond the cutoff", "other", f, _db(worst), faint=True))
         last = rate * ticks / 2.0
     marks = [Mark(series.harmonics * rate, f"cutoff {hertz(series.harmonics * rate)}")]
     bands: list[Band] = []
@@ -63,7 +65,7 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
         f"{axis} spectrum",
         "frequency [Hz]",
         "power [dB of the first harmonic]",
-        tuple(shown),
+        tuple(curves),
         tuple(bands),
         tuple(marks),
         log_x=True,
@@ -77,7 +79,7 @@ def _db(power: Floats) -> Floats:
 
 
 def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
-    """Return the largest power of each bin, where it is."""
+    """Return the largest power of each bin, with its frequency."""
     if len(f) <= _BINS:
         return f, power
     which = np.searchsorted(np.geomspace(f[0], f[-1], _BINS + 1), f, side="right")
@@ -87,7 +89,7 @@ def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
 
 
 def quantisation(subject: Subject) -> Section:
-    """Show the emitted code less the code of the float waveform."""
+    """Return the emitted code less the code of the unrounded waveform."""
     charts = []
     for axis, entry in subject.axes:
         k = _looked_at(entry.program)
@@ -101,7 +103,7 @@ def quantisation(subject: Subject) -> Section:
                 f"{axis} error of the codes",
                 f"time [{unit}]",
                 "error [LSB]",
-                (DrawnCurve("emitted less asked", "other", times * period_s * k / entry.line.ticks, error),),
+                (DrawnCurve("emitted less requested", "other", times * period_s * k / entry.line.ticks, error),),
                 marks=() if shaped else _certified(entry.certificate.max_error_lsb),
                 x_range=(0.0, times * period_s),
             )
@@ -144,9 +146,9 @@ def _certified(worst: float) -> tuple[Mark, ...]:
 
 
 def _looked_at(program: Program) -> Ints:
-    """All ticks of a period, or of a long one as many, evenly spread and at odd distances, so that no beat hides.
+    """Return all ticks of a period; of a long one as many, evenly spread at odd distances, so that no beat hides.
 
-    Of a long one that is shaped the first ones: its codes need all before them.
+    Of a long shaped one it returns the first ticks: the code of a shaped tick depends on all before it.
     """
     if program.ticks <= _MOST_TICKS or program.output.shaping.order:
         return np.arange(min(program.ticks, _MOST_TICKS), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""What a report is about: a scan that was planned just now, or a build as its directory has it."""
+"""The subject of a report: a planned scan, or a build in its directory."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from tablegen.waveform.series import FourierSeries
 
 @dataclass(frozen=True)
 class FileState:
-    """A file of the build: its SHA-256 as the manifest has it, and what is wrong with the one in the directory."""
+    """A file of the build: its SHA-256 in the manifest, and the fault of the one in the directory."""
 
     name: str
     sha256: str
@@ -33,10 +33,9 @@ class FileState:
 
 @dataclass(frozen=True)
 class PlannedScan:
-    """What is known of a scan and not of a directory.
+    """The data of a scan that a directory does not have.
 
-    ``broken`` are limits that the certificate exceeds, ``warnings`` errors above what goes without saying, each with
-    its percentage.
+    ``broken`` are limits that the certificate exceeds, ``warnings`` errors above the usual, each with its percentage.
     """
 
     setup: Setup
@@ -47,14 +46,14 @@ class PlannedScan:
 
     @property
     def limited(self) -> bool:
-        """Whether the scan file sets a limit."""
+        """True if the scan file sets a limit."""
         limits = self.plan.limits
         return limits.max_error_lsb is not None or limits.max_scaling_error_percent is not None
 
 
 @dataclass(frozen=True)
 class Subject:
-    """The build as its manifest has it; ``planned`` is None where nothing but a directory was given."""
+    """The build as its manifest describes it; ``planned`` is None for a directory."""
 
     manifest: Manifest
     digest: str
@@ -73,7 +72,7 @@ class Subject:
 
 
 def series_of(axis: ManifestAxis) -> FourierSeries:
-    """Return the waveform w(t) that is played."""
+    """Return the emitted waveform w(t)."""
     fourier = axis.fourier
     return FourierSeries(fourier.a0, np.array(fourier.a), np.array(fourier.b))
 
@@ -87,7 +86,13 @@ def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRe
 
 
 def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
-    """Read the build in a directory. Raises ``NotABuild``."""
+    """Read the build in a directory.
+
+    Raises
+    ------
+    NotABuild
+        If the directory is not a build.
+    """
     manifest = read_build(folder).manifest
     digest = sha256(read_bytes(folder / MANIFEST, MANIFEST_KIND)).hexdigest()
     states = [FileState(MANIFEST, digest)]

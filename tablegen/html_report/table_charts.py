@@ -11,11 +11,11 @@ from tablegen.fixedpoint.table_shape import MODES
 from tablegen.html_report.table_rows import AxisTables
 
 _ROLES: dict[Mode, Role] = {"direct": "before", "interpolated": "limit", "cubic": "other"}
-_HIGHEST = 4.0  # of what is asked
+_HIGHEST = 4.0  # times the requested error
 
 
 def table_charts(name: str, axes: Sequence[AxisTables]) -> PlottedCharts:
-    """Draw a chart an axis: the tables of each mode, the chosen one, and the requested error."""
+    """Draw a chart per axis: the tables of each mode, the chosen one, and the requested error."""
     return PlottedCharts(f"tables of {name}", tuple(map(table_chart, axes)), len(axes))
 
 
@@ -28,9 +28,9 @@ def table_chart(tables: AxisTables) -> Chart:
         if rows:
             memory = np.array([float(row.shape.memory_bits) for row in rows])
             curves.append(DrawnCurve(mode, _ROLES[mode], memory, np.array([row.max_error_lsb for row in rows])))
-    chosen = tables.chosen
-    at = np.array([float(chosen.shape.memory_bits)]), np.array([chosen.max_error_lsb])
-    curves.append(DrawnCurve(f"chosen: {chosen.shape.length} x {chosen.shape.bits}", "other", *at, kind="points"))
+    choice = tables.chosen
+    at = np.array([float(choice.shape.memory_bits)]), np.array([choice.max_error_lsb])
+    curves.append(DrawnCurve(f"chosen: {choice.shape.length} x {choice.shape.bits}", "other", *at, kind="points"))
     return Chart(
         f"tables-{tables.axis}",
         f"{tables.axis}: the largest error of a code against memory",

@@ -1,4 +1,4 @@
-"""What the modes of a table take on a device: measured, and written by ``python benchmarks/tables.py --costs``."""
+"""The cost of each table mode on a device: measured, and written by ``python benchmarks/tables.py --costs``."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from tablegen.fixedpoint.program import Mode
 
 
 class MeasuredRun(NamedTuple):
-    """What the instructions of a sample depend on beside its mode: the memory of words, and the converter's coding."""
+    """Conditions of the instruction counts besides the mode: word memory, and the converter's coding."""
 
     table_storage_bits: int  # 16, or 32 if a table of either axis has words of more than 16 bits
     output_storage_bits: int  # 16, or 32 if a converter's word has more than 16 bits

@@ -1,4 +1,4 @@
-"""The tables that an axis could have, with what each errs by and takes: as data, for text, JSON and a chart."""
+"""The tables that an axis could have, with error and cost of each: as data, for text, JSON and a chart."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,41 +20,42 @@ from tablegen.planning.other_table import with_table
 from tablegen.planning.table_front import table_front
 from tablegen.waveform.sampler import Sampler
 
-_CHUNK_TICKS = 1 << 16  # that are worked out together
+_CHUNK_TICKS = 1 << 16  # that are evaluated at a time
 
 
 @dataclass(frozen=True)
 class TableRow:
     """A table with its errors over all ticks, in LSB of the converter; of shaped output before the rounding.
 
-    ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
-    ``run`` is what its instructions depend on, if no word of the other axis is wider.
+    ``stored_bits`` is its memory in C: in words of 16 or 32 bits, with the first ones repeated behind the last.
+    ``smallest`` marks the least memory within the requested error. ``run`` are the conditions of its instructions, if
+    no word of the other axis is wider.
     """
 
     shape: TableShape
     max_error_lsb: float
     rms_error_lsb: float
     stored_bits: int
-    chosen: bool
+    smallest: bool
     planned: bool
     run: MeasuredRun
 
     @property
     def instructions(self) -> dict[str, float]:
-        """A sample in C that is not shaped, by processor."""
+        """Instructions per sample in C, without shaping, by processor."""
         return COUNTS[self.run][self.shape.mode]
 
     @property
     def cells(self) -> int:
-        """One axis in Verilog."""
+        """Cells of one axis in Verilog."""
         return CELLS[self.shape.mode]
 
 
 @dataclass(frozen=True)
 class AxisTables:
-    """The tables of one axis by memory, the one that is chosen, and Fourier words that a device renders into another.
+    """The tables of one axis by memory, and one that a device renders from Fourier words.
 
-    ``rendered`` is None where no table that a device renders keeps the error. ``shaped`` is whether the output is.
+    ``rendered`` is None where no table that a device renders keeps the error. ``shaped`` is true if the output is.
     """
 
     axis: Literal["x", "y"]
@@ -67,16 +68,16 @@ class AxisTables:
 
     @property
     def chosen(self) -> TableRow:
-        """The least memory within the error."""
-        return next(row for row in self.rows if row.chosen)
+        """The table with the least memory within the error."""
+        return next(row for row in self.rows if row.smallest)
 
     @property
     def upload_bits(self) -> int:
-        """Bits of the Fourier words."""
+        """The bits of the Fourier words."""
         return (2 * self.harmonics + 1) * WORD_BITS
 
     def record(self) -> dict[str, Any]:
-        """As JSON."""
+        """Return the tables as plain data, for JSON."""
         fourier = None
         if self.rendered is not None:
             fourier = {"upload_bits": self.upload_bits, "rendered": _shape(self.rendered)}
@@ -94,7 +95,7 @@ class AxisTables:
                     "rms_error_lsb": float(f"{row.rms_error_lsb:.6g}"),
                     "instructions": row.instructions,
                     "hx8k_cells": row.cells,
-                    "chosen": row.chosen,
+                    "chosen": row.smallest,
                     "planned": row.planned,
                 }
                 for row in self.rows
@@ -108,7 +109,7 @@ def _shape(shape: TableShape) -> dict[str, Any]:
 
 
 def _behind(shape: TableShape) -> int:
-    """Words that stand behind the last one in C."""
+    """Return the number of words behind the last one in C."""
     return WORDS_BEHIND if shape.mode == "cubic" else 1
 
 
@@ -120,7 +121,13 @@ def _run(shape: TableShape, output: Output) -> MeasuredRun:
 
 
 def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
-    """List the tables of a planned axis. Raises ``Unphysical`` where none keeps the requested error."""
+    """List the tables of a planned axis.
+
+    Raises
+    ------
+    Unphysical
+        If none keeps the requested error.
+    """
     front = table_front(setup, line)
 
     def rows() -> Iterator[TableRow]:
@@ -146,7 +153,7 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
 
 
 def _errors(line: LinePlan) -> tuple[float, float]:
-    """Largest and rms; of shaped output of what is rounded, since the table is to blame for that."""
+    """Return the largest and the rms error; of shaped output before rounding, which is not the table's error."""
     program = line.program
     if not program.output.shaping.order:
         played = EmittedPeriod(line)

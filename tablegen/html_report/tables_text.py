@@ -11,7 +11,7 @@ _HEAD = (
 
 
 def tables_text(tables: AxisTables) -> Iterator[str]:
-    """Title, a line a table, and what to write into the scan file."""
+    """Yield a title, a line per table, and the keys for the scan file."""
     shaped = "; shaped: errors are those before the rounding, instructions without it" if tables.shaped else ""
     yield f"{tables.axis}: {tables.harmonics} harmonics, {tables.ticks} ticks{shaped}"
     yield from _HEAD
@@ -20,13 +20,13 @@ def tables_text(tables: AxisTables) -> Iterator[str]:
         into = f"rendered on the device into {tables.rendered}: {tables.rendered.memory_bits} bits"
         yield f"     {'Fourier words':<13}{2 * tables.harmonics + 1:>7}{32:>6}{tables.upload_bits:>11}  {into}"
     yield "     (cells: of words and codes of 16 bits, cubic of words of 14)"
-    chosen = tables.chosen.shape
+    choice = tables.chosen.shape
     yield ""
     yield f"* the least memory within {tables.max_error_lsb:g} LSB. In the scan file, so that each build finds it:"
     yield from _keys(tables.axis, {"mode": '"auto"', "max_error_lsb": f"{tables.max_error_lsb:g}"})
     yield "or as it is:"
-    yield from _keys(tables.axis, {"mode": f'"{chosen.mode}"', "length": f"{chosen.length}", "bits": f"{chosen.bits}"})
-    if any(row.planned and not row.chosen for row in tables.rows):
+    yield from _keys(tables.axis, {"mode": f'"{choice.mode}"', "length": f"{choice.length}", "bits": f"{choice.bits}"})
+    if any(row.planned and not row.smallest for row in tables.rows):
         yield "= the table of the scan file"
 
 
@@ -37,7 +37,7 @@ def _keys(axis: str, keys: dict[str, str]) -> Iterator[str]:
 
 def _row(row: TableRow, digits: int) -> str:
     shape, takes = row.shape, row.instructions
-    mark = "*" if row.chosen else "=" if row.planned else " "
+    mark = "*" if row.smallest else "=" if row.planned else " "
     return (
         f"  {mark}  {shape.mode:<13}{shape.length:>7}{shape.bits:>6}{shape.memory_bits:>11}{row.stored_bits:>11}"
         f"{row.max_error_lsb:>8.{digits}f}{row.rms_error_lsb:>7.{digits}f}"

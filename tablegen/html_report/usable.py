@@ -1,4 +1,4 @@
-"""The offsets and sizes that driver, converter and amplifier leave, with this scan in them."""
+"""The offsets and sizes within driver, converter and amplifier, with this scan in them."""
 
 from fractions import Fraction
 
@@ -19,7 +19,7 @@ _SIZES = 241
 
 
 def usable(planned: PlannedScan) -> Section:
-    """Draw a chart an axis."""
+    """Return a chart per axis."""
     blocks = [_axis(planned, line) for line in planned.plan.moving]
     words = [word for _, words in blocks for word in words]
     return Section(
@@ -56,7 +56,7 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
     ]
     chart = Chart(
         f"usable-{line.axis}",
-        f"{line.axis}: which scans fit",
+        f"{line.axis}: usable scans",
         "offset [V]",
         "size of the line [nm]",
         tuple(curves),
@@ -68,7 +68,11 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
 
 
 def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats, str]:
-    """Offsets in V, the largest line at each in nm, and what bounds it at this scan's offset."""
+    """Compute the largest line at each offset, with the waveform of this scan.
+
+    Returns ------- Offsets in V and the largest line at each in nm, shape (offsets,) each; and the limit at this scan's
+    offset, in words.
+    """
     drive, driver = line.drive, line.drive.driver
     w = line.series.on_grid(32 * line.series.harmonics)
     low, high = float(np.min(w)), float(np.max(w))

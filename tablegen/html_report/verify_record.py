@@ -1,4 +1,4 @@
-"""What `tablegen verify --junit` has left: its checks, and of which build they are."""
+"""The record of `tablegen verify --junit`: its checks, and the build that they verify."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ _MOST_CHECKS = 1000
 
 @dataclass(frozen=True)
 class RecordedCheck:
-    """One check; ``failure`` is empty where it passed, ``exercised`` False where it had no occasion to fail."""
+    """One check; ``failure`` is empty if it passed, ``exercised`` is false if it had no stimulus."""
 
     name: str
     failure: str
@@ -20,7 +20,7 @@ class RecordedCheck:
 
 @dataclass(frozen=True)
 class VerifyRecord:
-    """A record: ``digest`` is the SHA-256 of the manifest that was verified, empty where the record does not say."""
+    """A record: ``digest`` is the SHA-256 of the verified manifest, empty if the record does not have it."""
 
     name: str
     digest: str
@@ -28,12 +28,20 @@ class VerifyRecord:
 
 
 def read_record(path: Path) -> VerifyRecord:
-    """Read a JUnit file of `tablegen verify`. Raises ``OSError`` and ``ValueError``, each with a reason."""
+    """Read a JUnit file of `tablegen verify`.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is no such record; the message has the reason.
+    """
     try:
-        text = read_text(path, RECORD)  # in no other encoding, whatever it says of itself
+        text = read_text(path, RECORD)  # in no other encoding, whatever its declaration
     except UnicodeDecodeError:
         raise ValueError("is no UTF-8") from None
-    if "<!" in text:  # declarations could grow without end, and a record has none
+    if "<!" in text:  # entity declarations could expand without limit, and a record has none
         raise ValueError("is no record of `tablegen verify --junit`: it has declarations")
     try:
         root = ElementTree.fromstring(text)

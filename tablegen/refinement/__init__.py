@@ -1,5 +1,5 @@
-"""A measured trace of the running scan to a layer over the model, by iterative learning with a stability bound.
+"""Refinement: from a measurement of the running scan to a layer over the model, by stable iterative learning.
 
-The layer stands in the scan file, from where a build takes it, see ``tablegen.planning.refinement_layer``. Nothing
-here reaches a word by another way: bits need not be the same on every machine.
+The layer stands in the scan file, from where a build takes it, see ``tablegen.planning.refinement_layer``. A layer
+changes an emitted word in no other way, so that its own arithmetic may differ from one machine to another.
 """

@@ -1,7 +1,8 @@
-"""When learning converges: the stability bound of the loop, harmonic by harmonic.
+"""The stability bound of learning, harmonic by harmonic.
 
-Let G be the scanner's true gain over the modelled one at a harmonic, a complex number, 1 for a perfect model. A round
-leaves |1 - gain G| of the error there: it shrinks if and only if |G| < 2 cos(arg G) / gain. Derivation: docs/refine.md.
+Let G be the scanner's true gain over the modelled one at a harmonic, a complex number, 1 for a perfect model. After a
+round |1 - gain G| of the error there remains: it shrinks if and only if |G| < 2 cos(arg G) / gain. Derivation:
+docs/refine.md.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from tablegen.compensation.dynamics import Measured, Response, SecondOrder, capp
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 
-# How wrong the dynamics of a scanner file are taken to be: frequencies, quality, and for responses gain and phase.
+# Assumed errors of the dynamics of a scanner file: frequencies, quality, and for responses gain and phase.
 FREQUENCIES = (0.8, 1.0, 1.25)
 QUALITIES = (0.5, 1.0, 2.0)
 GAINS = (0.8, 1.0, 1.25)
@@ -27,17 +28,17 @@ Complex = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Bound:
-    """What the loop tolerates.
+    """The limits within which learning converges.
 
-    ``harmonics`` are the most that can be learnt, ``left`` what a round leaves at worst of the error of those in use
-    with dynamics as wrong as above. ``largest_gain`` is the true over the modelled gain without a phase error,
-    ``phase_deg`` the phase error at a gain of 1, ``delay_s`` that phase at the highest harmonic in use.
+    ``harmonics`` is the largest number that can be learnt, ``remaining`` the largest share of the error of those in use
+    that a round leaves, with dynamics as wrong as above. ``largest_gain`` is the true over the modelled gain without a
+    phase error, ``phase_deg`` the phase error at a gain of 1, ``delay_s`` that phase at the highest harmonic in use.
     """
 
     gain: float
     harmonics: int
     used: int
-    left: float
+    remaining: float
     largest_gain: float
     phase_deg: float
     delay_s: float
@@ -45,7 +46,17 @@ class Bound:
 
 
 def remaining_error(gain: float, ratio: Complex) -> Floats:
-    """Return the share of an error that a round leaves, for true gains over modelled ones, of their shape."""
+    """Return the share of an error that remains after a round.
+
+    Parameters
+    ----------
+    ratio
+        True gains over modelled ones, of any shape.
+
+    Returns
+    -------
+    Shares, of that shape.
+    """
     return np.abs(1.0 - gain * ratio)
 
 
@@ -61,7 +72,7 @@ def bound(line: LinePlan, gain: float, used: int) -> Bound:
         gain=gain,
         harmonics=most,
         used=used,
-        left=float(np.max(worst[:used])) if used else float(worst[0]),
+        remaining=float(np.max(worst[:used])) if used else float(worst[0]),
         largest_gain=2.0 / gain,
         phase_deg=degrees(phase),
         delay_s=phase / (2.0 * pi * max(used, 1) * float(line.rate)),
@@ -72,7 +83,7 @@ def bound(line: LinePlan, gain: float, used: int) -> Bound:
 def plausible_ratios(line: LinePlan, f_hz: Floats) -> Complex:
     """Return true gains over modelled ones for scanners that the file may describe wrongly.
 
-    Without dynamics in the file there is one, whose ratio is 1: of the others nothing is known.
+    Without dynamics in the file there is one, whose ratio is 1: nothing is known of others.
 
     Parameters
     ----------

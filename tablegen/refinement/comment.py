@@ -1,4 +1,4 @@
-"""The comment above a layer: what a round rests on."""
+"""The comment above a layer: the measurement and the settings of its round."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from tablegen.refinement.round import Round, TraceRound, worst_scaling
 
 
 def provenance(learnt_round: Round, sources: Sequence[Source], stopped: bool = False) -> str:
-    """Format the comment on what a round rests on, or why the layer before it was kept; no date."""
+    """Format the comment on the sources of a round, or why the layer before it stays; no date."""
     update = learnt_round.update
     facts = []
     for source in sources:

@@ -1,4 +1,4 @@
-"""Samples of a displacement, each at its own phase -> one period as a Fourier series, with its covariance."""
+"""From samples of a displacement, each at its own phase, to one period as a Fourier series with its covariance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ from tablegen.fitting.correlation import correlation_length
 from tablegen.numerics.arrays import Floats
 from tablegen.waveform.series import FourierSeries
 
-_CHUNK_SAMPLES = 1 << 12  # samples that are worked out at a time
+_CHUNK_SAMPLES = 1 << 12  # samples that are evaluated at a time
 _OUTLIER_SIGMAS = 7.0  # standard deviations
-_GRID = 1024  # points of a period at which the asked position is taken
+_GRID = 1024  # points of a period at which the requested position is evaluated
 
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
-    """One settled period in nm, as the sensor has it.
+    """One settled period in nm, as the sensor reads it.
 
-    ``covariance`` is of (a0, a, b) in nm^2, widened where residuals depend on each other over ``correlated`` samples.
-    ``noise_nm`` is that of a reading, ``drift_nm`` how far the trace drifted, ``stray`` the sample farthest off the
-    others, counted from 0, where that is no noise.
+    ``covariance`` is of (a0, a, b) in nm^2, shape (2 H + 1, 2 H + 1), widened where residuals are correlated over
+    ``correlated`` samples. ``noise_nm`` is that of a reading, ``drift_nm`` the drift over the trace, ``stray`` the
+    sample farthest from the others, counted from 0, if it is an outlier.
     """
 
     series: FourierSeries
@@ -37,33 +37,75 @@ class Displacement:
 
     @property
     def detail(self) -> int:
-        """The highest harmonic."""
+        """The highest harmonic of the series."""
         return self.series.harmonics
 
     def value(self, times: Floats) -> Floats:
-        """Displacement in nm at times in periods."""
+        """Return the displacement at times.
+
+        Parameters
+        ----------
+        times
+            Times in periods, of any shape.
+
+        Returns
+        -------
+        Displacement in nm, of that shape.
+        """
         return self.series.value(times)
 
     def basis(self, times: Floats) -> Floats:
-        """Return the matrix from (a0, a, b) to the displacement: (times, coefficients)."""
+        """Return the matrix from (a0, a, b) to the displacement.
+
+        Parameters
+        ----------
+        times
+            Times in periods, shape (times,).
+
+        Returns
+        -------
+        Matrix, shape (times, 2 H + 1).
+        """
         return harmonic_basis(times, self.series.harmonics)
 
-    def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """Return the coefficients of the displacement less the line ``asked`` at times, in nm."""
+    def error(self, requested: Callable[[Floats], Floats], size_nm: float) -> Floats:
+        """Return the coefficients of the displacement less the requested line; that of the mean is arbitrary.
+
+        Parameters
+        ----------
+        requested
+            Returns the position on the line, 0..1, at times in periods, of their shape.
+        size_nm
+            Length of the line in nm.
+
+        Returns
+        -------
+        Coefficients (a0, a, b) in nm, shape (2 H + 1,).
+        """
         times = (np.arange(_GRID) + 0.5) / _GRID
         series = np.concatenate([[0.0], self.series.a, self.series.b])
-        coefficients: Floats = series - size_nm * (2.0 / _GRID) * (self.basis(times).T @ asked(times))
+        coefficients: Floats = series - size_nm * (2.0 / _GRID) * (self.basis(times).T @ requested(times))
         return coefficients
 
     @property
     def groups(self) -> list[list[int]]:
-        """Coefficients that are noise or not together: cosine and sine of a harmonic."""
+        """Coefficients that are learnt or discarded as a group: cosine and sine of a harmonic."""
         count = self.series.harmonics
         return [[n, count + n] for n in range(1, count + 1)]
 
 
 def harmonic_basis(times: Floats, harmonics: int) -> Floats:
-    """Return 1, cosines and sines at times in periods: (times, 2 harmonics + 1)."""
+    """Return 1, cosines and sines.
+
+    Parameters
+    ----------
+    times
+        Times in periods, shape (times,).
+
+    Returns
+    -------
+    Matrix, shape (times, 2 harmonics + 1).
+    """
     angle = 2.0 * pi * np.outer(times, np.arange(1, harmonics + 1))
     basis: Floats = np.column_stack([np.ones(len(times)), np.cos(angle), np.sin(angle)])
     return basis
@@ -72,11 +114,24 @@ def harmonic_basis(times: Floats, harmonics: int) -> Floats:
 def fit_displacement(
     turns: Floats, displacement_nm: Floats, harmonics: int, settle_periods: int | None = None, order: int | None = None
 ) -> Displacement:
-    """Fit harmonics 0..``harmonics`` and a polynomial drift to samples at ``turns``, ascending, in periods.
+    """Fit harmonics 0..``harmonics`` and a polynomial drift to a trace.
 
-    The first ``settle_periods`` are left out (of three periods or more the first, if not given). The drift is a
-    polynomial of ``order`` over the record: by default none below two periods, from which it could not be told, a line
-    from two on, a parabola from four, a cubic from six. Raises ``Unphysical``.
+    Parameters
+    ----------
+    turns
+        Times in periods, ascending, shape (samples,).
+    displacement_nm
+        Readings in nm, shape (samples,).
+    settle_periods
+        Periods at the beginning that are left out; the first one of three or more if None.
+    order
+        Order of the drift over the record. By default 0 below two periods, which do not determine a drift, 1 from two
+        on, 2 from four, 3 from six.
+
+    Raises
+    ------
+    Unphysical
+        If less than a period is left, the displacement is constant, or the samples do not determine the harmonics.
     """
     per_turn = (len(turns) - 1) / float(turns[-1] - turns[0])
     periods = float(turns[-1] - turns[0]) + 1.0 / per_turn
@@ -97,7 +152,7 @@ def fit_displacement(
     span = float(t[-1] - t[0])
 
     def basis(rows: slice) -> Floats:
-        """1, cosines, sines and the drift, a row each."""
+        """Return 1, cosines, sines and the drift, a row each."""
         angle = 2.0 * pi * (t[rows] % 1.0)
         s = 2.0 * (t[rows] - t[0]) / span - 1.0
         out = np.empty((1 + 2 * count + order, len(s)))
@@ -109,7 +164,7 @@ def fit_displacement(
             wave *= once
         if order:
             out[1 + 2 * count] = s
-        for n in range(2, order + 1):  # 0 at both ends, and so nearly apart from the line
+        for n in range(2, order + 1):  # 0 at both ends, and so nearly independent of the line
             out[2 * count + n] = s**n - s ** (n % 2)
         return out
 
@@ -147,5 +202,5 @@ def fit_displacement(
     most = float(distance[farthest])
     stands_out = most > max(_OUTLIER_SIGMAS * 1.4826 * float(np.median(distance, overwrite_input=True)), 1e-6)
     stray = left_out + farthest if stands_out else None
-    moved = height * (max(drift) - min(drift))
-    return Displacement(series, covariance, noise, moved, correlated, periods, len(t), left_out, stray)
+    drift_nm = height * (max(drift) - min(drift))
+    return Displacement(series, covariance, noise, drift_nm, correlated, periods, len(t), left_out, stray)

@@ -1,12 +1,13 @@
-"""A periodic sample in trace and retrace of a nearly straight scan: where each column was, whatever the rows do.
+"""A periodic sample in trace and retrace of a nearly straight scan: the position of each column, with free rows.
 
 height(row i, column j, direction d) = sum over spots of Re(A exp(2 pi i n . phase)) + a parabola in each row
 
 phase_b = a_b(i) + q_b x_d(j) + r_b(i) t_d(j)
 
-a_b(i), a phase of every wave b in every row, is free: drift of any kind, jumps and the slow axis are in it. r_b is by
-how much it goes on in a line, t_d the time in the line. x_d is what was asked for plus an error, a polynomial along the
-window. Least squares over all pixels, by Gauss and Newton; rows are eliminated one by one, so that a step costs little.
+a_b(i), a phase of every wave b in every row, is free: it contains drift of any kind, jumps and the slow axis. r_b is
+its growth within a line, t_d the time in the line. x_d is the requested position plus an error, a polynomial along the
+window. The fit is least squares over all pixels by Gauss-Newton; rows are eliminated one by one, so that a step is
+cheap.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,25 +22,25 @@ from tablegen.numerics.arrays import Floats, Ints
 
 _MAX_STEPS = 25
 _HALVINGS = 6
-_SETTLED = 1e-6  # of the line: a step that moves no column by more
-_PACE_ORDER = 5  # order of the polynomial in the rows by which phases go on in a line
-_CHUNK_VALUES = 1 << 22  # values of the derivatives that are worked out at a time
-_LOUD_ROWS = 3.0  # times the usual rms of what a row leaves; louder ones count less
+_SETTLED = 1e-6  # of the line: convergence is a step that moves no column by more
+_PACE_ORDER = 5  # order of the polynomial in the rows from which the growth of phases in a line comes
+_CHUNK_VALUES = 1 << 22  # values of the derivatives that are evaluated at a time
+_LOUD_ROWS = 3.0  # times the median rms residual of a row; rows above it weigh less
 _RCOND = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class ColumnModes:
-    """What the error of the position can be: (modes, 2 columns), trace then retrace, of the line."""
+    """Modes of the position error, shape (modes, 2 columns), trace then retrace, as shares of the line."""
 
     values: Floats
-    asked: Floats  # (2 columns,), of the line
+    requested: Floats  # (2 columns,), of the line
     time: Floats  # (2 columns,), of the line's period, from its middle
 
 
 @dataclass(frozen=True, eq=False)
 class RowPhases:
-    """Of each row in the middle of its line, (rows, waves), in periods, and covariances (rows, waves, waves)."""
+    """Phases of each row in the middle of its line, (rows, waves), in periods; covariances (rows, waves, waves)."""
 
     phase: Floats
     covariance: Floats
@@ -47,7 +48,11 @@ class RowPhases:
 
 @dataclass(frozen=True, eq=False)
 class FreeRowsState:
-    """``modes`` are the error's coefficients, ``q`` periods in the whole line of each wave, ``amplitudes`` of spots."""
+    """Parameters of the fit.
+
+    ``modes`` are the error's coefficients (modes,), ``q`` the periods in the whole line of each wave (waves,),
+    ``amplitudes`` those of the spots (spots,).
+    """
 
     modes: Floats
     q: Floats
@@ -61,34 +66,34 @@ class FreeRowsFit:
 
     ``covariance`` is of (modes, q), from each row by itself, so that noise may have any spectrum along a line.
 
-    ``lags`` are how much of ``r_b`` the images show, each with its standard error: from trace to retrace, and along the
-    line. Both are 1 where rows and columns are in the order of time. ``left`` of the images, of unit variance;
-    ``explained`` share of each image's variance; ``loud`` are rows unlike the others, counted from 0.
+    ``lags`` are the shares of ``r_b`` that the images show, each with its standard error: from trace to retrace, and
+    along the line. Both are 1 where rows and columns are in the order of time. ``residuals`` of the two images, of unit
+    variance; ``explained`` share of each image's variance; ``loud`` are rows unlike the others, counted from 0.
     """
 
     state: FreeRowsState
     covariance: Floats
     phases: RowPhases
     lags: tuple[tuple[float, float], tuple[float, float]]
-    left: tuple[Floats, Floats]
+    residuals: tuple[Floats, Floats]
     explained: tuple[float, float]
     loud: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class _Chunk:
-    """Rows at a time: derivatives by the free parameters, by the rows' phases, and what is left; levelled."""
+    """A block of rows: derivatives by the free parameters and by the rows' phases, and the residual; levelled."""
 
     rows: slice
     derivatives: Floats  # (rows, 2 columns, parameters)
     across: Floats  # (rows, 2 columns, waves)
-    left: Floats  # (rows, 2 columns)
+    residual: Floats  # (rows, 2 columns)
 
 
 class FreeRows:
-    """Levelled images of one shape, trace then retrace, and the spots: rows of whole numbers, one a wave.
+    """The model of levelled images of one shape, trace then retrace; ``spots`` are rows of whole numbers, one per wave.
 
-    ``moves`` is whether the slow axis goes on within a line, or steps between lines.
+    ``moves`` is true if the slow axis moves within a line, false if it steps between lines.
     """
 
     def __init__(
@@ -96,7 +101,7 @@ class FreeRows:
     ) -> None:
         self.geometry, self.spots, self.modes, self.moves = geometry, spots, modes, moves
         self.heights = np.concatenate(heights, axis=1)
-        self._centre = float(np.mean(modes.asked))
+        self._centre = float(np.mean(modes.requested))
 
     def fit(self, start: FreeRowsState) -> FreeRowsFit:
         """Fit from a start within a fraction of a period.
@@ -113,39 +118,44 @@ class FreeRows:
             solved, moves = self._solved(state, weights)
             size = 1.0
             for _ in range(_HALVINGS):
-                tried = self._moved(state, solved, moves, size)
-                now = self._cost(tried, weights)
+                trial = self._stepped(state, solved, moves, size)
+                now = self._cost(trial, weights)
                 if now <= cost * (1.0 + 1e-9):
                     break
                 size *= 0.5
             else:
                 break
-            moved = float(np.max(np.abs((tried.modes - state.modes) @ self.modes.values), initial=0.0))
-            state = tried
+            largest_shift = float(np.max(np.abs((trial.modes - state.modes) @ self.modes.values), initial=0.0))
+            state = trial
             if step == 1:  # once the start is behind it
                 weights = self._weights(state)
                 now = self._cost(state, weights)
             cost = now
-            if moved < _SETTLED and step > 2:
+            if largest_shift < _SETTLED and step > 2:
                 break
         else:
             raise Unphysical("the fit does not converge; is the sample periodic, and are the images from one scan?")
         return self._result(state, weights)
 
     def positions(self, state: FreeRowsState) -> Floats:
-        """Of all columns, trace then retrace, in lines."""
-        return np.asarray(self.modes.asked + state.modes @ self.modes.values, dtype=np.float64)
+        """Return the position of all columns, trace then retrace.
+
+        Returns
+        -------
+        Positions in lines, shape (2 columns,).
+        """
+        return np.asarray(self.modes.requested + state.modes @ self.modes.values, dtype=np.float64)
 
     def _count(self, state: FreeRowsState) -> int:
         return len(state.modes) + len(state.q) + 2 * len(state.amplitudes)
 
     def _times(self) -> Floats:
-        """(2 columns, 2): the mean time of each direction, and how far a column's is from it."""
+        """Return the mean time of each direction, and the distance of each column from it, (2 columns, 2)."""
         mean = np.repeat([np.mean(half) for half in np.split(self.modes.time, 2)], self.geometry.columns)
         return np.column_stack([mean, self.modes.time - mean])
 
     def _pace(self, rows: Floats) -> Floats:
-        """(rows, waves): by how much phases go on in a line."""
+        """Return the growth of the phases in a line, (rows, waves)."""
         if not self.moves:
             return np.zeros_like(rows)
         y = self.geometry.y
@@ -154,7 +164,7 @@ class FreeRows:
         return np.asarray(steps / self.geometry.rows, dtype=np.float64)
 
     def _waves(self, state: FreeRowsState, rows: slice, pace: Floats) -> Complexes:
-        """(spots, rows, 2 columns)."""
+        """Return the waves at every pixel, (spots, rows, 2 columns)."""
         x = self.positions(state) - self._centre
         phase = state.rows[rows, None, :] + x[:, None] * state.q + pace[rows, None, :] * self.modes.time[:, None]
         waves: Complexes = np.exp(2j * pi * np.moveaxis(phase @ self.spots.T, -1, 0))
@@ -165,7 +175,7 @@ class FreeRows:
         return self._levelled(np.real(np.tensordot(state.amplitudes, waves, 1)))
 
     def _levelled(self, values: Floats) -> Floats:
-        """Of (rows, 2 columns, ...): each direction less its rows' parabolas."""
+        """Subtract from (rows, 2 columns, ...) the parabola of each row and direction."""
         parabola = self.geometry.parabola
         halves = []
         for half in np.split(values, 2, axis=1):
@@ -177,7 +187,7 @@ class FreeRows:
         return levelled_values
 
     def _chunks(self, state: FreeRowsState, lag: bool = False) -> Iterator[_Chunk]:
-        """With ``lag`` the last two derivatives are those by factors of what goes on in a line."""
+        """Yield blocks of rows; with ``lag`` the last two derivatives are by factors of the growth in a line."""
         step = max(_CHUNK_VALUES // (self.heights.shape[1] * self._count(state)), 1)
         pace = self._pace(state.rows)
         x = self.positions(state) - self._centre
@@ -208,20 +218,22 @@ class FreeRows:
             weight = weights[chunk.rows]
             basis, triangle = np.linalg.qr(chunk.across)
             on_rows = np.swapaxes(basis, 1, 2) @ chunk.derivatives
-            seen = (np.swapaxes(basis, 1, 2) @ chunk.left[:, :, None])[:, :, 0]
+            projections = (np.swapaxes(basis, 1, 2) @ chunk.residual[:, :, None])[:, :, 0]
             free = chunk.derivatives - basis @ on_rows
             flat = (np.sqrt(weight)[:, None, None] * free).reshape(-1, free.shape[-1])
             normal += flat.T @ flat
-            right += np.einsum("i,ijp,ij->p", weight, free, chunk.left, optimize=True)
-            blocks.append((_inverted(triangle), on_rows, seen))
+            right += np.einsum("i,ijp,ij->p", weight, free, chunk.residual, optimize=True)
+            blocks.append((_inverted(triangle), on_rows, projections))
         step = _pseudo_inverse(normal) @ right
 
-        def of_rows(applied: Floats) -> Floats:
-            return np.concatenate([(back @ (seen - on @ applied)[:, :, None])[:, :, 0] for back, on, seen in blocks])
+        def row_step(applied: Floats) -> Floats:
+            return np.concatenate(
+                [(back @ (projections - on @ applied)[:, :, None])[:, :, 0] for back, on, projections in blocks]
+            )
 
-        return step, of_rows
+        return step, row_step
 
-    def _moved(
+    def _stepped(
         self, state: FreeRowsState, step: Floats, rows: Callable[[Floats], Floats], size: float
     ) -> FreeRowsState:
         modes, waves, spots = len(state.modes), len(state.q), len(state.amplitudes)
@@ -243,7 +255,7 @@ class FreeRows:
         return float(weights @ np.sum(self._left(state) ** 2, axis=1))
 
     def _weights(self, state: FreeRowsState) -> Floats:
-        """1, and less where a row leaves far more than the others."""
+        """Return 1, and less where a row has a far larger residual than the others."""
         power = np.sqrt(np.mean(self._left(state) ** 2, axis=1))
         usual = _LOUD_ROWS * float(np.median(power))
         weights: Floats = (
@@ -260,7 +272,7 @@ class FreeRows:
             weight = weights[chunk.rows]
             flat = (np.sqrt(weight)[:, None, None] * free).reshape(-1, free.shape[-1])
             whole += flat.T @ flat
-            scores.append(weight[:, None] * np.einsum("ijp,ij->ip", free, chunk.left, optimize=True))
+            scores.append(weight[:, None] * np.einsum("ijp,ij->ip", free, chunk.residual, optimize=True))
             back = _inverted(triangle)
             inverses.append(back @ np.swapaxes(back, 1, 2))
         by_row = np.concatenate(scores)
@@ -281,7 +293,7 @@ class FreeRows:
             covariance=covariance,
             phases=RowPhases(state.rows, noise * np.concatenate(inverses)),
             lags=(first, second),
-            left=(both[0], both[1]),
+            residuals=(both[0], both[1]),
             explained=(explained[0], explained[1]),
             loud=tuple(np.flatnonzero(weights < 1.0).tolist()),
         )
@@ -295,12 +307,12 @@ def _spread(influence: Floats, parameters: int) -> Floats:
 
 
 def _pseudo_inverse(normal: Floats) -> Floats:
-    """Of a matrix of positive scale: what nothing determines is left alone."""
+    """Invert a matrix of positive scale; directions that nothing determines do not change."""
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     both = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(normal / both, rcond=_RCOND, hermitian=True) / both, dtype=np.float64)
 
 
 def _inverted(triangles: Floats) -> Floats:
-    """Of each row; of one in which a wave has no contrast, nothing."""
+    """Invert the triangle of each row; the part of a wave without contrast becomes 0."""
     return np.asarray(np.linalg.pinv(triangles, rcond=1e-6), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A round from images of the running scan to what goes into the scan file, and whether it should."""
+"""A round from images of the running scan to the new layer, and whether it should be written."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +18,23 @@ from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import LayerUpdate, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
-from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_layer_update
+from tablegen.refinement.round import (
+    Options,
+    Round,
+    divergence_reason,
+    learning_bound,
+    mostly_noise,
+    stop,
+    with_layer_update,
+)
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
 
 _MIN_EXPLAINED = 0.03  # share of the variance of an image
 _LITTLE_EXPLAINED = 0.5
-_SURE_LAG = 0.2  # standard error with which the order of time is told
+_SURE_LAG = 0.2  # standard error below which the order of time is determined
 _FAR_APART = 0.35  # periods
-_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: what gets a remark
+_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: a larger size error gets a remark
 _MIN_PIXELS_PER_PERIOD = 4.0
 
 
@@ -34,22 +42,22 @@ _MIN_PIXELS_PER_PERIOD = 4.0
 class ImageRound(Round):
     """Round learnt from trace and retrace.
 
-    ``size`` is x's, where the constant of the sample is known, and ``asked_nm`` the requested size of x.
+    ``size`` is that of x, where the constant of the sample is known, and ``requested_nm`` the requested size of x.
     """
 
     frames: tuple[LatticeLine, ...]
     measured: WindowLine
     size: LineSize | None
-    asked_nm: float
+    requested_nm: float
 
     @property
     def periods(self) -> float:
-        """In the whole line of x, of the wave that has most."""
+        """Periods in the whole line of x, of the wave that has most."""
         return float(np.max(np.abs(self.frames[0].fit.state.q)))
 
     @property
     def recorded(self) -> str:
-        """Frames, pixels and periods."""
+        """The number of frames, pixels and periods, in words."""
         return f"{_pixels(self.frames)}, {self.periods:.4g} periods in the line"
 
 
@@ -61,17 +69,26 @@ def refine_images(
     images: ImageOptions | None = None,
     sample: KnownSample | None = None,
 ) -> ImageRound:
-    """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
+    """Learn from images of a grating or a lattice that the running scan images.
 
-    ``pairs`` are trace and retrace of frames that follow each other, one or more. Rows are in the order of time,
-    columns those of the scan's imaging window. With a ``sample`` of known constant the size of the line is compared as
-    well; it is not learnt. Raises ``Rejected`` where the scan, or
-    the scan with the new layer, cannot be planned, and ``Unphysical`` for images that are not of this scan, or that
-    bounds forbid.
+    Parameters
+    ----------
+    pairs
+        Trace and retrace of one or more consecutive frames: heights in any unit, (rows, columns) each. Rows are in the
+        order of time, columns those of the scan's imaging window.
+    sample
+        A sample of known constant, with which the size of the line is compared; the size is not learnt.
+
+    Raises
+    ------
+    Rejected
+        If the scan, or the scan with the new layer, cannot be planned.
+    Unphysical
+        If the images are not of this scan, or a bound forbids learning.
     """
     plan = make_plan(setup)
     line: LinePlan = getattr(plan, axis)
-    limits = allowed(line, options)
+    limits = learning_bound(line, options)
     frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     size = None if sample is None else _size(plan, frames, sample)
@@ -83,13 +100,13 @@ def refine_images(
         update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, update),
+        worse=divergence_reason(setup, axis, update),
         **stop(setup, line, update),
         remarks=(*_size_remarks(plan, size), *_remarks(line, frames, update)),
         frames=frames,
         measured=measured,
         size=size,
-        asked_nm=plan.x.drive.size_nm,
+        requested_nm=plan.x.drive.size_nm,
     )
 
 
@@ -103,7 +120,7 @@ def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> 
 def _check_shape(plan: Plan, trace: Floats) -> None:
     """Check that a column is a pixel of the imaging window."""
     if plan.x.band_limit.directions != "both":
-        raise Unphysical("this scan images forward only; a retrace image says nothing of it: image both directions")
+        raise Unphysical("this scan images forward only, and a retrace is not of it; image both directions")
     columns, pixels = trace.shape[-1], plan.schedule.pixels
     if columns != pixels:
         raise Unphysical(
@@ -112,8 +129,8 @@ def _check_shape(plan: Plan, trace: Floats) -> None:
         )
 
 
-def _check(seen: LatticeLine) -> None:
-    fit = seen.fit
+def _check(frame: LatticeLine) -> None:
+    fit = frame.fit
     least = min(fit.explained)
     if least < _MIN_EXPLAINED:
         name = "trace" if fit.explained[0] < fit.explained[1] else "retrace"
@@ -121,7 +138,7 @@ def _check(seen: LatticeLine) -> None:
             f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
             f"else, or trace and retrace are not of one scan"
         )
-    if len(fit.state.q) < 2 or not seen.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
+    if len(fit.state.q) < 2 or not frame.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
         return
     between, along = (lag < 0.0 for lag, _ in fit.lags)
     if between or along:
@@ -137,7 +154,13 @@ def _check(seen: LatticeLine) -> None:
 
 
 def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> LineSize:
-    """Of x, the mean of the frames. Raises ``Unphysical`` where the sample is another, or the size is."""
+    """Return the size of x, the mean over the frames.
+
+    Raises
+    ------
+    Unphysical
+        If the sample is another one, or the size is implausible.
+    """
     x, y = plan.x, plan.y
     low, high = y.band_limit.window
     aspect = y.drive.size_nm * (high - low) / x.drive.size_nm
@@ -170,16 +193,16 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate)
     if line.axis == "y" and len(frames) == 1:
         texts.append(
             spoils(
-                "a drift that becomes faster or slower counts as an error of y; give two frames that follow each "
-                "other, which tell it"
+                "a drift that becomes faster or slower counts as an error of y; give two consecutive frames, "
+                "which separate the two"
             )
         )
     return tuple(texts + _learning_remarks(update))
 
 
-def _remarks_of(seen: LatticeLine) -> list[Remark]:
+def _remarks_of(frame: LatticeLine) -> list[Remark]:
     remarks: list[Remark] = []
-    fit, geometry = seen.fit, seen.geometry
+    fit, geometry = frame.fit, frame.geometry
     explained = min(fit.explained)
     if explained < _LITTLE_EXPLAINED:
         remarks.append(
@@ -190,29 +213,29 @@ def _remarks_of(seen: LatticeLine) -> list[Remark]:
         remarks.append(
             Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
         )
-    if seen.start.apart > _FAR_APART:
+    if frame.start.mismatch > _FAR_APART:
         remarks.append(
             spoils(
-                f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be "
-                f"taken for the next one; calibrate first, or take a sample of a longer period"
+                f"trace and retrace are {frame.start.mismatch:.2g} periods apart, and beyond half a period they would "
+                f"be taken for the next one; calibrate first, or take a sample of a longer period"
             )
         )
     if fit.loud:
-        shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
-        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
+        row_numbers = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
+        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {row_numbers}); they counted less"))
     return remarks
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MismatchRound(Round):
-    """What trace and retrace of a sample without a period say: residuals are half of what the two differ by."""
+    """Round learnt from trace and retrace of a sample without a period: residuals are half of their mismatch."""
 
     frames: tuple[SweepMismatch, ...]
     measured: WindowLine
 
     @property
     def recorded(self) -> str:
-        """Frames and pixels."""
+        """The number of frames and pixels, in words."""
         return f"{_pixels(self.frames)}, trace against retrace"
 
 
@@ -223,14 +246,26 @@ def refine_mismatch(
     options: Options,
     images: ImageOptions | None = None,
 ) -> MismatchRound:
-    """Learn from heights of any sample what trace and retrace differ by, half in each; see ``refine_images``.
+    """Learn the mismatch of trace and retrace of any sample, half in each; see ``refine_images``.
 
-    What both directions share stays as it is: no sample without a period tells it.
+    An error that both directions share stays: no sample without a period shows it.
+
+    Parameters
+    ----------
+    pairs
+        Trace and retrace of one or more frames: heights in any unit, (rows, columns) each.
+
+    Raises
+    ------
+    Rejected
+        If the scan, or the scan with the new layer, cannot be planned.
+    Unphysical
+        If the axis is y, the images are not of this scan, or a bound forbids learning.
     """
     plan = make_plan(setup)
     if axis == "y":
-        raise Unphysical("trace and retrace say nothing of y; it needs a sample with a period")
-    limits = allowed(plan.x, options)
+        raise Unphysical("trace and retrace do not show the error of y; it needs a sample with a period")
+    limits = learning_bound(plan.x, options)
     for trace, _ in pairs:
         _check_shape(plan, trace)
     frames = tuple(mismatch(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
@@ -239,7 +274,7 @@ def refine_mismatch(
     refinement, changed = with_layer_update(setup, plan.x, update, "mismatch")
     remarks = [
         spoils(
-            "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
+            "only the mismatch of trace and retrace was measured and is corrected, half in each; an error that both "
             "share stays, and is in none of these figures"
         ),
         *_learning_remarks(update),
@@ -250,7 +285,7 @@ def refine_mismatch(
         update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, update, "mismatch"),
+        worse=divergence_reason(setup, axis, update, "mismatch"),
         **stop(setup, plan.x, update, "mismatch"),
         remarks=tuple(remarks),
         frames=frames,
@@ -262,7 +297,7 @@ def _learning_remarks(update: LayerUpdate) -> list[Remark]:
     remarks: list[Remark] = []
     if update.harmonics == 0:
         remarks.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
-    elif finished(update):
+    elif mostly_noise(update):
         remarks.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
     return [*remarks, Remark("images do not show that the build of this scan file was running")]
 

@@ -1,4 +1,4 @@
-"""Trace and retrace of a periodic sample, taken of the running scan -> the line that was reached, with its errors."""
+"""From trace and retrace of a periodic sample in the running scan to the reached line, with its errors."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,12 +11,12 @@ from tablegen.images.pair_checks import ALIASING_HINT, check_periods
 from tablegen.images.periodic_model import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.refinement.departure import asked_position
+from tablegen.refinement.departure import requested_position
 from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
 from tablegen.refinement.lattice_start import START_DEGREE, LatticeStart, lattice_start
 from tablegen.refinement.window_line import WindowLine, error_modes
 
-_DEGREES_A_PERIOD = 1.5  # of a grating, which tells the position where its bars have edges
+_DEGREES_A_PERIOD = 1.5  # of a grating, which shows the position only at the edges of its bars
 _MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
 _LEAST_DEGREES = 4
 _FAR_APART = 0.5  # periods
@@ -24,7 +24,7 @@ _FAR_APART = 0.5  # periods
 
 @dataclass(frozen=True)
 class ImageOptions:
-    """How images were stored; see ``docs/refine.md``."""
+    """Storage of the images; see ``docs/refine.md``."""
 
     retrace_mirrored: bool = False
     delay_pixels: float = 0.0
@@ -32,7 +32,7 @@ class ImageOptions:
 
 @dataclass(frozen=True, eq=False)
 class LatticeLine:
-    """What a pair of images says of x: the line, and the fit it rests on."""
+    """The line of x from a pair of images, and the fit on which it rests."""
 
     geometry: Geometry
     rows_model: FreeRows
@@ -42,28 +42,45 @@ class LatticeLine:
 
     @property
     def model(self) -> PeriodicModel:
-        """The waves that were found."""
+        """The waves of the sample."""
         return self.start.model
 
     @property
     def state(self) -> FitState:
-        """Of these waves."""
+        """The fit of these waves."""
         return self.start.fitted
 
     @property
     def amplitudes(self) -> Floats:
-        """(spots,), of unit variance of the heights."""
+        """The amplitudes of the spots.
+
+        Returns
+        -------
+        Magnitudes, for heights of unit variance, shape (spots,).
+        """
         return np.abs(self.fit.state.amplitudes)
 
     @property
     def waves(self) -> Floats:
-        """(bases, 2): periods in the line from turn to turn, and in the rows, of each base wave."""
+        """The base waves of the sample.
+
+        Returns
+        -------
+        Periods in the line from turn to turn, and in all rows, of each base wave, shape (waves, 2).
+        """
         rows = np.polyfit(self.geometry.y, self.fit.phases.phase, 1)[0]
         return np.stack([self.fit.state.q, rows], axis=1)
 
     @property
     def waves_covariance(self) -> Floats:
-        """Of q_1, s_1, q_2, s_2; that of rows by their scatter about a line, and drift is in that."""
+        """The covariance of q_1, s_1, q_2, s_2, in squared periods.
+
+        That of rows comes from their scatter about a line, which includes drift.
+
+        Returns
+        -------
+        Matrix, shape (2 waves, 2 waves).
+        """
         count = len(self.fit.state.q)
         phases, y = self.fit.phases.phase, self.geometry.y
         residuals = phases - np.column_stack([y, np.ones_like(y)]) @ np.polyfit(y, phases, 1)
@@ -74,7 +91,12 @@ class LatticeLine:
 
 
 def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
-    """Fit x from heights, rows x columns, rows in the order of time, left on the left.
+    """Fit x to a pair of images.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns), rows in the order of time, the left end first.
 
     Raises
     ------
@@ -93,10 +115,10 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     waves = len(start.state.q)
     most = float(np.max(np.abs(start.state.q)))
     check_periods(most, window[1] - window[0], geometry.columns)
-    if start.apart > _FAR_APART:
+    if start.mismatch > _FAR_APART:
         raise Unphysical(
-            f"trace and retrace are {start.apart:.2g} periods of the sample apart, and beyond half a period it is not "
-            f"known which belong together; if one was cropped, do not; else calibrate first, or take a sample of a "
+            f"trace and retrace are {start.mismatch:.2g} periods of the sample apart, and beyond half a period it is "
+            f"not known which belong together; if one was cropped, do not; else calibrate first, or take a sample of a "
             f"longer period{ALIASING_HINT}"
         )
     span = (window[1] - window[0]) * most
@@ -106,7 +128,7 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     model = FreeRows(geometry, heights, start.spots, finer, moves)
     fit = model.fit(replace(start.state, modes=error))
     count = len(finer.values)
-    requested = partial(asked_position, line)
+    requested = partial(requested_position, line)
     window_line = WindowLine(
         requested, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
     )
@@ -114,7 +136,7 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
 
 
 def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:
-    """At the middle of every column, trace then retrace."""
+    """Return the modes at the middle of every column, trace then retrace."""
     line = plan.x
     turn = line.drive.turn
     forward = np.repeat([True, False], geometry.columns)
@@ -122,4 +144,4 @@ def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:
     times = np.where(forward, turn * sweep, turn + (1.0 - turn) * sweep)
     place = np.where(forward, sweep, 1.0 - sweep)
     values = error_modes(place, forward, line.band_limit.window, degree, "both")
-    return ColumnModes(values, asked_position(line, times), times - 0.5)
+    return ColumnModes(values, requested_position(line, times), times - 0.5)

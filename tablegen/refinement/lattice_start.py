@@ -1,4 +1,4 @@
-"""Trace and retrace of a nearly straight scan -> the waves of the sample, and roughly how far columns are off."""
+"""From trace and retrace of a nearly straight scan to the waves of the sample and a rough position error."""
 
 from dataclasses import dataclass
 
@@ -13,20 +13,21 @@ from tablegen.numerics.arrays import Floats, Ints
 from tablegen.refinement.free_rows import ColumnModes, FreeRowsState
 
 _MIN_TRACKED_PERIODS = 8.0  # periods in the line; with fewer a straight line is near enough to begin with
-START_DEGREE = 6  # of the error that the phase along the line says to begin with
+START_DEGREE = 6  # of the error in the start, from the phase along the line
 _NEAR_BEND = 0.0  # of a branch that is straight
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeStart:
-    """``spots`` are rows of whole numbers, one a wave; ``apart`` how far trace and retrace are apart, in periods.
+    """The start of the fit; ``spots`` are rows of whole numbers, one per wave.
 
-    ``model`` and ``fitted`` are the fit with a polynomial in the rows, from which the state is.
+    ``mismatch`` is the largest distance of trace and retrace, in periods. ``model`` and ``fitted`` are the fit with a
+    polynomial in the rows, from which the state comes.
     """
 
     spots: Ints
     state: FreeRowsState
-    apart: float
+    mismatch: float
     model: PeriodicModel
     fitted: FitState
 
@@ -34,9 +35,14 @@ class LatticeStart:
 def lattice_start(
     geometry: Geometry, heights: list[Floats], modes: ColumnModes, moves: bool, advice: str
 ) -> LatticeStart:
-    """Estimate the waves of levelled images of unit variance, each (rows, columns).
+    """Estimate the waves of a pair of images.
 
     Trace and retrace are taken to be less than half a period apart, since a compensated scan is nearly straight.
+
+    Parameters
+    ----------
+    heights
+        Levelled images of unit variance, trace then retrace, shape (rows, columns) each.
 
     Raises
     ------
@@ -54,10 +60,10 @@ def lattice_start(
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     straight = Bend(0.5 * (forward.q + backward.q), BranchShape(), forward.match)
     polynomial = row_polynomial(geometry, heights[0], straight, spot, row_order())
-    q, error, apart = straight.q, np.zeros(len(modes.values)), 0.0
+    q, error, mismatch = straight.q, np.zeros(len(modes.values)), 0.0
     if q > _MIN_TRACKED_PERIODS:
-        q, error, apart = _tracked(geometry, heights, modes, straight, polynomial, moves)
-    off = np.split(modes.asked + error @ modes.values - np.tile(geometry.place, 2), 2)
+        q, error, mismatch = _tracked(geometry, heights, modes, straight, polynomial, moves)
+    off = np.split(modes.requested + error @ modes.values - np.tile(geometry.place, 2), 2)
     start = np.zeros(BASES + 1 + row_order())
     start[LAG] = 1.0 if moves else 0.0
     start[BASES], start[BASES + 1 :] = q, polynomial
@@ -66,15 +72,15 @@ def lattice_start(
     sides = list(zip((True, False), heights, strict=True))
     model, state, _ = described(geometry, sides, start, free, (off[0], off[1]))
     x = state.parameters
-    rows = model.q(x) * float(np.mean(modes.asked)) + (model.s(x) @ model.y_powers[1:]).T
+    rows = model.q(x) * float(np.mean(modes.requested)) + (model.s(x) @ model.y_powers[1:]).T
     begun = FreeRowsState(error, model.q(x).copy(), state.amplitudes, rows)
-    return LatticeStart(model.spots, begun, apart, model, state)
+    return LatticeStart(model.spots, begun, mismatch, model, state)
 
 
 def _tracked(
     geometry: Geometry, heights: list[Floats], modes: ColumnModes, straight: Bend, polynomial: Floats, moves: bool
 ) -> tuple[float, Floats, float]:
-    """q, the smoothest modes, and how far trace and retrace are apart, from the phase along each image."""
+    """Return q, the smoothest modes and the mismatch of trace and retrace, from the phase along each image."""
     tracks = [
         column_phase(geometry, image, side, straight, polynomial)
         for image, side in zip(heights, (True, False), strict=True)
@@ -87,6 +93,6 @@ def _tracked(
     turns = round(float(np.median((first - second)[inside])))
     second = second + turns
     phase = np.concatenate([first, second])
-    columns = np.column_stack([np.ones_like(phase), modes.asked, straight.q * modes.values.T])[whole]
+    columns = np.column_stack([np.ones_like(phase), modes.requested, straight.q * modes.values.T])[whole]
     c = np.linalg.lstsq(columns, phase[whole], rcond=None)[0]
     return float(c[1]), c[2:] * straight.q / float(c[1]), float(np.max(np.abs((first - second)[inside])))

@@ -1,4 +1,4 @@
-"""What learning takes of a measurement of the running scan, be it a sensor's trace or images."""
+"""The interface of a measurement of the running scan, from a sensor's trace or from images."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -11,21 +11,58 @@ class LineMeasurement(Protocol):
 
     @property
     def detail(self) -> int:
-        """About as many harmonics as the finest of it has."""
+        """About as many harmonics as its finest detail has."""
 
     @property
     def covariance(self) -> Floats:
-        """Of the coefficients, in nm^2."""
+        """The covariance of the coefficients.
+
+        Returns
+        -------
+        Matrix in nm^2, shape (coefficients, coefficients).
+        """
 
     @property
     def groups(self) -> list[list[int]]:
-        """Coefficients that are noise or not together."""
+        """Coefficients that are learnt or discarded as a group."""
 
     def value(self, times: Floats) -> Floats:
-        """Where the piezo was, in nm, at times in periods, in the imaged windows."""
+        """Return the position of the piezo in the imaged windows.
+
+        Parameters
+        ----------
+        times
+            Times in periods, shape (times,).
+
+        Returns
+        -------
+        Positions in nm, shape (times,).
+        """
 
     def basis(self, times: Floats) -> Floats:
-        """Return the matrix from the coefficients to the displacement: (times, coefficients)."""
+        """Return the matrix from the coefficients to the displacement.
 
-    def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """Return the coefficients of the reached line less the line ``asked`` at times, in nm."""
+        Parameters
+        ----------
+        times
+            Times in periods, shape (times,).
+
+        Returns
+        -------
+        Matrix, shape (times, coefficients).
+        """
+
+    def error(self, requested: Callable[[Floats], Floats], size_nm: float) -> Floats:
+        """Return the coefficients of the reached line less the requested one.
+
+        Parameters
+        ----------
+        requested
+            Returns the requested position, 0..1, at times in periods, of their shape.
+        size_nm
+            Length of the line in nm.
+
+        Returns
+        -------
+        Coefficients in nm, shape (coefficients,).
+        """

@@ -1,4 +1,4 @@
-"""When each sample of a trace was taken, in periods of the scan: from the recorded drive, or from a trigger."""
+"""The phase of each sample of a trace, in periods of the scan: from the recorded drive, or from a trigger."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _MAX_LAYER_MISSING = 0.5  # share of the layer
 
 @dataclass(frozen=True)
 class Phase:
-    """``turns`` are periods since a line start, one for each sample; the period is by the recorder's clock.
+    """The times of the samples; ``turns`` are periods since a line start, (samples,), by the recorder's clock.
 
     ``drive`` is the recorded drive's amplitude relative to the plan's, and its rms departure from the plan's waveform
     relative to that; None without a recorded drive.
@@ -39,23 +39,44 @@ class Phase:
 
 
 def phase_by_trigger(line: LinePlan, time_s: Floats, period_s: float | None, delay_s: float) -> Phase:
-    """Time 0 is a line start (of y: a frame start), the period the plan's or ``period_s``; times ascending."""
+    """Compute the phase of a trace whose time 0 is a line start (of y: a frame start).
+
+    Parameters
+    ----------
+    time_s
+        Times in s, ascending, shape (samples,).
+    period_s
+        Period by the recorder's clock in s; the plan's if None.
+    delay_s
+        Delay of the sensor in s.
+
+    Raises
+    ------
+    Unphysical
+        If the trace has too few samples, less than a period, or times that do not ascend.
+    """
     period = 1.0 / float(line.rate) if period_s is None else period_s
     _check_times(time_s, period)
     return Phase((time_s - delay_s) / period, period, None)
 
 
 def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: float) -> Phase:
-    """Fit period and start of the drive at the piezo (V) by the waveform that the plan's codes make there.
+    """Fit period and start of the recorded drive by the waveform that the plan's codes make there.
 
-    What the converter holds is that waveform, with ripple at the update rate: a code stands for the middle of its tick,
-    and periods are counted from the beginning of tick 0, as by a trigger. ``delay_s`` is that of the sensor against the
-    drive.
+    The output of the converter is that waveform, with ripple at the update rate: a code stands for the middle of its
+    tick, and periods are counted from the beginning of tick 0, as by a trigger.
+
+    Parameters
+    ----------
+    time_s, drive_v
+        Times in s, ascending, and the drive at the piezo in V, shape (samples,) each.
+    delay_s
+        Delay of the sensor against the drive, in s.
 
     Raises
     ------
     Unphysical
-        If the drive is not that of the plan.
+        If the trace is too short or too sparse, or the drive is not that of the plan.
     """
     nominal = 1.0 / float(line.rate)
     _check_times(time_s, nominal)
@@ -69,8 +90,8 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
         return t
 
     def residuals(x: Floats, rows: slice = slice(None)) -> Floats:
-        left: Floats = float(x[2]) + float(x[3]) * (_at(w, turns(x, rows)) - 0.5) - drive_v[rows]
-        return left / amplitude
+        residual: Floats = float(x[2]) + float(x[3]) * (_at(w, turns(x, rows)) - 0.5) - drive_v[rows]
+        return residual / amplitude
 
     def jacobian(x: Floats, rows: slice = slice(None)) -> Floats:
         t = turns(x, rows)
@@ -80,21 +101,21 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
     first = [period, start, float(np.mean(drive_v)), float(np.ptp(drive_v))]
     scales = [0.01 * nominal, 0.05 * nominal, amplitude, amplitude]
     few = slice(None, None, ceil(len(time_s) / _MOST_AT_ONCE))
-    found = solve(
+    fit = solve(
         lambda x: residuals(x, few),
         first,
         ("period", "start", "middle", "amplitude"),
         scales,
         jacobian=lambda x: jacobian(x, few),
     )
-    x, left = found.values, found.residuals
-    if len(left) < len(time_s):  # so near the minimum, one step with all samples reaches it
+    x, residual = fit.values, fit.residuals
+    if len(residual) < len(time_s):  # so near the minimum, one step with all samples reaches it
         x = x - _step(residuals, jacobian, x, np.array(scales), len(time_s))
-        left = np.empty(len(time_s))
+        residual = np.empty(len(time_s))
         for rows in _parts(len(time_s)):
-            left[rows] = residuals(x, rows)
+            residual[rows] = residuals(x, rows)
     relative, t = float(x[3]) / amplitude, turns(x)
-    departure = _averaged(t, left) / max(abs(relative), 1e-9)
+    departure = _averaged(t, residual) / max(abs(relative), 1e-9)
     if abs(float(x[0]) / nominal - 1.0) > _MAX_CLOCK_DIFFERENCE:
         raise Unphysical(
             f"the recorded drive has a period of {x[0]:.6g} s, this scan {nominal:.6g} s; is time_s in seconds?"
@@ -109,7 +130,7 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
             f"the recorded drive departs from this scan's by {100.0 * departure:.2g} % rms; record the scan as it is "
             f"built from this file"
         )
-    _check_layer(line, t[few], -left[few] / relative)
+    _check_layer(line, t[few], -residual[few] / relative)
     t -= delay_s / float(x[0])
     return Phase(t, float(x[0]), (relative, departure))
 
@@ -121,7 +142,7 @@ def _step(
     scales: Floats,
     samples: int,
 ) -> Floats:
-    """Gauss and Newton's, of all samples."""
+    """Return the Gauss-Newton step of all samples."""
     normal, right = np.zeros((len(x), len(x))), np.zeros(len(x))
     for rows in _parts(samples):
         j = jacobian(x, rows) * scales
@@ -153,7 +174,7 @@ def _check_times(time_s: Floats, period_s: float) -> None:
 
 
 def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal_s: float) -> tuple[float, float]:
-    """Period and a line start, from the angle of the fundamental in pieces of one nominal period each."""
+    """Return period and a line start, from the angle of the fundamental in pieces of one nominal period each."""
     if not float(np.ptp(drive_v)) > 0.0:
         raise Unphysical("the drive does not move")
     turns = time_s - time_s[0]
@@ -190,24 +211,24 @@ def _at(table: Floats, turns: Floats) -> Floats:
     return value
 
 
-def _averaged(turns: Floats, left: Floats) -> float:
-    """Rms of what is left, averaged over the periods in pieces of one, less what noise has in it.
+def _averaged(turns: Floats, residuals: Floats) -> float:
+    """Return the rms of the residuals, averaged over the periods in bins, less the share of noise.
 
-    Noise is what neighbouring readings differ by: a short trace has few readings in a piece, which average little.
+    Noise is estimated from the difference of neighbouring readings: in a short trace a bin has few readings.
     """
     count, total = np.zeros(_BINS_PER_PERIOD), np.zeros(_BINS_PER_PERIOD)
     for rows in _parts(len(turns)):
         place = ((turns[rows] - np.floor(turns[rows])) * _BINS_PER_PERIOD).astype(np.int64)
         place = np.minimum(place, _BINS_PER_PERIOD - 1)
         count += np.bincount(place, minlength=_BINS_PER_PERIOD)
-        total += np.bincount(place, left[rows], minlength=_BINS_PER_PERIOD)
+        total += np.bincount(place, residuals[rows], minlength=_BINS_PER_PERIOD)
     readings = count[count > 0]
     mean = total[count > 0] / readings
-    noise = 0.5 * sum(float(np.sum(np.diff(left[rows]) ** 2)) for rows in _parts(len(left))) / len(left)
+    noise = 0.5 * sum(float(np.sum(np.diff(residuals[rows]) ** 2)) for rows in _parts(len(residuals))) / len(residuals)
     return float(np.sqrt(max(float(np.mean(mean**2)) - noise * float(np.mean(1.0 / readings)), 0.0)))
 
 
-def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
+def _check_layer(line: LinePlan, turns: Floats, residuals: Floats) -> None:
     """Check that the drive has the layer of the file: a trace of an older build would be learnt twice."""
     if line.layer is None:
         return
@@ -219,13 +240,13 @@ def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
         # Offset, amplitude and start were fitted, and took a part of it.
         [_at(_tabled(line.layer, 0), t), np.ones_like(t), *(_at(_tabled(line.drive_series, n), t) for n in (0, 1))],
     )[inside]
-    found, left_over, rank, _ = np.linalg.lstsq(columns, left[inside], rcond=None)
+    coefficients, left_over, rank, _ = np.linalg.lstsq(columns, residuals[inside], rcond=None)
     if rank < 4 or not len(left_over):
         return
     inverse = np.linalg.inv(columns.T @ columns)
     error = float(np.sqrt(inverse[0, 0] * left_over[0] / max(len(columns) - 4, 1)))
-    if float(found[0]) < -_MAX_LAYER_MISSING and error < 0.2 * _MAX_LAYER_MISSING:
-        share = min(-float(found[0]), 1.0)
+    if float(coefficients[0]) < -_MAX_LAYER_MISSING and error < 0.2 * _MAX_LAYER_MISSING:
+        share = min(-float(coefficients[0]), 1.0)
         raise Unphysical(
             f"the recorded drive lacks {ceil(100.0 * share - 0.5)} % of the layer that the scan file has; "
             f"build, upload and record again"

@@ -1,8 +1,8 @@
-"""Trace and retrace of any sample -> how far they are apart along the line. What both share, they do not say.
+"""From trace and retrace of any sample to their mismatch along the line; it says nothing of an error that both share.
 
-The sample is the same in both: T(x at column) = R(x at column). Both are laid on one grid of positions, each moved by
-half of what they are apart, and the polynomial by which they agree best is found by Gauss and Newton, from coarse to
-fine. Rows of the retrace are later, and the slow axis has gone on meanwhile: they are taken from between the rows.
+The sample is the same in both: T(x at column) = R(x at column). Both are interpolated on one grid of positions, each
+shifted by half the mismatch, and the polynomial by which they agree best is fitted by Gauss-Newton, from coarse to
+fine. Rows of the retrace are later, when the slow axis has moved: they are interpolated between the rows.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from tablegen.images.pair_checks import check_mirrored
 from tablegen.images.periodic_model import Geometry
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.refinement.departure import asked_position
+from tablegen.refinement.departure import requested_position
 from tablegen.refinement.lattice_line import ImageOptions, column_modes
 from tablegen.refinement.window_line import WindowLine
 
@@ -27,13 +27,13 @@ _DEGREES = (3, 6, 12)  # of the polynomial meanwhile
 _STEPS = 8
 _SETTLED = 1e-3  # pixels
 _EDGE = 1  # columns and rows at the edges that are not compared
-_LEAST_MATCH = 0.3  # correlation of what is compared
-_MOST_PIXELS = 12.0  # columns that trace and retrace may be apart
+_LEAST_MATCH = 0.3  # correlation of the compared pixels
+_MOST_PIXELS = 12.0  # largest distance of trace and retrace, in columns
 
 
 @dataclass(frozen=True, eq=False)
 class SweepMismatch:
-    """``match`` is the correlation of trace and retrace once they lie on each other."""
+    """The mismatch of a pair of images; ``match`` is their correlation after the shift."""
 
     geometry: Geometry
     line: WindowLine
@@ -42,6 +42,11 @@ class SweepMismatch:
 
 def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> SweepMismatch:
     """Measure the mismatch of trace and retrace of x, half in each.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns), rows in the order of time, the left end first.
 
     Raises
     ------
@@ -61,10 +66,10 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
     rows = np.arange(geometry.rows)[:, None]
     across = np.broadcast_to(np.arange(geometry.columns), heights[0].shape)
     images = [heights[0], map_coordinates(heights[1], [rows - late, across], order=3, mode="nearest")]
-    asked = np.split(modes.asked, 2)
+    requested = np.split(modes.requested, 2)
     # Even positions, and polynomials there: of the trace's half of the difference.
-    grid = np.linspace(max(a[0] for a in asked), min(a[-1] for a in asked), geometry.columns)
-    place = np.interp(grid, asked[0], geometry.place)
+    grid = np.linspace(max(a[0] for a in requested), min(a[-1] for a in requested), geometry.columns)
+    place = np.interp(grid, requested[0], geometry.place)
     coefficients = np.zeros(_DEGREES[-1] + 1)
     influence, match = np.zeros((1, 1)), 0.0
     for blur, degree in zip(_BLURS, _DEGREES, strict=True):
@@ -76,11 +81,11 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
             half = polynomials @ coefficients[:count]
             shifted_images = [
                 _laid(image, np.interp(grid - sign * half, at_columns, np.arange(geometry.columns)))
-                for image, at_columns, sign in zip(smooth, asked, (1.0, -1.0), strict=True)
+                for image, at_columns, sign in zip(smooth, requested, (1.0, -1.0), strict=True)
             ]
-            apart, slope = shifted_images[0] - shifted_images[1], 0.5 * (shifted_images[0] + shifted_images[1])
+            difference, slope = shifted_images[0] - shifted_images[1], 0.5 * (shifted_images[0] + shifted_images[1])
             steep = 2.0 * np.gradient(slope, grid, axis=1)[_EDGE:-_EDGE, _EDGE:-_EDGE]
-            inner = apart[_EDGE:-_EDGE, _EDGE:-_EDGE]
+            inner = difference[_EDGE:-_EDGE, _EDGE:-_EDGE]
             basis = polynomials[_EDGE:-_EDGE]
             normal = np.einsum("ij,jm,jn->mn", steep**2, basis, basis, optimize=True)
             scores = (steep * inner) @ basis
@@ -96,7 +101,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
     scale = np.maximum(np.sqrt(np.mean(influence**2, axis=0)), 1e-300)
     spread = influence.T @ influence * correlation_length(influence / scale)
     found_line = WindowLine(
-        partial(asked_position, line),
+        partial(requested_position, line),
         line.drive.size_nm,
         line.drive.turn,
         window,
@@ -109,7 +114,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
 
 
 def _laid(spline: Floats, columns: Floats) -> Floats:
-    """Evaluate an image's rows at fractions of columns; it comes as coefficients of splines."""
+    """Evaluate an image, given by its spline coefficients, at fractional columns."""
     rows = np.broadcast_to(np.arange(spline.shape[0])[:, None], (spline.shape[0], len(columns)))
     shifted: Floats = map_coordinates(
         spline, [rows, np.broadcast_to(columns, rows.shape)], order=3, mode="nearest", prefilter=False
@@ -119,8 +124,8 @@ def _laid(spline: Floats, columns: Floats) -> Floats:
 
 def _check(geometry: Geometry, half: Floats, match: float, grid: Floats) -> None:
     pixel = float(grid[-1] - grid[0]) / (len(grid) - 1)
-    apart = 2.0 * float(np.max(np.abs(half))) / pixel
-    if match < _LEAST_MATCH or apart > _MOST_PIXELS:
+    distance = 2.0 * float(np.max(np.abs(half))) / pixel
+    if match < _LEAST_MATCH or distance > _MOST_PIXELS:
         raise Unphysical(
             "the retrace does not show what the trace shows; are they of one scan, with contrast along the lines?"
         )

@@ -1,4 +1,4 @@
-"""A round from a loaded scan and a trace to what goes into the scan file, and whether it should."""
+"""A round from a loaded scan and a trace to the new layer, and whether it should be written."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -21,7 +21,7 @@ from tablegen.refinement.displacement import Displacement, fit_displacement
 from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, LayerUpdate, learn
 from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
 
-_FINISHED_RATIO = 0.9  # share of the residual that a round would leave; above it the rest is noise
+_FINISHED_RATIO = 0.9  # predicted over measured residual; above it the rest is noise
 _CHORD_NOISES = 4.0  # of the largest and the least chord together: the rms noise of one, of some twenty in a window
 _MOST_SCALING = 1e4  # percent that a scan file can hold
 _SIZE_NOTE_LIMIT = 0.01  # share of the line; a larger size error gets a remark
@@ -29,7 +29,7 @@ _SIZE_NOTE_LIMIT = 0.01  # share of the line; a larger size error gets a remark
 
 @dataclass(frozen=True)
 class Options:
-    """How to learn; ``harmonics`` None is as many as the bound allows, up to 16."""
+    """Settings of a round; ``harmonics`` None is as many as the bound allows, up to 16."""
 
     gain: float = DEFAULT_GAIN
     harmonics: int | None = None
@@ -41,10 +41,10 @@ class Options:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Round:
-    """What a measurement says. ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer.
+    """The result of a measurement; ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer.
 
-    ``stopped`` is why no further layer is to be played although the residual did not grow, if so: the scaling error
-    rose; ``best`` is the layer of the round before, which had less, None where that had none.
+    ``stopped`` is why no further layer should be played although the residual did not grow, if so: the scaling error
+    rose. ``best`` is the layer of the round before, which had a smaller one; None where that had no layer.
     """
 
     line: LinePlan
@@ -59,20 +59,26 @@ class Round:
 
     @property
     def recorded(self) -> str:
-        """How much was recorded, in words."""
+        """The amount of data, in words.
+
+        Raises
+        ------
+        NotImplementedError
+            In this base class.
+        """
         raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TraceRound(Round):
-    """What the trace of a sensor says."""
+    """Round learnt from the trace of a sensor."""
 
     phase: Phase
     displacement: Displacement
 
     @property
     def recorded(self) -> str:
-        """Periods and samples."""
+        """The number of periods and samples, in words."""
         displacement = self.displacement
         return f"{displacement.periods:.4g} periods of {self.phase.period_s:.6g} s, {displacement.samples} samples"
 
@@ -85,14 +91,25 @@ def refine(
     drive_v: Floats | None,
     options: Options,
 ) -> TraceRound:
-    """Learn from a trace of the running scan: times ascending (s), displacement (nm), the drive at the piezo (V).
+    """Learn from a trace of the running scan.
 
-    Without a drive time 0 is a line start, of y a frame start. Raises ``Rejected`` where the scan, or the scan with the
-    new layer, cannot be planned, and ``Unphysical`` for a trace that is not of this scan or that bounds forbid.
+    Parameters
+    ----------
+    time_s, displacement_nm
+        Times in s, ascending, and the displacement in nm, shape (samples,) each.
+    drive_v
+        Drive at the piezo in V, shape (samples,); without it time 0 is a line start, of y a frame start.
+
+    Raises
+    ------
+    Rejected
+        If the scan, or the scan with the new layer, cannot be planned.
+    Unphysical
+        If the trace is not of this scan, or a bound forbids learning.
     """
     check_spans(time_s, displacement_nm, drive_v)
     line: LinePlan = getattr(make_plan(setup), axis)
-    limits = allowed(line, options)
+    limits = learning_bound(line, options)
     if drive_v is None:
         phase = phase_by_trigger(line, time_s, options.period_s, options.delay_s)
     else:
@@ -108,7 +125,7 @@ def refine(
         update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, update),
+        worse=divergence_reason(setup, axis, update),
         **stop(setup, line, update),
         remarks=_remarks(line, measured, update, phase, time_s),
         phase=phase,
@@ -122,7 +139,7 @@ BeforeOf = Literal["line", "mismatch"]
 def with_layer_update(
     setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf | None = None
 ) -> tuple[Refinement | None, Setup]:
-    """Build the new layer, if there is one, and the scan with it.
+    """Build the new layer, None if there is none, and the scan with it.
 
     Raises
     ------
@@ -162,19 +179,19 @@ def with_refinement(setup: Setup, axis: str, refinement: Refinement | None) -> S
     return replace(setup, scan=msgspec.structs.replace(setup.scan, **{axis: changed}))
 
 
-def allowed(line: LinePlan, options: Options) -> Bound:
+def learning_bound(line: LinePlan, options: Options) -> Bound:
     """Compute the bound for the requested gain and harmonics.
 
     Raises
     ------
     Unphysical
-        If learning might not converge.
+        If learning might not converge, or more harmonics are requested than the scan plays.
     """
-    asked = options.harmonics
-    limits = bound(line, options.gain, min(DEFAULT_HARMONICS, line.target.harmonics) if asked is None else asked)
-    if asked is not None and asked > line.target.harmonics:
-        raise Unphysical(f"{asked} harmonics are more than the {line.target.harmonics} that the scan plays")
-    if limits.used == 0 or (asked is not None and asked > limits.harmonics):
+    request = options.harmonics
+    limits = bound(line, options.gain, min(DEFAULT_HARMONICS, line.target.harmonics) if request is None else request)
+    if request is not None and request > line.target.harmonics:
+        raise Unphysical(f"{request} harmonics are more than the {line.target.harmonics} that the scan plays")
+    if limits.used == 0 or (request is not None and request > limits.harmonics):
         fits = f"learn up to {limits.harmonics} harmonics" if limits.harmonics else "scan slower"
         raise Unphysical(
             f"at a gain of {options.gain:g} the error of harmonic {limits.harmonics + 1} might not shrink, if the "
@@ -183,10 +200,10 @@ def allowed(line: LinePlan, options: Options) -> Bound:
     return limits
 
 
-def why_worse(setup: Setup, axis: str, update: LayerUpdate, before_of: BeforeOf | None = None) -> str:
-    """Whether the layer that was played made things worse, against the measurement before it; empty where not.
+def divergence_reason(setup: Setup, axis: str, update: LayerUpdate, before_of: BeforeOf | None = None) -> str:
+    """Return why the layer that was played made the residual grow since the measurement before; empty where it did not.
 
-    Only measurements of the same are compared.
+    Only measurements of the same kind are compared.
     """
     played: Refinement | None = getattr(setup.scan, axis).refinement
     if played is not None and played.best:
@@ -207,9 +224,9 @@ def why_worse(setup: Setup, axis: str, update: LayerUpdate, before_of: BeforeOf 
 
 
 def stop(setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf | None = None) -> dict[str, Any]:
-    """Fields of a round where the scaling error rose with the layer that was played; empty where it did not.
+    """Return the fields of a round where the scaling error rose with the layer that was played; empty where it did not.
 
-    What the noise of the measurement and the converter's rounding do to chords is no rise.
+    A rise within the effect of measurement noise and the converter's rounding on chords does not count.
     """
     played: Refinement | None = getattr(setup.scan, line.axis).refinement
     if played is None or played.before_scaling_percent is None or played.before_of != before_of:
@@ -258,7 +275,7 @@ def _remarks(
         remarks.append(
             Remark("the error is within the noise of the sensor: there is nothing more to learn from this trace")
         )
-    elif finished(update):
+    elif mostly_noise(update):
         remarks.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
     if measured.correlated > 3.0:
         remarks.append(
@@ -275,8 +292,8 @@ def _remarks(
     return tuple(remarks)
 
 
-def finished(update: LayerUpdate) -> bool:
-    """Whether most of what is left is noise."""
+def mostly_noise(update: LayerUpdate) -> bool:
+    """Return true if most of the remaining error is noise."""
     return update.after.rms_percent > _FINISHED_RATIO * update.before.rms_percent
 
 

@@ -11,11 +11,11 @@ from tablegen.refinement.image_round import ImageRound, MismatchRound
 from tablegen.refinement.round import Round, TraceRound
 
 
-def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]:
-    """Lines of text."""
-    update = found.update
+def refine_text(result: Round, name: str, sources: Sequence[Source]) -> list[str]:
+    """Format a round for the terminal."""
+    update = result.update
     lines = [
-        f"{name}, {found.line.axis}: {_what(found, sources)}",
+        f"{name}, {result.line.axis}: {_what(result, sources)}",
         "",
         "                        residual [% of the line]   scaling error",
         "direction                    rms      largest      [% peak to peak]",
@@ -27,45 +27,45 @@ def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]
     lines += [
         f"its noise{'':<14}{update.noise_percent:8.4f}{'':<20}{update.chord_noise_percent:8.3f} rms of a chord",
         "",
-        *_size(found),
-        *_learnt(found),
-        *_bound(found),
+        *_size(result),
+        *_learnt(result),
+        *_bound(result),
         "",
     ]
     return lines
 
 
-def _what(found: Round, sources: Sequence[Source]) -> str:
-    """What was measured."""
+def _what(result: Round, sources: Sequence[Source]) -> str:
+    """Name the measurement and its sources."""
     names = " and ".join(source.name for source in sources[:2]) + (" and others" if len(sources) > 2 else "")
-    return f"{found.recorded}{'' if isinstance(found, TraceRound) else ','} of {names}"
+    return f"{result.recorded}{'' if isinstance(result, TraceRound) else ','} of {names}"
 
 
-def _size(found: Round) -> list[str]:
-    """The length of x's line by the constant of the sample."""
-    if not isinstance(found, ImageRound) or found.size is None:
+def _size(result: Round) -> list[str]:
+    """Format the length of x's line by the constant of the sample."""
+    if not isinstance(result, ImageRound) or result.size is None:
         return []
-    size, asked = found.size.nm, found.asked_nm
-    by = 100.0 * (size.value / asked - 1.0)
+    size, requested_nm = result.size.nm, result.requested_nm
+    by = 100.0 * (size.value / requested_nm - 1.0)
     return [
-        f"size of x: {size.value:.5g} +- {size.standard_error:.2g} nm from turn to turn, asked {asked:.5g} nm: "
-        f"{by:+.3g} +- {100.0 * size.standard_error / asked:.2g} %"
+        f"size of x: {size.value:.5g} +- {size.standard_error:.2g} nm from turn to turn, requested "
+        f"{requested_nm:.5g} nm: {by:+.3g} +- {100.0 * size.standard_error / requested_nm:.2g} %"
     ]
 
 
-def _learnt(found: Round) -> list[str]:
-    update = found.update
+def _learnt(result: Round) -> list[str]:
+    update = result.update
     if not update.harmonics:
         return ["learnt: nothing"]
     change, layer = (100.0 * float(np.max(np.abs(s.on_grid(1024)))) for s in (update.change, update.layer))
     return [
-        f"learnt: harmonics 1 to {update.harmonics} of {found.bound.used}, up to {change:.3g} % of the line; "
+        f"learnt: harmonics 1 to {update.harmonics} of {result.bound.used}, up to {change:.3g} % of the line; "
         f"the layer is now up to {layer:.3g} %"
     ]
 
 
-def _bound(found: Round) -> list[str]:
-    b = found.bound
+def _bound(result: Round) -> list[str]:
+    b = result.bound
     lines = [
         f"bound: at a gain of {b.gain:g} it converges while the scanner's response at harmonics 1 to {b.used} is below "
         f"{b.largest_gain:.3g} times the modelled one, or off by less than {b.phase_deg:.3g} degrees, a delay of "
@@ -73,17 +73,17 @@ def _bound(found: Round) -> list[str]:
     ]
     if b.dynamics:
         lines.append(
-            f"with the dynamics of the scanner file off by a quarter a round leaves {100.0 * b.left:.3g} % at worst; "
-            f"up to {b.harmonics} harmonics converge"
+            f"with the dynamics of the scanner file off by a quarter a round leaves {100.0 * b.remaining:.3g} % at "
+            f"worst; up to {b.harmonics} harmonics converge"
         )
     else:
         lines.append("the scanner file has no dynamics: keep the resonance and the delay away from these harmonics")
     return lines
 
 
-def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[str, Any]:
-    """The same as plain data, for JSON."""
-    line, update, b = found.line, found.update, found.bound
+def refine_record(result: Round, name: str, sources: Sequence[Source]) -> dict[str, Any]:
+    """Return the round as plain data, for JSON."""
+    line, update, b = result.line, result.update, result.bound
 
     def errors(departure: Departure) -> dict[str, Any]:
         sides = departure.residual_percent
@@ -102,7 +102,7 @@ def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[st
     return {
         "scan": name,
         "axis": line.axis,
-        **_measurement(found, sources),
+        **_measurement(result, sources),
         "measured": errors(update.before),
         "predicted": errors(update.after),
         "harmonics": update.harmonics,
@@ -110,28 +110,28 @@ def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[st
             "gain": b.gain,
             "harmonics": b.harmonics,
             "used": b.used,
-            "left_of_error": b.left,
+            "left_of_error": b.remaining,
             "largest_gain": b.largest_gain,
             "phase_deg": b.phase_deg,
             "delay_s": b.delay_s,
             "dynamics_known": b.dynamics,
         },
         "layer": {"a": update.layer.a.tolist(), "b": update.layer.b.tolist()},
-        "worse": found.worse or None,
-        "stopped": found.stopped or None,
-        "remarks": list(found.remarks),
+        "worse": result.worse or None,
+        "stopped": result.stopped or None,
+        "remarks": list(result.remarks),
     }
 
 
-def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
-    """What differs between a trace and images."""
+def _measurement(result: Round, sources: Sequence[Source]) -> dict[str, Any]:
+    """Return the fields that differ between a trace and images."""
     plain = [{"name": source.name, "sha256": source.sha256} for source in sources]
-    line, update = found.line, found.update
-    if isinstance(found, TraceRound):
-        measured = found.displacement
+    line, update = result.line, result.update
+    if isinstance(result, TraceRound):
+        measured = result.displacement
         return {
             "source": plain[0],
-            "period_s": found.phase.period_s,
+            "period_s": result.phase.period_s,
             "periods": measured.periods,
             "samples": measured.samples,
             "left_out": measured.left_out,
@@ -140,26 +140,26 @@ def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
             "noise": {"reading_nm": measured.noise_nm, "position_percent": update.noise_percent},
             "drift_nm": measured.drift_nm,
         }
-    if isinstance(found, ImageRound | MismatchRound):
-        geometry = found.frames[0].geometry
+    if isinstance(result, ImageRound | MismatchRound):
+        geometry = result.frames[0].geometry
         shared = {
             "images": [{"trace": trace, "retrace": retrace} for trace, retrace in zip(*[iter(plain)] * 2, strict=True)],
             "rows": geometry.rows,
             "columns": geometry.columns,
             "noise": {"position_percent": update.noise_percent},
         }
-    if isinstance(found, MismatchRound):
-        return {**shared, "mismatch": True, "match": min(frame.match for frame in found.frames)}
-    if isinstance(found, ImageRound):
-        first = found.frames[0]
+    if isinstance(result, MismatchRound):
+        return {**shared, "mismatch": True, "match": min(frame.match for frame in result.frames)}
+    if isinstance(result, ImageRound):
+        first = result.frames[0]
         return {
             **shared,
             "mismatch": False,
-            "periods_of_the_sample": found.periods,
+            "periods_of_the_sample": result.periods,
             "waves": len(first.fit.state.q),
             "periodic_share": min(first.fit.explained),
-            "asked_nm": found.asked_nm,
-            "size_nm": None if found.size is None else found.size.nm.value,
-            "size_standard_error_nm": None if found.size is None else found.size.nm.standard_error,
+            "asked_nm": result.requested_nm,
+            "size_nm": None if result.size is None else result.size.nm.value,
+            "size_standard_error_nm": None if result.size is None else result.size.nm.standard_error,
         }
-    raise TypeError(type(found).__name__)
+    raise TypeError(type(result).__name__)

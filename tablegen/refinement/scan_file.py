@@ -1,4 +1,4 @@
-"""A layer into a scan file: one table in place, comments and order kept, a comment on which traces it came from."""
+"""Writing a layer into a scan file: one table in place, comments and order preserved, with a comment on its sources."""
 
 import re
 import tomllib
@@ -36,10 +36,10 @@ def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], prove
         changed = _put(text, name, axis, values)
         at = parse_toml(changed, name)[1].line_of(f"{axis}.{KEY}") - 1
         changed = _commented(changed, at, provenance)
-        kept = tomllib.loads(changed) == expected
-    except (Rejected, ValueError):  # what came out is no TOML
-        changed, kept = text, False
-    if not kept:
+        preserved = tomllib.loads(changed) == expected
+    except (Rejected, ValueError):  # the result is no TOML
+        changed, preserved = text, False
+    if not preserved:
         why = f"its layout is too unusual to be edited in place; write [{axis}] as a table of its own"
         raise Rejected([Problem(name, 0, axis, why)])
     return changed.replace("\n", "\r\n") if windows else changed
@@ -62,7 +62,7 @@ def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
         _update(parent[KEY], values)
     elif isinstance(parent, InlineTable):
         parent[KEY] = dict(values)
-    else:  # a new table by hand: comments above the next one are that one's, which tomlkit does not know
+    else:  # a new table by hand, since tomlkit would put it between the next table and its comment
         rows = text.split("\n")
         places = parse_toml(text, name)[1].lines or {}
         lines = [line for key, line in places.items() if key.split(".")[0] == axis]

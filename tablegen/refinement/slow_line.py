@@ -1,4 +1,4 @@
-"""The slow axis from the same images: the phases of the rows -> where y was in each line."""
+"""The slow axis from the same images: from the phases of the rows to the position of y in each line."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -9,7 +9,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.fitting.correlation import correlation_length
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.refinement.departure import asked_position
+from tablegen.refinement.departure import requested_position
 from tablegen.refinement.lattice_line import LatticeLine
 from tablegen.refinement.window_line import WindowLine, error_modes
 
@@ -22,9 +22,9 @@ _SAME_WAVES = 0.2  # how far waves of two frames may be from whole numbers of ea
 def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
     """Fit y over the lines of its way up, which the rows are, from the phases of the waves in each.
 
-    ``frames`` follow each other without a pause. Errors of the scanner are the same in each of them; what changes from
-    one to the next is drift, whose rate may change evenly. One frame does not separate that change from an error of y.
-    Two waves separate a shift along x from one along y; one does not.
+    ``frames`` follow each other without a pause. Errors of the scanner are the same in each of them; the difference
+    from one to the next is drift, whose rate may change linearly. One frame does not separate that change from an error
+    of y. Two waves separate a shift along x from one along y; one does not.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
             f"the whole frame: do not crop it, and leave out the lines of the flyback"
         )
     times = (schedule.up.first + np.arange(rows) + 0.5) / schedule.lines
-    requested = asked_position(line, times)
+    requested = requested_position(line, times)
     phases, covariance = _without_drift(frames, times)
     straight = np.column_stack([np.ones(rows), requested])
     c = np.linalg.lstsq(straight, phases, rcond=None)[0]
@@ -60,12 +60,12 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
     columns = np.column_stack([straight, modes]) * weight[:, None]
     inverse = np.linalg.inv(columns.T @ columns)
     solved = inverse @ (columns.T @ (weight * error))
-    left = weight * error - columns @ solved
-    correlated = correlation_length(left)
+    residuals = weight * error - columns @ solved
+    correlated = correlation_length(residuals)
     freedom = max(rows / correlated - columns.shape[1], 1.0)
-    covariance = inverse[2:, 2:] * float(left @ left) / freedom
+    covariance = inverse[2:, 2:] * float(residuals @ residuals) / freedom
     return WindowLine(
-        partial(asked_position, line),
+        partial(requested_position, line),
         line.drive.size_nm,
         line.drive.turn,
         window,
@@ -77,7 +77,7 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
 
 
 def _without_drift(frames: Sequence[LatticeLine], times: Floats) -> tuple[Floats, Floats]:
-    """Phases of each row, (rows, waves) of the first frame, and covariances: the mean over the frames."""
+    """Return the phases of each row, (rows, waves) of the first frame, and covariances: the mean over the frames."""
     first = frames[0]
     phases, covariances = [first.fit.phases.phase], [first.fit.phases.covariance]
     for frame in frames[1:]:
@@ -85,12 +85,12 @@ def _without_drift(frames: Sequence[LatticeLine], times: Floats) -> tuple[Floats
         phases.append(frame.fit.phases.phase @ back.T)
         covariances.append(back @ frame.fit.phases.covariance @ back.T)
     line = np.column_stack([np.ones_like(times), times])
-    # Of each frame against the first: a shift, and how much faster the sample goes.
-    apart = [np.linalg.lstsq(line, phase - phases[0], rcond=None)[0] for phase in phases]
+    # Of each frame against the first: a shift, and the change of the drift rate.
+    drifts = [np.linalg.lstsq(line, phase - phases[0], rcond=None)[0] for phase in phases]
     number = np.arange(len(phases))
-    faster = sum(k * c[1] for k, c in zip(number, apart, strict=True)) / max(float(number @ number), 1.0)
+    faster = sum(k * c[1] for k, c in zip(number, drifts, strict=True)) / max(float(number @ number), 1.0)
     bent = 0.5 * np.outer(times**2, faster)
-    mean = np.mean([phase - line @ c - bent for phase, c in zip(phases, apart, strict=True)], axis=0)
+    mean = np.mean([phase - line @ c - bent for phase, c in zip(phases, drifts, strict=True)], axis=0)
     return mean, np.mean(covariances, axis=0) / len(phases)
 
 
@@ -105,14 +105,14 @@ def _same_waves(first: LatticeLine, other: LatticeLine) -> Floats:
     raise Unphysical("the images do not show one sample; give frames that follow each other")
 
 
-def _across_rows(found: LatticeLine) -> Floats:
-    """Periods of each wave along the rows."""
-    slope: Floats = np.polyfit(found.geometry.y, found.fit.phases.phase, 1)[0]
+def _across_rows(frame: LatticeLine) -> Floats:
+    """Return the periods of each wave along the rows."""
+    slope: Floats = np.polyfit(frame.geometry.y, frame.fit.phases.phase, 1)[0]
     return slope
 
 
 def _across(phases: Floats, covariance: Floats, q: Floats, s: Floats) -> tuple[Floats, Floats]:
-    """Along y, of each row, in lines of y: what phases are off, and its variance."""
+    """Return the error along y of each row, in lines of y, and its variance."""
     if len(q) == 1:
         return phases[:, 0] / s[0], covariance[:, 0, 0] / s[0] ** 2
     across = np.linalg.inv(np.column_stack([q, s]))[1]  # of a shift along x and along y, the second

@@ -1,4 +1,4 @@
-"""The digest of all that a program is made from, so that a second run knows what it may leave as it is."""
+"""The digest of all inputs of a program, by which a second run recognises programs that are up to date."""
 
 import hashlib
 import json
@@ -15,16 +15,19 @@ from tablegen.emit.depfile import deciding_files
 
 
 class Inputs:
-    """Digests of files, each read once a run, and of the package that makes the formats."""
+    """Digests of files, each read once per run, and of the package that writes the formats."""
 
     def __init__(self) -> None:
         self._digests: dict[Path, str] = {}
         self._tool = cache(_tool_digest)
 
     def digest(self, setup: Setup, values: dict[str, Any], formats: Sequence[str]) -> str:
-        """Compute the digest of a setup, of the values of its scan file, and of the files that make these formats.
+        """Compute the digest of a setup, of the values of its scan file, and of the files that write these formats.
 
-        Raises ``OSError`` where a file that it names cannot be read.
+        Raises
+        ------
+        OSError
+            If a file that the setup names cannot be read.
         """
         files = [path for path in setup.files if str(path) != setup.scan_file.name]
         for path in files:
@@ -40,7 +43,7 @@ class Inputs:
 
 
 def _tool_digest(formats: tuple[str, ...]) -> str:
-    """Compute the digest of the files that make these formats: the same wherever tablegen is installed."""
+    """Compute the digest of the files that write these formats: the same wherever tablegen is installed."""
     installed = set(records(PACKAGE.parent))  # which differs between two installations of one version
     paths = [path for path in deciding_files(formats) if path not in installed and path.exists()]
     return hashlib.sha256("\n".join(sorted(f"{file_sha256(path)} {path.name}" for path in paths)).encode()).hexdigest()

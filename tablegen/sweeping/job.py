@@ -1,4 +1,4 @@
-"""One program of a library: built, certified, and written into its folder, in a worker."""
+"""One program of a library, which a worker builds, certifies and writes into its folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -32,11 +32,11 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Made:
-    """What became of it; ``different`` are the files that were written, or with ``only_check`` would be.
+class BuiltProgram:
+    """The result of a job; ``different`` are the files that were written, or with ``only_check`` would be.
 
-    With ``only_check``, ``leftovers`` are files that no sweep makes or removes, and ``memories`` the memory files that
-    stand on no disk, by name.
+    With ``only_check``, ``leftovers`` are files that no sweep writes or removes, and ``memories`` the memory files that
+    are on no disk, by name.
     """
 
     entry: Entry
@@ -45,26 +45,35 @@ class Made:
     memories: dict[str, bytes] = field(default_factory=dict)
 
 
-class Doubtful(Exception):
+class StrictWarnings(Exception):
     """A scan has warnings, which are errors with ``--strict``."""
 
     def __init__(self, warnings: Sequence[str]) -> None:
         self.warnings = list(warnings)
         super().__init__("\n".join(self.warnings))
 
-    def __reduce__(self) -> tuple[type["Doubtful"], tuple[list[str]]]:
+    def __reduce__(self) -> tuple[type["StrictWarnings"], tuple[list[str]]]:
         return type(self), (self.warnings,)
 
 
-def make(job: Job) -> Made:
-    """Build a program. Raises ``Rejected``, ``BrokenLimit``, ``Doubtful`` or ``CannotWrite``.
+def build_program(job: Job) -> BuiltProgram:
+    """Build a program; an interruption waits until its files are in place.
 
-    An interruption waits until its files are in place.
+    Raises
+    ------
+    Rejected
+        If the scan cannot be built.
+    BrokenLimit
+        If the program breaks a limit of the scan file.
+    StrictWarnings
+        If it has warnings, with ``strict``.
+    CannotWrite
+        If its files cannot be written.
     """
     built = build(job.setup, formats=job.formats)
     warnings = built.warnings
     if job.strict and warnings:
-        raise Doubtful(warnings)
+        raise StrictWarnings(warnings)
     runtime = built.runtime
     files = {name: text for name, text in built.files.items() if name not in runtime}
     entry = _entry(job, built, files)
@@ -76,11 +85,11 @@ def make(job: Job) -> Made:
         WrittenRecords().note(files[RECORD])
     if came:
         raise KeyboardInterrupt
-    return Made(entry, changed)
+    return BuiltProgram(entry, changed)
 
 
-def _compared(job: Job, entry: Entry, files: dict[str, bytes]) -> Made:
-    """Hold the folder of a program against what a sweep would write and remove, as ``build --check`` does."""
+def _compared(job: Job, entry: Entry, files: dict[str, bytes]) -> BuiltProgram:
+    """Compare the folder of a program with the files that a sweep would write and remove, as ``build --check`` does."""
     different = [name for name, text in files.items() if not holds(job.folder / name, text)]
     memories = {name: files[name] for name in different if name.endswith(".mem")}
     outdated = outdated_files(job.folder, files)
@@ -89,7 +98,7 @@ def _compared(job: Job, entry: Entry, files: dict[str, bytes]) -> Made:
     except OSError:
         present = set()
     leftovers = {*present, *leftover_files(job.folder, files)} - {*files, *outdated}
-    return Made(entry, [*different, *outdated], sorted(leftovers), memories)
+    return BuiltProgram(entry, [*different, *outdated], sorted(leftovers), memories)
 
 
 def _entry(job: Job, built: Build, files: dict[str, bytes]) -> Entry:

@@ -1,4 +1,4 @@
-"""A sweep: which programs are up to date, what becomes of the others, and the index of those that are there."""
+"""A sweep: the programs that are up to date, the results of the others, and the index of the existing ones."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
@@ -25,7 +25,7 @@ from tablegen.library.index import is_indexed, listed_files, make_index
 from tablegen.manifest.format import INDEX, MANIFEST, RECORD
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.sweeping.inputs import Inputs
-from tablegen.sweeping.job import Doubtful, Job, Made, make
+from tablegen.sweeping.job import BuiltProgram, Job, StrictWarnings, build_program
 from tablegen.sweeping.written_records import WrittenRecords
 
 _SHOWN = 20  # scans with the same reason, by name
@@ -43,38 +43,38 @@ class Failed:
 
 @dataclass(repr=False)
 class ScanLibrary(Result):
-    """The scans of a library, and what became of them."""
+    """The scans of a library, and the result of each."""
 
     library: str
     variants: list[Variant]
     folder: Path
     entries: dict[str, Entry] = field(default_factory=dict)
-    """What can be played, by name."""
+    """Existing programs, by name."""
     built: list[str] = field(default_factory=list)
     current: list[str] = field(default_factory=list)
-    """What was up to date."""
+    """Names of programs that were up to date."""
     failed: list[Failed] = field(default_factory=list)
     different: list[str] = field(default_factory=list)
     """With ``only_check``: paths that a sweep would write or remove, below ``folder``."""
     notes: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
-    """Programs of an earlier sweep that nobody asked for now."""
+    """Programs of an earlier sweep that are not in this one."""
     memories: dict[tuple[str, str], bytes] = field(default_factory=dict)
-    """With ``only_check``: memory files that stand on no disk, by program and name."""
+    """With ``only_check``: memory files that are on no disk, by program and name."""
 
     @property
     def done(self) -> int:
-        """How many scans are dealt with."""
+        """The number of scans that have a result."""
         return len(self.built) + len(self.current) + len(self.failed)
 
     @property
     def in_order(self) -> list[Entry]:
-        """What can be played, as the index numbers it."""
+        """The existing programs, as the index numbers them."""
         return [self.entries[variant.name] for variant in self.variants if variant.name in self.entries]
 
     @property
     def record(self) -> dict[str, Any]:
-        """Names of the scans by what became of them, and the reasons of those that failed."""
+        """Names of the scans by result, and the reasons of those that failed."""
         failed = [{"name": one.variant.name, "kind": one.kind, "reasons": one.reasons} for one in self.failed]
         return {
             "library": self.library,
@@ -89,7 +89,7 @@ class ScanLibrary(Result):
         }
 
     def verdict(self) -> str:
-        """Return what became of the scans in one line, as ``tablegen sweep`` prints it."""
+        """Return the results of the scans in one line, as ``tablegen sweep`` prints it."""
         count, failed = len(self.variants), len(self.failed)
         parts = [f"{len(self.built)} built"] * bool(self.built)
         parts += [f"{len(self.current)} up to date"] * bool(self.current)
@@ -102,7 +102,7 @@ class ScanLibrary(Result):
         return [*warnings, *self._reasons(), *(f"note: {note}" for note in self.notes)]
 
     def _reasons(self) -> list[str]:
-        """Each reason once, with the scans that it holds for."""
+        """Return each reason once, with the scans to which it applies."""
         by_reason: dict[str, list[str]] = {}
         for failed in self.failed:
             by_reason.setdefault("\n".join(failed.reasons), []).append(failed.variant.name)
@@ -117,7 +117,7 @@ class ScanLibrary(Result):
         return "\n".join([*self.remarks(), self.verdict()])
 
     def charts(self) -> PlottedCharts:
-        """Give the largest scaling error of each program, in the order of the index."""
+        """Return the largest scaling error of each program, in the order of the index."""
         from tablegen.charts.chart import Chart, DrawnCurve
 
         errors = [max(axis.scaling_error_percent for axis in entry.axes) for entry in self.in_order]
@@ -137,8 +137,12 @@ def state(
 ) -> Entry | tuple[Any, str]:
     """Return the entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
 
-    Its record has to be one that a sweep of this user has written, whatever else stands in the directory. Raises
-    ``Rejected``.
+    Its record must have been written by a sweep of this user, whatever else is in the directory.
+
+    Raises
+    ------
+    Rejected
+        If the setup of the scan is faulty.
     """
     setup, digest = _inputs(variant, formats, inputs)
     folder = sweep.folder / variant.name
@@ -150,7 +154,7 @@ def state(
 
 
 def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> tuple[Any, str]:
-    """Load the setup of a scan, and compute the digest of its inputs. Raises ``Rejected``."""
+    """Load the setup of a scan, and compute the digest of its inputs."""
     setup = variant.setup
     names = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
     try:
@@ -158,7 +162,7 @@ def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> 
     except UnknownFormat as error:
         raise Rejected([Problem("formats", 0, "", str(error))]) from None
     except OSError:
-        return setup, ""  # the build says what is wrong
+        return setup, ""  # the build reports the error
 
 
 def run(
@@ -170,11 +174,16 @@ def run(
     only_check: bool = False,
     progress: Callable[[int, int], object] = lambda _done, _all: None,
 ) -> None:
-    """Build what is missing or has changed, and write the index. ``progress`` is told how many of all are done.
+    """Build programs that are missing or outdated, and write the index.
 
-    With ``only_check`` every program is made again and compared, whatever the directory says of itself. Raises
-    ``CannotWrite`` where the directory cannot be written. Whatever ends it, programs that were built stay, and no
-    index: it exists only where all programs that it lists are as it says.
+    ``progress`` is called with the number of finished scans and that of all. With ``only_check`` every program is built
+    again and compared, whatever the directory contains. However a sweep ends, finished programs stay; the index
+    exists only if all programs that it lists are as it says.
+
+    Raises
+    ------
+    CannotWrite
+        If the directory cannot be written.
     """
     pending: list[Variant] = []
     before = listed_files(sweep.folder)
@@ -184,27 +193,27 @@ def run(
         for variant in sweep.variants:
             try:
                 if only_check:
-                    found: Entry | tuple[Any, str] = _inputs(variant, formats, inputs)
+                    state_or_result: Entry | tuple[Any, str] = _inputs(variant, formats, inputs)
                 else:
-                    found = state(sweep, variant, formats, inputs, written)
+                    state_or_result = state(sweep, variant, formats, inputs, written)
             except Rejected as rejected:
                 sweep.failed.append(Failed(variant, "wrong input", list(map(str, rejected.problems))))
                 continue
-            if isinstance(found, Entry):
-                _current(sweep, variant, found, strict)
+            if isinstance(state_or_result, Entry):
+                _current(sweep, variant, state_or_result, strict)
                 progress(sweep.done, len(sweep.variants))
                 continue
-            setup, digest = found
+            setup, digest = state_or_result
             if not pending and not only_check:
                 _remove_index(sweep.folder, before)
             pending.append(variant)
-            chosen = None if formats is None else tuple(formats)
+            requested = None if formats is None else tuple(formats)
             folder = sweep.folder / variant.name
-            yield (Job(sweep.library, setup, variant.settings, folder, chosen, digest, strict, only_check),)
+            yield (Job(sweep.library, setup, variant.settings, folder, requested, digest, strict, only_check),)
 
     progress(0, len(sweep.variants))
-    for number, found in results(make, tasks(), jobs):
-        _note(sweep, pending[number], found, only_check)
+    for number, state_or_result in results(build_program, tasks(), jobs):
+        _note(sweep, pending[number], state_or_result, only_check)
         progress(sweep.done, len(sweep.variants))
     _finish(sweep, before, only_check)
     written.prune()
@@ -218,10 +227,10 @@ def _current(sweep: ScanLibrary, variant: Variant, entry: Entry, strict: bool) -
     sweep.current.append(variant.name)
 
 
-def _note(sweep: ScanLibrary, variant: Variant, result: "Made | Exception", only_check: bool) -> None:
+def _note(sweep: ScanLibrary, variant: Variant, result: "BuiltProgram | Exception", only_check: bool) -> None:
     """Note the result of a worker for a program."""
     match result:
-        case Made():
+        case BuiltProgram():
             sweep.entries[variant.name] = result.entry
             (sweep.built if result.different else sweep.current).append(variant.name)
             if only_check:
@@ -230,7 +239,7 @@ def _note(sweep: ScanLibrary, variant: Variant, result: "Made | Exception", only
                 sweep.memories |= {(variant.name, name): text for name, text in result.memories.items()}
         case CannotWrite():
             raise result
-        case Doubtful():
+        case StrictWarnings():
             sweep.failed.append(Failed(variant, "limit", result.warnings))
         case Rejected():
             kind: Kind = "limit" if isinstance(result, BrokenLimit) else "wrong input"
@@ -240,14 +249,14 @@ def _note(sweep: ScanLibrary, variant: Variant, result: "Made | Exception", only
 
 
 def _note_leftovers(sweep: ScanLibrary, names: Sequence[str], only_check: bool) -> None:
-    """Say what no sweep makes and none removes, and what a compiler that is given a pattern would take in."""
+    """Note files that no sweep writes or removes, which a compiler with a file pattern would read."""
     sweep.notes += [f"{sweep.folder / name}: is not of this library; remove it" for name in names]
     if only_check:
         sweep.different += names
 
 
 def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> None:
-    """Write the index and the runtime, and remove what an earlier sweep has left; or say what would be."""
+    """Write the index and the runtime, and remove the rest of an earlier sweep; or list what would change."""
     order = {variant.name: number for number, variant in enumerate(sweep.variants)}
     sweep.failed.sort(key=lambda failed: order[failed.variant.name])
     entries = sweep.in_order
@@ -287,9 +296,9 @@ def _remove_index(folder: Path, listed: dict[str, str]) -> None:
 
 
 def _dropped(sweep: ScanLibrary) -> tuple[list[Entry], list[str]]:
-    """Programs in the directory that are not among the scans: those of this library, and folders of all others.
+    """Return programs in the directory that are not among the scans: those of this library, and the folders of others.
 
-    Folders without a build are passed over.
+    Folders without a build are ignored.
     """
     names = {variant.name for variant in sweep.variants}
     try:
@@ -307,9 +316,9 @@ def _dropped(sweep: ScanLibrary) -> tuple[list[Entry], list[str]]:
 
 
 def _is_of(sweep: ScanLibrary, folder: Path, entry: Entry, stored: StoredBuild | None) -> bool:
-    """Whether a sweep of this library has made a folder: its manifest is one of ours, of the plan that the record has.
+    """Return true if a sweep of this library built a folder: its manifest is ours and that of the plan in the record.
 
-    A link is followed nowhere: what it leads to is not in the directory.
+    Links are not followed: their targets are outside the directory.
     """
     if stored is None or entry.library != sweep.library or folder.is_symlink():
         return False
@@ -324,7 +333,7 @@ def _stored(folder: Path) -> StoredBuild | None:
 
 
 def _unlisted(sweep: ScanLibrary, files: Collection[str]) -> list[str]:
-    """Files that are called as those of this library's index or of the runtime are, and are none of these files."""
+    """Return files with a name of this library's index or of the runtime that are not in ``files``."""
     try:
         present = sorted(path.name for path in sweep.folder.iterdir() if path.is_file() and path.name not in files)
     except OSError:

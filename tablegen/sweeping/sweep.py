@@ -50,7 +50,7 @@ def sweep(
     Raises
     ------
     Rejected
-        The scan file cannot be read, or a setting is wrong. What is wrong with one scan stands in ``failed``.
+        The scan file cannot be read, or a setting is wrong. Errors of single scans are in ``failed``.
     CannotWrite
         The directory cannot be written.
 
@@ -68,11 +68,23 @@ def sweep(
 def planned_library(
     scan: str | Path, settings: "Mapping[str, Iterable[Any]] | Sequence[Setting]", out: str | Path
 ) -> ScanLibrary:
-    """The scans of a library before any is built. Raises ``Rejected``."""
+    """Return the scans of a library before any is built.
+
+    Raises
+    ------
+    Rejected
+        If the scan file or a setting is wrong.
+    """
     name, scans = variants(scan, settings)
     return ScanLibrary(name, scans, Path(out))
 
 
 def build_library(library: ScanLibrary, *, jobs: int | None, **options: Any) -> None:
-    """Build what is missing or has changed; ``options`` are those of ``sweep``. Raises as ``sweep`` does."""
+    """Build programs that are missing or outdated; ``options`` are those of ``sweep``.
+
+    Raises
+    ------
+    CannotWrite
+        If the directory cannot be written.
+    """
     run(library, jobs=jobs or default_jobs(), **options)

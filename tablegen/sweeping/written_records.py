@@ -1,8 +1,8 @@
-"""Records of programs that this user's sweeps have written: what stands in a library does not vouch for itself.
+"""Records of programs that this user's sweeps have written: the contents of a library are not trusted by themselves.
 
-Of each record its digest is kept in the user's cache, as the name of an empty file. A record has the digests of all
-files of its program, so that one that is known vouches for them, wherever the library stands. Where nothing is known,
-after a change of machine for example, a program is made again and compared, which costs time and changes no file.
+The digest of each record is stored in the user's cache, as the name of an empty file. A record has the digests of all
+files of its program, so that a known record vouches for them, wherever the library is. Without the cache, for example
+on another machine, a program is built again and compared, which costs time and changes no file.
 """
 
 import os
@@ -11,11 +11,11 @@ from hashlib import sha256
 
 from tablegen.base.user_cache import keep_newest, private_folder
 
-_MOST = 20_000  # the least recently used go
+_MOST = 20_000  # the least recently used beyond it are removed
 
 
 class WrittenRecords:
-    """The records that are known."""
+    """The records in the cache."""
 
     def __init__(self) -> None:
         self._folder = private_folder("programs")
@@ -30,13 +30,13 @@ class WrittenRecords:
         return True
 
     def note(self, record: bytes) -> None:
-        """Keep a record that was written just now; where that fails its program is made again the next time."""
+        """Store a record that was just written; if that fails its program is built again the next time."""
         if self._folder is not None:
             with suppress(OSError):
                 (self._folder / _name(record)).touch(mode=0o600)
 
     def prune(self) -> None:
-        """Forget those that were not used for longest."""
+        """Remove the least recently used records."""
         if self._folder is not None:
             with suppress(OSError):
                 if len(os.listdir(self._folder)) > _MOST:

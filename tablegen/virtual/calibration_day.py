@@ -1,7 +1,7 @@
-"""A calibration day on the virtual scanner: its own simulated data through the fits of ``tablegen.calibration``.
+"""A simulated calibration session: the virtual scanner's own data through the fits of ``tablegen.calibration``.
 
-What comes out is the scanner file that a laboratory would have, noise and all; nothing is known but what was measured.
-Needs scipy, of the extra ``calibrate``.
+The result is the scanner file that a laboratory would have, noise included: only measured quantities enter it.
+It needs scipy, of the extra ``calibrate``.
 """
 
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ PERIODS, SAMPLES = 4, 1000  # periods per trace, samples per period
 
 @dataclass(frozen=True)
 class Calibration:
-    """The scanner as calibrated, and by axis and kind the fits that it rests on."""
+    """The calibrated setup, and by axis and kind the fits on which it rests."""
 
     setup: Setup
     fits: dict[str, dict[str, Fit]]
@@ -77,14 +77,23 @@ def calibrate(
     offset_sizes: Sequence[float] = (),
     sizes_from_images: bool = False,
 ) -> Calibration:
-    """Measure both axes with a sensor and fit what a scanner file holds; its base size, references and boost are kept.
+    """Measure both axes and fit what a scanner file holds; its base size, references and boost stay.
 
-    ``noise`` is relative, rms, of every reading; ``amplitudes`` of the traces are shares of v_max. Hysteresis is taken
-    as measured at each amplitude, or by (22) with one u_peak where ``points`` is false; with ``images`` not from a
-    sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. ``offset_sizes`` are the
-    scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. With
-    ``sizes_from_images`` size and offset are fitted to such images too, drifting and tilted, and not to sizes with
-    ``noise``.
+    Parameters
+    ----------
+    noise
+        Rms noise of every reading, relative.
+    amplitudes
+        Peak-to-peak voltages of the traces, as shares of the driver's span.
+    points
+        True to write the hysteresis as measured at each amplitude, false to write (22) with one u_peak.
+    images
+        True to fit hysteresis to trace and retrace of a lattice and a grating (256 x 256 pixels, 5 % noise), false to
+        fit it to a sensor's traces.
+    offset_sizes
+        Scan voltages, as shares of the span, of the images that give m; ``OFFSET_SIZE`` if empty.
+    sizes_from_images
+        True to fit size and offset to such images too, with drift and tilt, and not to sizes with ``noise``.
 
     Raises
     ------
@@ -98,7 +107,7 @@ def calibrate(
         day = _Day(setup, name, axis, noise, 1000 * (2 * seed + number), sizes_from_images)
         fits[name] = day.fits(amplitudes, images, offset_sizes)
         axes[name] = day.scanner_axis(fits[name], points)
-    scan = msgspec.structs.replace(  # what was learnt over another model does not fit to this one
+    scan = msgspec.structs.replace(  # a refinement over another model does not fit this one
         setup.scan,
         x=msgspec.structs.replace(setup.scan.x, refinement=None),
         y=msgspec.structs.replace(setup.scan.y, refinement=None),
@@ -107,7 +116,7 @@ def calibrate(
 
 
 class _Day:
-    """One axis on the bench. Every measurement has noise of its own."""
+    """The measurements of one axis, each with noise of its own."""
 
     def __init__(
         self, setup: Setup, name: Literal["x", "y"], axis: VirtualAxis, noise: float, seed: int, imaged: bool
@@ -125,7 +134,13 @@ class _Day:
         self._scan_v: float = scan.size_v or scan.size_nm / self._before.size.k_nm_per_v
 
     def fits(self, amplitudes: Sequence[float], images: bool, offset_sizes: Sequence[float]) -> dict[str, Fit]:
-        """Everything that can be calibrated; a resonance only where the scanner file has one."""
+        """Fit all that can be calibrated; a resonance only where the scanner file has one.
+
+        Raises
+        ------
+        Unphysical
+            If a fit fails. Where both the resonance and the hysteresis fail, the error is that of the hysteresis.
+        """
         size = self._size()
         offset = self._offset(size, offset_sizes or (OFFSET_SIZE,))
         imaged = self._imaged_hysteresis(amplitudes) if images else None
@@ -136,10 +151,10 @@ class _Day:
             try:
                 resonance = self._resonance(self._before.resonance)
             except Unphysical:
-                if traces:  # of two reasons that of the hysteresis is told: without it there is nothing to correct
+                if traces:  # of two errors that of the hysteresis is raised: without it there is nothing to correct
                     fit_hysteresis(traces, self._driver)
                 raise
-            # A build undoes this lag by the resonance; left in the loops, it would be undone by them once more.
+            # A build undoes this lag by the resonance; if it stayed in the loops, they would undo it a second time.
             lag_s = 1.0 / (2.0 * pi * resonance.frequency_hz.value * resonance.quality.value)
             delay_s = resonance.delay_s.value + lag_s
         fits: dict[str, Fit] = {
@@ -171,7 +186,7 @@ class _Day:
         )
 
     def _offset(self, size: SizeFit, sizes: Sequence[float]) -> Fit:
-        """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
+        """Fit m to images of one object at five offsets, for a large scan closer to the middle, so that it fits."""
         k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
         law = SizeLaw.calibrated(k, self._driver.span, beta, size.base_nm, threshold)
         groups = []
@@ -180,31 +195,31 @@ class _Day:
             volts = [self._driver.volts(0.5 + room * (offset - 0.5)) for offset in OFFSETS]
             size_v = share * self._driver.span
             if self._imaged:
-                taken = self._images([(size_v, offset) for offset in volts])
-                nm, errors = apparent_of(taken, law, self._driver, SAMPLES_SEEN)
+                image_sizes = self._images([(size_v, offset) for offset in volts])
+                nm, errors = apparent_of(image_sizes, law, self._driver, SAMPLES_SEEN)
                 groups.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
                 continue
-            seen = apparent_sizes(
+            simulated = apparent_sizes(
                 self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
             )
             unknown = np.zeros(len(volts))
-            groups.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
+            groups.append((simulated["offset_v"], simulated["apparent_nm"], np.full(len(volts), size_v), unknown))
         offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*groups, strict=True))
-        known = errors if self._imaged else None
-        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._driver, law, known)
+        errors_nm = errors if self._imaged else None
+        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._driver, law, errors_nm)
 
     def _size(self) -> SizeFit:
         size = self._before.size
         if self._imaged:
             drives = [share * self._driver.span for share in IMAGED_SIZES]
-            taken = self._images([(volts, self._driver.middle) for volts in drives])
+            image_sizes = self._images([(volts, self._driver.middle) for volts in drives])
             return fit_size(
                 np.array(drives),
-                taken.nm,
+                image_sizes.nm,
                 self._driver,
                 size.base_nm,
-                errors_nm=taken.errors_nm,
-                shared=taken.shared,
+                errors_nm=image_sizes.errors_nm,
+                shared=image_sizes.shared,
             )
         nominal = [share * self._driver.span * size.k_nm_per_v for share in SIZES]
         sizes = actual_sizes(
@@ -221,9 +236,9 @@ class _Day:
         )
 
     def _images(self, scans: Sequence[tuple[float, float]]) -> ImageSizes:
-        """Images at scan voltages and offsets, of a lattice where the line is short and of a grating where it is long.
+        """Simulate images at scan voltages and offsets: of a lattice where the line is short, else of a grating.
 
-        The sample drifts by a share of the line and lies on a slope.
+        The sample drifts by a share of the line and is tilted.
         """
         images = []
         for volts, offset in scans:
@@ -274,7 +289,7 @@ class _Day:
         return self._rate_hz * min(self._scan_v / volts, 1.0)
 
     def _gains(self) -> dict[str, Floats]:
-        """Two decades about the reference, below a tenth of any resonance."""
+        """Return the response over two decades about the reference, below a tenth of any resonance."""
         f = self._reference_hz * np.geomspace(0.1, 10.0, 15)
         return frequency_response(self._axis, f, noise=self._noise, seed=self._next())
 
@@ -290,7 +305,7 @@ class _Day:
 
 
 def _tilted(sample: Surface, slope: Floats) -> Surface:
-    """Put the sample on a plane."""
+    """Tilt the sample by heights per nm along x and y."""
     return lambda x, y: sample(x, y) + slope[0] * x + slope[1] * y
 
 

@@ -30,7 +30,17 @@ def with_scan(
     rate_hz: float | None = None,
     band_limit: BandLimit | None = None,
 ) -> Setup:
-    """Return the same scan with another fast axis: a size, and what else is given; without a refinement."""
+    """Return the same scan with another fast axis and without a refinement; None keeps what the scan file has.
+
+    Parameters
+    ----------
+    size_v, size_nm
+        Size of the line in V or in nm; one of the two.
+    offset_v
+        Offset in V.
+    rate_hz
+        Line rate in Hz.
+    """
     scan = setup.scan
     x = msgspec.structs.replace(
         scan.x,
@@ -74,7 +84,22 @@ def size_map(
     offsets: Sequence[float] = OFFSETS,
     sizes: Sequence[float] = MAP_SIZES,
 ) -> Floats:
-    """Error of the size in the image, in percent, a row an offset and a column a size, both as shares of full scale."""
+    """Return the size error of the image at each offset and size.
+
+    Parameters
+    ----------
+    offsets, sizes
+        Offset and nominal size (k times the scan voltage), as shares of the driver's range.
+
+    Returns
+    -------
+    Errors in percent, shape (offsets, sizes).
+
+    Raises
+    ------
+    Rejected
+        If one of the scans cannot be built.
+    """
     driver, k = setup.scanner.driver, setup.scanner.x.size.k_nm_per_v
     return np.array(
         [

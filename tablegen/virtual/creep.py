@@ -1,8 +1,8 @@
-"""Creep, and the loss with frequency that is the same thing: first-order terms of equal weight, in even log steps.
+"""Creep, and the loss of gain with frequency that belongs to it: first-order terms of equal weight, log-spaced.
 
-A step goes on growing by a constant share a decade of time, and the gain falls by that share a decade of frequency. It
-cannot do so without a lag (Kramers and Kronig): (pi/2) of the loss in nepers, 1.2 degrees at 3 % a decade, which widens
-every loop by about 1 % of the scan.
+After a step the displacement grows by a constant share per decade of time, and the gain falls by that share per decade
+of frequency. By Kramers and Kronig a phase lag belongs to it: (pi/2) of the loss in nepers, 1.2 degrees at 3 % per
+decade, which widens every loop by about 1 % of the scan.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from tablegen.virtual.modes import Modes
 def logarithmic_creep(
     loss_per_decade: float, reference_hz: float, fastest_s: float, slowest_s: float, terms_per_decade: int
 ) -> Modes:
-    """Gain 1 at ``reference_hz``, falling by ``loss_per_decade`` of it, between the two times."""
+    """Return terms with gain 1 at ``reference_hz``, which falls by ``loss_per_decade`` between the two times."""
     decades = np.log10(slowest_s / fastest_s)
     count = max(round(decades * terms_per_decade), 1)
     times = fastest_s * (slowest_s / fastest_s) ** (np.arange(count + 1) / count)

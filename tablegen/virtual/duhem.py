@@ -5,10 +5,10 @@ it falls towards +c(u), each over its own share of the full drive:
 
     rising   dz/du = rise (-b(u) - z)         falling   dz/du = -fall (c(u) - z)
 
-Nothing is wiped out: what a lag remembers decays with the way that the drive has gone, and a drive that goes to and fro
-about one value brings it to its balance there. R', b and c are Bernstein polynomials with coefficients >= 0. The
-equation is linear: a branch is a polynomial and an exponential, exact whatever the number of ticks, and one period maps
-a lag to a linear function of itself, whose fixed point is the steady state.
+No turning point is wiped out: the memory of a lag decays with the path of the drive, and small cycles about one drive
+bring a lag to its balance there. R', b and c are Bernstein polynomials with coefficients >= 0. The equation is linear:
+a branch is a polynomial and an exponential, exact whatever the number of ticks, and one period maps a lag to a linear
+function of itself, whose fixed point is the steady state.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ POINTS = np.linspace(0.0, 1.0, 201)  # drives at which the slope is checked
 
 @dataclass(frozen=True)
 class Lag:
-    """Rates per full drive; ``below`` and ``above`` are the Bernstein coefficients of b and c in nm."""
+    """One lag: rates per full drive; ``below`` and ``above`` are the Bernstein coefficients of b and c in nm."""
 
     rise: float
     fall: float
@@ -36,18 +36,33 @@ class Lag:
 
     @cached_property
     def towards(self) -> tuple[Floats, Floats]:
-        """Polynomials that solve the equation of a rise and of a fall; every other solution approaches them."""
+        """Polynomials that solve the equation of a rise and of a fall; every other solution approaches them.
+
+        Returns
+        -------
+        Power coefficients in nm, lowest first, shapes (len(below),) and (len(above),).
+        """
         return -_relaxed(self.below, -self.rise), _relaxed(self.above, self.fall)
 
     def balance(self, drive: FloatsLike) -> Floats:
-        """Where a small drive to and fro about ``drive`` ends, in nm."""
+        """Return the lag to which small cycles about a drive lead.
+
+        Returns
+        -------
+        Lag in nm, of the shape of ``drive`` (0..1).
+        """
         polyval = np.polynomial.polynomial.polyval
         pulled = self.fall * polyval(drive, powers_of(self.above)) - self.rise * polyval(drive, powers_of(self.below))
         return np.asarray(pulled / (self.rise + self.fall), dtype=np.float64)
 
     @cached_property
     def reach(self) -> tuple[Floats, Floats]:
-        """The lowest and the highest lag at each of ``POINTS`` that a history which began in balance can lead to."""
+        """The lowest and the highest lag that a history which began in balance can lead to.
+
+        Returns
+        -------
+        Lags in nm at each of ``POINTS``, shape (201,) each.
+        """
         low, high = self.balance(POINTS), self.balance(POINTS)
         solutions = [np.polynomial.polynomial.polyval(POINTS, solution) for solution in self.towards]
         count = len(POINTS)
@@ -60,7 +75,21 @@ class Lag:
         return low, high
 
     def after(self, z: float, turned: float, drive: FloatsLike, up: bool) -> Floats:
-        """Return the lag in nm at drives of a branch that left the drive ``turned`` with a lag of ``z``."""
+        """Return the lag along a branch.
+
+        Parameters
+        ----------
+        z, turned
+            The lag in nm and the drive where the branch began.
+        drive
+            Drives of 0..1 on the branch, of any shape.
+        up
+            True if the branch rises.
+
+        Returns
+        -------
+        Lag in nm, of the shape of ``drive``.
+        """
         rate, solution = (self.rise, self.towards[0]) if up else (self.fall, self.towards[1])
         away = z - float(np.polynomial.polynomial.polyval(turned, solution))
         drive = np.asarray(drive, dtype=np.float64)
@@ -70,7 +99,7 @@ class Lag:
 
 @dataclass(frozen=True, slots=True)
 class Lags:
-    """Where the drive is, 0..1, and each lag there in nm."""
+    """The state: the drive, 0..1, and each lag there in nm."""
 
     drive: float
     nm: tuple[float, ...]
@@ -80,8 +109,12 @@ class Lags:
 class Duhem:
     """The operator; drive normalised to 0..1, displacement in nm above that at drive 0 in balance.
 
-    ``reversible``: Bernstein coefficients of the slope R' over 0..1, in nm per full drive. Raises ``ValueError`` where
-    a branch could run backwards, whatever was played before.
+    ``reversible``: Bernstein coefficients of the slope R' over 0..1, in nm per full drive.
+
+    Raises
+    ------
+    ValueError
+        If a branch could run backwards after some history, or if a coefficient or a rate is out of range.
     """
 
     reversible: tuple[float, ...]
@@ -92,7 +125,7 @@ class Duhem:
         if not self.reversible or not all(lag.below and lag.above for lag in self.lags) or min(coefficients) < 0.0:
             raise ValueError("reversible slope, below and above need coefficients, none of which is below 0")
         if min((rate for lag in self.lags for rate in (lag.rise, lag.fall)), default=LEAST_RATE) < LEAST_RATE:
-            raise ValueError(f"a lag that relaxes at less than {LEAST_RATE:g} per full drive is no lag")
+            raise ValueError(f"a lag must not relax at less than {LEAST_RATE:g} per full drive")
         slope = self.least_slope()
         if slope < 0.0:
             raise ValueError(f"a branch could run backwards, at {-slope:.3g} nm per full drive")
@@ -104,11 +137,11 @@ class Duhem:
 
     @cached_property
     def rest(self) -> Lags:
-        """At drive 0, in balance."""
+        """The state at drive 0, in balance."""
         return Lags(0.0, tuple(float(lag.balance(0.0)) for lag in self.lags))
 
     def least_slope(self) -> float:
-        """Return the least slope of a branch after any history, in nm per full drive, or less."""
+        """Return a lower bound of the slope of a branch after any history, in nm per full drive."""
         polyval = np.polynomial.polynomial.polyval
         rising = falling = polyval(POINTS, powers_of(self.reversible))
         for lag in self.lags:
@@ -118,12 +151,34 @@ class Duhem:
         return float(min(np.min(rising), np.min(falling)))
 
     def middle(self, drive: FloatsLike) -> Floats:
-        """In balance at a drive, in nm: between the branches of every small loop there."""
+        """Return the displacement in balance, between the branches of every small loop at a drive.
+
+        Returns
+        -------
+        Displacement in nm, of the shape of ``drive`` (0..1).
+        """
         lags = sum(lag.balance(drive) for lag in self.lags) - sum(self.rest.nm)
         return np.asarray(np.polynomial.polynomial.polyval(drive, self._integral) + lags, dtype=np.float64)
 
     def play(self, drive: Floats, memory: Lags | None = None) -> tuple[Floats, Lags]:
-        """Displacement in nm at each drive of a sequence, and what is remembered after it."""
+        """Return the displacement along a sequence of drives, and the state after it.
+
+        Parameters
+        ----------
+        drive
+            Drives of 0..1, shape (ticks,).
+        memory
+            The state before; at rest at drive 0 if None.
+
+        Returns
+        -------
+        Displacement in nm, shape (ticks,), and the state.
+
+        Raises
+        ------
+        ValueError
+            If a drive is outside 0..1.
+        """
         drive = normalised(drive)
         memory = memory or self.rest
         at, z = memory.drive, [*memory.nm]
@@ -137,7 +192,22 @@ class Duhem:
         return out, Lags(at, tuple(z))
 
     def settled(self, drive: Floats) -> Floats:
-        """Displacement in nm over one period of a drive that has been repeated for ever."""
+        """Return the displacement over one period of a drive that has been repeated for ever.
+
+        Parameters
+        ----------
+        drive
+            Drives of 0..1 over one period, shape (ticks,).
+
+        Returns
+        -------
+        Displacement in nm, shape (ticks,).
+
+        Raises
+        ------
+        ValueError
+            If a drive is outside 0..1.
+        """
         drive = normalised(drive)
         at = float(drive[-1])
         _, memory = self.play(np.array([at]))
@@ -145,14 +215,14 @@ class Duhem:
         up, down = float(np.sum(way[way > 0.0])), -float(np.sum(way[way < 0.0]))
         if up == 0.0:
             return self.play(drive, memory)[0]
-        # A period maps z to kept z + gained, so that gained / (1 - kept) comes back.
+        # A period maps z to decay z + gained, whose fixed point is gained / (1 - decay).
         gained = self.play(drive, Lags(at, (0.0,) * len(self.lags)))[1].nm
-        lost = [-expm1(-lag.rise * up - lag.fall * down) for lag in self.lags]
-        return self.play(drive, Lags(at, tuple(g / one for g, one in zip(gained, lost, strict=True))))[0]
+        decay = [-expm1(-lag.rise * up - lag.fall * down) for lag in self.lags]
+        return self.play(drive, Lags(at, tuple(g / one for g, one in zip(gained, decay, strict=True))))[0]
 
 
 def _branches(drive: Floats, at: float) -> Iterator[tuple[int, int, float, bool]]:
-    """First and last tick of every monotonic piece, the drive that it left, and whether it rises."""
+    """Yield the first and last tick of every monotonic piece, the drive where it begins, and whether it rises."""
     for first, stop in monotonic(np.append(at, drive)):
         turned = at if first == 0 else float(drive[first - 1])
         yield first, stop, turned, bool(drive[stop - 1] > turned)

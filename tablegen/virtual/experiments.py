@@ -1,6 +1,6 @@
-"""What a laboratory would measure on the virtual scanner: simulated data for the calibration, by column name.
+"""Simulated measurements of the virtual scanner for the calibration, by column name.
 
-Columns have the names and units that ``tablegen.calibration`` reads. Noise comes from the seed alone.
+Columns have the names and units that ``tablegen.calibration`` reads. Noise depends on the seed alone.
 """
 
 from collections.abc import Sequence
@@ -20,10 +20,16 @@ MAX_TICKS = 1 << 21  # beyond it steps are so small that they ring nothing
 
 
 def triangle_size(axis: VirtualAxis, size_v: float, offset_v: float, rate_hz: float, turn: float = 0.5) -> float:
-    """Nanometres between the ends of a settled triangle of ``size_v`` volts peak to peak."""
+    """Return the size in nm, end to end, of a settled triangle of ``size_v`` volts peak to peak.
+
+    Raises
+    ------
+    ValueError
+        If the triangle leaves the driver's range.
+    """
     ticks = TICKS * _finer(axis, rate_hz * TICKS, TICKS)
-    moved = axis.settled(_triangle(size_v, offset_v, ticks, turn), 1.0 / (rate_hz * ticks))
-    return float(np.max(moved) - np.min(moved))
+    displacement_nm = axis.settled(_triangle(size_v, offset_v, ticks, turn), 1.0 / (rate_hz * ticks))
+    return float(np.max(displacement_nm) - np.min(displacement_nm))
 
 
 def sensor_trace(
@@ -36,16 +42,30 @@ def sensor_trace(
     turn: float = 0.5,
     sensor: Sensor | None = None,
 ) -> dict[str, Floats]:
-    """Simulate ``time_s``, ``drive_v``, ``displacement_nm`` of a triangle after a long rest at its lowest voltage.
+    """Simulate the trace of a triangle that starts after a long rest at its lowest voltage.
 
-    ``samples`` a period; the first period is not settled, and creep drifts through all of them.
+    The first period is not settled, and creep drifts through all of them.
+
+    Parameters
+    ----------
+    samples
+        Samples per period.
+
+    Returns
+    -------
+    ``time_s``, ``drive_v``, ``displacement_nm``, each of shape (periods * samples,).
+
+    Raises
+    ------
+    ValueError
+        If the triangle leaves the driver's range.
     """
     finer = _finer(axis, rate_hz * samples, periods * samples)
     volts = np.tile(_triangle(size_v, offset_v, samples * finer, turn), periods)
     time = np.arange(periods * samples, dtype=np.float64) / (rate_hz * samples)
-    moved = axis.follow(volts, 1.0 / (rate_hz * samples * finer), offset_v)[::finer]
+    displacement_nm = axis.follow(volts, 1.0 / (rate_hz * samples * finer), offset_v)[::finer]
     volts = volts[::finer]
-    return {"time_s": time, "drive_v": volts, "displacement_nm": (sensor or Sensor()).read(moved, time)}
+    return {"time_s": time, "drive_v": volts, "displacement_nm": (sensor or Sensor()).read(displacement_nm, time)}
 
 
 def apparent_sizes(
@@ -58,9 +78,23 @@ def apparent_sizes(
     seed: int = 0,
     turn: float = 0.5,
 ) -> dict[str, Floats]:
-    """``offset_v``, ``apparent_nm``: how large an object looks in a scan of ``size_v``, calibrated at the middle.
+    """Simulate how large an object of ``true_nm`` looks at each offset, calibrated at the middle of the range.
 
-    ``noise`` is relative, rms.
+    Parameters
+    ----------
+    offsets_v, size_v
+        Offsets and the scan voltage, in V.
+    noise
+        Rms noise of a size, relative.
+
+    Returns
+    -------
+    ``offset_v`` and ``apparent_nm``, each of shape (offsets,).
+
+    Raises
+    ------
+    ValueError
+        If a scan leaves the driver's range.
     """
     middle = triangle_size(axis, size_v, axis.driver.middle, rate_hz, turn)
     ratios = [middle / triangle_size(axis, size_v, offset, rate_hz, turn) for offset in offsets_v]
@@ -77,7 +111,24 @@ def actual_sizes(
     seed: int = 0,
     turn: float = 0.5,
 ) -> dict[str, Floats]:
-    """``nominal_nm``, ``actual_nm``: sizes set with a linear k, and those reached; by default at the middle."""
+    """Simulate the sizes reached where a linear k sets them.
+
+    Parameters
+    ----------
+    offset_v
+        Offset in V; the middle of the range if None.
+    noise
+        Rms noise of a size, relative.
+
+    Returns
+    -------
+    ``nominal_nm`` and ``actual_nm``, each of shape (sizes,).
+
+    Raises
+    ------
+    ValueError
+        If a scan leaves the driver's range.
+    """
     offset = axis.driver.middle if offset_v is None else offset_v
     sizes = [triangle_size(axis, nominal / k_nm_per_v, offset, rate_hz, turn) for nominal in nominal_nm]
     return {"nominal_nm": np.array(nominal_nm, dtype=np.float64), "actual_nm": _noisy(sizes, noise, seed)}
@@ -86,7 +137,19 @@ def actual_sizes(
 def frequency_response(
     axis: VirtualAxis, frequency_hz: FloatsLike, noise: float = 0.0, seed: int = 0
 ) -> dict[str, Floats]:
-    """``frequency_hz``, ``gain``, ``phase_deg`` of a small sine, 1 at the creep's reference. ``noise`` is relative."""
+    """Simulate the response to a small sine; the gain is 1 at the reference of the creep.
+
+    Parameters
+    ----------
+    frequency_hz
+        Frequencies in Hz, shape (frequencies,).
+    noise
+        Rms noise of the real and of the imaginary part, relative.
+
+    Returns
+    -------
+    ``frequency_hz``, ``gain`` and ``phase_deg``, each of shape (frequencies,).
+    """
     f = np.asarray(frequency_hz, dtype=np.float64)
     generator = np.random.default_rng(seed)
     complex_noise = generator.standard_normal(f.shape) + 1j * generator.standard_normal(f.shape)
@@ -95,9 +158,9 @@ def frequency_response(
 
 
 def _finer(axis: VirtualAxis, tick_hz: float, ticks: int) -> int:
-    """Into how many a tick is split, so that the generator's own steps do not ring the resonance.
+    """Return into how many steps a tick is split, so that the generator's own steps do not ring the resonance.
 
-    Steps that are far apart need not be: their ringing has died away when the tick ends.
+    Steps that are far enough from each other are not split: their ringing has decayed when the tick ends.
     """
     if not axis.resonance.poles:
         return 1

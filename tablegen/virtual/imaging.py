@@ -1,8 +1,8 @@
-"""What the virtual scanner would image: trace and retrace of a grating or a lattice.
+"""Simulated images of the virtual scanner: trace and retrace of a grating or a lattice.
 
 ``image_pair`` scans x with a triangle; the slow axis is ideal: a ramp through the frame, which is as high as the line
 is long. ``running_frame`` plays the emitted integers of a build on both axes, ``triangle_frame`` triangles on both, as
-an old microscope did; they return beside the heights where each pixel was. Noise comes from the seed alone.
+an uncorrected microscope does; both return the heights and the position of each pixel. Noise depends on the seed alone.
 """
 
 from collections.abc import Callable
@@ -20,14 +20,14 @@ _TICKS = 16384  # ticks per line
 _STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip
 _DUTY = 0.3
 _ROUGH_WAVES = 40
-_FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is looked at
+_FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is evaluated
 
 Position = Callable[[Floats], Floats]  # where an axis is, in nm, at times in its periods
 Surface = Callable[[Floats, Floats], Floats]  # height at x and y in nm
 
 
 def grating(pitch_nm: float, angle_deg: float = 3.0) -> Surface:
-    """Bars with round shoulders, wider than their gaps, whose normal is turned from x by an angle."""
+    """Return bars with round shoulders, wider than their gaps, whose normal is turned from x by an angle."""
     c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
 
     def height(x: Floats, y: Floats) -> Floats:
@@ -81,31 +81,48 @@ def image_pair(
     drift: float = 0.0,
     seed: int = 0,
 ) -> tuple[Floats, Floats]:
-    """Trace and retrace, lines x pixels, left on the left in both.
+    """Simulate trace and retrace of a settled triangle on x.
 
-    Pixels are evenly spread in time over ``window`` of each sweep. ``noise`` is rms, of the heights' peak to peak;
-    ``drift`` moves the sample along x by so much of the line in a frame, faster as it goes on.
+    Pixels are evenly spread in time over ``window`` of each sweep.
+
+    Parameters
+    ----------
+    size_v, offset_v
+        Peak-to-peak voltage and offset in V.
+    noise
+        Rms noise, of the heights' peak to peak.
+    drift
+        Movement of the sample along x over the frame, in lines; it accelerates.
+
+    Returns
+    -------
+    Heights, shape (lines, pixels) each, the left end of the line first in both.
+
+    Raises
+    ------
+    ValueError
+        If the triangle leaves the driver's range.
     """
     volts = offset_v + size_v * (ideal_triangle(_TICKS, turn) - 0.5)
-    moved = axis.settled(volts, 1.0 / (rate_hz * _TICKS))
-    size = float(np.max(moved) - np.min(moved))
+    displacement_nm = axis.settled(volts, 1.0 / (rate_hz * _TICKS))
+    size = float(np.max(displacement_nm) - np.min(displacement_nm))
     place = window[0] + (window[1] - window[0]) * (np.arange(pixels) + 0.5) / pixels
     random = np.random.default_rng(seed)
-    shown = []
+    images = []
     for time in (turn * place, turn + (1.0 - turn) * (1.0 - place)):
-        x = np.interp(time, np.arange(_TICKS) / _TICKS, moved, period=1.0)
+        x = np.interp(time, np.arange(_TICKS) / _TICKS, displacement_nm, period=1.0)
         frame = (np.arange(lines)[:, None] + time) / lines
         heights = surface(x + drift * size * frame**2, size * frame)
-        shown.append(heights + noise * float(np.ptp(heights)) * random.standard_normal(heights.shape))
-    return shown[0], shown[1]
+        images.append(heights + noise * float(np.ptp(heights)) * random.standard_normal(heights.shape))
+    return images[0], images[1]
 
 
 @dataclass(frozen=True, eq=False)
 class SweepImage:
-    """One direction of a frame, each array lines x pixels, left on the left, lines in the order of time.
+    """One direction of a frame, each array (lines, pixels), the left end first, lines in the order of time.
 
-    ``x_nm`` and ``y_nm`` are where the scanner was in the middle of each pixel; ``drift_nm`` how far the sample had
-    gone the other way, along x and y: what was seen is ``surface(x_nm + drift_nm[0], y_nm + drift_nm[1])``.
+    ``x_nm`` and ``y_nm`` are the positions of the scanner in the middle of each pixel; ``drift_nm`` is the movement of
+    the sample the other way, along x and y: the heights are ``surface(x_nm + drift_nm[0], y_nm + drift_nm[1])``.
     """
 
     heights: Floats
@@ -116,7 +133,7 @@ class SweepImage:
 
 @dataclass(frozen=True, eq=False)
 class FrameImages:
-    """Both directions of a frame."""
+    """The trace and the retrace of a frame."""
 
     trace: SweepImage
     retrace: SweepImage
@@ -124,12 +141,12 @@ class FrameImages:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What disturbs a frame.
+    """Disturbances of a frame.
 
-    ``noise`` is rms, of the heights' peak to peak. ``drift`` along x and y is a share of what the frame shows, over the
-    frame, faster as it goes on. ``tilt`` along x and y is the rise of a plane over the frame, of the heights' peak to
-    peak. Columns show the sample ``late`` pixels late, as of a feedback. ``frame`` counts frames, from 0: drift goes on
-    from one to the next.
+    ``noise`` is rms, of the heights' peak to peak. ``drift`` along x and y is a share of the imaged size, over the
+    frame; it accelerates. ``tilt`` along x and y is the rise of a plane over the frame, of the heights' peak to peak.
+    Columns show the sample ``late`` pixels late, as with a slow feedback. ``frame`` counts frames, from 0: drift
+    continues from one to the next.
     """
 
     noise: float = 0.05
@@ -153,6 +170,11 @@ def running_frame(
 
     Columns are ``pixels`` (those of the scan file, if not given), evenly in time within x's imaging window of each
     sweep. Lines are those of the frame that lie in y's imaging window on its way up, or on its way ``down``.
+
+    Raises
+    ------
+    ValueError
+        If y images no line on that way, or the scan leaves the range of the virtual scanner.
     """
     schedule = plan.schedule
     part = schedule.down if down else schedule.up
@@ -184,6 +206,18 @@ def triangle_frame(
     """Simulate a settled frame of an uncompensated triangle on each axis, x then y: ``lines`` on y's way up.
 
     Columns are ``pixels``, evenly in time within ``window`` of each sweep of x. A frame takes lines / turn[1] lines.
+
+    Parameters
+    ----------
+    size_v, offset_v
+        Peak-to-peak voltages and offsets in V, x then y.
+    turn
+        Share of the period in which each axis rises.
+
+    Raises
+    ------
+    ValueError
+        If a triangle leaves the range of the virtual scanner.
     """
     whole = round(lines / turn[1])
     moves = []
@@ -202,14 +236,14 @@ def triangle_frame(
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Times of the columns of a direction in periods of x, left first, and how long a column takes."""
+    """Times of the columns of a direction in periods of x, the left end first, and the duration of a column."""
 
     times: Floats
     lasts: float
 
 
 def _columns(turn: float, window: tuple[float, float], pixels: int) -> tuple[_Columns, _Columns]:
-    """Trace and retrace."""
+    """Return the columns of the trace and of the retrace."""
     width = window[1] - window[0]
     place = window[0] + width * (np.arange(pixels) + 0.5) / pixels
     back = 1.0 - turn
@@ -221,12 +255,12 @@ def _playing(line: LinePlan, axis: SettledAxis) -> Position:
     return _periodic(axis.settled(drive.volts, drive.tick_s), 0.5)
 
 
-def _periodic(moved: Floats, middle: float) -> Position:
-    """Between values each ``middle`` of a tick after its beginning."""
-    turns = (np.arange(len(moved)) + middle) / len(moved)
+def _periodic(displacement_nm: Floats, middle: float) -> Position:
+    """Interpolate values that lie ``middle`` of a tick after the beginning of each tick."""
+    turns = (np.arange(len(displacement_nm)) + middle) / len(displacement_nm)
 
     def position(time: Floats) -> Floats:
-        return np.interp(time, turns, moved, period=1.0)
+        return np.interp(time, turns, displacement_nm, period=1.0)
 
     return position
 
@@ -241,17 +275,17 @@ def _frame(
 ) -> FrameImages:
     """Simulate the lines of these numbers, of a frame of ``lines``."""
     random = np.random.default_rng(conditions.seed)
-    shown = []
+    images = []
     for column in columns:
-        seen = column.times - conditions.late * column.lasts
+        sample_times = column.times - conditions.late * column.lasts
         frame = (numbers[:, None] + column.times) / lines
-        x, y = np.broadcast_arrays(positions[0](seen % 1.0), positions[1](frame % 1.0))
-        gone = (frame - numbers[0] / lines + conditions.frame) / (len(numbers) / lines)
-        drift = [share * float(np.ptp(moved)) * gone**2 for share, moved in zip(conditions.drift, (x, y), strict=True)]
+        x, y = np.broadcast_arrays(positions[0](sample_times % 1.0), positions[1](frame % 1.0))
+        elapsed = (frame - numbers[0] / lines + conditions.frame) / (len(numbers) / lines)
+        drift = [share * float(np.ptp(nm)) * elapsed**2 for share, nm in zip(conditions.drift, (x, y), strict=True)]
         heights = surface(x + drift[0], y + drift[1])
         contrast = float(np.ptp(heights))
         across, along = (np.arange(n) / n for n in heights.shape)
         heights = heights + contrast * (conditions.tilt[0] * along + conditions.tilt[1] * across[:, None])
         heights = heights + conditions.noise * contrast * random.standard_normal(heights.shape)
-        shown.append(SweepImage(heights, x, y, (drift[0], drift[1])))
-    return FrameImages(shown[0], shown[1])
+        images.append(SweepImage(heights, x, y, (drift[0], drift[1])))
+    return FrameImages(images[0], images[1])

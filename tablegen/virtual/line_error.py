@@ -1,8 +1,8 @@
-"""What is wrong with a line, in the paper's own measures: residual, and scaling error.
+"""Errors of a line in the paper's measures: residual and scaling error.
 
 Residual: displacement less the ideal line, in percent of the line. Scaling error: relative deviation of the local
-slope from that at x = 0.5, in percent, above 0 where the image is stretched, taken of chords of 1/20 of the line that
-lie inside the window.
+slope from that at x = 0.5, in percent, above 0 where the image is stretched; slopes are those of chords of 1/20 of the
+line that lie inside the window.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ POINTS = 1001  # points over the whole line
 
 @dataclass(frozen=True, eq=False)
 class BranchError:
-    """One direction of a line; arrays run with the position x, 0 on the left for both directions.
+    """The errors of one direction; arrays run with the position x, 0 at the left end for both directions.
 
-    ``residual`` stands at ``position``, ``scaling`` at ``scaling_position``; both in percent.
+    ``residual`` stands at ``position``, shape (1001,) each; ``scaling`` at ``scaling_position``; both in percent.
     """
 
     position: Floats
@@ -31,7 +31,7 @@ class BranchError:
 
     @property
     def peak(self) -> tuple[float, float]:
-        """The residual of the largest size inside the window, with its sign, and where it is."""
+        """The residual of the largest magnitude inside the window, with its sign, and its position."""
         inside = self._inside()
         i = int(np.argmax(np.abs(self.residual[inside])))
         return float(self.residual[inside][i]), float(self.position[inside][i])
@@ -54,7 +54,7 @@ class BranchError:
 
 @dataclass(frozen=True, eq=False)
 class LineError:
-    """Both directions, and the size in nm that the ideal line would have."""
+    """The errors of both directions, and the size in nm of the ideal line."""
 
     size_nm: float
     forward: BranchError
@@ -81,7 +81,21 @@ def about_window_line(error: LineError, directions: Sequence[str] = ("forward", 
 
 
 def ideal_triangle(ticks: int, turn: float, first: float = 0.0) -> Floats:
-    """Return the ideal position at every tick of a period, (14); ``first`` is when the first one is, in ticks."""
+    """Return the ideal position at every tick of a period, (14).
+
+    Parameters
+    ----------
+    ticks
+        Ticks per period.
+    turn
+        Share of the period in which the line rises.
+    first
+        Time of the first value, in ticks.
+
+    Returns
+    -------
+    Positions of 0..1, shape (ticks,).
+    """
     t = (np.arange(ticks) + first) / ticks
     return np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
 
@@ -93,13 +107,28 @@ def line_error(
     ideal: Floats | None = None,
     first: float = 0.0,
 ) -> LineError:
-    """Compare one period of a settled displacement, shape (ticks,), with the ideal line.
+    """Compare one period of a settled displacement with the ideal line.
 
-    ``first`` is when the first value is, in ticks: 0 for a drive that has value k at time k, 0.5 for one that holds it
-    from there on.
+    The displacement's extremes are taken for those of ``ideal``: those of a triangle are the line's ends.
 
-    ``ideal`` is the position that was asked for at every tick, 0..1, rounded where the line turns; by default the
-    triangle. The displacement's extremes are taken for those of ``ideal``: those of a triangle are the line's ends.
+    Parameters
+    ----------
+    displacement_nm
+        One period, shape (ticks,).
+    turn
+        Share of the period in which the line rises.
+    window
+        Part of the line on which the scaling error is computed.
+    ideal
+        Requested position at every tick, 0..1, rounded where the line turns, shape (ticks,); the triangle if None.
+    first
+        Time of the first value, in ticks: 0 for a drive that has value k at time k, 0.5 for one that is held from
+        there on.
+
+    Raises
+    ------
+    ValueError
+        If the displacement is constant.
     """
     ticks = len(displacement_nm)
     intended = ideal_triangle(ticks, turn, first) if ideal is None else ideal

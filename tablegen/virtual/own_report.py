@@ -1,4 +1,4 @@
-"""What a simulation on the scanner file's own operator says, as text and as plain data."""
+"""The report of a simulation on the scanner file's own operator, as text and as plain data."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,19 +13,19 @@ def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]
     """Format a table for the terminal; ``without`` are the axes that have no operator."""
     sizes = " and ".join(f"{run.nominal_nm:g} nm in {run.axis}" for run in runs)
     lines = [
-        f"{name}: {LABEL}; {sizes} asked for",
+        f"{name}: {LABEL}; {sizes} requested",
         f"mean (worst) of {SEEDS} scanners that depart from the operator at random, by its own uncertainty",
     ]
     for run in runs:
         rms, size = ([abs(trace.left_out[i]) for trace in run.traces] for i in (0, 3))
         lines.append(
-            f"  {run.axis}: rms {min(rms):.2g} to {max(rms):.2g} %, size {min(size):.2g} to {max(size):.2g} %, as it "
-            f"is wrong on each of its {len(run.traces)} traces when that is left out"
+            f"  {run.axis}: error of the operator on each of its {len(run.traces)} traces when that is left out: "
+            f"rms {min(rms):.2g} to {max(rms):.2g} %, size {min(size):.2g} to {max(size):.2g} %"
         )
         if run.distance > SAME_CENTRE:
             lines.append(
-                f"  {run.axis}: the nearest trace is {100.0 * run.distance:.3g} % of v_max from this offset; what the "
-                "operator is wrong by here is not known, and more than that"
+                f"  {run.axis}: the nearest trace is {100.0 * run.distance:.3g} % of v_max from this offset; the "
+                "operator's error here is unknown, and larger"
             )
     lines += [
         "",
@@ -42,7 +42,7 @@ def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]
         if run.refined
     ]
     lines += [
-        "A simulation, not a measurement: it knows of the scanner what the traces show; not drift, coupling, aging.",
+        "A simulation, not a measurement: the scanner is modelled from its traces, without drift, coupling and aging.",
     ]
     return lines
 
@@ -68,7 +68,7 @@ def _called(row: OwnRow) -> str:
 
 
 def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str, Any]:
-    """Return the report for JSON: by axis and correction; ``null`` where one cannot be played, and why."""
+    """Return the report for JSON, by axis and correction; ``null`` with a reason where one cannot be played."""
 
     def row(one: OwnRow) -> dict[str, Any]:
         return {

@@ -19,7 +19,7 @@ from tablegen.virtual.own_scanner import OwnAxis, operator_line
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 SEEDS = 20
-_MOST_TICKS = 1 << 13  # of a period that are looked at
+_MOST_TICKS = 1 << 13  # of a period that are evaluated
 MEASURES = ("rms", "scaling", "mismatch", "size")
 
 
@@ -27,8 +27,8 @@ MEASURES = ("rms", "scaling", "mismatch", "size")
 class OwnRow:
     """One correction on one axis.
 
-    ``errors`` has a row a seed and a column a measure, in percent of the line; mismatch is NaN where one direction
-    images. ``rejected`` says why there are none. ``example`` is the run of the first seed.
+    ``errors`` has a row per seed and a column per measure, in percent of the line; mismatch is NaN where one direction
+    images. ``rejected`` is the reason why it could not be played. ``example`` is the run of the first seed.
     """
 
     correction: str
@@ -38,7 +38,7 @@ class OwnRow:
     example: AxisRun | None = field(default=None, compare=False, repr=False)
 
     def summary(self) -> dict[str, tuple[float, float]]:
-        """Mean and worst of each measure, the worst with its sign; without the mismatch where there is none."""
+        """Return the mean and the worst of each measure, the worst with its sign; no mismatch of one direction."""
         out = {}
         for name, column in zip(MEASURES, np.array(self.errors).T, strict=True):
             if not np.isnan(column[0]):
@@ -48,7 +48,7 @@ class OwnRow:
 
 @dataclass(frozen=True, slots=True)
 class OwnRun:
-    """One axis: what was asked for, the traces that the operator rests on, and the corrections.
+    """One axis: the request, the traces on which the operator rests, and the corrections.
 
     ``distance`` is that of the offset to the nearest one of a trace, of v_max. ``refined``: the scan file has a
     refinement, which was learnt on the piezo itself and is left out.
@@ -70,8 +70,12 @@ def own_axes(setup: Setup) -> tuple[str, ...]:
 def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda _: None) -> list[OwnRun]:
     """Simulate every axis with an operator, with the models that the scanner file allows; without refinement.
 
-    Raises ``Rejected`` where the scan cannot be built with the operator, and ``Unphysical`` where a departure makes a
-    branch run backwards.
+    Raises
+    ------
+    Rejected
+        If the scan cannot be built with the operator.
+    Unphysical
+        If a departure makes a branch run backwards.
     """
     scan = setup.scan
     plain = msgspec.structs.replace(
@@ -105,14 +109,20 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
             rows.append(OwnRow(correction, model, rejected="; ".join(map(str, faults.problems))))
             continue
         runs = _on_each(played, plants)
-        rows.append(OwnRow(correction, model, tuple(map(measured, runs)), example=runs[0]))
+        rows.append(OwnRow(correction, model, tuple(map(image_errors, runs)), example=runs[0]))
     nearest = min(abs(one.centre - centre) for one in operator.lines)
     return OwnRun(name, line.drive.size_nm, operator.lines, nearest, False, tuple(rows))
 
 
 def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, ...], ...]:
-    """Of a line that is played on several scanners: a row each, of ``MEASURES``."""
-    return tuple(map(measured, _on_each(line, plants)))
+    """Return the errors of a line that is played on several scanners: a row each, of ``MEASURES``.
+
+    Raises
+    ------
+    Unphysical
+        If a departure makes a branch run backwards.
+    """
+    return tuple(map(image_errors, _on_each(line, plants)))
 
 
 def _on_each(line: LinePlan, plants: Sequence[OwnAxis]) -> list[AxisRun]:
@@ -122,8 +132,8 @@ def _on_each(line: LinePlan, plants: Sequence[OwnAxis]) -> list[AxisRun]:
         raise Unphysical(f"{line.axis}: with a random departure of its own uncertainty, {reason}") from None
 
 
-def measured(run: AxisRun) -> tuple[float, float, float, float]:
-    """Rms and scaling error of the worse direction, mismatch (NaN of one direction) and size of the image, percent."""
+def image_errors(run: AxisRun) -> tuple[float, float, float, float]:
+    """Return rms and scaling error of the worse direction, mismatch (NaN of one direction), size error, in percent."""
     branches = [getattr(run.imaged, side) for side in run.directions]
     low, high = branches[0].window
     inside = (branches[0].position >= low) & (branches[0].position <= high)

@@ -1,7 +1,8 @@
-"""The operator of the scanner file as the virtual scanner, wrong by as much as it is uncertain.
+"""The operator of the scanner file as the virtual scanner, with errors as large as its uncertainty.
 
-A build knows the operator; the piezo departs from it. How far is taken from the traces, each of which was left out when
-the operator was identified: near it, loops are bent by smooth random curves of that rms, and sizes changed by as much.
+A build knows the operator; the piezo departs from it. The size of the departure comes from the traces, each of which
+was left out when the operator was identified: near it, loops are bent by smooth random curves of that rms, and sizes
+changed by as much.
 """
 
 from dataclasses import dataclass, replace
@@ -26,13 +27,26 @@ _WINDOW = np.linspace(-0.8, 0.8, 161)  # x = 0.1..0.9, where the rms holds
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DepartingField(Field):
-    """A field, and rows by which it is wrong near each of its points; ``departures`` is of the shape of the rows."""
+    """A field with an error near each of its points.
+
+    ``places`` are the points, shape (n, 2) of stroke and centre; ``departures`` has the shape of the weights.
+    """
 
     places: Floats
     departures: Floats
 
     def at(self, stroke: float, centre: float) -> Floats:
-        """As ``Field.at``; a variance that departures have at all points they have in between and beyond as well."""
+        """Return the interpolated row with its departure, of the same variance between the points and beyond.
+
+        Parameters
+        ----------
+        stroke, centre
+            Shares of the driver's range.
+
+        Returns
+        -------
+        Row, shape (columns,).
+        """
         near = covariance(np.array([[stroke, centre]]), self.places, _ALIKE)[0]
         departure = near @ self.departures / np.sqrt(np.sum(near * near))
         return np.asarray(super().at(stroke, centre) + departure, dtype=np.float64)
@@ -40,7 +54,7 @@ class DepartingField(Field):
 
 @dataclass(frozen=True, eq=False)
 class OwnAxis:
-    """An axis that does what an operator says; creep and dynamics up to ``harmonics``; nm from the lower turn on."""
+    """An axis that follows an operator; creep and dynamics act up to ``harmonics``; nm from the lower turn on."""
 
     operator: Operator
     factor: float
@@ -50,7 +64,7 @@ class OwnAxis:
 
     @classmethod
     def of(cls, line: LinePlan, operator: Operator | None = None) -> "OwnAxis":
-        """At the offset and the rate of a line that was found on an operator; ``operator`` replaces that one."""
+        """Return an axis at the offset and the rate of a line that was solved on an operator, or on ``operator``."""
         shape = operator_line(line)
         drive = line.drive
         return cls(operator or shape.operator, shape.factor, drive.driver, drive.response, line.series.harmonics)
@@ -65,6 +79,17 @@ class OwnAxis:
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Return the settled position in the middle of each tick of a period.
+
+        Parameters
+        ----------
+        volts
+            One period in V, shape (ticks,), that rises once and falls once.
+        tick_s
+            Length of a tick in s.
+
+        Returns
+        -------
+        Position in nm, shape (ticks,).
 
         Raises
         ------
@@ -86,17 +111,17 @@ def operator_line(line: LinePlan) -> OperatorLine:
 def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
     """Return the operator with branches and sizes wrong by each trace's residual when it was left out.
 
-    By the median of all traces at least: one alone may be met by chance.
+    The error is at least the median of all traces: a single trace may agree by chance.
     """
     random = np.random.default_rng(seed)
     places = np.array([(line.stroke, line.centre) for line in operator.lines])
     half = len(operator.residual.weights[0]) // 2
     missed_by = 0.01 * np.abs([line.left_out for line in operator.lines])
-    rms, _, _, missed = np.maximum(missed_by, np.median(missed_by, axis=0)).T
+    rms, _, _, size_error = np.maximum(missed_by, np.median(missed_by, axis=0)).T
     roughness = float(np.median([line.left_out[1] / max(line.left_out[0], 1e-9) for line in operator.lines]))
     waves = int(np.clip(_WAVES_PER_ROUGHNESS * roughness, min(_WAVES, half - 2), max(half - 2, 1)))
     bends = np.array([_bend(random, half, max(waves, 1)) for _ in places]) * rms[:, None]
-    sizes = random.standard_normal((len(places), 1)) * missed[:, None]
+    sizes = random.standard_normal((len(places), 1)) * size_error[:, None]
     residual, size = (
         DepartingField(field.points, field.weights, field.lengths, field.straight, places=places, departures=rows)
         for field, rows in ((operator.residual, bends), (operator.size, sizes))
@@ -105,11 +130,11 @@ def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
 
 
 def _bend(random: np.random.Generator, count: int, waves: int) -> Floats:
-    """Coefficients of both branches, ``count`` each: 0 where the loop turns, of rms 1 inside the window."""
+    """Return coefficients of both branches, ``count`` each: 0 where the loop turns, of rms 1 inside the window."""
     fade = np.arange(1.0, waves + 1.0) ** -0.5
     turns = np.array([0.5, 0.0, -0.5])  # 1 - x^2
-    drawn = [np.polynomial.chebyshev.chebmul(turns, fade * random.standard_normal(waves)) for _ in range(2)]
-    branches = np.array([np.pad(one, (0, max(count - len(one), 0)))[:count] for one in drawn])
-    seen = np.array([np.polynomial.chebyshev.chebval(_WINDOW, one) for one in branches])
-    about = seen - np.polynomial.chebyshev.chebval(_WINDOW, np.polynomial.chebyshev.chebfit(_WINDOW, seen.mean(0), 1))
+    polynomials = [np.polynomial.chebyshev.chebmul(turns, fade * random.standard_normal(waves)) for _ in range(2)]
+    branches = np.array([np.pad(one, (0, max(count - len(one), 0)))[:count] for one in polynomials])
+    bends = np.array([np.polynomial.chebyshev.chebval(_WINDOW, one) for one in branches])
+    about = bends - np.polynomial.chebyshev.chebval(_WINDOW, np.polynomial.chebyshev.chebfit(_WINDOW, bends.mean(0), 1))
     return np.concatenate(branches) / float(np.sqrt(np.mean(about * about)))

@@ -1,4 +1,4 @@
-"""The file of a virtual scanner: what is true of it, as a laboratory would never know it."""
+"""The file of a virtual scanner: its true parameters, which a laboratory would never know."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -25,7 +25,7 @@ BUILT_IN = ("default", "duhem")  # scanners that come with the package
 
 
 class LagTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lag of the Duhem operator; see ``tablegen.virtual.duhem``."""
+    """One lag of the Duhem operator; see ``tablegen.virtual.duhem``."""
 
     rise: Annotated[float, Meta(ge=0.5, le=200.0, description="rate per full drive while the drive rises")]
     fall: Annotated[float, Meta(ge=0.5, le=200.0, description="the same while it falls")]
@@ -47,7 +47,7 @@ class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     lags: Annotated[list[LagTruth], Meta(max_length=4, description="duhem: lags that add up")] = []
 
     def operator(self) -> Preisach | Duhem:
-        """Return the operator.
+        """Build the hysteresis operator.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Creep(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class ResonanceTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The first resonance."""
+    """Parameters of the first resonance."""
 
     frequency_hz: Annotated[Hertz, Meta(description="undamped")]
     quality: Annotated[float, Meta(ge=0.6, le=1e4, description="quality factor")]
@@ -108,7 +108,7 @@ class AmplifierTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A virtual scanner."""
+    """Parameters of a virtual scanner."""
 
     name: Annotated[Name, Meta(description="for reports")]
     identified_on: Annotated[Name, Meta(description="what the parameters come from")] = "nothing that its file names"
@@ -157,7 +157,7 @@ def _check_hysteresis(file: Document, problems: Problems, key: str, built: Hyste
     if rows != list(range(len(rows), 0, -1)):
         problems.add(file, f"{key}.density_nm", f"{len(rows)} rows need {len(rows)}, ..., 2, 1 coefficients")
     elif not any(built.reversible_nm):
-        problems.add(file, f"{key}.reversible_nm", "all 0; a drive that turns would not move at all")
+        problems.add(file, f"{key}.reversible_nm", "all 0; the axis would not move after a turn of the drive")
     else:
         try:
             built.operator()
@@ -166,5 +166,10 @@ def _check_hysteresis(file: Document, problems: Problems, key: str, built: Hyste
 
 
 def sensitivity(coefficients: Sequence[float], p: FloatsLike) -> Floats:
-    """s(p) = 1 + c1 p + c2 p^2 + ..."""
+    """Return s(p) = 1 + c1 p + c2 p^2 + ...
+
+    Returns
+    -------
+    Relative sensitivities, of the shape of ``p`` (-1..1).
+    """
     return np.asarray(np.polynomial.polynomial.polyval(p, [1.0, *coefficients]), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What the operators of hysteresis share: monotonic pieces of a drive, and Bernstein polynomials as powers."""
+"""Functions that the hysteresis operators share: monotonic pieces of a drive, and Bernstein polynomials as powers."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -13,7 +13,16 @@ _SATURATION_TOLERANCE = 1e-9
 
 
 def normalised(drive: Floats) -> Floats:
-    """Round a drive of 0..1 beyond the last bits of a voltage.
+    """Clip a drive that leaves 0..1 by the last bits of a voltage.
+
+    Parameters
+    ----------
+    drive
+        Normalised drives, of any shape.
+
+    Returns
+    -------
+    Drives of 0..1, of the same shape.
 
     Raises
     ------
@@ -27,7 +36,17 @@ def normalised(drive: Floats) -> Floats:
 
 
 def monotonic(drive: Floats) -> list[tuple[int, int]]:
-    """Ranges of drive[1:] along which the sequence never both rises and falls; flat parts belong to what is before."""
+    """Return the monotonic pieces of drive[1:]; flat parts belong to the piece before.
+
+    Parameters
+    ----------
+    drive
+        Drives, shape (n,), of which the first is where the sequence begins.
+
+    Returns
+    -------
+    First and end index of each piece in drive[1:].
+    """
     steps = np.sign(np.diff(drive))
     moving = np.flatnonzero(steps)
     if not len(moving):
@@ -38,12 +57,27 @@ def monotonic(drive: Floats) -> list[tuple[int, int]]:
 
 
 def one_minus(n: int) -> Floats:
-    """Coefficients of (1 - x)^n."""
+    """Return the coefficients of (1 - x)^n.
+
+    Returns
+    -------
+    Coefficients of 1, x, ..., x^n, shape (n + 1,).
+    """
     return np.array([(-1.0) ** k * comb(n, k) for k in range(n + 1)])
 
 
 def powers_of(bernstein: Sequence[float]) -> Floats:
-    """Convert Bernstein coefficients over 0..1 to coefficients of 1, x, x^2, ..."""
+    """Convert Bernstein coefficients over 0..1 to coefficients of 1, x, x^2, ...
+
+    Parameters
+    ----------
+    bernstein
+        Coefficients, shape (n + 1,).
+
+    Returns
+    -------
+    Coefficients, lowest power first, shape (n + 1,).
+    """
     n = len(bernstein) - 1
     out = np.zeros(n + 1)
     for i, weight in enumerate(bernstein):

@@ -8,15 +8,16 @@ from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Sampler
 
-# A slow axis can have more ticks a frame than fit in memory; its codes are then looked at this often.
+# A slow axis can have more ticks a frame than fit in memory; its codes are then sampled this often.
 MAX_TICKS = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
 class PlayedDrive:
-    """One period of an axis: codes, and volts at the piezo, held for ``tick_s`` each; ``tick`` are their numbers.
+    """One period of an axis: codes and volts at the piezo, held for ``tick_s`` each; ``tick`` numbers the ticks.
 
-    Of a period that is too long ``tick`` are evenly spread, each the middle of those that it stands for.
+    All arrays have shape (ticks,). In a period that is too long ``tick`` are evenly spread, each the middle of those
+    for which it stands.
     """
 
     tick: Ints
@@ -27,20 +28,30 @@ class PlayedDrive:
 
     @property
     def time_s(self) -> Floats:
-        """The middle of what each code is held for."""
+        """The middle of the time for which each code is held.
+
+        Returns
+        -------
+        Times in s, shape (ticks,).
+        """
         return self.period_s * self.turns
 
     @property
     def turns(self) -> Floats:
-        """The same in periods."""
+        """The same in periods.
+
+        Returns
+        -------
+        Times in periods, 0..1, shape (ticks,).
+        """
         return (np.arange(len(self.codes)) + 0.5) / len(self.codes)
 
 
 def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
-    """Return what an undisturbed period of one axis puts out: a line of x, a frame of y.
+    """Return the output of an undisturbed period of one axis: a line of x, a frame of y.
 
-    Of a shaped axis it is the first period since the program began. Where one is too long, its ``volts`` are those that
-    shaped codes have in the mean of the ticks that one stands for.
+    For a shaped axis it is the first period since the program began. Where one is too long, its ``volts`` are the mean
+    of the shaped codes over the ticks for which one stands.
     """
     period = line.program.ticks
     count = min(period, most_ticks)
@@ -58,7 +69,12 @@ def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
 
 
 def intended(line: LinePlan, drive: PlayedDrive) -> Floats:
-    """Return the position, 0..1, that the model asks for in the middle of each tick: rounded where it turns."""
+    """Return the position that the model requests in the middle of each tick: rounded where it turns.
+
+    Returns
+    -------
+    Positions of 0..1, shape (ticks,).
+    """
     shape, t = line.drive.shape, drive.turns
     w = Sampler(line.described, 2 * len(t)).at(2 * np.arange(len(t), dtype=np.int64) + 1)
     return np.where(t <= shape.turn, shape.forward.inverse(w), 1.0 - shape.backward.inverse(1.0 - w))

@@ -45,7 +45,12 @@ class Preisach:
 
     @cached_property
     def everett(self) -> Floats:
-        """Coefficients e[p, q] of alpha^p beta^q of the Everett function, in nm."""
+        """The coefficients of the Everett function E(alpha, beta).
+
+        Returns
+        -------
+        e[p, q] of alpha^p beta^q, in nm, shape (size, size).
+        """
         n, m = len(self.density) - 1, len(self.reversible)
         size = max(n + 3, m + 1)
         out = np.zeros((size, size))
@@ -59,16 +64,48 @@ class Preisach:
         return out
 
     def branch(self, high: FloatsLike, low: FloatsLike) -> Floats:
-        """E(high, low): nm between the drives ``low`` and ``high`` along the branch that turned at one of them."""
+        """Return E(high, low), the displacement between two drives along the branch that turned at one of them.
+
+        Parameters
+        ----------
+        high, low
+            Drives of 0..1, of one shape.
+
+        Returns
+        -------
+        Displacement in nm, of that shape.
+        """
         return np.asarray(np.polynomial.polynomial.polyval2d(high, low, self.everett), dtype=np.float64)
 
     def middle(self, drive: FloatsLike) -> Floats:
-        """Between the branches of the largest loop, in nm."""
+        """Return the displacement between the branches of the largest loop.
+
+        Returns
+        -------
+        Displacement in nm, of the shape of ``drive`` (0..1).
+        """
         full, none = np.ones_like(drive, dtype=np.float64), np.zeros_like(drive, dtype=np.float64)
         return 0.5 * (self.branch(drive, none) + self.branch(full, none) - self.branch(full, drive))
 
     def play(self, drive: Floats, memory: TurningPoints | None = None) -> tuple[Floats, TurningPoints]:
-        """Displacement in nm at each drive of a sequence, and what is remembered after it."""
+        """Return the displacement along a sequence of drives, and the turning points after it.
+
+        Parameters
+        ----------
+        drive
+            Drives of 0..1, shape (ticks,).
+        memory
+            The turning points before; rest at drive 0 if None.
+
+        Returns
+        -------
+        Displacement in nm, shape (ticks,), and the turning points.
+
+        Raises
+        ------
+        ValueError
+            If a drive is outside 0..1.
+        """
         drive = normalised(drive)
         memory = memory or TurningPoints()
         turning, reached = list(memory.drives), list(memory.displacements)
@@ -78,28 +115,43 @@ class Preisach:
         return out, TurningPoints(tuple(turning), tuple(reached))
 
     def settled(self, drive: Floats) -> Floats:
-        """Displacement in nm over one period of a periodic drive: one period has wiped out what it can."""
+        """Return the displacement over one period of a periodic drive: one period has wiped out what it can.
+
+        Parameters
+        ----------
+        drive
+            Drives of 0..1 over one period, shape (ticks,).
+
+        Returns
+        -------
+        Displacement in nm, shape (ticks,).
+
+        Raises
+        ------
+        ValueError
+            If a drive is outside 0..1.
+        """
         _, memory = self.play(drive)
         return self.play(drive, memory)[0]
 
     def _sweep(self, drive: Floats, out: Floats, turning: list[float], reached: list[float]) -> None:
-        """One monotonic piece of a drive; the end of the piece before it is the last turning point."""
+        """Play one monotonic piece of a drive; the end of the piece before it is the last turning point."""
         end = float(drive[-1])
         if end == drive[0] == turning[-1]:
             out[:] = reached[-1]
             return
         up = end > turning[-1]
-        if len(turning) > 1 and (turning[-1] > turning[-2]) == up:  # it goes on where it went before
+        if len(turning) > 1 and (turning[-1] > turning[-2]) == up:  # it continues in the previous direction
             del turning[-1], reached[-1]
-        done = 0
-        while done < len(drive):
+        start = 0
+        while start < len(drive):
             # One branch holds up to the turning point before its own; from there on both are wiped out.
             limit = turning[-2] if len(turning) > 1 else 1.0
             free = len(turning) == 1 or limit == 0.0
             inside = len(drive) if free else int(np.count_nonzero(drive < limit if up else drive > limit))
-            out[done:inside] = reached[-1] + self._from(turning[-1], drive[done:inside], up)
-            done = max(done, inside)
-            if done < len(drive):
+            out[start:inside] = reached[-1] + self._from(turning[-1], drive[start:inside], up)
+            start = max(start, inside)
+            if start < len(drive):
                 del turning[-2:], reached[-2:]
         if end == 0.0:
             turning[:], reached[:] = [0.0], [0.0]
@@ -108,7 +160,7 @@ class Preisach:
             reached.append(float(out[-1]))
 
     def _from(self, turned: float, drive: Floats, up: bool) -> Floats:
-        """Change in nm since the turning point, along the branch that starts there."""
+        """Return the change in nm since the turning point, along the branch that starts there."""
         powers = turned ** np.arange(len(self.everett))
         coefficients = self.everett @ powers if up else -(powers @ self.everett)
         value = np.full_like(drive, coefficients[-1])
@@ -118,7 +170,7 @@ class Preisach:
 
 
 def _monomials(n: int, i: int, j: int) -> Floats:
-    """Bernstein polynomial n!/(i! j! k!) (1 - alpha)^i (alpha - beta)^j beta^k as coefficients of alpha^p beta^q."""
+    """Expand the Bernstein polynomial n!/(i! j! k!) (1 - alpha)^i (alpha - beta)^j beta^k in alpha^p beta^q."""
     k = n - i - j
     out = np.zeros((n + 1, n + 1))
     for s, first in enumerate(one_minus(i)):

@@ -1,4 +1,4 @@
-"""What a simulation says, as text, rows of a CSV and plain data. All of it is labelled as a simulation."""
+"""The report of a simulation, as text, rows of a CSV and plain data, each labelled as a simulation."""
 
 import io
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _LARGE_PERCENT = 1.0  # of the line: more spoils an image
 
 @dataclass(frozen=True)
 class SimulationStage:
-    """Runs with one scanner file: as ``given``, or as ``calibrated`` on the virtual scanner; and what could not run."""
+    """Runs with one scanner file, given or calibrated on the virtual scanner, and the models that could not run."""
 
     name: str
     heading: str
@@ -32,7 +32,7 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
     first = next(run for stage in stages for run in stage.runs)
     lines = [
         f"{name}: {LABEL} ({truth.name!r}); "
-        f"{first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y asked for",
+        f"{first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y requested",
         "",
         "                  size    residual in the window [% of the line]               in the image       "
         "scaling error",
@@ -55,11 +55,11 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
 
 
 def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
-    """Return what the scanner file's own models leave in the last stage's image, the worst first."""
+    """Return the errors that the scanner file's own models leave in the last stage's image, the worst first."""
     played = [stage for stage in stages if stage.runs]
     findings = []
     for run in played[-1].runs if played else ():
-        for one in (getattr(run, axis) for axis in run.asked):
+        for one in (getattr(run, axis) for axis in run.configured):
             residuals = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
             side = max(residuals, key=lambda name: residuals[name])
             text = f"the {run.model} model leaves {residuals[side]:.2g} % of the line of {one.axis}, {side}"
@@ -72,7 +72,7 @@ def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
 
 def _rows(axis: str, run: Run) -> list[str]:
     one: AxisRun = getattr(run, axis)
-    mark = ("*" if axis in run.asked else "") + ("+" if one.refined else "")
+    mark = ("*" if axis in run.configured else "") + ("+" if one.refined else "")
     start = f"{axis:<4}  {run.model + mark:<12}{one.size_error_percent:+6.2f}"
     rows: list[str] = []
     for side in one.directions:
@@ -123,7 +123,7 @@ def data(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> dict[str
         **{
             stage.name: {
                 "models": {
-                    run.model: {"in_scanner_file": list(run.asked), "x": axis(run.x), "y": axis(run.y)}
+                    run.model: {"in_scanner_file": list(run.configured), "x": axis(run.x), "y": axis(run.y)}
                     for run in stage.runs
                 },
                 "rejected": {model: "; ".join(reasons) for model, reasons in stage.rejected},
@@ -134,7 +134,7 @@ def data(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> dict[str
 
 
 def csv(stages: Sequence[SimulationStage]) -> str:
-    """One settled period of each axis, at most some ten thousand of its ticks; ``position`` is that of the triangle."""
+    """Format one settled period of each axis, at most some 10,000 ticks; ``position`` is that of the triangle."""
     out = io.StringIO()
     out.write("# simulation\n")
     out.write("scanner,model,axis,tick,time_s,code,drive_v,displacement_nm,position,residual_percent\n")

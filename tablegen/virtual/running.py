@@ -19,18 +19,36 @@ def running_trace(
     clock: float = 0.0,
     delay_s: float = 0.0,
 ) -> dict[str, Floats]:
-    """Simulate ``time_s``, ``drive_v``, ``displacement_nm`` of the emitted integers, settled.
+    """Simulate the settled trace of the emitted integers.
 
-    ``samples`` a period, of ``periods`` from ``start`` (in periods) on; time 0 is the line start before the record. The
-    recorder averages over a tick about each of them, its clock is fast by ``clock``, and the sensor is late by
-    ``delay_s``.
+    The recorder averages over a tick about each sample. Time 0 is the line start before the record.
+
+    Parameters
+    ----------
+    periods, start
+        Length and beginning of the record, in periods.
+    samples
+        Samples per period.
+    clock
+        Relative error of the recorder's clock; above 0 it is fast.
+    delay_s
+        Delay of the sensor in s.
+
+    Returns
+    -------
+    ``time_s``, ``drive_v``, ``displacement_nm``, each of shape (round(periods * samples),).
+
+    Raises
+    ------
+    ValueError
+        If the scan leaves the range of the virtual scanner.
     """
     drive = played(line)
-    moved = axis.settled(drive.volts, drive.tick_s)
+    settled_nm = axis.settled(drive.volts, drive.tick_s)
     turns = start + np.arange(round(periods * samples)) / samples
     true_s = turns * drive.period_s
-    # What a converter holds, averaged over a tick, is linear between the middles of its ticks.
+    # A held output, averaged over a tick, is linear between the middles of its ticks.
     volts = np.interp(turns, drive.turns, drive.volts, period=1.0)
-    displacement = np.interp(turns - delay_s / drive.period_s, drive.turns, moved, period=1.0)
+    displacement = np.interp(turns - delay_s / drive.period_s, drive.turns, settled_nm, period=1.0)
     reading = (sensor or Sensor()).read(displacement, true_s)
     return {"time_s": true_s * (1.0 + clock), "drive_v": volts, "displacement_nm": reading}

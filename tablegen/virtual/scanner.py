@@ -1,7 +1,7 @@
 """The virtual scanner: volts at the amplifier's output stage in, nanometres out.
 
-dead time -> amplifier bandwidth -> hysteresis -> sensitivity at the mean drive -> creep -> resonances, each axis by
-itself. The mean drive is that of all that is played, or, with a memory, of the last tens of seconds.
+The order is dead time, amplifier bandwidth, hysteresis, sensitivity at the mean drive, creep, resonances; the axes are
+independent. The mean drive is that of the whole period or, with a memory, of the last tens of seconds.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.driver import Driver
 from tablegen.virtual import parameters
 from tablegen.virtual.creep import logarithmic_creep
-from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side
+from tablegen.virtual.modes import Modes, delay, low_pass, second_order, side_by_side
 from tablegen.virtual.parameters import Truth, sensitivity
 
 _STRAIGHT = Modes(1.0)
@@ -23,16 +23,38 @@ _DRIVE_LEVELS = 2.0**36  # levels of the drive
 
 
 class HysteresisOperator(Protocol):
-    """Hysteresis: a drive of 0..1 to nm above rest at drive 0, whatever the family."""
+    """Hysteresis of any family: a drive of 0..1 to nm above rest at drive 0."""
 
     def play(self, drive: Floats, memory: Any = None) -> tuple[Floats, Any]:
-        """Displacement at each drive of a sequence, and what is remembered after it."""
+        """Return the displacement along a sequence of drives, and the state after it.
+
+        Parameters
+        ----------
+        drive
+            Drives of 0..1, shape (ticks,).
+        memory
+            The state before; at rest at drive 0 if None.
+
+        Returns
+        -------
+        Displacement in nm, shape (ticks,), and the state.
+        """
 
     def settled(self, drive: Floats) -> Floats:
-        """Displacement over one period of a drive that has been repeated for ever."""
+        """Return the displacement over one period of a drive that has been repeated for ever.
+
+        Returns
+        -------
+        Displacement in nm, of the shape (ticks,) of ``drive``.
+        """
 
     def middle(self, drive: FloatsLike) -> Floats:
-        """Displacement between the branches, at drives of 0..1."""
+        """Return the displacement between the branches.
+
+        Returns
+        -------
+        Displacement in nm, of the shape of ``drive`` (0..1).
+        """
 
 
 @dataclass(frozen=True)
@@ -50,7 +72,7 @@ class VirtualAxis:
 
     @classmethod
     def of(cls, axis: parameters.AxisTruth, v_max: float, amplifier: parameters.AmplifierTruth) -> "VirtualAxis":
-        """From the parameters of a file."""
+        """Build the axis from the parameters of a file."""
         c, r, other = axis.creep, axis.resonance, axis.second_resonance
         creep = _STRAIGHT
         if c is not None:
@@ -71,21 +93,54 @@ class VirtualAxis:
         )
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Where the axis is, as a mean over each tick, in a period that has been held tick by tick for ever."""
-        late = delayed(volts, self.dead_time_s / tick_s)
+        """Return the displacement over one period that has been repeated for ever.
+
+        Parameters
+        ----------
+        volts
+            One period in V, held tick by tick, shape (ticks,).
+        tick_s
+            Length of a tick in s.
+
+        Returns
+        -------
+        Mean displacement in nm over each tick, shape (ticks,).
+
+        Raises
+        ------
+        ValueError
+            If the drive leaves the range of the driver.
+        """
+        late = delay(volts, self.dead_time_s / tick_s)
         drive = self._normalised(self.amplifier.settled(late, tick_s))
         mean_v: FloatsLike = float(np.mean(volts)) if self.memory is None else self.memory.settled(late, tick_s)
-        moved = self._moved(self.hysteresis.settled(drive), mean_v)
-        return self.resonance.settled(self.creep.settled(moved, tick_s), tick_s)
+        displacement = self._with_sensitivity(self.hysteresis.settled(drive), mean_v)
+        return self.resonance.settled(self.creep.settled(displacement, tick_s), tick_s)
 
     def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
         """Return the response to a drive that begins after a long rest at its first voltage.
 
-        Without a memory the sensitivity is that at ``mean_v``, by default the mean of this drive, and does not change
-        meanwhile. A memory begins with ``mean_v``, by default the first voltage.
+        Parameters
+        ----------
+        volts
+            Drive in V, held tick by tick, shape (ticks,).
+        tick_s
+            Length of a tick in s.
+        mean_v
+            Without a memory the mean drive in V at which the sensitivity is taken, by default that of ``volts``; with a
+            memory the mean drive before, by default the first voltage.
+
+        Returns
+        -------
+        Mean displacement in nm over each tick, shape (ticks,).
+
+        Raises
+        ------
+        ValueError
+            If the drive leaves the range of the driver.
         """
         first = float(volts[0])
-        late = delayed(volts, self.dead_time_s / tick_s, first)
+        late = delay(volts, self.dead_time_s / tick_s, first)
         drive = self._normalised(self.amplifier.follow(late, tick_s))
         rest, memory = self.hysteresis.play(self._normalised(volts[:1]))
         bias: FloatsLike
@@ -94,19 +149,24 @@ class VirtualAxis:
         else:
             start = first if mean_v is None else mean_v
             bias = self.memory.follow(late, tick_s, start)
-        moved = self._moved(self.hysteresis.play(drive, memory)[0], bias)
-        at_rest = float(self._moved(rest, start)[0])
-        crept = self.creep.follow(moved, tick_s, at_rest)
+        displacement = self._with_sensitivity(self.hysteresis.play(drive, memory)[0], bias)
+        at_rest = float(self._with_sensitivity(rest, start)[0])
+        crept = self.creep.follow(displacement, tick_s, at_rest)
         return self.resonance.follow(crept, tick_s, at_rest * float(self.creep.response(0.0).real))
 
     def response(self, f_hz: FloatsLike) -> npt.NDArray[np.complex128]:
-        """Return the linear response to small signals, hysteresis aside: amplifier, creep, resonance."""
+        """Return the linear response to small signals, without hysteresis: dead time, amplifier, creep, resonance.
+
+        Returns
+        -------
+        Complex gains, of the shape of ``f_hz``.
+        """
         late = np.exp(-2j * pi * self.dead_time_s * np.asarray(f_hz, dtype=np.float64))
         linear = self.amplifier.response(f_hz) * self.creep.response(f_hz) * self.resonance.response(f_hz)
         return np.asarray(late * linear, dtype=np.complex128)
 
-    def _moved(self, displacement: Floats, mean_v: FloatsLike) -> Floats:
-        """With the sensitivity; one that changes with a memory scales about where the remembered drive would be."""
+    def _with_sensitivity(self, displacement: Floats, mean_v: FloatsLike) -> Floats:
+        """Apply the sensitivity; with a memory it scales about the displacement at the remembered drive."""
         factor = self._sensitivity(mean_v)
         if self.memory is None:
             return np.asarray(factor * displacement, dtype=np.float64)
@@ -130,7 +190,7 @@ class VirtualAxis:
 
 @dataclass(frozen=True)
 class VirtualScanner:
-    """Both axes; they do not couple."""
+    """The two axes, which do not couple."""
 
     name: str
     x: VirtualAxis

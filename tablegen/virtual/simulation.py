@@ -20,9 +20,9 @@ from tablegen.virtual.scanner import VirtualScanner
 
 @dataclass(frozen=True, eq=False)
 class AxisRun:
-    """One axis of a scan: what was put out, and where the virtual scanner went, in nm above rest at 0 V.
+    """One axis of a scan: the drive, and ``displacement_nm`` of the virtual scanner, (ticks,), above rest at 0 V.
 
-    ``error`` takes the line's ends for right, as the paper does; ``imaged`` is about the best line through the windows
+    ``error`` takes the line's ends for exact, as the paper does; ``imaged`` is about the best line through the windows
     that are imaged.
     """
 
@@ -38,34 +38,58 @@ class AxisRun:
 
     @property
     def size_error_percent(self) -> float:
-        """Error of the size in the image against what the scan file asks for."""
+        """Error of the size in the image against the request of the scan file."""
         return 100.0 * (self.imaged.size_nm / self.nominal_nm - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A scan with one hysteresis model. ``asked`` are the axes on which it is that of the scanner file."""
+    """A scan with one hysteresis model. ``configured`` are the axes on which it is that of the scanner file."""
 
     model: str
-    asked: tuple[str, ...]
+    configured: tuple[str, ...]
     x: AxisRun
     y: AxisRun
 
 
 class SettledAxis(Protocol):
-    """An axis on which a period is played."""
+    """An axis on which a settled period can be played."""
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Displacement in nm in the middle of each tick of a period of volts, (ticks,), that are held tick by tick."""
+        """Return the displacement in the middle of each tick of a settled period.
+
+        Parameters
+        ----------
+        volts
+            One period in V, held tick by tick, shape (ticks,).
+        tick_s
+            Length of a tick in s.
+
+        Returns
+        -------
+        Displacement in nm, shape (ticks,).
+        """
 
 
 def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
-    """Play one axis until it has settled."""
+    """Play one axis until it has settled.
+
+    Raises
+    ------
+    ValueError
+        If the line leaves the range of the axis.
+    """
     return run_on_each(line, [axis])[0]
 
 
 def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS) -> list[AxisRun]:
-    """Play the same line on several axes, at no more ticks than that of a period."""
+    """Play the same line on several axes, with at most ``most_ticks`` ticks per period.
+
+    Raises
+    ------
+    ValueError
+        If the line leaves the range of an axis.
+    """
     drive = played(line, most_ticks)
     requested = intended(line, drive)
     return [_axis_run(line, drive, requested, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
@@ -106,9 +130,9 @@ def with_model(setup: Setup, model: str) -> Setup:
 
 
 def models_of(setup: Setup) -> tuple[str, ...]:
-    """Models that can be compared, the simplest first: for which all axes that are calibrated have parameters.
+    """Return the models that can be compared, the simplest first.
 
-    And those of the scanner file itself.
+    These are the models for which all calibrated axes have parameters, and those of the scanner file itself.
     """
     both = (setup.scanner.x.hysteresis, setup.scanner.y.hysteresis)
     calibrated = [h for h in both if h is not None and h.calibrated]
@@ -124,14 +148,14 @@ def simulate(setup: Setup, scanner: VirtualScanner, model: str) -> Run:
     Raises
     ------
     Rejected
-        If the scan cannot be played so.
+        If the scan cannot be built with this model.
     ValueError
         If it leaves the virtual scanner's range.
     """
     plan = make_plan(with_model(setup, model))
-    asked = tuple(
+    configured = tuple(
         axis
         for axis, h in (("x", setup.scanner.x.hysteresis), ("y", setup.scanner.y.hysteresis))
         if (h.model() if h is not None else models.UNCOMPENSATED) == model
     )
-    return Run(model, asked, run_line(plan.x, scanner.x), run_line(plan.y, scanner.y))
+    return Run(model, configured, run_line(plan.x, scanner.x), run_line(plan.y, scanner.y))

@@ -15,7 +15,7 @@ from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
-from tablegen.virtual.own_run import measured
+from tablegen.virtual.own_run import image_errors
 from tablegen.virtual.simulation import run_line
 
 SAMPLES = 2000  # of a period, on which the piezos are integrated
@@ -71,7 +71,7 @@ def judged(plant: ForeignPlant, folder: Path) -> tuple[Floats, Floats, Floats]:
         sides = expected.rms, expected.scaling, {"": expected.mismatch}, {"": expected.size}
         figures = [[one for one in side.values() if one is not None] for side in sides]
         most.append([max(abs(one.value) + (one.uncertainty or 0.0) for one in found) for found in figures])
-        left.append(np.abs(measured(run_line(plan.x, Played(plant)))).tolist())
+        left.append(np.abs(image_errors(run_line(plan.x, Played(plant)))).tolist())
     return np.array(left), np.array(most), np.tile(plain, (len(left), 1))
 
 

@@ -178,7 +178,7 @@ def test_the_own_operator(tmp_path: Path) -> None:
     scan = write_operator_scan(tmp_path, operator_file())
     shown, plain, other = (run("simulate", scan, *extra) for extra in ((), ("--json",), ("--json", "--seed", "5")))
     assert (shown.status, shown.err, plain.status, plain.err) == (0, "", 0, "")
-    assert "simulation on the scanner file's own operator; 200 nm in x asked for" in shown.out.splitlines()[0]
+    assert "simulation on the scanner file's own operator; 200 nm in x requested" in shown.out.splitlines()[0]
     assert shown.out.splitlines()[-1].startswith("A simulation, not a measurement")
     assert "y     has no operator; --scanner-truth default" in shown.out
     data = json.loads(plain.out)

@@ -168,8 +168,8 @@ def test_damaged_files_of_a_build_are_told(lab: Path, tmp_path: Path) -> None:
         file.write("\n")
     outcome = run("compare", scan, tmp_path / "build")
     assert outcome.status == 1
-    assert f"not as its manifest says: {name}" in outcome.out
-    assert outcome.out.splitlines()[-1].endswith("but files of a build are not as its manifest says")
+    assert f"does not agree with its manifest: {name}" in outcome.out
+    assert outcome.out.splitlines()[-1].endswith("but files of a build do not agree with its manifest")
 
 
 def test_a_limit_that_is_exceeded_is_told_and_compared(lab: Path) -> None:

@@ -43,7 +43,7 @@ def test_what_is_straight_stays_bit_for_bit_where_nothing_moves() -> None:
     image = np.random.default_rng(1).standard_normal((ROWS, COLUMNS))
     for forward in (True, False):
         assert Resampler.of(found, forward)(image) == pytest.approx(image, abs=1e-12)
-        assert np.nanmax(np.abs(found.moved(forward))) < 1e-9
+        assert np.nanmax(np.abs(found.displacement(forward))) < 1e-9
 
 
 @settings(max_examples=25, deadline=None)
@@ -115,8 +115,8 @@ def test_the_distance_of_two_pictures_is_measured() -> None:
         0.0,
     )
     found = agreement((trace, retrace), (trace, retrace), still)
-    assert found.apart[0] == pytest.approx(found.apart[1], abs=1e-6)
-    assert found.apart[1] == pytest.approx(np.full(len(found.place), 1.7), abs=0.05)
+    assert found.offsets[0] == pytest.approx(found.offsets[1], abs=1e-6)
+    assert found.offsets[1] == pytest.approx(np.full(len(found.place), 1.7), abs=0.05)
     assert difference(trace, trace) == 0.0
     assert difference(trace, random.standard_normal(x.shape)) == pytest.approx(1.0, abs=0.05)
     nothing = agreement((trace, random.standard_normal(x.shape)), (trace, random.standard_normal(x.shape)), still)

@@ -119,7 +119,7 @@ def test_noise_that_hides_spots_is_said() -> None:
 
 def test_a_lattice_of_few_periods_hides_the_spots_of_a_larger_cell() -> None:
     few = 0.2 * CELL
-    with pytest.raises(Unphysical, match=r"larger cell cannot be told from its own; image 4\.4 periods or more"):
+    with pytest.raises(Unphysical, match=r"cell cannot be distinguished from its own; image 4\.4 periods or more"):
         check_cell(PeriodicScan(straight(96, 128), few, 0.9, True), picture((1.0, 4.0, 0.6), (0.9, 1.4, 3.6)), True)
 
 

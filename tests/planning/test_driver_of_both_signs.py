@@ -179,14 +179,14 @@ def test_an_image_is_put_straight_alike() -> None:
     def position(by: float) -> Any:
         setup = moved(by, points=True)
         model = ScannerModel(setup.scanner, setup.scanner_file, Path())
-        return model.moved("x", AxisScan(triangle(60.0, 55.0 - by, 0.5), 100.0, 0.5, (0.1, 0.9)))
+        return model.position("x", AxisScan(triangle(60.0, 55.0 - by, 0.5), 100.0, 0.5, (0.1, 0.9)))
 
     one, other = position(0.0), position(50.0)
     assert np.ptp(one) > 400.0
     assert np.max(np.abs((one - one.mean()) - (other - other.mean()))) < 1e-6 * np.ptp(one)
     setup, beyond = moved(50.0, points=False), AxisScan(triangle(60.0, -35.0, 0.5), 100.0, 0.5, (0.1, 0.9))
     with pytest.raises(Unphysical, match=r"x: -65 V is outside the driver's -50\.\.50 V, by 15 V"):
-        ScannerModel(setup.scanner, setup.scanner_file, Path()).moved("x", beyond)
+        ScannerModel(setup.scanner, setup.scanner_file, Path()).position("x", beyond)
 
 
 def test_the_tubes_page_and_terminal_speak_of_its_range(tmp_path: Path) -> None:

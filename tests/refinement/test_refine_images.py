@@ -253,7 +253,7 @@ def test_y_needs_the_whole_frame_and_periods_along_it(setup: Setup, lattice: Pai
         refine_images(setup, "y", [(lattice[0][10:], lattice[1][10:])], Options())
     with pytest.raises(Unphysical, match=r"periods of the sample along y; at least 3 are needed: turn a grating"):
         refine_images(setup, "y", [bars], Options())
-    with pytest.raises(Unphysical, match="say nothing of y"):
+    with pytest.raises(Unphysical, match="do not show the error of y"):
         refine_mismatch(setup, "y", [lattice], Options())
     with pytest.raises(Unphysical, match="do not show one sample"):
         refine_images(setup, "y", [lattice, frames_of(setup, replace(LATTICE, periods=12.0))[0]], Options())

@@ -199,7 +199,7 @@ def test_what_a_resonance_allows(tmp_path: Path) -> None:
     most = int(np.flatnonzero(worst > MAX_ERROR_LEFT)[0])
     assert 3 < most < H
     assert (found.harmonics, found.used) == (most, min(most, 16))
-    assert found.left == pytest.approx(float(np.max(worst[: found.used])))
+    assert found.remaining == pytest.approx(float(np.max(worst[: found.used])))
     assert found.phase_deg == pytest.approx(np.degrees(np.arccos(0.35)))
     assert found.delay_s == pytest.approx(np.arccos(0.35) / (2.0 * np.pi * found.used * 100.0))
     assert bound(line, 0.3, 16).harmonics > most
@@ -213,7 +213,7 @@ def test_what_a_resonance_allows(tmp_path: Path) -> None:
 def test_without_dynamics_nothing_is_known(line: LinePlan) -> None:
     assert plausible_ratios(line, np.arange(1.0, 5.0)).tolist() == [[1.0, 1.0, 1.0, 1.0]]
     found = bound(line, 0.7, 16)
-    assert (found.dynamics, found.harmonics, found.left) == (False, H, pytest.approx(0.3))
+    assert (found.dynamics, found.harmonics, found.remaining) == (False, H, pytest.approx(0.3))
     assert found.largest_gain == pytest.approx(2.0 / 0.7)
 
 

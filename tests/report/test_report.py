@@ -53,7 +53,17 @@ def test_the_page_is_well_formed_and_needs_no_network(found: tuple[bytes, Page])
     content, read = found
     well_formed(content, read)
     assert read.verdicts == ["good"]
-    parts = ("ranked", "lattice", "certificate", "asked", "lines", "errors", "spectrum", "quantisation", "corrections")
+    parts = (
+        "ranked",
+        "lattice",
+        "certificate",
+        "request",
+        "lines",
+        "errors",
+        "spectrum",
+        "quantisation",
+        "corrections",
+    )
     assert [*parts, "usable", "calibration", "verify", "files"] == [i for i in read.ids if not i.startswith("chart-")]
 
 
@@ -115,7 +125,7 @@ def test_an_operator_with_hostile_traces(tmp_path: Path) -> None:
     content, read = report(scan)
     well_formed(content, read)
     assert "img" not in read.tags
-    assert "by how much the operator misses each trace" in read.said
+    assert "error of the operator on each trace" in read.said
     for name in ("x without correction", "x with the laws", "x with the operator", "y with the laws"):
         assert name in read.said
 
@@ -310,14 +320,14 @@ def test_a_curve_in_the_page_is_the_drive(found: tuple[bytes, Page], example: Pa
 def test_the_simulated_mismatch_is_what_the_certificate_expects(subject: Subject) -> None:
     """Two ways to it: emitted codes on the loop of their stroke here, the float waveform on it there."""
     from tablegen.html_report.playing import played_axes
-    from tablegen.virtual.own_run import measured
+    from tablegen.virtual.own_run import image_errors
 
     x, _ = played_axes(subject.planned)  # type: ignore[arg-type]
     expected = subject.manifest.axes.x.certificate.expected
-    _, scaling, mismatch, _ = measured(x.emitted)  # type: ignore[arg-type]
+    _, scaling, mismatch, _ = image_errors(x.emitted)  # type: ignore[arg-type]
     assert mismatch == pytest.approx(expected.mismatch_percent.value, abs=0.02)  # type: ignore[union-attr]
     assert scaling < 1.0
-    before = measured(x.before)  # type: ignore[arg-type]
+    before = image_errors(x.before)  # type: ignore[arg-type]
     worst = max(one["uncompensated"] for one in subject.manifest.axes.x.certificate.scaling_error_percent.values())  # type: ignore[union-attr]
     assert before[1] == pytest.approx(worst, rel=0.1)
     assert before[2] > 5.0 * mismatch

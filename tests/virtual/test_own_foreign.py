@@ -8,7 +8,7 @@ from foreign_plants import BoucWen, ForeignPlant, ManyPlays, triangle
 from operator_scans import Played, fitted, foreign_traces, scan_on
 
 from tablegen.planning.line_plan import make_plan
-from tablegen.virtual.own_run import measured, simulate_own
+from tablegen.virtual.own_run import image_errors, simulate_own
 from tablegen.virtual.simulation import run_line
 
 
@@ -32,7 +32,7 @@ def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: t
         setup = scan_on(tmp_path, fit, size_nm, 50.0, *law)
         (run,) = simulate_own(setup, 0)
         table = run.rows[2].summary()
-        real = measured(run_line(make_plan(setup).x, Played(plant)))
+        real = image_errors(run_line(make_plan(setup).x, Played(plant)))
         (_, rms), (_, scaling), (_, mismatch), (_, size) = table.values()
         assert real[0] < rms
         assert real[2] < mismatch
@@ -46,5 +46,5 @@ def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: t
     setup = scan_on(tmp_path, fit, 100.0, 85.0)
     (run,) = simulate_own(setup, 0)
     assert run.distance == pytest.approx(0.35, abs=1e-3)
-    real = measured(run_line(make_plan(setup).x, Played(plant)))
+    real = image_errors(run_line(make_plan(setup).x, Played(plant)))
     assert abs(real[3]) > 10.0 * abs(run.rows[2].summary()["size"][1])

@@ -15,7 +15,7 @@ from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.virtual.modes import second_order
-from tablegen.virtual.own_run import errors_on, measured, simulate_own
+from tablegen.virtual.own_run import errors_on, image_errors, simulate_own
 from tablegen.virtual.own_scanner import OwnAxis, departing
 from tablegen.virtual.simulation import run_line
 
@@ -66,7 +66,7 @@ def plants(line: LinePlan, operator: Operator) -> list[OwnAxis]:
 
 
 def test_without_a_departure_it_does_what_the_build_expects(line: LinePlan) -> None:
-    rms, scaling, mismatch, size = measured(run_line(line, OwnAxis.of(line)))
+    rms, scaling, mismatch, size = image_errors(run_line(line, OwnAxis.of(line)))
     assert rms < 0.02
     assert scaling < 0.8
     assert mismatch < 0.05

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tablegen.numerics.driver import Driver
 from tablegen.virtual.experiments import apparent_sizes, frequency_response, triangle_size
 from tablegen.virtual.line_error import ideal_triangle
-from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side
+from tablegen.virtual.modes import Modes, delay, low_pass, second_order, side_by_side
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.preisach import Preisach
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
@@ -27,7 +27,7 @@ def test_a_dead_time_is_that_of_a_finer_grid(ticks: float, periodic: bool) -> No
     parts = round(ticks * PARTS)
     fine = np.repeat(held, PARTS)
     late = np.roll(fine, parts) if periodic else np.append(np.full(parts, 0.25), fine)[: len(fine)]
-    found = delayed(held, parts / PARTS, None if periodic else 0.25)
+    found = delay(held, parts / PARTS, None if periodic else 0.25)
     assert found == pytest.approx(late.reshape(-1, PARTS).mean(axis=1), abs=1e-12)
 
 

@@ -206,7 +206,7 @@ def test_models_of_a_scan(tmp_path: Path) -> None:
     setup = setup_of(tmp_path)
     assert models_of(setup) == ("triangle", "sinusoidal", "harmonic")
     plain, shaped = (simulate(setup, SCANNER, model) for model in ("triangle", "harmonic"))
-    assert (plain.asked, shaped.asked) == ((), ("x", "y"))
+    assert (plain.configured, shaped.configured) == ((), ("x", "y"))
     for axis in ("x", "y"):
         for side in getattr(plain, axis).directions:
             before, after = (getattr(getattr(run, axis).error, side).scaling_peak_to_peak for run in (plain, shaped))
@@ -216,7 +216,7 @@ def test_models_of_a_scan(tmp_path: Path) -> None:
 def test_an_axis_without_calibration_is_a_triangle(tmp_path: Path) -> None:
     branches = {"x.hysteresis.model": '"triangle"', "y.hysteresis.model": '"triangle"'}
     setup = setup_of(tmp_path, scanner={**branches})
-    assert simulate(setup, SCANNER, "triangle").asked == ("x", "y")
+    assert simulate(setup, SCANNER, "triangle").configured == ("x", "y")
 
 
 def test_readings_are_repeatable() -> None:

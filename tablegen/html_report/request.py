@@ -1,4 +1,4 @@
-"""What was asked for, and what will be played; the files of the build; what verify found."""
+"""The request beside the played scan, the files of the build, and the record of verify."""
 
 from tablegen.certificate.summary import rate
 from tablegen.html_report.blocks import Bullets, Grid, Paragraph, Section, TableCell, row
@@ -8,8 +8,8 @@ from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.settling import settling, settling_text
 
 
-def asked(subject: Subject) -> Section:
-    """One table: a row a quantity, asked for and played."""
+def request_section(subject: Subject) -> Section:
+    """Return a table of the request and the played scan, a row per quantity."""
     sequence = subject.manifest.sequence
     schedule = sequence.schedule
     planned = subject.planned
@@ -42,13 +42,11 @@ def asked(subject: Subject) -> Section:
     y = subject.manifest.axes.y
     if y.resting:
         rows.append(row("y", "off", f"rests at {y.drive.v_offset:.6g} V, code {y.output.offset_code}"))
-    return Section(
-        "asked", "What was asked for, and what will be played", (Grid("", ("", "asked", "played"), tuple(rows)),)
-    )
+    return Section("request", "Requested and played", (Grid("", ("", "requested", "played"), tuple(rows)),))
 
 
 def schedule_hz(subject: Subject) -> float:
-    """Lines a second, as asked for."""
+    """Return the requested line rate in Hz."""
     return subject.manifest.axes.x.line.requested_hz
 
 
@@ -86,8 +84,8 @@ def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
 
 
 def verification(subject: Subject) -> Section:
-    """Show the checks of a record, or how to get one."""
-    record, title = subject.verified, "What verify found"
+    """Return the checks of a record, or how to get one."""
+    record, title = subject.verified, "Verification"
     if record is None:
         text = "No record was given. `tablegen verify DIR --junit verify.xml` makes one, `tablegen report --verified "
         return Section("verify", title, (Paragraph(text + "verify.xml` shows it here."),))
@@ -95,7 +93,7 @@ def verification(subject: Subject) -> Section:
     which = Paragraph("The record is of this very build.", "good")
     if not same:
         why = "is of another build" if record.digest else "does not say of which build it is"
-        which = Paragraph(f"\u2717 The record {why}: it tells nothing of this one. Verify again.", "bad")
+        which = Paragraph(f"\u2717 The record {why}: it says nothing about this one. Verify again.", "bad")
     rows = []
     for check in record.checks:
         cell = TableCell("\u2713 passed", "good") if check.exercised else TableCell("not exercised", "quiet")
@@ -108,7 +106,7 @@ def verification(subject: Subject) -> Section:
 
 
 def files(subject: Subject) -> Section:
-    """Every file with its SHA-256."""
+    """Return every file with its SHA-256."""
     manifest = subject.manifest
     rows = [
         row(

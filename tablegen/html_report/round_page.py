@@ -1,4 +1,4 @@
-"""A round of `tablegen refine` as a page: what was measured, what is predicted and learnt, and the rounds before."""
+"""A round of `tablegen refine` as a page: measured and predicted errors, the layer, and the rounds before."""
 
 from collections.abc import Sequence
 
@@ -18,23 +18,23 @@ _TURNS = np.linspace(0.0, 1.0, 601)
 
 
 def round_page(round_: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
-    """Render the page of a round. ``earlier`` are comments of earlier rounds, ``refused`` why it is not learnt from."""
+    """Render the page of a round; ``earlier`` are comments of earlier rounds, ``refused`` why it is not used."""
     axis, update = round_.line.axis, round_.update
     findings = worst_first(of_remarks(round_.remarks))
     both = f"{update.before.rms_percent:.3g} % rms measured; {update.after.rms_percent:.2g} % predicted after it."
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:
         findings.insert(0, Finding("limit", 1.0, refused, "\u2717 not used"))
-        verdict = TableCell("\u2717 This trace is not learnt from.", "bad")
+        verdict = TableCell("\u2717 This measurement is not used.", "bad")
     elif not update.harmonics:
-        verdict = TableCell("Nothing was learnt: what is left is noise.", "quiet")
-    found_in = [_errors(round_), _layer(round_)]
+        verdict = TableCell("Nothing was learnt: the residual is noise.", "quiet")
+    parts = [_errors(round_), _layer(round_)]
     if earlier:
         rows = tuple(row(str(number), text) for number, text in enumerate(earlier, 1))
-        found_in.append(Section("rounds", "Rounds before", (Grid("", ("round", "learnt from"), rows),)))
+        parts.append(Section("rounds", "Rounds before", (Grid("", ("round", "learnt from"), rows),)))
     files = ", ".join(f"{source.name}, sha256 {source.sha256}" for source in sources)
     foot = f"From {files}; tablegen {__version__}."
-    return document(f"{name}: refinement of {axis}", verdict, findings, found_in, "", foot)
+    return document(f"{name}: refinement of {axis}", verdict, findings, parts, "", foot)
 
 
 def _errors(round_: Round) -> Section:
@@ -52,7 +52,7 @@ def _errors(round_: Round) -> Section:
 
 
 def round_charts(round_: Round, name: str) -> PlottedCharts:
-    """Draw what a round measured, what it predicts, and what it adds to the drive."""
+    """Draw the measured and the predicted residual of a round, and its change of the drive."""
     heading = f"{name}: refinement of {round_.line.axis}"
     return PlottedCharts(heading, (*_residuals(round_), _layer_chart(round_)), 3)
 
@@ -79,7 +79,7 @@ def _layer(round_: Round) -> Section:
         f"response of the scanner is below {bound.largest_gain:.3g} times the modelled one, or off by less than "
         f"{bound.phase_deg:.3g} degrees."
     )
-    return Section("layer", "What was learnt", (Paragraph(text), Charts((_layer_chart(round_),))))
+    return Section("layer", "The layer", (Paragraph(text), Charts((_layer_chart(round_),))))
 
 
 def _layer_chart(round_: Round) -> Chart:
