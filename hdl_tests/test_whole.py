@@ -203,3 +203,8 @@ def test_a_mutant_is_found(mutant: WholeMutant, tmp_path: Path) -> None:
 
 def test_every_word_of_the_map_is_counted() -> None:
     assert len(USED) == 38
+
+
+def test_the_page_tells_how_many_mutants_there_are() -> None:
+    page = (Path(__file__).resolve().parents[1] / "docs" / "verilog.md").read_text("utf-8")
+    assert f"whole; with {len(MUTANTS)} mutants" in page
