@@ -38,7 +38,7 @@ class Proof:
     asserts_in_stubs: bool = True
 
 
-ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit")
+ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit", "dac_whole")
 PROOFS = {
     "slew": Proof("slew_properties", 1, 12, {"BITS": 4}),
     # These look back for as long as a sample is under way.
@@ -50,11 +50,13 @@ PROOFS = {
     "play_cubic": Proof("play_properties", 59, 67, {"CUBIC": 1}, ALL_STUBS, 90, asserts_in_stubs=False),
     "play_cubic_low_area": Proof("play_properties", 18, 26, {"CUBIC": 1, "LOW_AREA": 1}, ALL_STUBS, 30),
     "valid": Proof("valid_properties", 4, 20, covers=12),
-    "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit"), covers=40),
+    "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit", "dac_whole"), covers=40),
     "sequencer_of_look_up_tables": Proof(
-        "sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis", "dac_fit")
+        "sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis", "dac_fit", "dac_whole")
     ),
-    "sequencer_that_shapes": Proof("sequencer_properties", 27, 35, {"SHAPING": 3}, stubs=("dac_axis", "dac_fit")),
+    "sequencer_that_shapes": Proof(
+        "sequencer_properties", 27, 35, {"SHAPING": 3}, stubs=("dac_axis", "dac_fit", "dac_whole")
+    ),
     "first": Proof("shaper_properties", 1, 8, {"SHAPING": 1}, covers=8),
     "second": Proof("shaper_properties", 2, 12, {"SHAPING": 2}, covers=12),
 }

@@ -196,8 +196,9 @@ module dac_sequencer #(
     wire [23:0] table_data;
     wire unused_bits = &{table_address, table_data};  // upper bits, unused for short tables and words
 
-    // A program with a word that does not fit its register is not committed.
-    wire fits;
+    // A program with a word that does not fit its register is not committed, nor is a part of a program.
+    wire words_fit, whole;
+    wire fits = words_fit && whole;
     wire sound_commit = host_commit && fits;
     dac_fit #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
@@ -206,13 +207,21 @@ module dac_sequencer #(
         .HARMONICS(FOURIER ? HARMONICS : 0), .SHAPING(SHAPING)
     ) fit (
         .clock(clock), .data(write_data), .address(write_address[3:0]), .scan_write(scan_write), .x_write(x_write),
-        .y_write(y_write), .discard(reset || withdraw), .fits(fits)
+        .y_write(y_write), .discard(reset || withdraw), .fits(words_fit)
     );
 
     wire bank, loaded, take, drained;
     dac_bank banks (
         .clock(clock), .reset(reset), .commit(rendered), .withdraw(withdraw), .take(take), .drained(drained),
         .bank(bank), .committed(committed), .loaded(loaded), .writable(idle_writable)
+    );
+
+    dac_whole #(
+        .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .Y_INTERPOLATED(Y_INTERPOLATED),
+        .Y_INDEX_BITS(Y_INDEX_BITS), .HARMONICS(FOURIER ? HARMONICS : 0)
+    ) parts (
+        .clock(clock), .write(accepted_write), .region(write_region), .address(write_address), .data(write_data),
+        .take(take), .whole(whole)
     );
 
     wire accepted_tick = tick && !busy;

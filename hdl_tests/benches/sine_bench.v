@@ -18,23 +18,32 @@ module sine_bench #(
     initial ended = 1'b0;
     always @(posedge clock) begin
         clocks <= clocks + 12'd1;
-        if (clocks == 12'd1300) ended <= 1'b1;
+        if (clocks == 12'd1400) ended <= 1'b1;
     end
-    reg [5:0] address;
+    // A whole program: 48 words of registers, 16 and 8 of tables, 3 and 3 Fourier words; all but four of them 0.
+    reg [2:0] region;
+    reg [11:0] address;
     reg [31:0] word;
-    always @*
+    always @* begin
+        if (clocks < 12'd50) {region, address} = {3'd0, clocks - 12'd1};
+        else if (clocks < 12'd66) {region, address} = {3'd1, clocks - 12'd50};
+        else if (clocks < 12'd74) {region, address} = {3'd2, clocks - 12'd66};
+        else if (clocks < 12'd77) {region, address} = {3'd3, clocks - 12'd74};
+        else {region, address} = {3'd4, clocks - 12'd77};
         case (clocks)
-            12'd1: {address, word} = {6'd0, 32'd8};
-            12'd2: {address, word} = {6'd1, 32'd1};
-            12'd3: {address, word} = {6'd26, 31'd0, X_HARMONICS};
-            default: {address, word} = {6'd42, 31'd0, Y_HARMONICS};
+            12'd1: word = 32'd8;
+            12'd2: word = 32'd1;
+            12'd27: word = {31'd0, X_HARMONICS};
+            12'd43: word = {31'd0, Y_HARMONICS};
+            default: word = 32'd0;
         endcase
+    end
     dac_sequencer #(
         .X_INDEX_BITS(4), .Y_INDEX_BITS(3), .FOURIER(1), .HARMONICS(1), .PLAIN_MULTIPLIER(MULTIPLIER),
         .SINE_FILE(SINE_FILE)
     ) sequencer (
-        .clock(clock), .reset(1'b0), .write(clocks >= 12'd1 && clocks <= 12'd4), .write_region(3'd0),
-        .write_address({10'd0, address}), .write_data(word), .writable(), .refused(refused), .commit(clocks == 12'd5),
+        .clock(clock), .reset(1'b0), .write(clocks >= 12'd1 && clocks < 12'd80), .write_region(region),
+        .write_address({4'd0, address}), .write_data(word), .writable(), .refused(refused), .commit(clocks == 12'd80),
         .withdraw(1'b0), .committed(committed), .arm(1'b0), .arm_frames(16'd0), .trigger(1'b0), .park(1'b0),
         .clear_faults(1'b0), .armed(), .running(), .tick(1'b0), .underrun(1'b0), .busy(), .strobe(), .x_code(),
         .y_code(), .line_marker(), .frame_marker(), .pixel_marker(), .backward_marker(), .valid_marker(),

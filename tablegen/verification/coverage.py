@@ -7,7 +7,7 @@ from tablegen.verification.play.placement import Placement
 
 _ALWAYS = {
     "dac_sequencer", "dac_fit", "dac_bank", "dac_scan", "dac_markers", "dac_window", "dac_pixels", "dac_register",
-    "dac_verdict", "dac_faults", "dac_coding", "dac_spi", "dac_axi_stream", "dac_boot",
+    "dac_verdict", "dac_faults", "dac_whole", "dac_whole_table", "dac_coding", "dac_spi", "dac_axi_stream", "dac_boot",
 }  # fmt: skip
 _PIPELINED = {"dac_axis", "dac_output", "dac_offset", "dac_slew", "dac_delay"}
 _RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}

@@ -1,7 +1,7 @@
 """Programs into the idle bank of a device that plays a script: that of the build as its files have it, and others."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, program_words
@@ -13,7 +13,6 @@ from tablegen.verification.play.variation import Kind, variation
 from tablegen.verification.play.wide_program import Part, wide_program
 
 _LOADING_PACE, _LOADING_TICKS = 7, 500  # clocks between ticks while words are written, at least, and how many at most
-_OWN_TABLE = 0  # in place of the length of a variation's table
 VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
 
 
@@ -36,9 +35,6 @@ class Loader:
     own: DualProgram
     memories: Memories | None
     placement: Placement
-    _tables: dict[tuple[int, int], int] = field(
-        default_factory=dict
-    )  # length of a variation's table, or that of the build, by bank and region
 
     @property
     def own_commit_clocks(self) -> int:
@@ -49,11 +45,9 @@ class Loader:
         )
 
     def load_own(self) -> None:
-        """Write the program of the build, word for word as its files have it; tables unless the bank has them still."""
+        """Write the program of the build, word for word as its files have it."""
         memories, script = self.memories, self.script
         self._begin()
-        bank_has = {region: self._tables.get((self._bank, region)) for region in (X_TABLE, Y_TABLE)}
-        self._tables |= {(self._bank, region): _OWN_TABLE for region in bank_has}
         if memories is None:
             return
         script.write(PROGRAM, list(memories.program))
@@ -61,8 +55,7 @@ class Loader:
             (memories.x, memories.x_harmonics, 1, X_TABLE, X_FOURIER),
             (memories.y, memories.y_harmonics, 2, Y_TABLE, Y_FOURIER),
         ):
-            if harmonics or bank_has[table] != _OWN_TABLE:
-                script.write(fourier if harmonics else table, list(words))
+            script.write(fourier if harmonics else table, list(words))
             if harmonics:  # 0 in the file, which is for uploaded tables
                 script.write(PROGRAM, [harmonics], first=page * PAGE_WORDS + AXIS_WORDS.index("harmonics"))
 
@@ -71,21 +64,24 @@ class Loader:
         self.script.request("commit", program=self.own, commit_clocks=self.own_commit_clocks)
 
     def load(self, kind: Kind, longer: int = 0) -> DualProgram:
-        """Write a variation: its registers, and its tables unless the bank has them."""
+        """Write a variation: its registers and its tables, since a part of a program is refused."""
         program, script = variation(self.own, kind, self._bank, longer), self.script
         self._begin()
         script.write(PROGRAM, program_words(program.schedule, program.x, program.y))
         for axis, region in ((program.x, X_TABLE), (program.y, Y_TABLE)):
-            # Tables of one length are alike in all variations of a bank.
-            if self._tables.get((self._bank, region)) != len(axis.words):
-                script.write(region, axis.words)
-            self._tables[self._bank, region] = len(axis.words)
+            script.write(region, axis.words)
         return program
 
     @property
     def has_long_tables(self) -> bool:
         """True if tables serve a period of any length."""
         return "direct" not in (self.own.x.mode, self.own.y.mode)
+
+    def fill_banks(self) -> None:
+        """Write as many words as a bank has, so that a direct table of any length is complete."""
+        shape = SequencerShape.of((self.own.x, self.own.y))
+        for region, index_bits in ((X_TABLE, shape.x_index_bits), (Y_TABLE, shape.y_index_bits)):
+            self.script.write(region, [0] * 2**index_bits)
 
     def load_wide(self, part: Part) -> DualProgram:
         """Write a program that fills its registers, with the tables of a variation."""

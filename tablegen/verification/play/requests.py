@@ -275,6 +275,8 @@ class Requests:
         script.request("park")
         self._ticks(1)
         self._ramp()
+        if not self._in_c:
+            self._part_of_a_program()
         program = loader.load("free")
         script.come_to_rest()
         words = program_words(program.schedule, program.x, program.y)
@@ -293,6 +295,18 @@ class Requests:
             self._words_that_just_fit(program, words, inside)
         script.request("arm", "trigger")
         self._ticks(program.schedule.ticks + 7)
+
+    def _part_of_a_program(self) -> None:
+        """Refuse registers and one table: the other table of that bank is of an older program."""
+        script, own = self.script, self.loader.own
+        script.wait_writable()
+        script.write(PROGRAM, program_words(own.schedule, own.x, own.y))
+        script.write(Y_TABLE, own.y.words)
+        script.come_to_rest()
+        script.commit_unfit()
+        script.wait(_REFUSAL_CLOCKS)
+        script.state("with a part of a program", rests=True)
+        script.request("withdraw", "clear_faults")
 
     def _discards(self, words: list[int], address: int, word: int) -> None:
         """Check that an idle program with an invalid word is discarded."""
@@ -320,6 +334,7 @@ class Requests:
     def _words_that_just_fit(self, program: DualProgram, words: list[int], inside: list[dict[int, int]]) -> None:
         """They are committed, and withdrawn again."""
         script = self.script
+        self.loader.fill_banks()
         for edge in inside:
             for address, word in edge.items():
                 script.write(PROGRAM, [word], first=address)
