@@ -25,7 +25,7 @@ from tablegen.images.formats.channel import (
     FirstRow,
     choose,
     partner,
-    quoted,
+    quote,
 )
 from tablegen.images.formats.gwyddion import gwy_channels
 from tablegen.images.formats.igor import ibw_channels
@@ -102,7 +102,13 @@ def read_pair(
     """Read trace and retrace of one scan, from two files, or from one that has both.
 
     The retrace is ``retrace_channel``, or the retrace that belongs to the trace's channel, or the channel of the same
-    name. Raises ``Rejected`` with file and reason, also where a file calls the trace a retrace, or the reverse.
+    name.
+
+    Raises
+    ------
+    Rejected
+        If a file cannot be read, has no such channel, or calls the trace a retrace, or the reverse; the message has
+        file and reason.
     """
     first = _opened(trace)
     second = first if retrace is None or retrace == trace else _opened(retrace)
@@ -113,13 +119,13 @@ def read_pair(
         other = partner(second.channels, one) if retrace_channel is None else None
         other = _required(other or choose(second.channels, retrace_channel or channel, "retrace"), "retrace")
         if first is second and one is other:
-            raise ValueError(f"channel {one.number} ({quoted(one.title)}) has no retrace in this file; give it too")
+            raise ValueError(f"channel {one.number} ({quote(one.title)}) has no retrace in this file; give it too")
         return read, _read(second, other, frame)
 
 
 def _required(channel: Channel, direction: Direction) -> Channel:
     if channel.direction not in (None, direction):
-        what = f"channel {channel.number} ({quoted(channel.title)}) is the {channel.direction} by the file"
+        what = f"channel {channel.number} ({quote(channel.title)}) is the {channel.direction} by the file"
         raise ValueError(f"{what}; the {direction} is needed here. Are trace and retrace exchanged?")
     return channel
 
@@ -160,7 +166,13 @@ class _ImageFile:
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """Turn a ``ValueError`` into ``Rejected`` with the name of the file."""
+        """Turn a ``ValueError`` into ``Rejected`` with the name of the file.
+
+        Raises
+        ------
+        Rejected
+            If the block raises ``ValueError``.
+        """
         try:
             yield
         except ValueError as reason:
@@ -187,7 +199,7 @@ def _opened(path: Path) -> _ImageFile:
 
 def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
     """Return the image of a channel. Raise ``ValueError`` unless it has heights."""
-    what = f"channel {channel.number} ({quoted(channel.title)}): " if len(file.channels) > 1 else ""
+    what = f"channel {channel.number} ({quote(channel.title)}): " if len(file.channels) > 1 else ""
     size = " x ".join(map(str, channel.shape))
     if len(channel.shape) != 2:
         raise ValueError(f"{what}has the shape {shortened(size, 60)}; rows x columns are needed")
@@ -198,11 +210,11 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         raise ValueError(
             f"{what}is a movie of {channel.frames} frames; choose one with --frame, 0 to {channel.frames - 1}"
         )
-    chosen = frame or 0
-    if not 0 <= chosen < channel.frames:
-        raise ValueError(f"{what}has no frame {chosen}; the last one is {channel.frames - 1}")
+    frame_number = frame or 0
+    if not 0 <= frame_number < channel.frames:
+        raise ValueError(f"{what}has no frame {frame_number}; the last one is {channel.frames - 1}")
     with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
-        matrix = channel.load(chosen)
+        matrix = channel.load(frame_number)
         if matrix.dtype.kind not in "iufb":
             raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
         if matrix.shape != channel.shape:
@@ -228,7 +240,7 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         height_nm=channel.height_nm,
         line_rate_hz=channel.line_rate_hz,
         first_row=channel.first_row,
-        frame=chosen,
+        frame=frame_number,
         frames=channel.frames,
         angle_deg=channel.angle_deg,
     )
