@@ -262,7 +262,7 @@ def test_one_amplitude_does_not_determine_rho() -> None:
     assert np.isnan(growth.rho.standard_error)
     assert float(growth.beta(np.array(0.5))) == pytest.approx(grown(50.0, 0.08, 1.5), abs=0.002)
     said = " ".join(fit.remarks)
-    assert "rho is not determined by these amplitudes and was left at 2" in said
+    assert "rho is not determined by these amplitudes and was set to 2" in said
     assert "beta_max is extrapolated from 0.5 of v_max" in said
 
 
@@ -273,7 +273,7 @@ def test_no_hysteresis_has_no_peak() -> None:
     for seed in range(4):
         trace = scanner.trace(100.0, noise=noise(1000, seed))
         signs.add(fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm).forward.beta.value > 0.0)
-        with pytest.raises(Unphysical, match=r"turn 0.\d+, (for|back)ward: no hysteresis can be told from noise"):
+        with pytest.raises(Unphysical, match=r"turn 0.\d+, (for|back)ward: no hysteresis above the noise"):
             fit_hysteresis([trace], V_MAX)
     assert signs == {True, False}, "or the test would show half"
 

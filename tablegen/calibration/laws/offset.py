@@ -123,7 +123,7 @@ def _shape(p: Floats) -> Floats:
 
 def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[Remark]:
     remarks: list[Remark] = []
-    if solution.freedom == 0 and solution.known_errors:
+    if solution.freedom == 0 and solution.absolute_errors:
         remarks.append(
             Remark("three points fit exactly: errors are those of the images alone; measure at two more offsets")
         )

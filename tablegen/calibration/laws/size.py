@@ -97,7 +97,7 @@ def fit_size(
     if free is None and threshold is None:
         remarks.append(
             Remark(
-                f"the threshold is not determined by these points and was left at {fixed:g}; it takes four sizes or "
+                f"the threshold is not determined by these points and was set to {fixed:g}; it takes four sizes or "
                 f"more, some of them above 0.6 of v_max and some below 0.4"
             )
         )
@@ -213,7 +213,7 @@ def _unit(v: Floats, beta: float, threshold: float) -> Floats:
 
 def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[Remark]:
     remarks: list[Remark] = []
-    if solution.known_errors and len(solution.residuals) == len(solution.names):
+    if solution.absolute_errors and len(solution.residuals) == len(solution.names):
         remarks.append(Remark("as many sizes as parameters: errors are those of the images alone; measure more sizes"))
     elif solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
         remarks.append(
