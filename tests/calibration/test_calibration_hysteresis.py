@@ -79,7 +79,7 @@ def test_the_first_of_three_periods_is_left_out() -> None:
     told = replace(trace, displacement_nm=unsettled)
     assert shapes(fitted(told)) == pytest.approx([0.037, 0.37, 0.080, 0.48], abs=2e-6)
     assert abs(shapes(fitted(told, settle_periods=0))[0] - 0.037) > 2e-4, "or the test would show nothing"
-    assert fitted(told).left_out == pytest.approx(250, abs=1)
+    assert fitted(told).settling_samples == pytest.approx(250, abs=1)
 
 
 def test_drift_is_taken_off_as_far_as_a_polynomial_follows_it() -> None:
