@@ -197,7 +197,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         )
     if fit.strays:
         numbers = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {numbers}); they stay in the fit"))
+        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {numbers}); they were used"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
             remarks.append(

@@ -197,5 +197,5 @@ def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
         remarks.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels"))
     if line.strays:
         numbers = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
-        remarks.append(Remark(f"{len(line.strays)} lines differ from the others (row {numbers}); they stay in the fit"))
+        remarks.append(Remark(f"{len(line.strays)} lines differ from the others (row {numbers}); they were used"))
     return remarks
