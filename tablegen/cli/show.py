@@ -1,4 +1,4 @@
-"""``tablegen show``: what would be built."""
+"""``tablegen show``: show drive, rates, accuracy and plots of a scan."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None, no_plot: bool, optimum: bool) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
-    In the plots > is forward and < is backward; the axis is doubled where the image is taken.
+    In the plots, > is forward and < is backward; a double axis marks the imaged part.
 
     \b
     Examples:
@@ -55,10 +55,10 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         from tablegen.certificate.optimum import with_optimum
         from tablegen.certificate.summary import summary
 
-        found: dict[str, Certificate] = {
+        certificates: dict[str, Certificate] = {
             line.axis: with_optimum(line, built.certificates[line.axis]) for line in plan.lines
         }
-        lines = summary(plan, found)
+        lines = summary(plan, certificates)
     for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
     click.echo()
