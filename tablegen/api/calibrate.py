@@ -382,7 +382,7 @@ class Calibrated(Result):
         return fit_charts(self.fit, self.axis)
 
     def _lines(self) -> Sequence[str]:
-        values = ", ".join(f"{key} {_shown(one)}" for key, one in list(self.parameters.items())[:4])
+        values = ", ".join(f"{key} {_estimate_text(one)}" for key, one in list(self.parameters.items())[:4])
         residual = f"left {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
         what = f"{self.axis}.{self.kind} from {self.fit.points} points"
         files = f"from {', '.join(one.name for one in self.sources)}"
@@ -412,6 +412,6 @@ def _fit(kind: Kind, tables: list[MeasuredTable], scanner: KnownScanner, options
             return fit_resonance(table[FREQUENCY], table[GAIN], table.columns.get(PHASE.name), **options)
 
 
-def _shown(estimate: Estimate) -> str:
+def _estimate_text(estimate: Estimate) -> str:
     significant = estimate.standard_error > 1e-9 * abs(estimate.value)  # not nan, nor of a turn, which is as it was set
     return f"{estimate.value:.5g}" + (f" \u00b1 {estimate.standard_error:.2g}" if significant else "")

@@ -72,7 +72,7 @@ class Compared(Result):
         return "\n".join(compare_text(self.both, everything))
 
     @cached_property
-    def _drawn(self) -> list[Chart]:
+    def _all_charts(self) -> list[Chart]:
         from tablegen.comparison.charts import comparison_charts
 
         return comparison_charts(self.both)
@@ -81,16 +81,16 @@ class Compared(Result):
         """Return all charts, those that differ first; a terminal shows the first of these."""
         from tablegen.comparison.charts import differing_charts
 
-        first = differing_charts(self._drawn)
-        rest = [chart for chart in self._drawn if chart not in first]
+        first = differing_charts(self._all_charts)
+        rest = [chart for chart in self._all_charts if chart not in first]
         heading = "A: {}, B: {}".format(*self.both.titles)
-        return PlottedCharts(heading, (*first, *rest), brief=tuple((first or self._drawn)[:_IN_TERMINAL]))
+        return PlottedCharts(heading, (*first, *rest), brief=tuple((first or self._all_charts)[:_IN_TERMINAL]))
 
     def page(self) -> bytes:
         """Return the HTML page that ``tablegen compare -o`` writes."""
         from tablegen.comparison.page import comparison_page
 
-        return comparison_page(self.both, self._drawn)
+        return comparison_page(self.both, self._all_charts)
 
     def _lines(self) -> Sequence[str]:
         a, b = self.both.titles

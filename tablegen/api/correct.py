@@ -85,7 +85,7 @@ def correct(
         mirrored = bool(how.get("retrace_mirrored", False))
         images = Images(tuple(both), (True, False)[: len(both)], tuple(range(len(both))), (), mirrored)
     files = [None if path is None else Path(path) for path in (scanner, scan)]
-    return Corrected(straight(images, files[0], files[1], taken_of(how), pitch_nm, lattice_nm), images)
+    return Corrected(straight(images, files[0], files[1], old_scan_of(how), pitch_nm, lattice_nm), images)
 
 
 def straight(
@@ -117,7 +117,7 @@ def choice_of(how: Mapping[str, Any]) -> Choice:
     return Choice(**{name: how[name] for name in _CHOICE if name in how})
 
 
-def taken_of(how: Mapping[str, Any]) -> OldScan:
+def old_scan_of(how: Mapping[str, Any]) -> OldScan:
     """Return how an image was taken, by keywords of ``correct`` and of the command."""
     x, y = ({key: how[f"{prefix}{key}"] for key in _AXIS if f"{prefix}{key}" in how} for prefix in ("", "slow_"))
     rest = {key: how[key] for key in _REST if key in how}

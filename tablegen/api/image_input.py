@@ -71,14 +71,14 @@ def read_trace_and_perhaps_retrace(
     if retrace is None:
         if both:
             raise Rejected([Problem("retrace", 0, "", "missing; both directions are needed")])
-        return [_given(trace, "trace", how)]
-    pair = [_given(trace, "trace", how), _given(retrace, "retrace", how)]
+        return [_scan_image(trace, "trace", how)]
+    pair = [_scan_image(trace, "trace", how), _scan_image(retrace, "retrace", how)]
     if pair[0].heights.shape != pair[1].heights.shape:
         raise Rejected([Problem("retrace", 0, "", "has another shape than the trace")])
     return pair
 
 
-def _given(image: ImageSource, direction: Direction, how: dict[str, Any]) -> ScanImage:
+def _scan_image(image: ImageSource, direction: Direction, how: dict[str, Any]) -> ScanImage:
     if isinstance(image, Image):
         return image.scan
     if isinstance(image, str | Path):
@@ -138,15 +138,15 @@ def sample_of(how: dict[str, Any]) -> KnownSample:
     TypeError
         As ``known_sample``.
     """
-    return known_sample(**_chosen(how, _SAMPLE))
+    return known_sample(**_subset(how, _SAMPLE))
 
 
 def acquisition_of(how: dict[str, Any]) -> Acquisition:
     """Return how images were taken, by keywords of a function or of a command."""
-    return Acquisition(**_chosen(how, _ACQUISITION))
+    return Acquisition(**_subset(how, _ACQUISITION))
 
 
-def _chosen(how: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+def _subset(how: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
     return {name: how[name] for name in names if name in how}
 
 

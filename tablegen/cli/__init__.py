@@ -159,7 +159,7 @@ def _ended(error: BaseException, stdout: IO[str] | None) -> int:
         return _exited(error, stdout)
     if isinstance(error, OSError) and _of_stdout(error):
         if isinstance(error, BrokenPipeError):
-            return _reader_left()
+            return _closed_pipe()
         sys.stdout = None
         click.echo(f"cannot write to stdout: {error.strerror or error}", err=True)
         return ExitStatus.CANNOT_WRITE
@@ -177,7 +177,7 @@ def _interrupted(error: BaseException) -> int:
 def _exited(end: SystemExit, stdout: IO[str] | None) -> int:
     """Return the status of an exit by click: after a broken pipe, where it replaces stdout, or after completion."""
     if sys.stdout is not stdout:
-        return _reader_left()
+        return _closed_pipe()
     if isinstance(end.code, int) and _raised_in(end, "click"):
         return end.code
     return _unexpected(end)
@@ -208,7 +208,7 @@ def _unexpected(error: BaseException) -> int:
         return ExitStatus.UNEXPECTED
 
 
-def _reader_left() -> int:
+def _closed_pipe() -> int:
     """Return the status after the reader of a pipe closed it; Python's own flush at exit must not complain."""
     sys.stdout = None
     return ExitStatus.OK

@@ -18,7 +18,7 @@ from tablegen.cli.shared.common import (
     written,
 )
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, show_plot
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
@@ -130,7 +130,7 @@ def build(
         from tablegen.html_report.scan_charts import scan_charts
 
         brief = in_terminal(plot)
-        put_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
+        show_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
     return ExitStatus.OK
 
 

@@ -9,7 +9,7 @@ import click
 
 from tablegen.cli.shared.common import OutputFile, fail, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path 
     else:
         click.echo(comparison.summary(everything))
     if plot is not None and comparison.charts().charts:
-        put_plot(plot, comparison.charts)
+        show_plot(plot, comparison.charts)
     if output is not None:
         written(output.parent, {output.name: comparison.page()})
     return ExitStatus.OK if comparison.same else ExitStatus.STALE

@@ -79,7 +79,7 @@ def report(
         require("matplotlib", extra="plot", otherwise="; or write --svg, which needs nothing")
     with Progress() as progress:
         page = _reported(source, verified, progress)
-    charts = _chosen(page.figures, figures)
+    charts = _select_charts(page.figures, figures)
     written(output.parent, {output.name: page.content})
     _write_charts(charts, svg, png, pdf)
     click.echo(f"{output}: {len(page.content) / 1000:.0f} kB")
@@ -101,7 +101,7 @@ def _reported(source: Path, verified: Path | None, progress: Progress) -> "Repor
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def _chosen(charts: "dict[str, Chart]", names: tuple[str, ...]) -> "dict[str, Chart]":
+def _select_charts(charts: "dict[str, Chart]", names: tuple[str, ...]) -> "dict[str, Chart]":
     unknown = [name for name in names if name not in charts]
     if unknown:
         raise click.UsageError(f"--figure {unknown[0]}: the page has no such chart; it has {', '.join(charts)}")

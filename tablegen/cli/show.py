@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tablegen.cli.shared.common import format_option, planned, rendered, require, scan_argument
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, show_plot
 from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
     built = planned(scan, list(formats) or None)
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
-        put_plot(plot, lambda: _charts(built, plot))
+        show_plot(plot, lambda: _charts(built, plot))
         return
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
@@ -62,7 +62,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
     for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
     click.echo()
-    put_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)
+    show_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)
     for choice in built.choices:
         click.echo(f"chosen: {choice}")
     for finding in built.findings:

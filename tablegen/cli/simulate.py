@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def simulate(
     if csv_file is not None:
         written(csv_file.parent, {csv_file.name: result.csv().encode()})
     click.echo(result.to_json() if as_json else result.summary())
-    put_plot(plot, result.charts)
+    show_plot(plot, result.charts)
 
 
 def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -> bool:

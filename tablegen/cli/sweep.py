@@ -107,7 +107,7 @@ def sweep(
         fail([f"{output}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
     finally:
         bar.close()
-    return _told(library, only_check, quiet)
+    return _report_outcome(library, only_check, quiet)
 
 
 def _library(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
@@ -145,7 +145,7 @@ def _listed(library: "ScanLibrary", formats: list[str] | None) -> int:
     return ExitStatus.WRONG_INPUT if wrong == len(library.variants) else ExitStatus.PARTIAL
 
 
-def _told(library: "ScanLibrary", only_check: bool, quiet: bool) -> int:
+def _report_outcome(library: "ScanLibrary", only_check: bool, quiet: bool) -> int:
     """Print the outcome of a sweep, and return the status."""
     for line in library.remarks():
         click.echo(line, err=True)

@@ -7,7 +7,7 @@ import click
 
 from tablegen.cli.shared.common import fail, quiet_blas, scan_argument
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 from tablegen.cli.shared.terminal import tell
 
@@ -54,7 +54,7 @@ def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_jso
                 click.echo()
             for number, text in enumerate(lines):
                 tell(text, bold=number == 0)
-    put_plot(plot, feasible.charts)
+    show_plot(plot, feasible.charts)
 
 
 def _feasible(scan: Path, axis: Literal["x", "y"] | None) -> "FeasibleTables":

@@ -88,7 +88,7 @@ def read_image(
         If the file cannot be read or has no such heights; the message has file and reason.
     """
     file = _opened(path)
-    with file.named():
+    with file.rejecting():
         return _read(file, choose(file.channels, channel, direction), frame)
 
 
@@ -112,10 +112,10 @@ def read_pair(
     """
     first = _opened(trace)
     second = first if retrace is None or retrace == trace else _opened(retrace)
-    with first.named():
+    with first.rejecting():
         one = _required(choose(first.channels, channel, "trace"), "trace")
         read = _read(first, one, frame)
-    with second.named():
+    with second.rejecting():
         other = partner(second.channels, one) if retrace_channel is None else None
         other = _required(other or choose(second.channels, retrace_channel or channel, "retrace"), "retrace")
         if first is second and one is other:
@@ -139,7 +139,7 @@ def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
         If the file cannot be read, or a channel is no image of heights.
     """
     file = _opened(path)
-    with file.named():
+    with file.rejecting():
         if not file.channels:
             raise ValueError("contains no image")
         return [_read(file, channel, frame) for channel in file.channels]
@@ -165,7 +165,7 @@ class _ImageFile:
     channels: list[Channel]
 
     @contextmanager
-    def named(self) -> Iterator[None]:
+    def rejecting(self) -> Iterator[None]:
         """Turn a ``ValueError`` into ``Rejected`` with the name of the file.
 
         Raises
@@ -185,7 +185,7 @@ def _opened(path: Path) -> _ImageFile:
     file = _ImageFile(name, Source(path.name, ""), [])
     ending = path.suffix.lower()
     reader = spm_channels if _NUMBERED.fullmatch(ending) else _READERS.get(ending)
-    with file.named():
+    with file.rejecting():
         if reader is None:
             what = path.suffix or "no ending"
             raise ValueError(f"{what} is not one of {', '.join(_READERS)}; export it as one of these")

@@ -12,7 +12,7 @@ from tablegen.cli.calibrate.options import (
     turn_option,
     window_option,
 )
-from tablegen.cli.calibrate.run import Common, ended_by_input, put, scanner_options, shared_options
+from tablegen.cli.calibrate.run import Common, ended_by_input, output_fit, scanner_options, shared_options
 from tablegen.cli.images.pairs import (
     CommandOfPairs,
     channel_option,
@@ -87,4 +87,4 @@ def images(
             rho=rho,
             **scanner_options(common),
         )
-    return put(common, fit)
+    return output_fit(common, fit)

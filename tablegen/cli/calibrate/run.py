@@ -12,7 +12,7 @@ import click
 from tablegen.cli.images.samples import check_sample, named_images
 from tablegen.cli.shared.common import OutputFile, fail, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -237,13 +237,13 @@ def finish(
             fit = run()
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
-    return put(common, Calibrated(fit, common.axis, tuple(tables), points))
+    return output_fit(common, Calibrated(fit, common.axis, tuple(tables), points))
 
 
 def of_sample_images(
     kind: 'Literal["size", "offset"]', common: Common, images: "Sequence[tuple[Any, ...]]", options: dict[str, Any]
 ) -> int:
-    """Fit sizes, or sizes at several offsets, to images of a sample of known constant; continue as ``put``."""
+    """Fit sizes, or sizes at several offsets, to images of a sample of known constant; continue as ``output_fit``."""
     from tablegen.api.calibrate import calibrate
 
     check_sample(options)
@@ -251,10 +251,10 @@ def of_sample_images(
     with ended_by_input(), Progress() as progress:
         progress.now("fitting")
         fit = calibrate(kind, axis=common.axis, images=rows, **options, **scanner_options(common))
-    return put(common, fit)
+    return output_fit(common, fit)
 
 
-def put(common: Common, fit: "Calibrated") -> int:
+def output_fit(common: Common, fit: "Calibrated") -> int:
     """Print, draw and write a fit; a meaningless one is printed with its doubts, and written only by --force."""
     if common.as_json:
         click.echo(fit.to_json())
@@ -278,7 +278,7 @@ def put(common: Common, fit: "Calibrated") -> int:
 
 def plot_fit(common: Common, charts: "Callable[[], PlottedCharts]") -> None:
     """Draw the charts as the options require."""
-    put_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
+    show_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
 
 
 def _write(common: Common, fit: "Calibrated") -> None:

@@ -87,10 +87,10 @@ def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as be
     except errors.LinkError as error:
         fail([error], next(status for kind, status in statuses if isinstance(error, kind)))
     except KeyboardInterrupt:
-        fail([f"interrupted; {_left_behind(open_device, goes_on)}"], ExitStatus.INTERRUPTED)
+        fail([f"interrupted; {_interrupted_state(open_device, goes_on)}"], ExitStatus.INTERRUPTED)
 
 
-def _left_behind(device: "Device | None", goes_on: str) -> str:
+def _interrupted_state(device: "Device | None", goes_on: str) -> str:
     """Describe the state of a device when a command is interrupted."""
     from tablegen.link.messages import Request
 

@@ -11,7 +11,7 @@ import click
 
 from tablegen.cli.shared.common import fail, finite, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 from tablegen.cli.shared.progress_bar import Bar
 
@@ -179,7 +179,7 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
                 corrected = _corrected(trace, retrace, options)
             if bar is not None:
                 bar.hide()
-            records.append(_put(corrected, targets[number], suffix, options))
+            records.append(_output(corrected, targets[number], suffix, options))
         except _Refused as reason:
             refused += reason.lines
     if bar is not None:
@@ -295,7 +295,7 @@ def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "C
         raise _Refused([f"{error.filename or names}: {error.strerror or error}"]) from None
 
 
-def _put(
+def _output(
     corrected: "Corrected", target: tuple[Path, str] | None, suffix: str | None, options: dict[str, Any]
 ) -> dict[str, Any]:
     """Print, draw and write one scan; return its record."""
@@ -314,7 +314,7 @@ def _put(
                 raise _Refused([f"{path}: is the scanner file"])
     if not options["as_json"]:
         click.echo(corrected.summary())
-    put_plot(options["plot"], corrected.charts)
+    show_plot(options["plot"], corrected.charts)
     if target is not None:
         written(target[0], files)
         for name in files:

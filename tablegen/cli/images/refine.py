@@ -10,7 +10,7 @@ from tablegen.cli.images.refine_images import ImageArguments, image_options
 from tablegen.cli.images.samples import CommandOfRunningImages
 from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def refine(
         click.echo(refined.to_json())
     else:
         click.echo("\n".join(refined.table()))
-    put_plot(plot, refined.charts, by_default=not (as_json or no_plot))
+    show_plot(plot, refined.charts, by_default=not (as_json or no_plot))
     if not as_json:
         for finding in refined.findings():
             click.echo(finding.line)

@@ -86,7 +86,7 @@ def in_terminal(plot: Path | None) -> bool:
     return plot is None or plot == Path(TERMINAL)
 
 
-def put_plot(plot: Path | None, charts: "Callable[[], PlottedCharts]", by_default: bool = False) -> None:
+def show_plot(plot: Path | None, charts: "Callable[[], PlottedCharts]", by_default: bool = False) -> None:
     """Draw into the file, or into the terminal if the option has no file or ``by_default``."""
     if plot is None and not by_default:
         return

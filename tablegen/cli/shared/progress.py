@@ -20,7 +20,7 @@ class Progress:
 
     def __init__(self) -> None:
         self._what: str | Callable[[], str] = ""
-        self._done = threading.Event()
+        self._stop = threading.Event()
         self._thread = threading.Thread(target=self._tell, daemon=True) if sys.stderr.isatty() else None
 
     def now(self, what: str | Callable[[], str]) -> None:
@@ -35,14 +35,14 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._done.set()
+        self._stop.set()
         if self._thread is not None:
             self._thread.join()
 
     def _tell(self) -> None:
         start = time.monotonic()
         visible = False
-        while not self._done.wait(_SHOW_AFTER_S):
+        while not self._stop.wait(_SHOW_AFTER_S):
             what = self._what if isinstance(self._what, str) else self._what()
             text = f"{what} ({time.monotonic() - start:.0f} s)"
             redraw(f"{text:<{_WIDTH}}")

@@ -21,7 +21,7 @@ class Bar:
         self._clock, self._unit = clock, unit
         self._shows = sys.stderr is not None and sys.stderr.isatty()
         self._start: tuple[float, int] | None = None
-        self._shown_at = 0.0
+        self._draw_time = 0.0
 
     def __call__(self, count: int, total: int) -> None:
         """Draw the bar for a count of a total."""
@@ -30,16 +30,16 @@ class Bar:
         now = self._clock()
         if self._start is None:
             self._start = now, count  # a resumed upload has some bytes from the start
-        elif now - self._shown_at < _REDRAW_S and count < total:
+        elif now - self._draw_time < _REDRAW_S and count < total:
             return
-        self._shown_at = now
+        self._draw_time = now
         redraw(f"{self._text(now, count, total):<{_WIDTH}}")
 
     def hide(self) -> None:
         """Erase the line until the next call, for a message."""
         if self._start is not None:
             erase(_WIDTH)
-            self._shown_at = 0.0
+            self._draw_time = 0.0
 
     def close(self) -> None:
         """Erase the line."""
