@@ -42,7 +42,7 @@ class Laboratory:
     ) -> None:
         self.truth = load_truth(truth)
         self.scanner, self.scaled = VirtualScanner.of(self.truth), ""
-        """The scanner, and how it was scaled, in words; empty where it is as it was."""
+        """The scanner, and its scaling in words; empty without scaling."""
         if like is not None and truth in BUILT_IN:
             file = like if isinstance(like, Scanner) else load_scanner(like)[0]
             self.scanner, self.scaled = scaled_to(self.scanner, file)

@@ -23,7 +23,7 @@ def _cut(text: str, most: int) -> str:
 
 
 class Unphysical(ValueError):
-    """A quantity that the physics or the arithmetic cannot serve; the message says by how much and what would fit."""
+    """A quantity that is physically or numerically impossible; the message says by how much, and what would fit."""
 
 
 class Problem(NamedTuple):

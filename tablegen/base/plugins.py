@@ -1,4 +1,4 @@
-"""Formats and models of other distributions: whatever fails in one ends in a message with the distribution's name."""
+"""Guard formats and models of other distributions: a failure in one ends in a message with the distribution's name."""
 
 import sys
 from collections.abc import Iterator

@@ -82,7 +82,8 @@ def _offset(fit: OffsetFit) -> Iterator[str]:
         if _within(m, _LOOSE):
             yield f"{name} = {_text(m)} may be off by a fifth or more; {_MORE_OFFSETS}"
     if all(_within(m, max(abs(m.value - 1.0), _SMALL_OFFSET)) for _, m in both):
-        yield f"m_minus = {_text(fit.m_minus)} and m_plus = {_text(fit.m_plus)} cannot be told from 1; {_MORE_OFFSETS}"
+        values = f"m_minus = {_text(fit.m_minus)} and m_plus = {_text(fit.m_plus)}"
+        yield f"{values} cannot be distinguished from 1; {_MORE_OFFSETS}"
 
 
 _MORE_OFFSETS = "measure at more offsets, or a larger object"
@@ -93,12 +94,13 @@ def _size(fit: SizeFit) -> Iterator[str]:
     if _within(fit.k_nm_per_v, _LOOSE * fit.k_nm_per_v.value):
         yield f"k_nm_per_v = {_text(fit.k_nm_per_v)} may be off by a fifth or more; {more}"
     if _within(fit.beta, max(abs(fit.beta.value), _LOOSE_BETA)):
-        yield f"beta = {_text(fit.beta)} cannot be told from 0, the linear scanner; {more}"
+        yield f"beta = {_text(fit.beta)} cannot be distinguished from 0, the linear scanner; {more}"
 
 
 def _frequency(fit: FrequencyFit) -> Iterator[str]:
     if _within(fit.alpha, max(fit.alpha.value, _LOOSE_ALPHA)):
-        yield f"alpha = {_text(fit.alpha)} cannot be told from 0, no loss; measure over more decades, and more often"
+        more = "measure over more decades, and more often"
+        yield f"alpha = {_text(fit.alpha)} cannot be distinguished from 0, no loss; {more}"
 
 
 def _resonance(fit: ResonanceFit) -> Iterator[str]:

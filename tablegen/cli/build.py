@@ -98,7 +98,7 @@ def build(
         built = planned(scan, list(formats) or None, strict)
         files = rendered(built)
     except KeyboardInterrupt as interruption:
-        where = f" {interruption}".rstrip()  # that of a plug-in says so
+        where = f" {interruption}".rstrip()  # that of a plug-in names it
         fail([f"interrupted{where}; {output} was left as it was"], ExitStatus.INTERRUPTED)
     if only_check:
         if differences := _stale(built, files, output):

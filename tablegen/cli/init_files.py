@@ -89,7 +89,7 @@ def _scanner(wishes: Wishes) -> str:
     larger = "" if factor == 1.0 else f", with a range {factor:g} times as large"
     return f"""\
 # The instrument: converter, amplifier, and a high-speed AFM scanner as the paper measured it{larger}.
-# `tablegen calibrate` writes what your scanner does in place of these values. Voltages are at the piezo.
+# `tablegen calibrate` writes the values of your scanner in their place. Voltages are at the piezo.
 name = "hs-afm"
 {_line(f"v_max = {_number(_V_MAX)}", "V, maximum output of the piezo driver; normalised voltages refer to it")}
 

@@ -46,6 +46,6 @@ def paths(**options: bool) -> int:
     selection = [name for name in places if options[name.replace("-", "_")]]
     width = max(map(len, places))
     for name in selection or places:
-        # As bytes: a path has to come out as it is, whatever the terminal can show.
+        # As bytes: the path is printed unchanged, even if the terminal cannot show it.
         click.echo((b"" if selection else f"{name:<{width}}  ".encode()) + os.fsencode(places[name]))
     return ExitStatus.OK

@@ -1,6 +1,6 @@
 """Images of heights from files: those of instruments, Gwyddion's .gwy, .npy, .tif, .png, and numbers as text.
 
-Needs the extra ``images`` for .tif, .png and .jpk. What each format says is in docs/image_files.md.
+Needs the extra ``images`` for .tif, .png and .jpk. docs/image_files.md lists the values that each format has.
 """
 
 import hashlib
@@ -45,10 +45,10 @@ MODULES = {".png": "PIL", **dict.fromkeys((".tif", ".tiff", ".jpk", ".jpk-qi-ima
 
 @dataclass(frozen=True, eq=False)
 class ScanImage:
-    """Heights, rows x columns, and what the file says of them; ``file`` as messages call it.
+    """Heights, rows x columns, with the data of their file; ``file`` is its name in messages.
 
-    Row 0 is the first in time, as far as the file tells; the left end of the line is at the left in both directions.
-    What a file does not say is None, or empty.
+    Row 0 is the first in time as far as the file states it; the left end of the line is at the left in both directions.
+    A value that the file does not have is None, or empty.
     """
 
     file: str
@@ -146,7 +146,7 @@ def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
 
 
 def channels_of(path: Path) -> list[Channel]:
-    """Return the channels of a file, without reading more of it than its format needs for that.
+    """Return the channels of a file, without reading more of it than its format needs.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def channels_of(path: Path) -> list[Channel]:
 
 @dataclass(frozen=True, eq=False)
 class _ImageFile:
-    """A file whose structure was read, and where it came from."""
+    """A file with its channels, and its origin."""
 
     name: str
     source: Source

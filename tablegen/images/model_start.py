@@ -102,7 +102,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
         raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{ALIASING_HINT}")
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
-    # A grating square to the lines looks the same mirrored; then the bend tells.
+    # A grating square to the lines looks the same mirrored; then the bend decides.
     check_signs(forward.shape.lag, backward.shape.lag, 0.02, advice)
     return spot, (forward, backward)
 
@@ -321,7 +321,7 @@ def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:
     span = geometry.window[1] - geometry.window[0]
     visible = np.abs(along) * span < 0.45 * geometry.columns
     visible &= np.abs(across) < 0.45 * geometry.rows
-    visible &= np.hypot(along * span, across) > 1.2  # the rest goes with the parabolas of the lines
+    visible &= np.hypot(along * span, across) > 1.2  # slower waves are removed with the parabolas of the rows
     for q, s in zip(fitted @ model.q(state.parameters), fitted @ model.s(state.parameters)[:, 0], strict=True):
         for sign in (1.0, -1.0):
             visible &= np.hypot(sign * along - q, sign * across - s) > 1.2

@@ -159,8 +159,8 @@ def _check_steps(sizes: Sequence[ImageSize]) -> None:
                 continue
             raise Unphysical(
                 f"{less.name} has {less.size.nm.value / less.v_scan:.4g} nm per volt, and {more.name} "
-                f"{more.size.nm.value / more.v_scan:.4g}: is each image of the voltage that was said, of the sample "
-                f"whose constant was given, and a period more than two pixels?"
+                f"{more.size.nm.value / more.v_scan:.4g}: is each image of the stated voltage, of the sample "
+                f"of this constant, and a period more than two pixels?"
             )
 
 

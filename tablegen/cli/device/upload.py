@@ -136,7 +136,7 @@ def _verdict(device: "Device", image: "ProgramImage", force: bool) -> str:
         return "\nthe scan is already active on the device"
     keyed = device.needs_key()
     text = f"\nthe device would accept the scan: {len(image.data)} bytes as {_form(image)}"
-    text += ", if the key is right, which only an upload tells" if keyed else ""
+    text += ", if the key is right, which only an upload shows" if keyed else ""
     return text if status.permits else f"{text}, but its interlock is open: no upload can become active"
 
 

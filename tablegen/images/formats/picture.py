@@ -1,4 +1,4 @@
-"""Pictures: .png in grey."""
+"""Pictures in grey (.png)."""
 
 import warnings
 from io import BytesIO
