@@ -1,1 +1,1 @@
-"""What ``import tablegen`` offers: functions and results for scripts, notebooks, and the commands themselves."""
+"""Functions and results of ``import tablegen``: for scripts, notebooks, and the commands themselves."""

@@ -1,4 +1,4 @@
-"""From a scan file, or from values, to a plan, its certificate, its arrays and its files."""
+"""Build a scan from a scan file, or from values: its plan, certificate, arrays and files."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -73,14 +73,14 @@ def plan(
     Parameters
     ----------
     source : path or Setup, optional
-        Scan file, or what ``load`` gave.
+        Scan file, or a result of ``load``.
     scan, scanner : mapping, optional
         In place of ``source`` the keys of the two files, nested: ``scan={"x": {"size_nm": 200.0, ...}, ...}``.
 
     Returns
     -------
     Plan
-        The integers of both axes, and what they were made from.
+        The integers of both axes, and the inputs of the plan.
 
     Raises
     ------
@@ -96,12 +96,12 @@ def plan(
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:
-    """Measure what the emitted integers of a plan promise, at every tick.
+    """Compute the certificate of a plan: the errors of its emitted integers, at every tick.
 
     Parameters
     ----------
     plan : Plan
-        What ``plan`` gave.
+        A result of ``plan``.
 
     Returns
     -------
@@ -137,11 +137,11 @@ def build(
     source, scan, scanner
         As for ``plan``.
     out : str or Path, optional
-        Directory; what an earlier build left there is removed.
+        Directory; files of an earlier build there are removed.
     formats : sequence of str, optional
         Output formats; those of the scan file unless given.
     progress : callable
-        Called with what is being done.
+        Called with a text for each stage.
 
     Returns
     -------
@@ -164,11 +164,12 @@ def build(
     (1250,)
     """
     setup = _setup(source, scan, scanner)
-    wanted = _formats(setup, formats)
+    output_formats = _formats(setup, formats)
     certified = certify_scan(setup, progress)
     if certified.broken:
         raise BrokenLimit(list(certified.broken))
-    built = Build(setup, certified.plan, certified.certificates, [each.name for each in wanted], formats is not None)
+    names = [each.name for each in output_formats]
+    built = Build(setup, certified.plan, certified.certificates, names, formats is not None)
     if out is not None:
         progress("writing the files")
         built.write(out)
@@ -176,17 +177,17 @@ def build(
 
 
 class Build(Result):
-    """A certified scan: its plan, its arrays, its certificate, and the files that it is emitted as."""
+    """A certified scan: its plan, arrays, certificate and emitted files."""
 
     def __init__(
-        self, setup: Setup, plan: Plan, certificates: dict[str, Certificate], formats: list[str], given: bool
+        self, setup: Setup, plan: Plan, certificates: dict[str, Certificate], formats: list[str], explicit: bool
     ) -> None:
         self.setup = setup
         self.plan = plan
         self.certificates = certificates
         """By axis, "x" and "y"."""
         self.formats = formats
-        self._given = given
+        self._explicit = explicit
 
     @property
     def name(self) -> str:
@@ -204,15 +205,27 @@ class Build(Result):
         return self.samples("y")
 
     def samples(self, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> "Samples":
-        """Ticks [first, stop) of the period of an axis: for frames that have too many of them."""
+        """Return ticks [first, stop) of the period of an axis: for frames that have too many of them.
+
+        Raises
+        ------
+        ValueError
+            If the ticks are outside of the period.
+        """
         from tablegen.api.samples import samples
 
         return samples(self.plan, axis, first, stop)
 
     @cached_property
     def files(self) -> dict[str, bytes]:
-        """Every file by its name, the manifest last. Raises ``Rejected`` for a scan that a format cannot hold."""
-        return render_scan(self.setup, self.plan, self.certificates, self.formats, given=self._given)
+        """Every file by its name, the manifest last.
+
+        Raises
+        ------
+        Rejected
+            If a format cannot hold the scan.
+        """
+        return render_scan(self.setup, self.plan, self.certificates, self.formats, given=self._explicit)
 
     @property
     def runtime(self) -> set[str]:
@@ -227,15 +240,15 @@ class Build(Result):
     @property
     def record(self) -> dict[str, Any]:
         """The manifest as plain data."""
-        found: dict[str, Any] = read_json(self.files[MANIFEST])
-        return found
+        plain: dict[str, Any] = read_json(self.files[MANIFEST])
+        return plain
 
     def to_json(self) -> str:
         """Return ``manifest.json`` as text."""
         return self.manifest
 
     def charts(self) -> "PlottedCharts":
-        """Give the drive of each axis, and the error of the modelled piezo with and without compensation."""
+        """Return the drive of each axis, and the error of the modelled piezo with and without compensation."""
         from tablegen.charts.picture_file import PlottedCharts
         from tablegen.html_report.scan_charts import drive_of, modelled_error
 
@@ -248,22 +261,22 @@ class Build(Result):
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """What was chosen for what the scan file says of the image, in sentences; empty where it says all itself."""
+        """Settings that the build chose where the scan file leaves them open, in sentences; empty if there are none."""
         return self.setup.choices
 
     @property
     def notes(self) -> list[str]:
-        """What to know before the image is trusted, in sentences: what spoils it first, small print last."""
+        """Advice to read before the image is trusted, in sentences: the most serious first."""
         return [one.text for one in self.findings]
 
     @property
     def findings(self) -> list[Finding]:
-        """The same with weights, percentages of the scan, codes and axes, the worst first."""
+        """The notes with weights, percentages of the scan, codes and axes, the worst first."""
         return scan_findings(self.plan, self.certificates)
 
     @cached_property
     def warnings(self) -> list[str]:
-        """Where the scan errs by more than 1 %, or by more than the uncompensated line; empty if it does nowhere.
+        """Errors above 1 %, or above that of the uncompensated line; empty if there are none.
 
         Each names its key, the error, its cause (quantisation, band limit or model), and the remedies that were
         planned and measured: only a scan with a warning takes this time.
@@ -272,32 +285,35 @@ class Build(Result):
 
     @property
     def prepared(self) -> "PreparedScan":
-        """What ``Device.upload`` sends: ``device.upload(scan.prepared.image("auto", device.info))``."""
+        """The program that ``Device.upload`` sends: ``device.upload(scan.prepared.image("auto", device.info))``."""
         from tablegen.link.prepare import PreparedScan
 
         return PreparedScan.of_plan(self.plan)
 
     def write(self, folder: str | Path) -> list[str]:
-        """Write what differs into a directory, remove what an earlier build has left there, and name what changed.
+        """Write the files that differ into a directory, remove outdated ones, and return the names that changed.
 
-        Raises ``CannotWrite``; what stood there before then still stands.
+        Raises
+        ------
+        CannotWrite
+            If the directory cannot be written; its files are then unchanged.
         """
         folder = Path(folder)
         return write_files(folder, self.files, lambda: self.outdated(folder))
 
     def outdated(self, folder: str | Path) -> list[str]:
-        """Files of a directory that an earlier build made and this one does not: ``write`` removes them.
+        """Return the files of a directory that an earlier build made and this one does not: ``write`` removes them.
 
-        The input is never among them, whatever a manifest of somebody else lists.
+        The input is never among them, whatever another manifest lists.
         """
-        found = outdated_files(Path(folder), self.files)
-        if not found:
+        names = outdated_files(Path(folder), self.files)
+        if not names:
             return []
         read = {path.resolve() for path in self.setup.files}
-        return [name for name in found if (Path(folder) / name).resolve() not in read]
+        return [name for name in names if (Path(folder) / name).resolve() not in read]
 
     def leftovers(self, folder: str | Path) -> list[str]:
-        """Files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""
+        """Return files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""
         return leftover_files(Path(folder), self.files)
 
     def _lines(self) -> Sequence[str]:
@@ -310,7 +326,7 @@ class Build(Result):
         return f"build{head}", f"{errors} peak to peak", *warnings, f"{volts}; formats {', '.join(self.formats)}"
 
     def _repr_html_(self) -> str:
-        """Drive, error and certificate, for notebooks."""
+        """Return drive, error and certificate, for notebooks."""
         from tablegen.api.html import build_html
 
         return build_html(self.plan, self.certificates)
@@ -324,8 +340,8 @@ def _setup(source: Source | None, scan: Mapping[str, Any] | None, scanner: Mappi
     return source if isinstance(source, Setup) else load_files(source)
 
 
-def _formats(setup: Setup, given: Sequence[str] | None) -> list[Format]:
+def _formats(setup: Setup, names: Sequence[str] | None) -> list[Format]:
     try:
-        return chosen(setup.scan.emit.formats or DEFAULT_FORMATS if given is None else given)
+        return chosen(setup.scan.emit.formats or DEFAULT_FORMATS if names is None else names)
     except UnknownFormat as error:
-        raise format_rejected(setup, str(error), given=given is not None) from None
+        raise format_rejected(setup, str(error), given=names is not None) from None

@@ -1,4 +1,4 @@
-"""From measurements to the parameters of a scanner file, with their standard errors, and into the file."""
+"""Calibrate: measurements to parameters of a scanner file with their standard errors, and into the file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -86,12 +86,12 @@ def calibrate(
     points: bool = False,
     **options: Any,
 ) -> "Calibrated":
-    """Fit what ``tablegen calibrate KIND`` fits, to CSV files or to arrays by the names of their columns.
+    """Fit a law of the scanner to measurements: CSV files, or arrays by the names of their columns.
 
     Parameters
     ----------
     kind : {"size", "offset", "hysteresis", "frequency", "resonance"}
-        What to fit; docs/python.md lists the columns and options of each.
+        Law to fit; docs/python.md lists the columns and options of each.
     data : path, mapping of arrays, or a sequence of them
         CSV file or arrays (n,) by column: ``drive_v`` and ``actual_nm`` of sizes; ``offset_v``, ``apparent_nm`` and
         perhaps ``size_v`` of offsets; ``time_s``, ``drive_v``, ``displacement_nm`` of hysteresis; ``frequency_hz``,
@@ -101,9 +101,9 @@ def calibrate(
     images : sequence of (volts, trace[, retrace]), of offsets (volts, offset_v, trace[, retrace])
         In place of ``data``, images of a sample of known constant: files, or heights of shape (rows, columns).
     scanner, v_max, v_min : optional
-        Scanner file, which has the range of the driver and what a fit needs of other calibrations; or the range in V.
+        Scanner file, which has the range of the driver and other calibrations that a fit needs; or the range in V.
     points : bool
-        True to keep hysteresis, or a response, as measured, in place of a law.
+        True to write hysteresis, or a response, as measured, in place of a law.
     **options : optional
         ``base_nm``, ``threshold``, ``noise`` of sizes, ``size_v`` of offsets, ``reference_hz`` of frequency; ``rho``,
         ``settle_periods``, ``drift_order``, ``delay_s`` of hysteresis; of ``images`` those of ``calibrate_operator``.
@@ -140,18 +140,18 @@ def calibrate(
     tables = [table_of(one, *_COLUMNS[kind]) for one in measured]
     if len(tables) > 1 and kind != "hysteresis":
         raise ValueError(f"{kind} takes one table; hysteresis alone takes several")
-    known = known_scanner(scanner, axis, v_max, v_min)
-    return Calibrated(_fit(kind, tables, known, options), axis, tuple(tables), points)
+    prior = known_scanner(scanner, axis, v_max, v_min)
+    return Calibrated(_fit(kind, tables, prior, options), axis, tuple(tables), points)
 
 
-def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], known: KnownScanner, how: dict[str, Any]) -> "Calibrated":
-    """Sizes, or sizes at several offsets, of images of a sample of known constant."""
+def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], prior: KnownScanner, how: dict[str, Any]) -> "Calibrated":
+    """Fit sizes, or sizes at several offsets, to images of a sample of known constant."""
     sample, acquisition = sample_of(how), acquisition_of(how)
     rows = [row if kind == "offset" else (row[0], None, *row[1:]) for row in images]
     read = [sample_image(size, at, pair[0], pair[1] if pair[1:] else None, how) for size, at, *pair in rows]
     files = tuple(one for _, both in read for one in both)
-    driver, size_v = known.driver, np.array([row[0] for row in rows], dtype=np.float64)
-    law = known.size_law("the calibration of offsets by images") if kind == "offset" else None
+    driver, size_v = prior.driver, np.array([row[0] for row in rows], dtype=np.float64)
+    law = prior.size_law("the calibration of offsets by images") if kind == "offset" else None
     fit: Fit
     try:
         sizes = sizes_of([image for image, _ in read], driver, sample, acquisition)
@@ -161,16 +161,22 @@ def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], known: KnownScanne
             offsets = fit_offset_sizes(offset_v, apparent, size_v, driver, law, errors)
             fit = replace(offsets, images=sizes.images, remarks=sizes.remarks + offsets.remarks)
         else:
-            base, threshold = how.get("base_nm") or known.number("size", "base_nm") or _BASE_NM, how.get("threshold")
+            base, threshold = how.get("base_nm") or prior.number("size", "base_nm") or _BASE_NM, how.get("threshold")
             size = fit_size(size_v, sizes.nm, driver, base, threshold, errors_nm=sizes.errors_nm, shared=sizes.shared)
             fit = replace(size, images=sizes.images, remarks=sizes.remarks + size.remarks)
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
-    return Calibrated(_with_angles(fit, files, known.axis), known.axis, files)
+    return Calibrated(_with_angles(fit, files, prior.axis), prior.axis, files)
 
 
 def known_scanner(scanner: str | Path | None, axis: str, v_max: float | None, v_min: float) -> KnownScanner:
-    """What the scanner file says; with ``v_max`` it may be missing. Raises as ``KnownScanner.read`` does."""
+    """Return the contents of the scanner file; with ``v_max`` it may be missing.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read.
+    """
     return KnownScanner.read(None if scanner is None else Path(scanner), axis, v_max, v_min, new=v_max is not None)
 
 
@@ -193,7 +199,7 @@ def calibrate_images(
     Parameters
     ----------
     pairs : sequence of (volts, trace) or (volts, trace, retrace)
-        Scan voltage at the piezo in V, peak to peak, of a triangle; and its images: files, what ``read_image`` gave, or
+        Scan voltage at the piezo in V, peak to peak, of a triangle; and images: files, results of ``read_image``, or
         heights of shape (rows, columns), rows in order of time, the left end of the line at the left. A file may have
         both directions.
     axis : {"x", "y"}
@@ -249,10 +255,10 @@ def _with_angles(fit: Fit, images: Sequence[ScanImage], axis: str) -> Fit:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibrated(Result):
-    """A fit of one kind to an axis: ``parameters`` with standard errors, ``doubts``, and how it gets into the file.
+    """A fit of one kind to an axis: ``parameters`` with standard errors, ``doubts``, and changes of the scanner file.
 
-    ``fit`` has residuals, outliers and remarks, ``measured`` the tables or images that were fitted; ``points`` says
-    that measured values are written in place of a law.
+    ``fit`` has residuals, outliers and remarks, ``measured`` the tables or images that were fitted; ``points`` is True
+    if measured values are written in place of a law.
     """
 
     fit: Fit
@@ -267,38 +273,43 @@ class Calibrated(Result):
 
     @property
     def kind(self) -> str:
-        """Which table of the scanner file it is: "size", "offset", "hysteresis", "frequency", "resonance"."""
+        """Table of the scanner file: "size", "offset", "hysteresis", "frequency", "resonance"."""
         return change(self.fit, ()).kind
 
     @property
     def parameters(self) -> dict[str, Estimate]:
-        """Each parameter by its key: ``value``, and ``standard_error``, twice which covers the truth in 95 %.
+        """Each parameter by its key: ``value`` and ``standard_error``; twice the error covers the truth in 95 %.
 
         Of hysteresis at several turns the keys of the second one begin with "2: ", and so on.
         """
-        found: dict[str, Estimate] = {}
+        estimates: dict[str, Estimate] = {}
         number = 0
         for key, estimate, _ in parameters(self.fit):
             number += key in ("turn", "size_v")
-            found[f"{number}: {key}" if number > 1 else key] = estimate
-        return found
+            estimates[f"{number}: {key}" if number > 1 else key] = estimate
+        return estimates
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What makes the fit meaningless, in sentences with what to do; empty for one that ``write`` takes."""
+        """Reasons why the fit is meaningless, in sentences with what to do; empty for one that ``write`` takes."""
         return doubts(self.fit, self.points)
 
     @property
     def record(self) -> dict[str, Any]:
-        """As plain data: what ``tablegen calibrate --json`` prints."""
+        """The fit as plain data, as ``tablegen calibrate --json`` prints it."""
         return record(self.fit, self.axis, self.sources)
 
     def content(self, scanner: Path, driver: Driver | float | None = None, force: bool = False) -> dict[str, bytes]:
-        """Names and contents of the files that change beside ``scanner``, its own the last; nothing is written.
+        """Return names and contents of the files that change beside ``scanner``, its own the last; nothing is written.
 
-        A file that is not there is begun, and needs the range of the driver, or a number for ``v_max``. Raises
-        ``Rejected`` where the file cannot take the values, where the fit is meaningless unless by ``force``, and
-        ``Unphysical`` where there are no ``points``.
+        A file that is missing is begun, and needs the range of the driver, or a number for ``v_max``.
+
+        Raises
+        ------
+        Rejected
+            If the file cannot take the values, or the fit is meaningless, unless by ``force``.
+        Unphysical
+            If there are no ``points``.
         """
         meaningless = self.doubts
         if meaningless and not force:
@@ -313,16 +324,23 @@ class Calibrated(Result):
         if not path.exists() and driver is None:
             raise Rejected([Problem(str(scanner), 0, "v_max", "the file is not there; give v_max to begin it")])
         text = read_text(path, CONFIGURATION) if driver is None or path.exists() else new_file(path.stem, driver)
-        put = change(self.fit, self.sources, self.points, response, bool(meaningless))
-        files[path.name] = updated(text, str(scanner), self.axis, put).encode("utf-8")
+        file_change = change(self.fit, self.sources, self.points, response, bool(meaningless))
+        files[path.name] = updated(text, str(scanner), self.axis, file_change).encode("utf-8")
         return files
 
     def write(
         self, scanner: str | Path, v_max: float | None = None, force: bool = False, v_min: float = 0.0
     ) -> list[str]:
-        """Put the parameters into a scanner file, as ``tablegen calibrate --write`` does; the names that changed.
+        """Put the parameters into a scanner file, as ``tablegen calibrate --write``; return the names that changed.
 
-        Raises as ``content`` does, and ``CannotWrite``.
+        Raises
+        ------
+        Rejected
+            As ``content``.
+        Unphysical
+            As ``content``.
+        CannotWrite
+            If a file cannot be written.
         """
         path = Path(scanner)
         files = self.content(path, None if v_max is None else Driver(v_max, v_min), force)
@@ -340,11 +358,11 @@ class Calibrated(Result):
         return [name if lines is None else f"{name}:{lines[at]}" for at in self.fit.outliers]
 
     def findings(self) -> list[Finding]:
-        """Return what to know before the fit is trusted, the worst first."""
+        """Return warnings to read before the fit is trusted, the worst first."""
         return fit_findings(self.fit, self.places(), self.points)
 
     def summary(self) -> str:
-        """Return what ``tablegen calibrate`` prints: parameters with standard errors, what is left, and what is odd."""
+        """Return what ``tablegen calibrate`` prints: parameters with standard errors, residuals, and warnings."""
         return "\n".join([*self.table(), *(finding.line for finding in self.findings())])
 
     def table(self) -> list[str]:
@@ -358,17 +376,18 @@ class Calibrated(Result):
         return fit_page(self.fit, self.axis, list(self.sources), self.places(path=False), self.points)
 
     def charts(self) -> PlottedCharts:
+        """Return the charts that ``tablegen calibrate --plot`` draws."""
         from tablegen.html_report.fitted import fit_charts
 
         return fit_charts(self.fit, self.axis)
 
     def _lines(self) -> Sequence[str]:
-        values = ", ".join(f"{key} {_shown(one)}" for key, one in list(self.parameters.items())[:4])
-        left = f"left {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
+        values = ", ".join(f"{key} {_estimate_text(one)}" for key, one in list(self.parameters.items())[:4])
+        residual = f"left {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
         what = f"{self.axis}.{self.kind} from {self.fit.points} points"
         files = f"from {', '.join(one.name for one in self.sources)}"
         third = f"means nothing: {self.doubts[0]}" if self.doubts else files
-        return f"calibration of {what}: {left}", values, third
+        return f"calibration of {what}: {residual}", values, third
 
 
 def _fit(kind: Kind, tables: list[MeasuredTable], scanner: KnownScanner, options: dict[str, Any]) -> Fit:
@@ -393,6 +412,6 @@ def _fit(kind: Kind, tables: list[MeasuredTable], scanner: KnownScanner, options
             return fit_resonance(table[FREQUENCY], table[GAIN], table.columns.get(PHASE.name), **options)
 
 
-def _shown(estimate: Estimate) -> str:
-    known = estimate.standard_error > 1e-9 * abs(estimate.value)  # not nan, nor of a turn, which is as it was set
-    return f"{estimate.value:.5g}" + (f" \u00b1 {estimate.standard_error:.2g}" if known else "")
+def _estimate_text(estimate: Estimate) -> str:
+    significant = estimate.standard_error > 1e-9 * abs(estimate.value)  # not nan, nor of a turn, which is as it was set
+    return f"{estimate.value:.5g}" + (f" \u00b1 {estimate.standard_error:.2g}" if significant else "")

@@ -1,4 +1,4 @@
-"""From traces of a sensor, or images, to an operator of the piezo, and into a file beside the scanner file."""
+"""Calibrate an operator of the piezo by traces of a sensor, or by images, and write it beside the scanner file."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ def calibrate_operator(
     progress: Callable[[str], object] = lambda _: None,
     **how: Any,
 ) -> "CalibratedOperator":
-    """Identify what the piezo does at every size and offset, from traces of a sensor, from images, or from both.
+    """Fit an operator of the piezo, for all sizes and offsets, to traces of a sensor, to images, or to both.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def calibrate_operator(
     delay_s : float or "fit"
         Delay of the sensor against the drive in s.
     progress : callable
-        Called with what is being done.
+        Called with a text for each stage.
     **how : optional
         Of images: ``lattice_nm``, ``lattice``, ``cell``, ``pitch_nm``, ``angle_deg``, ``aspect``, ``turn``, ``window``,
         ``retrace_mirrored``, ``delay_pixels``, ``channel``, ``retrace_channel``, ``frame``.
@@ -78,14 +78,14 @@ def calibrate_operator(
     Returns
     -------
     CalibratedOperator
-        What it leaves of every trace, in the fit and left out; ``write`` puts it beside the scanner file.
+        Errors of every trace, in the fit and left out; ``write`` puts it beside the scanner file.
 
     Raises
     ------
     Rejected
         A file or the scanner file is wrong.
     Unphysical
-        The traces are too few, too noisy, or of no scanner; the message names the trace.
+        The traces are too few, too noisy, or not of a scanner; the message names the trace.
 
     Examples
     --------
@@ -103,16 +103,16 @@ def calibrate_operator(
         raise TypeError('delay_s="fit" is for traces of a sensor; images have delay_pixels')
     tables = [table_of(one, _NEEDED, [TRACE]) for one in measured]
     pairs = [sample_image(v, at, pair[0], pair[1] if pair[1:] else None, how) for v, at, _, *pair in images]
-    known = known_scanner(scanner, axis, v_max, v_min)
+    prior = known_scanner(scanner, axis, v_max, v_min)
     sources: tuple[MeasuredTable | ScanImage, ...] = (*tables, *(one for _, files in pairs for one in files))
-    response, offset_law = known.axis_laws()
-    lines = _sensor_lines(tables, known.driver)
+    response, offset_law = prior.axis_laws()
+    lines = _sensor_lines(tables, prior.driver)
     try:
         delay = fit_delay(lines, response) if delay_s == "fit" else Estimate(float(delay_s))
         lines = [line.earlier(delay.value) for line in lines]
-        lines += _image_lines([(image, row[2]) for (image, _), row in zip(pairs, images, strict=True)], known, how)
-        if (k := known.number("size", "k_nm_per_v")) is not None:
-            check_size(lines, k * known.driver.span, f"k_nm_per_v = {k:g} of {known.path}")
+        lines += _image_lines([(image, row[2]) for (image, _), row in zip(pairs, images, strict=True)], prior, how)
+        if (k := prior.number("size", "k_nm_per_v")) is not None:
+            check_size(lines, k * prior.driver.span, f"k_nm_per_v = {k:g} of {prior.path}")
         progress("fitting the families, with and without each trace")
         fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
     except _NamedUnphysical:
@@ -120,7 +120,7 @@ def calibrate_operator(
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(one.file for one in sources)}: {reason}") from None
     return CalibratedOperator(
-        fit, axis, tuple(lines), known.driver, delay, next_trace(fit, lines, known.driver), sources
+        fit, axis, tuple(lines), prior.driver, delay, next_trace(fit, lines, prior.driver), sources
     )
 
 
@@ -140,12 +140,12 @@ def _sensor_lines(tables: Sequence[MeasuredTable], driver: Driver) -> list[Perio
 
 
 def _image_lines(
-    images: Sequence[tuple[SampleImage, float]], known: KnownScanner, how: dict[str, Any]
+    images: Sequence[tuple[SampleImage, float]], prior: KnownScanner, how: dict[str, Any]
 ) -> list[PeriodicLine]:
     lines = []
     for image, rate_hz in images:
         try:
-            lines.append(imaged_line(image, rate_hz, known.driver, sample_of(how), acquisition_of(how))[0])
+            lines.append(imaged_line(image, rate_hz, prior.driver, sample_of(how), acquisition_of(how))[0])
         except Unphysical as reason:
             raise _NamedUnphysical(f"{image.name}: {reason}") from None
     return lines
@@ -153,10 +153,10 @@ def _image_lines(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CalibratedOperator(Result):
-    """An operator of one axis, what it leaves of every trace, and how it gets into the files.
+    """An operator of one axis, its errors of every trace, and the files that it is written to.
 
     ``fit`` has the operator and its residuals, ``lines`` the traces as one settled period each, ``delay`` that of the
-    sensor in s, ``next_trace`` what to measure next, ``measured`` the tables and images.
+    sensor in s, ``next_trace`` the measurement that helps most, ``measured`` the tables and images.
     """
 
     fit: OperatorFit
@@ -169,17 +169,17 @@ class CalibratedOperator(Result):
 
     @property
     def family(self) -> str:
-        """Name of the family of hysteresis that describes traces best that were left out."""
+        """Name of the family of hysteresis that predicts traces best that were left out."""
         return self.fit.family
 
     @property
     def left(self) -> tuple[LineErrors, ...]:
-        """What the operator leaves of each trace: ``rms``, ``scaling``, ``mismatch`` in percent of the line."""
+        """Errors of each trace in the fit: ``rms``, ``scaling``, ``mismatch`` in percent of the line."""
         return self.fit.in_fit
 
     @property
     def left_out(self) -> tuple[LineErrors, ...]:
-        """The same of each trace when it is predicted from the others, and the error of its ``size``."""
+        """Errors of each trace when it is predicted from the others, and the error of its ``size``."""
         return self.fit.left_out
 
     @property
@@ -196,7 +196,11 @@ class CalibratedOperator(Result):
                 "size_share": line.stroke,
                 "offset_share": line.centre,
                 "rate_hz": line.rate_hz,
-                "left": {"rms_percent": left.rms, "scaling_percent": left.scaling, "mismatch_percent": left.mismatch},
+                "left": {
+                    "rms_percent": fit.rms,
+                    "scaling_percent": fit.scaling,
+                    "mismatch_percent": fit.mismatch,
+                },
                 "left_out": {
                     "rms_percent": out.rms,
                     "scaling_percent": out.scaling,
@@ -204,7 +208,7 @@ class CalibratedOperator(Result):
                     "size_percent": out.size,
                 },
             }
-            for line, left, out in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True)
+            for line, fit, out in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True)
         ]
         error, further = self.delay.standard_error, self.next_trace
         return {
@@ -221,29 +225,29 @@ class CalibratedOperator(Result):
         }
 
     def findings(self) -> list[Finding]:
-        """Return what to know of the images before the operator is trusted, the worst first."""
+        """Return warnings about the images to read before the operator is trusted, the worst first."""
         return worst_first(of_remarks(angle_remarks(self.measured, self.axis)))
 
     def summary(self) -> str:
-        """Return the parameters, what is left of every trace, what to measure next, and what is odd."""
+        """Return the parameters, the errors of every trace, the trace to measure next, and warnings."""
         creep = self.fit.operator.creep
         pure = {name: score for name, score in self.fit.candidates.items() if name == self.family or "," not in name}
-        tried = ", ".join(f"{name} {score:.3g} %" for name, score in pure.items())
+        scores = ", ".join(f"{name} {score:.3g} %" for name, score in pure.items())
         out = [
             f"operator of {self.axis} from {len(self.lines)} traces",
             "",
-            f"family   {self.family}  (mean rms of a trace left out: {tried})",
+            f"family   {self.family}  (mean rms of a trace left out: {scores})",
             f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
             *_delay_text(self.delay),
             "",
             f"{'':41}  {'in the fit':<23}   left out",
             f"size [V]  offset [V]  rate [Hz]  noise [%]{_MEASURES}  {_MEASURES}  size [%]  trace",
         ]
-        for line, left, without in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True):
+        for line, inside, without in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True):
             noise = 100.0 * line.noise_nm / float(line.displacement_nm.max() - line.displacement_nm.min())
             out.append(
                 f"{line.stroke * self.driver.span:8.4g}  {self.driver.volts(line.centre):10.4g}  {line.rate_hz:9.4g}  "
-                f"{noise:9.2g}  {left.rms:5.2f}  {left.scaling:8.2f}  {left.mismatch:8.2f}   {without.rms:5.2f}  "
+                f"{noise:9.2g}  {inside.rms:5.2f}  {inside.scaling:8.2f}  {inside.mismatch:8.2f}   {without.rms:5.2f}  "
                 f"{without.scaling:8.2f}  {without.mismatch:8.2f}  {without.size:+8.2f}  {line.name}"
             )
         out += ["percent of the line over x = 0.1..0.9; left out: predicted from the other traces", ""]
@@ -253,7 +257,7 @@ class CalibratedOperator(Result):
         further = self.next_trace
         text = [f"next trace: {further.size_v:.3g} V at {further.offset_v:.3g} V would help most"]
         if further.rate_hz is not None:
-            text.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would tell creep from hysteresis")
+            text.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would separate creep from hysteresis")
         return text
 
     def _lines(self) -> Sequence[str]:
@@ -266,6 +270,7 @@ class CalibratedOperator(Result):
         )
 
     def charts(self) -> PlottedCharts:
+        """Return the charts that ``tablegen calibrate operator --plot`` draws."""
         from tablegen.html_report.operator_charts import operator_charts
 
         return operator_charts(self.fit, self.lines, self.next_trace, self.driver, self.axis)
@@ -274,12 +279,12 @@ class CalibratedOperator(Result):
         """Return the HTML page that ``tablegen calibrate operator --report`` writes."""
         from tablegen.html_report.fitted import operator_page
 
-        def figures(line: PeriodicLine, left: LineErrors, out: LineErrors) -> tuple[float, ...]:
+        def figures(line: PeriodicLine, inside: LineErrors, out: LineErrors) -> tuple[float, ...]:
             drive = line.stroke * self.driver.span, self.driver.volts(line.centre), line.rate_hz
-            return *drive, left.rms, left.scaling, left.mismatch, out.rms, out.scaling, out.mismatch, out.size
+            return *drive, inside.rms, inside.scaling, inside.mismatch, out.rms, out.scaling, out.mismatch, out.size
 
         rows = zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True)
-        traces = [(line.name, figures(line, left, out)) for line, left, out in rows]
+        traces = [(line.name, figures(line, inside, out)) for line, inside, out in rows]
         advice = self._advice()[0].removeprefix("next trace: ")
         candidates = [*self.fit.candidates.items()]
         return operator_page(self.axis, self.family, candidates, traces, f"a trace of {advice}", list(self.sources))
@@ -287,7 +292,10 @@ class CalibratedOperator(Result):
     def content(self, scanner: str | Path) -> dict[str, bytes]:
         """Return names and contents of the operator's file and of the scanner file, the last; nothing is written.
 
-        Raises ``Rejected`` where the scanner file cannot take it.
+        Raises
+        ------
+        Rejected
+            If the scanner file cannot take it.
         """
         scanner = Path(scanner)
         name, path = str(scanner), scanner.resolve()
@@ -307,7 +315,14 @@ class CalibratedOperator(Result):
     def write(self, scanner: str | Path) -> list[str]:
         """Write the operator's file, then the scanner file that names it, and return the names that changed.
 
-        A scanner file that is missing is begun. Raises as ``content`` does, and ``CannotWrite``.
+        A scanner file that is missing is begun.
+
+        Raises
+        ------
+        Rejected
+            As ``content``.
+        CannotWrite
+            If a file cannot be written.
         """
         scanner = Path(scanner)
         (beside, operator), (own, text) = self.content(scanner).items()
@@ -316,7 +331,7 @@ class CalibratedOperator(Result):
 
 
 def _delay_text(delay: Estimate) -> list[str]:
-    """Nothing where there is none."""
+    """Return a line on the delay; none for a delay of 0."""
     if isfinite(delay.standard_error):
         return [f"delay    {1e6 * delay.value:.3g} us of the sensor, fitted, +- {1e6 * delay.standard_error:.2g} us"]
     return [f"delay    {1e6 * delay.value:.3g} us of the sensor, as given"] if delay.value else []

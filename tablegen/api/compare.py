@@ -1,4 +1,4 @@
-"""Two scans, builds or calibrations side by side."""
+"""Compare two scans, builds or calibrations."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ def compare(a: str | Path, b: str | Path, *, progress: Callable[[str], object] =
     a, b : str or Path
         The two files or directories.
     progress : callable
-        Called with what is being done.
+        Called with a text for each stage.
 
     Returns
     -------
     Compared
-        ``same``, and ``differing``: the quantities that differ, with both values.
+        ``same``, and ``differing``, the quantities that differ, with both values.
 
     Raises
     ------
@@ -54,7 +54,7 @@ class Compared(Result):
 
     @property
     def same(self) -> bool:
-        """True if nothing differs, and every file of a build is as its manifest says."""
+        """True if nothing differs, and every file of a build agrees with its manifest."""
         return self.both.same
 
     @property
@@ -64,33 +64,33 @@ class Compared(Result):
 
     @property
     def record(self) -> dict[str, Any]:
-        """What differs as plain data, as ``tablegen compare --json`` prints it."""
+        """The differences as plain data, as ``tablegen compare --json`` prints them."""
         return self.both.record()
 
     def summary(self, everything: bool = False) -> str:
-        """Return what ``tablegen compare`` prints: what differs, or with ``everything`` what is the same too."""
+        """Return what ``tablegen compare`` prints: the differences, or with ``everything`` also what is the same."""
         return "\n".join(compare_text(self.both, everything))
 
     @cached_property
-    def _drawn(self) -> list[Chart]:
+    def _all_charts(self) -> list[Chart]:
         from tablegen.comparison.charts import comparison_charts
 
         return comparison_charts(self.both)
 
     def charts(self) -> PlottedCharts:
-        """Give all charts, those that differ first; a terminal shows the first of these."""
+        """Return all charts, those that differ first; a terminal shows the first of these."""
         from tablegen.comparison.charts import differing_charts
 
-        first = differing_charts(self._drawn)
-        rest = [chart for chart in self._drawn if chart not in first]
+        first = differing_charts(self._all_charts)
+        rest = [chart for chart in self._all_charts if chart not in first]
         heading = "A: {}, B: {}".format(*self.both.titles)
-        return PlottedCharts(heading, (*first, *rest), brief=tuple((first or self._drawn)[:_IN_TERMINAL]))
+        return PlottedCharts(heading, (*first, *rest), brief=tuple((first or self._all_charts)[:_IN_TERMINAL]))
 
     def page(self) -> bytes:
         """Return the HTML page that ``tablegen compare -o`` writes."""
         from tablegen.comparison.page import comparison_page
 
-        return comparison_page(self.both, self._drawn)
+        return comparison_page(self.both, self._all_charts)
 
     def _lines(self) -> Sequence[str]:
         a, b = self.both.titles

@@ -1,4 +1,4 @@
-"""Images that were already taken, put straight, as `tablegen correct` does it; given as files or as arrays."""
+"""Correct existing images, as `tablegen correct` does; given as files or as arrays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,17 +35,17 @@ def correct(
     fit: bool = False,
     **how: Any,
 ) -> "Corrected":
-    """Put an image straight: by a scanner file, by the scan file that it was taken with, or by a fit to a lattice.
+    """Correct an image: by a scanner file, by the scan file that it was taken with, or by a fit to a lattice.
 
     Parameters
     ----------
     trace, retrace : path, Image or array
-        Files, what ``read_image`` gave, or heights of shape (rows, columns), rows in order of time, the left end of
+        Files, results of ``read_image``, or heights of shape (rows, columns), rows in order of time, the left end of
         the line at the left in both directions. A file may have both, and all its channels are corrected.
     scanner, scan : path, optional
         Scanner file, with ``how`` the image was taken; or the scan file that it was taken with.
     lattice_nm, pitch_nm, fit : optional
-        Constant in nm of a periodic sample, which is fitted; ``fit=True`` where it is not known.
+        Constant in nm of a periodic sample, which is fitted; ``fit=True`` where it is unknown.
     **how : optional
         ``size_v`` in V peak to peak at the piezo or ``size_nm``, ``offset_v``, ``turn``, ``window`` of the fast axis,
         the same with ``slow_`` of the slow one; ``rate_hz``, ``lines``, ``slow_back``, ``delay_pixels``; of files
@@ -54,7 +54,7 @@ def correct(
     Returns
     -------
     Corrected
-        ``trace`` and ``retrace`` put straight; ``write`` makes a file.
+        ``trace`` and ``retrace`` corrected; ``write`` makes a file.
 
     Raises
     ------
@@ -84,34 +84,41 @@ def correct(
         both = read_trace_and_perhaps_retrace(trace, retrace, how)
         mirrored = bool(how.get("retrace_mirrored", False))
         images = Images(tuple(both), (True, False)[: len(both)], tuple(range(len(both))), (), mirrored)
-    given = None if scanner is None else Path(scanner)
-    taken = straight(images, given, None if scan is None else Path(scan), taken_of(how), pitch_nm, lattice_nm)
-    return Corrected(taken, images)
+    files = [None if path is None else Path(path) for path in (scanner, scan)]
+    return Corrected(straight(images, files[0], files[1], old_scan_of(how), pitch_nm, lattice_nm), images)
 
 
 def straight(
     images: Images,
     scanner: Path | None,
     scan: Path | None,
-    taken: OldScan,
+    old_scan: OldScan,
     pitch_nm: float | None,
     lattice_nm: float | None,
 ) -> StraightScan:
-    """By the scan file where there is one, by the scanner file, or by a fit where there is neither."""
+    """Correct images by the scan file, else by the scanner file, else by a fit.
+
+    Raises
+    ------
+    Rejected
+        If a file is wrong.
+    Unphysical
+        If the sample has no period, or no scanner takes such an image.
+    """
     if scan is not None:
-        return by_scan_file(images, scan, scanner, taken)
+        return by_scan_file(images, scan, scanner, old_scan)
     if scanner is not None:
-        return by_scanner(images, scanner, taken)
-    return by_fit(images, taken, pitch_nm, lattice_nm)[0]
+        return by_scanner(images, scanner, old_scan)
+    return by_fit(images, old_scan, pitch_nm, lattice_nm)[0]
 
 
 def choice_of(how: Mapping[str, Any]) -> Choice:
-    """Which channels of files; what is not given is as the files say."""
+    """Return the choice of channels by keywords of ``correct``; the file decides the others."""
     return Choice(**{name: how[name] for name in _CHOICE if name in how})
 
 
-def taken_of(how: Mapping[str, Any]) -> OldScan:
-    """How an image was taken, of names as ``correct`` and the command have them."""
+def old_scan_of(how: Mapping[str, Any]) -> OldScan:
+    """Return how an image was taken, by keywords of ``correct`` and of the command."""
     x, y = ({key: how[f"{prefix}{key}"] for key in _AXIS if f"{prefix}{key}" in how} for prefix in ("", "slow_"))
     rest = {key: how[key] for key in _REST if key in how}
     return OldScan(x=OldAxis(**x), y=OldAxis(**y), back=bool(how.get(_BACK, False)), **rest)
@@ -122,9 +129,9 @@ _NAMES = (*_AXIS, *(f"slow_{name}" for name in _AXIS), *_REST, _BACK, *_CHOICE)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Corrected(Result):
-    """An image put straight: ``trace`` and ``retrace``, by how much it was moved, how far both agree now.
+    """A corrected image: ``trace`` and ``retrace``, the displacement of its pixels, the distance of both that remains.
 
-    ``scan`` has all channels that were corrected, ``images`` what they were before.
+    ``scan`` has all channels that were corrected, ``images`` the originals.
     """
 
     scan: StraightScan
@@ -132,41 +139,61 @@ class Corrected(Result):
 
     @property
     def trace(self) -> Floats:
-        """Heights of the trace, or of whatever there is, (rows, columns); NaN where nothing was imaged."""
+        """Heights of the trace, or of the only image, (rows, columns); NaN where nothing was imaged.
+
+        Returns
+        -------
+        Floats
+            In the unit of the file, shape (rows, columns).
+        """
         return self.scan.pictures[self.scan.reference[0]].heights
 
     @property
     def retrace(self) -> Floats | None:
-        """Those of the retrace, on the same places; None without one."""
+        """Heights of the retrace at the same positions, (rows, columns); None without one.
+
+        Returns
+        -------
+        Floats or None
+            In the unit of the file, shape (rows, columns).
+        """
         return self.scan.pictures[self.scan.reference[1]].heights if len(self.scan.reference) > 1 else None
 
     @property
     def size_nm(self) -> tuple[float, float] | None:
-        """Width and height of the picture; None where they are not known."""
+        """Width and height of the picture; None where they are unknown."""
         return self.scan.size_nm
 
     @property
     def moved_pixels(self) -> tuple[float, float]:
-        """The largest displacement along x and y, the mean one aside."""
+        """The largest displacement of a pixel along x and y, less the mean one."""
         return self.scan.moved_pixels
 
     @property
     def difference(self) -> tuple[float, float] | None:
-        """Of trace and retrace, rms over that of both, before and after; None without a retrace."""
+        """Difference of trace and retrace, rms over that of both, before and after; None without a retrace."""
         return None if self.scan.agreement is None else self.scan.agreement.difference
 
     @property
     def apart_pixels(self) -> tuple[float, float] | None:
-        """Largest distance of the same thing in trace and retrace, before and after; None where it is not known."""
+        """Largest distance between trace and retrace of one feature, before and after; None where it is unknown."""
         return None if self.scan.agreement is None else self.scan.agreement.worst
 
     @property
     def record(self) -> dict[str, Any]:
-        """What was done, as plain data: every file that is written has it."""
+        """The correction as plain data: every file that is written has it."""
         return self.scan.record
 
     def write(self, path: str | Path) -> list[str]:
-        """Write .gwy, .tif, .npy or .png, and what goes beside it; the names that changed. Raises ``CannotWrite``."""
+        """Write .gwy, .tif, .npy or .png, and the files beside it, and return the names that changed.
+
+        Raises
+        ------
+        Rejected
+            If the name has another ending.
+        CannotWrite
+            If a file cannot be written.
+        """
         path = Path(path)
         if path.suffix.lower() not in (".gwy", ".tif", ".tiff", ".npy", ".png"):
             raise Rejected([Problem(str(path), 0, "", "the name has to end in .gwy, .tif, .npy or .png")])
@@ -177,7 +204,7 @@ class Corrected(Result):
         return "\n".join(correct_text(self.scan, self.images))
 
     def charts(self) -> PlottedCharts:
-        """Give the charts that ``tablegen correct --plot`` draws."""
+        """Return the charts that ``tablegen correct --plot`` draws."""
         from tablegen.html_report.corrected import correction_charts
 
         return correction_charts(self.scan, self.images.first.file)
@@ -186,7 +213,7 @@ class Corrected(Result):
         x, y = self.moved_pixels
         size = "" if self.size_nm is None else f", {self.size_nm[0]:.4g} x {self.size_nm[1]:.4g} nm"
         difference = self.difference
-        third = "there is no retrace; nothing tells whether this is right"
+        third = "there is no retrace, by which the result could be checked"
         if difference is not None:
             third = f"trace and retrace differ by {difference[0]:.3g} before, {difference[1]:.3g} after"
         return f"corrected image{size}", f"moved by up to {x:.3g} pixels along x, {y:.3g} along y", third

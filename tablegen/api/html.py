@@ -1,4 +1,4 @@
-"""A build as HTML for notebooks: drive and error as SVG, and the certificate. Nothing is loaded from outside."""
+"""A build as HTML for notebooks: drive and error as SVG, and the certificate. Nothing is loaded from a network."""
 
 from html import escape
 
@@ -11,7 +11,7 @@ from tablegen.planning.line_plan import Plan
 
 
 def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
-    """A self-contained fragment."""
+    """Return a self-contained fragment of HTML."""
     schedule = plan.schedule
     title = f"{plan.name} on {plan.scanner}: {rate(schedule.line_rate)} lines of {schedule.ticks} ticks"
     parts = [

@@ -1,4 +1,4 @@
-"""Images as scripts have them: the path of a file, an array of heights, or what ``read_image`` gave."""
+"""Read images that scripts give: the path of a file, an array of heights, or a result of ``read_image``."""
 
 from collections.abc import Sequence
 from hashlib import sha256
@@ -25,7 +25,13 @@ IMAGE_OPTIONS = (*_SAMPLE, *_ACQUISITION, *_CHANNEL)
 
 
 def check_names(how: dict[str, Any], names: Sequence[str]) -> None:
-    """Raise ``TypeError`` for a keyword that is none of these."""
+    """Check the names of keywords.
+
+    Raises
+    ------
+    TypeError
+        If one is none of ``names``.
+    """
     if unknown := [name for name in how if name not in names]:
         raise TypeError(f"{unknown[0]} is none of {', '.join(names)}")
 
@@ -33,17 +39,26 @@ def check_names(how: dict[str, Any], names: Sequence[str]) -> None:
 def read_trace_and_retrace(
     trace: ImageSource, retrace: ImageSource | None, how: dict[str, Any]
 ) -> tuple[ScanImage, ScanImage]:
-    """Trace and retrace of one scan; one file, or one image that was read, may have both. Raises ``Rejected``."""
-    found = read_trace_and_perhaps_retrace(trace, retrace, how, both=True)
-    return found[0], found[1]
+    """Read trace and retrace of one scan; one file, or one image that was read, may have both.
+
+    Raises
+    ------
+    Rejected
+        If a file is wrong, or there is no retrace.
+    """
+    pair = read_trace_and_perhaps_retrace(trace, retrace, how, both=True)
+    return pair[0], pair[1]
 
 
 def read_trace_and_perhaps_retrace(
     trace: ImageSource, retrace: ImageSource | None, how: dict[str, Any], both: bool = False
 ) -> list[ScanImage]:
-    """The trace, and the retrace where one is given or stands in the same file; ``both`` makes it an error to miss it.
+    """Read the trace, and the retrace if one is given or in the same file; with ``both`` it must not be missing.
 
-    Raises ``Rejected`` with every fault.
+    Raises
+    ------
+    Rejected
+        If a file is wrong, the shapes differ, or a retrace is missing that is needed.
     """
     channel, retrace_channel, frame = (how.get(name) for name in _CHANNEL)
     if isinstance(trace, str | Path) and (retrace is None or isinstance(retrace, str | Path)):
@@ -56,14 +71,14 @@ def read_trace_and_perhaps_retrace(
     if retrace is None:
         if both:
             raise Rejected([Problem("retrace", 0, "", "missing; both directions are needed")])
-        return [_given(trace, "trace", how)]
-    pair = [_given(trace, "trace", how), _given(retrace, "retrace", how)]
+        return [_scan_image(trace, "trace", how)]
+    pair = [_scan_image(trace, "trace", how), _scan_image(retrace, "retrace", how)]
     if pair[0].heights.shape != pair[1].heights.shape:
         raise Rejected([Problem("retrace", 0, "", "has another shape than the trace")])
     return pair
 
 
-def _given(image: ImageSource, direction: Direction, how: dict[str, Any]) -> ScanImage:
+def _scan_image(image: ImageSource, direction: Direction, how: dict[str, Any]) -> ScanImage:
     if isinstance(image, Image):
         return image.scan
     if isinstance(image, str | Path):
@@ -77,12 +92,12 @@ def _given(image: ImageSource, direction: Direction, how: dict[str, Any]) -> Sca
 
 
 def _has_retrace(path: Path, channel: str | None) -> bool:
-    """True if a file has the retrace of the trace that would be read."""
+    """Return True if a file has the retrace of the trace that would be read."""
     try:
         channels = channels_of(path)
         return partner(channels, choose(channels, channel, "trace")) is not None
     except (Rejected, ValueError):
-        return False  # the reader says what is wrong
+        return False  # the reader reports the fault
 
 
 def known_sample(
@@ -93,7 +108,13 @@ def known_sample(
     pitch_nm: float | None = None,
     angle_deg: tuple[float, float] | None = None,
 ) -> KnownSample:
-    """The sample of these constants. Raises ``TypeError`` where they contradict each other, or none is given."""
+    """Return the sample of these constants.
+
+    Raises
+    ------
+    TypeError
+        If they contradict each other, or none is given.
+    """
     if lattice_nm is None and cell is None and pitch_nm is None:
         raise TypeError("images need the constant of their sample: lattice_nm, cell, or pitch_nm")
     if lattice_nm is not None and cell is not None:
@@ -110,23 +131,35 @@ def known_sample(
 
 
 def sample_of(how: dict[str, Any]) -> KnownSample:
-    """The sample that keywords of a function, or of a command, describe. Raises as ``known_sample`` does."""
-    return known_sample(**_chosen(how, _SAMPLE))
+    """Return the sample that keywords of a function, or of a command, describe.
+
+    Raises
+    ------
+    TypeError
+        As ``known_sample``.
+    """
+    return known_sample(**_subset(how, _SAMPLE))
 
 
 def acquisition_of(how: dict[str, Any]) -> Acquisition:
-    """How images were taken, by keywords of a function or of a command."""
-    return Acquisition(**_chosen(how, _ACQUISITION))
+    """Return how images were taken, by keywords of a function or of a command."""
+    return Acquisition(**_subset(how, _ACQUISITION))
 
 
-def _chosen(how: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+def _subset(how: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
     return {name: how[name] for name in names if name in how}
 
 
 def sample_image(
     v_scan: float, v_offset: float | None, trace: ImageSource, retrace: ImageSource | None, how: dict[str, Any]
 ) -> tuple[SampleImage, list[ScanImage]]:
-    """An image of a sample of known constant, and what was read for it. Raises ``Rejected``."""
+    """Read an image of a sample of known constant; return it with the channels of its files.
+
+    Raises
+    ------
+    Rejected
+        If a file is wrong.
+    """
     images = read_trace_and_perhaps_retrace(trace, retrace, how)
     first, ratio = images[0], None
     if first.width_nm and first.height_nm:

@@ -1,4 +1,4 @@
-"""What a calibration needs to know of the scanner beside the measurements: the driver's range, and other laws."""
+"""Data of the scanner that a calibration needs beside the measurements: the driver's range, and other laws."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +18,7 @@ from tablegen.planning.laws import dynamics_of, offset_surface, size_law_of
 
 
 class NoRange(ValueError):
-    """Neither a scanner file nor ``v_max`` says how many volts the driver gives."""
+    """The range of the driver is missing: neither a scanner file nor ``v_max`` gives it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class KnownScanner:
     """A scanner file that may be incomplete, or none, for one ``axis``.
 
     ``values`` are its keys as they are written, empty where the file is to be begun; ``v_max`` and ``v_min`` in V are
-    what was given beside it.
+    those that were given beside it.
     """
 
     path: Path | None
@@ -37,7 +37,13 @@ class KnownScanner:
 
     @classmethod
     def read(cls, path: Path | None, axis: str, v_max: float | None, v_min: float, new: bool) -> "KnownScanner":
-        """Read the file, which may be missing if it is ``new``. Raises ``Rejected`` where it cannot be read."""
+        """Read the file, which may be missing if it is ``new``.
+
+        Raises
+        ------
+        Rejected
+            If it cannot be read.
+        """
         begun = path is None or (new and not path.exists())
         values = {} if path is None or begun else inherited(*read_toml(path, str(path)))[0]
         return cls(path, axis, values, v_max, v_min)
@@ -46,19 +52,32 @@ class KnownScanner:
     def driver(self) -> Driver:
         """The range of the driver.
 
-        Raises ``Rejected`` for a file that contradicts ``v_max`` or ``v_min``, ``NoRange`` where nothing gives a range.
+        Raises
+        ------
+        Rejected
+            If the file contradicts ``v_max`` or ``v_min``.
+        NoRange
+            If nothing gives a range.
         """
         return _driver(str(self.path), self.values, self.v_max, self.v_min)
 
     def number(self, kind: str, key: str) -> float | None:
-        """A positive number of the file as it is, or None."""
+        """Return a positive number of the file as it is, or None."""
         value: Any = self.values
         for name in (self.axis, kind, key):
             value = value.get(name) if isinstance(value, dict) else None
         return float(value) if isinstance(value, int | float) and value > 0.0 else None
 
     def size_law(self, source: str) -> SizeLaw:
-        """The size law of the file, for the scan voltages that ``source`` gives. Raises as ``axis_laws`` does."""
+        """Return the size law of the file, for the scan voltages that ``source`` gives.
+
+        Raises
+        ------
+        Rejected
+            If the table has a fault.
+        Unphysical
+            If the size is not calibrated, or no scanner has its values.
+        """
         path = f"{self.axis}.size"
         if self.number("size", "k_nm_per_v") is None:
             raise Unphysical(f"{source} takes {path} of the scanner file; calibrate the size first")
@@ -68,9 +87,14 @@ class KnownScanner:
             raise Unphysical(f"{self.path}: {path}: {reason}") from None
 
     def axis_laws(self) -> tuple[Response | None, OffsetLaw]:
-        """The dynamics, and the offset law for small scans; without them none, and a constant.
+        """Return the dynamics, and the offset law for small scans; without them None, and a constant.
 
-        Raises ``Rejected`` for faults of the tables that are read, ``Unphysical`` for values that no scanner has.
+        Raises
+        ------
+        Rejected
+            If a table that is read has a fault.
+        Unphysical
+            If no scanner has its values.
         """
         if self.path is None or not self.values:
             return None, OffsetLaw()
@@ -84,7 +108,7 @@ class KnownScanner:
             raise Unphysical(f"{self.path}: {self.axis}: {reason}") from None
 
     def _tables(self, *names: str) -> dict[str, Any]:
-        """The tables of the file that are whole, by path such as "x.size"; none of ``names`` may have a fault."""
+        """Return the tables of the file that are whole, by path such as "x.size"; check ``names`` for faults."""
         assert self.path is not None
         values, document = inherited(*read_toml(self.path, str(self.path)))
         tables: dict[str, Any] = {}

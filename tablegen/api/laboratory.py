@@ -1,6 +1,6 @@
-"""A laboratory with a virtual scanner: what its instruments would measure, as columns and images; all of it simulated.
+"""A laboratory with a virtual scanner: simulated measurements of its instruments, as columns and images.
 
-To try a procedure before the instrument is there, and to see what it leaves where the truth is known.
+It serves to try a procedure before the instrument is there, and to measure its errors where the truth is known.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class Laboratory:
     """Measurements on a virtual scanner, with noise that comes from ``seed`` alone: the same calls give the same data.
 
     ``truth`` is "default", "duhem", or a file of a virtual scanner. With ``like``, a scanner file, a built-in scanner
-    goes as far as that file says, over the same volts. ``noise`` is relative, rms, of every reading.
+    moves as far as by that file, over the same volts. ``noise`` is relative, rms, of every reading.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Laboratory:
     ) -> None:
         self.truth = load_truth(truth)
         self.scanner, self.scaled = VirtualScanner.of(self.truth), ""
-        """The scanner, and how it was scaled, in words; empty where it is as it was."""
+        """The scanner, and its scaling in words; empty without scaling."""
         if like is not None and truth in BUILT_IN:
             file = like if isinstance(like, Scanner) else load_scanner(like)[0]
             self.scanner, self.scaled = scaled_to(self.scanner, file)
@@ -54,7 +54,20 @@ class Laboratory:
         return self.scanner.x.driver
 
     def sizes(self, axis: Axis, drives_v: Sequence[float], rate_hz: float) -> dict[str, Floats]:
-        """``drive_v``, ``actual_nm``: triangles about the middle of the range, measured by a sensor."""
+        """Measure ``drive_v`` and ``actual_nm`` by a sensor: triangles about the middle of the range.
+
+        Parameters
+        ----------
+        drives_v
+            Drives in V peak to peak, shape (n,).
+        rate_hz
+            Line rate in Hz.
+
+        Returns
+        -------
+        dict of Floats
+            Drives in V and sizes in nm, shape (n,) each.
+        """
         one = self._axis(axis)
         nm = np.array([triangle_size(one, volts, one.driver.middle, rate_hz) for volts in drives_v])
         noisy = nm * (1.0 + self.noise * np.random.default_rng(self._next()).standard_normal(len(nm)))
@@ -63,9 +76,24 @@ class Laboratory:
     def apparent_sizes(
         self, axis: Axis, offsets_v: Sequence[float], size_v: float, rate_hz: float
     ) -> dict[str, Floats]:
-        """``offset_v``, ``apparent_nm``, ``size_v``: one object in images of ``size_v`` at several offsets."""
-        found = apparent_sizes(self._axis(axis), offsets_v, size_v, rate_hz, noise=self.noise, seed=self._next())
-        return {**found, "size_v": np.full(len(offsets_v), float(size_v))}
+        """Measure ``offset_v``, ``apparent_nm`` and ``size_v``: one object in images of ``size_v`` at several offsets.
+
+        Parameters
+        ----------
+        offsets_v
+            Offsets in V, shape (n,).
+        size_v
+            Scan voltage in V peak to peak.
+        rate_hz
+            Line rate in Hz.
+
+        Returns
+        -------
+        dict of Floats
+            Offsets in V, apparent sizes in nm and scan voltages in V, shape (n,) each.
+        """
+        columns = apparent_sizes(self._axis(axis), offsets_v, size_v, rate_hz, noise=self.noise, seed=self._next())
+        return {**columns, "size_v": np.full(len(offsets_v), float(size_v))}
 
     def trace(
         self,
@@ -77,7 +105,24 @@ class Laboratory:
         samples: int = 1000,
         turn: float = 0.5,
     ) -> dict[str, Floats]:
-        """``time_s``, ``drive_v``, ``displacement_nm`` of a triangle that begins after a rest; ``samples`` a period."""
+        """Record ``time_s``, ``drive_v``, ``displacement_nm`` of a triangle that begins after a rest.
+
+        Parameters
+        ----------
+        size_v, offset_v
+            Drive peak to peak, and its middle, in V.
+        rate_hz
+            Line rate in Hz.
+        samples
+            Samples a period.
+        turn
+            Share of the period in which the drive rises.
+
+        Returns
+        -------
+        dict of Floats
+            Columns in s, V and nm, shape (periods x samples,) each.
+        """
         one = self._axis(axis)
         clean = sensor_trace(one, size_v, offset_v, rate_hz, periods, samples, turn)
         extent = float(np.ptp(clean["displacement_nm"]))
@@ -85,27 +130,44 @@ class Laboratory:
         return {**clean, "displacement_nm": sensor.read(clean["displacement_nm"], clean["time_s"])}
 
     def response(self, axis: Axis, frequency_hz: Sequence[float]) -> dict[str, Floats]:
-        """``frequency_hz``, ``gain``, ``phase_deg`` of a small sine."""
+        """Measure ``frequency_hz``, ``gain``, ``phase_deg`` with a small sine.
+
+        Parameters
+        ----------
+        frequency_hz
+            Frequencies in Hz, shape (n,).
+
+        Returns
+        -------
+        dict of Floats
+            Frequencies in Hz, gains and phases in degrees, shape (n,) each.
+        """
         return frequency_response(self._axis(axis), np.asarray(frequency_hz), self.noise, self._next())
 
     def running_trace(
         self, scan: "str | Path | Setup | Plan", axis: Axis, periods: float = 5.0, samples: int = 2000
     ) -> dict[str, Floats]:
-        """``time_s``, ``drive_v``, ``displacement_nm`` of a sensor while a build of the scan runs: for ``refine``."""
+        """Record ``time_s``, ``drive_v``, ``displacement_nm`` by a sensor while a build runs: for ``refine``.
+
+        Returns
+        -------
+        dict of Floats
+            Columns in s, V and nm, shape (n,) each.
+        """
         line = getattr(_plan(scan), axis)
         sensor = Sensor(noise_nm=self.noise * line.drive.size_nm, seed=self._next())
         return running_trace(line, self._axis(axis), periods, samples, sensor)
 
     def play(self, scan: "str | Path | Setup | Plan", axis: Axis) -> AxisRun:
-        """What really happens when a build runs, without noise: ``displacement_nm``, ``imaged``, ``error``."""
+        """Play a build without noise, and return ``displacement_nm``, ``imaged`` and ``error`` of an axis."""
         return run_line(getattr(_plan(scan), axis), self._axis(axis))
 
     def lattice(self, constant_nm: float, angle_deg: float = 7.0) -> Surface:
-        """A hexagonal lattice: heights over x and y in nm."""
+        """Return a hexagonal lattice: heights over x and y in nm."""
         return hexagonal(constant_nm, angle_deg)
 
     def grating(self, pitch_nm: float, angle_deg: float = 3.0) -> Surface:
-        """Bars across the lines: heights over x and y in nm."""
+        """Return a grating with bars across the lines: heights over x and y in nm."""
         return grating(pitch_nm, angle_deg)
 
     def image(
@@ -118,7 +180,7 @@ class Laboratory:
         slow_turn: float = 0.5,
         conditions: Conditions | None = None,
     ) -> FrameImages:
-        """Trace and retrace of an old instrument: the same triangle on both axes, uncompensated.
+        """Take trace and retrace with an uncompensated instrument: the same triangle on both axes.
 
         The slow one goes up in ``slow_turn`` of its period, in which the image is taken.
         """
@@ -132,12 +194,12 @@ class Laboratory:
         pixels: int | None = None,
         conditions: Conditions | None = None,
     ) -> FrameImages:
-        """Trace and retrace of a settled frame of a build."""
+        """Take trace and retrace of a settled frame of a build."""
         return running_frame(_plan(scan), self.scanner.x, self.scanner.y, sample, conditions, pixels)
 
     def _axis(self, axis: Axis) -> VirtualAxis:
-        found: VirtualAxis = getattr(self.scanner, axis)
-        return found
+        scanner_axis: VirtualAxis = getattr(self.scanner, axis)
+        return scanner_axis
 
     def _next(self) -> int:
         self._seed += 1

@@ -1,4 +1,4 @@
-"""Many builds at once: in processes of their own, as they complete, with errors as values."""
+"""Build many scans in worker processes: results as they complete, with errors as values."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Scans = Iterable["str | Path | Setup | Variant"]
 
 @dataclass(frozen=True, repr=False)
 class BuildOutcome:
-    """What became of one scan of many: a build, or the error that kept it from being one."""
+    """Outcome of one scan of many: a build, or the error that prevented it."""
 
     number: int
     """Its place in the sources, from 0."""
@@ -35,8 +35,8 @@ class BuildOutcome:
         return self.source.name if isinstance(self.source, Variant) else str(self.source)
 
     def __repr__(self) -> str:
-        told = repr(self.build).partition("\n")[0] + ">" if self.build is not None else f"{self.error}"
-        return f"<tablegen outcome {self.number}: {told}>"
+        state = repr(self.build).partition("\n")[0] + ">" if self.build is not None else f"{self.error}"
+        return f"<tablegen outcome {self.number}: {state}>"
 
 
 def variants(path: str | Path, settings: Mapping[str, Iterable[Any]] | None = None) -> list[Variant]:
@@ -74,18 +74,18 @@ def build_many(
     formats: Sequence[str] | None = None,
     jobs: int | None = None,
 ) -> Iterator[BuildOutcome]:
-    """Build many scans in parallel processes, and give each as it completes, its error in place of a build.
+    """Build many scans in parallel processes, and yield each as it completes, its error in place of a build.
 
     Parameters
     ----------
     sources : iterable of path, Setup or Variant
-        Taken as workers become free, and nothing is kept, so that memory does not grow with their number.
+        Read as workers become free, and not stored, so that memory does not grow with their number.
     out : str or Path, optional
         Directory; each is written into ``out/NAME``, as by ``build``.
     formats : sequence of str, optional
         Output formats; those of the scan files unless given.
     jobs : int, optional
-        Number of processes: nine tenths of the cores unless given; with 1 all of it runs in this process.
+        Number of processes: nine tenths of the cores unless given; with 1 all builds run in this process.
 
     Yields
     ------
@@ -103,19 +103,19 @@ def build_many(
     >>> sorted(one.name for one in tablegen.build_many(scans, jobs=1))
     ['annexin_200nm_size_nm_100', 'annexin_200nm_size_nm_150']
     """
-    given: dict[int, str | Path | Setup | Variant] = {}
+    pending: dict[int, str | Path | Setup | Variant] = {}
 
     def tasks() -> Iterator[tuple[Setup | Exception, str | None, Sequence[str] | None]]:
         for number, source in enumerate(sources):
-            given[number] = source
+            pending[number] = source
             yield _setup(source), None if out is None else str(out), formats
 
-    for number, found in results(_built, tasks(), default_jobs() if jobs is None else jobs):
-        source = given.pop(number)
-        if isinstance(found, Exception):
-            yield BuildOutcome(number, source, None, found)
+    for number, outcome in results(_built, tasks(), default_jobs() if jobs is None else jobs):
+        source = pending.pop(number)
+        if isinstance(outcome, Exception):
+            yield BuildOutcome(number, source, None, outcome)
         else:
-            yield BuildOutcome(number, source, found, None)
+            yield BuildOutcome(number, source, outcome, None)
 
 
 def _setup(source: "str | Path | Setup | Variant") -> Setup | Exception:
@@ -128,9 +128,9 @@ def _setup(source: "str | Path | Setup | Variant") -> Setup | Exception:
 
 
 def _built(setup: Setup | Exception, out: str | None, formats: Sequence[str] | None) -> Build:
-    """In a worker. What went wrong before comes back as it went."""
+    """Build in a worker; raise the error of the setup again."""
     if isinstance(setup, Exception):
         raise setup
     built = build(setup, None if out is None else Path(out) / setup.scan.name, formats=formats)
-    built.__dict__.pop("files", None)  # ten times what the rest is; it makes them again when it is asked
+    built.__dict__.pop("files", None)  # ten times the size of the rest; the build makes them again on demand
     return built

@@ -1,4 +1,4 @@
-"""Measurements as scripts have them: the path of a CSV file, or arrays by the names of its columns."""
+"""Read measurements that scripts give: the path of a CSV file, or arrays by the names of its columns."""
 
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
@@ -14,18 +14,21 @@ from tablegen.calibration.tables.table import MeasuredTable, read_table
 from tablegen.numerics.arrays import Floats
 
 Measured = str | Path | Mapping[str, ArrayLike]
-VALUES = "values"  # what messages and comments call arrays that are of no file
+VALUES = "values"  # name in messages and comments of arrays that are of no file
 
 
 def measured_list(data: Measured | Sequence[Measured]) -> list[Measured]:
-    """One table, or several, as a list."""
+    """Return one table, or several, as a list."""
     return list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
 
 
 def table_of(data: Measured, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
-    """The columns that are needed, and the optional ones that are there; of arrays in the first unit of each.
+    """Return the columns that are needed, and the optional ones that are there; of arrays in the first unit of each.
 
-    Raises ``Rejected`` with every fault.
+    Raises
+    ------
+    Rejected
+        If a column is missing, has another shape than (n,), or a value out of range.
     """
     if isinstance(data, str | Path):
         return read_table(Path(data), needed, optional)

@@ -1,4 +1,4 @@
-"""Image files of instruments: what they contain, and an image of them with its retrace."""
+"""Read image files of instruments: their channels, and an image with its retrace."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -61,9 +61,9 @@ def read_image(
     Parameters
     ----------
     path : str or Path
-        Image file; ``channels`` lists what it has.
+        Image file; ``channels`` lists its channels.
     channel : str or int, optional
-        Title or number of the channel; a title without the direction, such as "Height", finds both directions.
+        Title or number of the channel; a title without the direction, such as "Height", has both directions.
     retrace, retrace_channel : optional
         File and channel of the retrace, where they are not those that belong to the trace.
     frame : int, optional
@@ -97,19 +97,19 @@ def _name(channel: str | int | None) -> str | None:
 
 
 def _has_both(path: Path, channel: str | None) -> bool:
-    found = channels_of(path)
+    all_channels = channels_of(path)
     try:
-        chosen = choose(found, channel, "trace")
+        trace = choose(all_channels, channel, "trace")
     except ValueError:
-        return False  # the reader says what is wrong
-    return chosen.direction != "retrace" and partner(found, chosen) is not None
+        return False  # the reader reports the fault
+    return trace.direction != "retrace" and partner(all_channels, trace) is not None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Image(Result):
     """An image of heights as its file has it, and its ``retrace``, which is None where there is none.
 
-    Row 0 is the first in time as far as the file tells, and the left end of the line is at the left.
+    Row 0 is the first in time as far as the file states it, and the left end of the line is at the left.
     """
 
     scan: ScanImage
@@ -117,7 +117,13 @@ class Image(Result):
 
     @property
     def heights(self) -> Floats:
-        """Heights in ``unit``, (rows, columns)."""
+        """Heights in ``unit``, (rows, columns).
+
+        Returns
+        -------
+        Floats
+            Shape (rows, columns), row 0 the first in time as far as the file states it.
+        """
         return self.scan.heights
 
     @property
@@ -147,7 +153,7 @@ class Image(Result):
 
     @property
     def record(self) -> dict[str, Any]:
-        """What the file says of the image, without its heights."""
+        """The data of the file about the image, without its heights."""
         one, rows, columns = self.scan, *self.heights.shape
         return {
             "file": one.file,
@@ -165,7 +171,7 @@ class Image(Result):
         }
 
     def summary(self) -> str:
-        """Return what the file says of the image and of its retrace, a line each."""
+        """Return a line on the image, and one on its retrace."""
         both = [self] if self.retrace is None else [self, self.retrace]
         return "\n".join(f"{one.scan.file}: {one._title()}, {one._range()}" for one in both)
 
@@ -185,6 +191,7 @@ class Image(Result):
         return f"image of {self.scan.file}: {self._title()}", self._range(), back
 
     def charts(self) -> PlottedCharts:
+        """Return a chart of the heights, and one of the retrace's."""
         from tablegen.correction.straight import ScanPicture
         from tablegen.html_report.corrected import height_chart
 
@@ -240,6 +247,7 @@ class Channels(Result, Sequence[Channel]):
         return f"channels of {self.path}: {len(self)}", titles + more, f"pixels {', '.join(sizes[:4])}"
 
     def charts(self) -> PlottedCharts:
+        """Return a chart of each channel."""
         from tablegen.images.files import read_channels
 
         first = 0 if any(one.frames > 1 for one in self) else None
@@ -247,14 +255,14 @@ class Channels(Result, Sequence[Channel]):
         return PlottedCharts(str(self.path), tuple(charts), 3)
 
     def _repr_html_(self) -> str:
-        """The table alone: the channels of a file may be many, and their heights are not read for a list."""
+        """Return the table alone: the channels of a file may be many, and their heights are not read for a list."""
         from html import escape
 
         return f"<pre>{escape(str(self.path))}\n{escape(self.summary())}</pre>"
 
 
 def _record(channel: Channel) -> dict[str, Any]:
-    """A channel as data."""
+    """Return a channel as data."""
     return {
         "number": channel.number,
         "title": channel.title,
@@ -272,7 +280,7 @@ def _record(channel: Channel) -> dict[str, Any]:
 
 
 def _row(channel: Channel) -> tuple[str, ...]:
-    """A channel as a line of the table: columns x rows, and width x height."""
+    """Return the cells of a channel: columns x rows, and width x height."""
     sides = [f"{side:.6g}" if side else "?" for side in (channel.width_nm, channel.height_nm)]
     return (
         str(channel.number),

@@ -1,4 +1,4 @@
-"""A trace or images of the running scan to a layer over the model, and into the scan file: a round of learning."""
+"""Refine a scan: a trace or images of the running scan to a layer over the model, a round of learning."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ def refine(
     mismatch: bool = False,
     **how: Any,
 ) -> "RefinedScan":
-    """Learn what the model of the scanner leaves, from a trace or from images of the running scan.
+    """Correct the remaining error of the scanner's model, from a trace or from images of the running scan.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def refine(
     Returns
     -------
     RefinedScan
-        ``setup`` has what was learnt; ``write`` puts it into the scan file.
+        ``setup`` has the new layer; ``write`` puts it into the scan file.
 
     Raises
     ------
@@ -88,8 +88,8 @@ def refine(
     text = "" if path is None else read_text(path, CONFIGURATION)
     options = Options(**{name: how[name] for name in (*_LEARNING, *_OF_TRACES) if name in how})
     if trace is None:
-        found, sources = _of_images(setup, axis, images, options, mismatch, how)
-        return RefinedScan(found, sources, path, text)
+        result, sources = _of_images(setup, axis, images, options, mismatch, how)
+        return RefinedScan(result, sources, path, text)
     if axis == "y" and setup.scan.y.off:
         raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
     table = table_of(trace, [TIME, DISPLACEMENT], [DRIVE])
@@ -97,8 +97,8 @@ def refine(
         why = "missing; or give --triggered if time 0 is a line start"
         raise Rejected([Problem(table.file, max(int(table.lines[0]) - 1, 0), DRIVE.name, why)])
     drive = None if triggered else table[DRIVE]
-    found = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
-    return RefinedScan(found, (table.source,), path, text)
+    result = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
+    return RefinedScan(result, (table.source,), path, text)
 
 
 _LEARNING = ("gain", "harmonics")
@@ -117,28 +117,28 @@ def _of_images(
 ) -> tuple[Round, tuple[Source, ...]]:
     if setup.scan.y.off:
         raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, which takes no images")])
-    known = any(how.get(name) is not None for name in _CONSTANTS)
-    if mismatch and known:
+    has_constant = any(how.get(name) is not None for name in _CONSTANTS)
+    if mismatch and has_constant:
         raise TypeError("mismatch is for a sample without a period; it has no constant")
     pairs = [read_trace_and_retrace(pair[0], pair[1] if pair[1:] else None, how) for pair in images]
     heights = [(one.heights, other.heights) for one, other in pairs]
     stored = ImageOptions(bool(how.get("retrace_mirrored", False)), float(how.get("delay_pixels", 0.0)))
     sources = tuple(image.source for pair in pairs for image in pair)
-    found: Round
+    result: Round
     if mismatch:
-        found = refine_mismatch(setup, axis, heights, options, stored)
+        result = refine_mismatch(setup, axis, heights, options, stored)
     else:
-        found = refine_images(setup, axis, heights, options, stored, sample_of(how) if known else None)
+        result = refine_images(setup, axis, heights, options, stored, sample_of(how) if has_constant else None)
     remarks = running_scan_remarks(image for pair in pairs for image in pair)
-    return replace(found, remarks=(*remarks, *found.remarks)), sources
+    return replace(result, remarks=(*remarks, *result.remarks)), sources
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RefinedScan(Result):
-    """A round: ``setup`` is the scan with the new layer, ``refused`` why it must not be used, if so.
+    """A round: ``setup`` is the scan with the new layer, ``refused`` the reason if it must not be used.
 
-    ``round`` has residuals and remarks; ``scan`` and ``text`` are the scan file that was learnt for, and what it said.
-    ``stopped`` is why learning ends here, if so: the scaling error rose, and the layer of the best round is kept.
+    ``round`` has residuals and remarks; ``scan`` and ``text`` are the scan file and its text before the round.
+    ``stopped`` is the reason if learning ends here: the scaling error rose, and the layer of the best round is used.
     """
 
     round: Round
@@ -148,13 +148,13 @@ class RefinedScan(Result):
 
     @property
     def setup(self) -> Setup:
-        """The scan with what was learnt, or the best layer: ``tablegen.build(refined.setup)`` needs no file."""
-        found = self.round
-        return found.setup if found.best is None else with_refinement(found.setup, found.line.axis, found.best)
+        """The scan with the new layer, or the best one: ``tablegen.build(refined.setup)`` needs no file."""
+        result = self.round
+        return result.setup if result.best is None else with_refinement(result.setup, result.line.axis, result.best)
 
     @property
     def stopped(self) -> str:
-        """Why no further layer is to be played, empty where one is."""
+        """The reason why no further layer is to be played, empty where one is."""
         return self.round.stopped
 
     @property
@@ -164,12 +164,12 @@ class RefinedScan(Result):
 
     @property
     def after_percent(self) -> float:
-        """The one that is predicted for the next trace."""
+        """The residual that is predicted for the next trace, rms, in percent of the line."""
         return self.round.update.after.rms_percent
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know of the trace, in sentences."""
+        """Remarks on the trace or the images, in sentences."""
         return self.round.remarks
 
     @property
@@ -180,7 +180,7 @@ class RefinedScan(Result):
 
     @property
     def refused(self) -> str:
-        """Why the round must not be used: an error grew, or the file was learnt from before. Empty where it may."""
+        """The reason why the round must not be used: an error grew, or the measurement was used before; or empty."""
         if self.round.worse:
             return self.round.worse
         if self.round.stopped and self.round.best is None:
@@ -188,28 +188,40 @@ class RefinedScan(Result):
         if not any(source.sha256 in row for row in self.earlier for source in self.sources):
             return ""
         what = "this trace" if len(self.sources) == 1 else "these images"
-        return f"[{self.round.line.axis}.refinement] was already learnt from {what}; build, upload and record again"
+        return f"[{self.round.line.axis}.refinement] was already refined by {what}; build, upload and record again"
 
     def content(self, force: bool = False) -> bytes:
-        """The scan file with the new layer; empty where nothing was learnt. Raises ``Rejected``.
+        """Return the scan file with the new layer; empty if the round changes nothing.
 
         Where the round stopped it is the file with the best layer, unless by ``force``.
+
+        Raises
+        ------
+        Rejected
+            If the file cannot be edited.
+        ValueError
+            If the scan was given as a setup, without a file.
         """
         if self.scan is None:
             raise ValueError("the scan was given as a setup; give the path of its file to write into it")
-        found = self.round
-        best = None if force else found.best
-        if best is None and (found.refinement is None or not found.update.harmonics):
+        result = self.round
+        best = None if force else result.best
+        if best is None and (result.refinement is None or not result.update.harmonics):
             return b""
-        plain = msgspec.json.decode(msgspec.json.encode(best or found.refinement))
+        plain = msgspec.json.decode(msgspec.json.encode(best or result.refinement))
         values = {key: value for key, value in plain.items() if value is not None}  # as a file has it
-        comment = provenance(found, self.sources, stopped=best is not None)
-        return with_layer(self.text, str(self.scan), found.line.axis, values, comment).encode("utf-8")
+        comment = provenance(result, self.sources, stopped=best is not None)
+        return with_layer(self.text, str(self.scan), result.line.axis, values, comment).encode("utf-8")
 
     def write(self, force: bool = False) -> list[str]:
-        """Put the layer into the scan file, as ``tablegen refine --write`` does; the names that changed.
+        """Put the layer into the scan file, as ``tablegen refine --write`` does, and return the names that changed.
 
-        Raises ``Rejected`` for a round that is refused, unless by ``force``, and ``CannotWrite``.
+        Raises
+        ------
+        Rejected
+            If the round is refused, unless by ``force``, or the file cannot be edited.
+        CannotWrite
+            If the file cannot be written.
         """
         if self.refused and not force:
             raise Rejected([Problem(str(self.scan or ""), 0, self.round.line.axis, self.refused)])
@@ -227,7 +239,7 @@ class RefinedScan(Result):
         return self.round.setup.scan.name
 
     def findings(self) -> list[Finding]:
-        """Return what to know before the round is used, the worst first."""
+        """Return warnings to read before the round is used, the worst first."""
         return worst_first(of_remarks(self.round.remarks))
 
     def table(self) -> list[str]:
@@ -235,11 +247,11 @@ class RefinedScan(Result):
         return refine_text(self.round, self._name, list(self.sources))
 
     def summary(self) -> str:
-        """Return what ``tablegen refine`` prints: errors before and after, and what is odd."""
+        """Return what ``tablegen refine`` prints: errors before and after, and warnings."""
         return "\n".join([*self.table(), *(finding.line for finding in self.findings())])
 
     def charts(self) -> PlottedCharts:
-        """Give the charts that ``tablegen refine --plot`` draws."""
+        """Return the charts that ``tablegen refine --plot`` draws."""
         from tablegen.html_report.round_page import round_charts
 
         return round_charts(self.round, self._name)

@@ -30,14 +30,14 @@ def report(
     source : str or Path
         Scan file, or directory of a build; of a build the page has neither limits nor errors on the scanner.
     verified : str or Path, optional
-        What ``tablegen verify DIR --junit FILE`` wrote, to show it too.
+        File that ``tablegen verify DIR --junit FILE`` wrote, to show it too.
     progress : callable
-        Called with what is being done.
+        Called with a text for each stage.
 
     Returns
     -------
     ReportPage
-        ``content`` is the page, ``findings`` what spoils the image first, ``broken`` the limits that are exceeded.
+        ``content`` is the page, ``findings`` the warnings, the worst first, ``broken`` the limits that are exceeded.
 
     Raises
     ------
@@ -68,15 +68,15 @@ class ReportPage(Result):
     """The page of a scan or of a build: ``content`` in HTML, and every chart by its name in ``figures``."""
 
     def __init__(self, subject: Subject, progress: Callable[[str], object] = lambda _: None) -> None:
-        found = sections(subject, progress)
+        parts = sections(subject, progress)
         self.subject = subject
-        self.content = page(subject, found)
+        self.content = page(subject, parts)
         """The page: one file that needs no network and no other file."""
-        self.figures: dict[str, Chart] = charts_of(found)
+        self.figures: dict[str, Chart] = charts_of(parts)
 
     @property
     def findings(self) -> list[Finding]:
-        """What to know before the image is trusted, the worst first."""
+        """Warnings to read before the image is trusted, the worst first."""
         return ranked(self.subject)
 
     @property
@@ -101,11 +101,19 @@ class ReportPage(Result):
         return "\n".join(one.line for one in self.findings) or "no findings"
 
     def charts(self) -> PlottedCharts:
-        """Give all charts of the page."""
+        """Return all charts of the page."""
         return PlottedCharts(self.subject.manifest.name, tuple(self.figures.values()))
 
     def write(self, path: str | Path) -> list[str]:
-        """Write the page, and return the name if the file changed. Raises ``CannotWrite``, ``Rejected`` for a .toml."""
+        """Write the page, and return the name if the file changed.
+
+        Raises
+        ------
+        Rejected
+            If the name ends in .toml, as that of a scan or scanner file.
+        CannotWrite
+            If the file cannot be written.
+        """
         path = Path(path)
         if path.suffix == ".toml":
             why = "the page would replace a scan or a scanner file; give a name in .html"

@@ -1,4 +1,4 @@
-"""What the functions give: three lines in a shell, charts in a notebook, text, a picture and JSON."""
+"""Results of the functions: three lines in a shell, charts in a notebook, text, a picture and JSON."""
 
 import json
 from abc import ABC, abstractmethod
@@ -23,7 +23,12 @@ class Picture:
     def write(self, path: str | Path) -> list[str]:
         """Write .svg, .png or .pdf, and return the name if the file changed; .png and .pdf need the extra ``plot``.
 
-        Raises ``Rejected`` for another ending, ``CannotWrite`` where the directory cannot be written.
+        Raises
+        ------
+        Rejected
+            If the name has another ending.
+        CannotWrite
+            If the directory cannot be written.
         """
         from tablegen.charts.picture_file import KINDS, picture
 
@@ -48,7 +53,7 @@ class Picture:
 
 
 class Result(ABC):
-    """What every function gives: ``summary()``, ``plot()`` and ``to_json()``; a notebook shows text and charts."""
+    """Result of a function: ``summary()``, ``plot()`` and ``to_json()``; a notebook shows text and charts."""
 
     @property
     @abstractmethod
@@ -61,21 +66,26 @@ class Result(ABC):
 
     @abstractmethod
     def _lines(self) -> Sequence[str]:
-        """Give what ``repr`` shows: at most three lines, the first of them the title."""
+        """Return the lines of ``repr``: at most three, the first of them the title."""
 
     @abstractmethod
     def charts(self) -> "PlottedCharts":
-        """Give the charts that ``--plot`` of the command draws."""
+        """Return the charts that ``--plot`` of the command draws."""
 
     def plot(self, path: str | Path | None = None) -> Picture:
         """Draw the charts of ``--plot``; a notebook shows them, and with ``path`` they are written: .svg, .png, .pdf.
 
-        Raises ``Rejected`` for another ending, ``CannotWrite`` where the file cannot be written.
+        Raises
+        ------
+        Rejected
+            If the name has another ending.
+        CannotWrite
+            If the file cannot be written.
         """
-        drawn = Picture(self.charts())
+        image = Picture(self.charts())
         if path is not None:
-            drawn.write(path)
-        return drawn
+            image.write(path)
+        return image
 
     def to_json(self) -> str:
         """Return the result as JSON, as ``--json`` of the command prints it."""

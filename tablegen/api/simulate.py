@@ -1,4 +1,4 @@
-"""A scan on a virtual scanner: the errors that remain, with each model of hysteresis."""
+"""Simulate a scan on a virtual scanner: the errors that remain, with each model of hysteresis."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -39,17 +39,17 @@ def simulate(
     Parameters
     ----------
     scan : path or Setup
-        Scan file, or what ``load`` gave.
+        Scan file, or a result of ``load``.
     truth : {"own", "default", "duhem"} or path, optional
-        Scanner to play on; "own" is the operator of the scanner file, and is taken if the file has one.
+        Scanner to play on; "own" is the operator of the scanner file, and the default if the file has one.
     calibrated : bool
-        True to play also what is calibrated on simulated measurements; not for "own".
+        True to play also with a calibration on simulated measurements; not for "own".
     noise_percent : float
         Noise of these measurements, rms, in percent.
     seed : int
-        Random seed of the noise, and of what "own" is wrong by.
+        Random seed of the noise, and of the errors of "own".
     progress : callable
-        Called with what is being done.
+        Called with a text for each stage.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def _calibrated(
 def _played(
     name: str, heading: str, setup: Setup, scanner: VirtualScanner, truth: str, progress: Callable[[str], object]
 ) -> SimulationStage:
-    """Every model that can be played, and why the others cannot."""
+    """Play every model that can be played, and collect the reasons of the others."""
     runs: list[Run] = []
     rejected: list[tuple[str, tuple[str, ...]]] = []
     for model in models_of(setup):
@@ -162,7 +162,7 @@ class SimulatedScan(Result):
         return "\n".join(report.text(self.name, self.truth, self.stages))
 
     def charts(self) -> PlottedCharts:
-        """Give residual and scaling error of each run."""
+        """Return residual and scaling error of each run."""
         from tablegen.html_report.simulated import own_charts, stage_charts
 
         return own_charts(self.name, self.own_runs) if self.truth is None else stage_charts(self.name, self.stages)

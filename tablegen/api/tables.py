@@ -1,4 +1,4 @@
-"""The tables that would do for a scan, and the smallest of them."""
+"""List the feasible tables of a scan, and the smallest of them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ def tables(
     *,
     progress: Callable[[str], object] = lambda _: None,
 ) -> "FeasibleTables":
-    """List the tables that would do for a scan: memory, error of a code, and what each takes of a device.
+    """List the feasible tables of a scan: memory, error of a code, and the resources that each takes of a device.
 
     Parameters
     ----------
     scan : path or Setup
-        Scan file, or what ``load`` gave.
+        Scan file, or a result of ``load``.
     axis : {"x", "y"}, optional
         One axis; every axis that moves unless given.
     progress : callable
-        Called with what is being done.
+        Called with a text for each stage.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def tables(
     Rejected
         The scan is wrong, or no table keeps the error.
     ValueError
-        The axis rests in this scan.
+        The axis is static in this scan.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def tables(
     plan = make_plan(setup)
     lines = [line for line in plan.moving if axis in (None, line.axis)]
     if not lines:
-        raise ValueError(f"{axis} rests in this scan: it has no table to choose.")
+        raise ValueError(f"{axis} is static in this scan: it has no table to choose.")
     problems, axes = Problems(), []
     for line in lines:
         progress(f"measuring tables of {line.axis}")
@@ -86,7 +86,7 @@ class FeasibleTables(Result):
         return "\n\n".join("\n".join(lines) for lines in self.texts())
 
     def charts(self) -> PlottedCharts:
-        """Give a chart an axis: memory and error."""
+        """Return a chart for each axis: memory and error."""
         from tablegen.html_report.table_charts import table_charts
 
         return table_charts(self.name, self.axes)

@@ -22,13 +22,13 @@ def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
 
 @contextmanager
 def blas_limited() -> Iterator[None]:
-    """Limit BLAS to one thread. Without threadpoolctl, of the extra ``calibrate``, nothing is limited."""
+    """Limit BLAS to one thread; without threadpoolctl, of the extra ``calibrate``, nothing is limited."""
     try:
         from threadpoolctl import threadpool_limits
     except ImportError:
         yield
         return
     with suppress(ImportError):
-        import scipy.linalg  # noqa: F401 -- it brings a BLAS of its own, which has to be there to be limited
+        import scipy.linalg  # noqa: F401 -- its own BLAS has to be loaded to be limited
     with threadpool_limits(limits=1, user_api="blas"):
         yield

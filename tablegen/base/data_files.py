@@ -37,7 +37,13 @@ def file_content(path: Path, name: str, kind: Kind = MEASUREMENT) -> bytes:
 
 
 def require_file(path: Path, name: str) -> None:
-    """Raise ``Rejected`` unless a regular file stands at this path."""
+    """Check that a regular file stands at this path.
+
+    Raises
+    ------
+    Rejected
+        If there is none; the message has ``name``.
+    """
     if not os.path.isfile(path):
         raise Rejected([Problem(name, 0, "", "is not a file")])
 

@@ -20,6 +20,6 @@ def _rounded(value: float, digits: int, rounding: str) -> str:
 
 def shown_path(path: Path) -> str:
     """Return a path on one line, shortened if it is very long."""
-    shown = str(path)
-    shown = shown if shown.isprintable() else ascii(shown)
-    return shown if len(shown) <= 200 else f"{shown[:100]}...{shown[-97:]}"
+    text = str(path)
+    text = text if text.isprintable() else ascii(text)
+    return text if len(text) <= 200 else f"{text[:100]}...{text[-97:]}"

@@ -50,7 +50,7 @@ class CachedFiles:
                 path = Path(part.name)
             try:
                 shutil.copy(source, path)
-                path.chmod(stat.S_IMODE(path.stat().st_mode) & ~_BY_OTHERS)  # a compiler leaves it to the umask
+                path.chmod(stat.S_IMODE(path.stat().st_mode) & ~_BY_OTHERS)  # a compiler leaves the mode to the umask
                 path.rename(folder / _name(key, path))
             finally:
                 path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Input errors: what is wrong, at which file, line and key, all reported in one run."""
+"""Input errors: each fault with its file, line and key, all reported in one run."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -23,7 +23,7 @@ def _cut(text: str, most: int) -> str:
 
 
 class Unphysical(ValueError):
-    """A quantity that the physics or the arithmetic cannot serve; the message says by how much and what would fit."""
+    """A quantity that is physically or numerically impossible; the message says by how much, and what would fit."""
 
 
 class Problem(NamedTuple):
@@ -110,11 +110,23 @@ class Problems:
         self.entries: list[Problem] = []
 
     def add(self, document: Document, key: str, why: str) -> None:
-        """Add a problem of a key, and go on."""
+        """Add a problem of a key, and go on.
+
+        Raises
+        ------
+        Rejected
+            If there are more than ``MOST_PROBLEMS``.
+        """
         self.note(document.problem(key, why))
 
     def note(self, problem: Problem) -> None:
-        """Add a problem that was made elsewhere."""
+        """Add a problem that was made elsewhere.
+
+        Raises
+        ------
+        Rejected
+            If there are more than ``MOST_PROBLEMS``.
+        """
         self.entries.append(problem)
         if len(self.entries) > MOST_PROBLEMS:
             raise Rejected(self.entries)
@@ -128,6 +140,12 @@ class Problems:
             self.add(document, key, str(reason))
 
     def stop_if_any(self) -> None:
-        """Raise ``Rejected`` if there are problems."""
+        """End the collection.
+
+        Raises
+        ------
+        Rejected
+            If there are problems.
+        """
         if self.entries:
             raise Rejected(self.entries)

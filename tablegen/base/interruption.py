@@ -16,12 +16,24 @@ def endings_interrupt() -> Iterator[None]:
     """Make all of ``ENDINGS`` raise ``KeyboardInterrupt`` inside, so that open work is put in order first.
 
     A signal that is ignored stays ignored, as with ``nohup``, and one that has a handler keeps it.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        In the block, when one of the signals arrives.
     """
     before: list[signal.Signals] = []
     if threading.current_thread() is threading.main_thread():
         before = [number for number in ENDINGS if signal.getsignal(number) is signal.SIG_DFL]
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
+        """Handle the signal.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            Always.
+        """
         raise KeyboardInterrupt
 
     for number in before:
@@ -45,12 +57,12 @@ def defer_signals(*numbers: signal.Signals) -> Iterator[list[int]]:
     if threading.current_thread() is threading.main_thread():
         before = {number: signal.getsignal(number) for number in numbers if callable(signal.getsignal(number))}
 
-    def hold(number: int, _frame: FrameType | None) -> None:
+    def record(number: int, _frame: FrameType | None) -> None:
         received.append(number)
         signal.signal(number, before[signal.Signals(number)])
 
     for number in before:
-        signal.signal(number, hold)
+        signal.signal(number, record)
     try:
         yield received
     finally:

@@ -1,4 +1,4 @@
-"""Formats and models of other distributions: whatever fails in one ends in a message with the distribution's name."""
+"""Guard formats and models of other distributions: a failure in one ends in a message with the distribution's name."""
 
 import sys
 from collections.abc import Iterator
@@ -35,7 +35,14 @@ def guarded(name: str, of: str, what: str, *passed: type[BaseException]) -> Iter
     """Turn whatever the plug-in ``name`` of the distribution ``of`` raises inside into ``PluginFailed``.
 
     Exceptions of the types ``passed`` go through; ``what`` names the failure, as in "cannot be loaded". ``SystemExit``
-    would end the command with the plug-in's status; an interruption stays one, and names its place.
+    would end the command with the plug-in's status.
+
+    Raises
+    ------
+    PluginFailed
+        If the block raises; the message has plug-in, distribution and cause.
+    KeyboardInterrupt
+        If it was interrupted; the message names the plug-in.
     """
     try:
         yield

@@ -89,7 +89,13 @@ def read_text(path: str | os.PathLike[str], kind: Kind, encoding: str = "utf-8",
 
 
 def file_sha256(path: str | os.PathLike[str], kind: Kind = BUILD_FILE) -> str:
-    """Return the digest of a file, in hexadecimal digits, read in parts."""
+    """Return the digest of a file, in hexadecimal digits, read in parts.
+
+    Raises
+    ------
+    OSError
+        As ``read_bytes``.
+    """
     digest = sha256()
     for chunk in chunks_of(path, kind):
         digest.update(chunk)
@@ -110,7 +116,13 @@ def size_shown(count: int) -> str:
 
 
 def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -> Iterator[bytes]:
-    """Yield the bytes of a file in parts; what ``read_bytes`` refuses is refused before the first part."""
+    """Yield the bytes of a file in parts; what ``read_bytes`` refuses is refused before the first part.
+
+    Raises
+    ------
+    OSError
+        As ``read_bytes``; with ``private`` also if others own or can write the file.
+    """
     count = 0
     with _opened(path) as (handle, status):
         if private and not is_private(status):

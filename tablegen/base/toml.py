@@ -14,8 +14,8 @@ from tablegen.base.reading import CONFIGURATION, read_text
 
 _BARE_KEY = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
 _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", '"': '"', "\\": "\\"}
-# Of a dotted key, whose parts take the parser memory by their square; the deepest of the schema has 7. And of all keys
-# of three parts or more, since each part takes the parser a kilobyte.
+# Parts of one dotted key, whose memory in the parser grows with their square; the deepest of the schema has 7. Parts
+# of all keys of three parts or more, since each part takes the parser a kilobyte.
 _MAXIMUM_PARTS, _MAXIMUM_PARTS_OF_ALL = 20, 50_000
 _MAXIMUM_DIGITS = 4300  # digits of a decimal number that Python converts
 
@@ -64,8 +64,8 @@ def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
 
 
 _PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-# Comments and texts are passed over; whatever else has dots between its parts may be a key. A text that is not closed
-# is passed over too, so that none is looked at twice.
+# Comments and texts are skipped; whatever else has dots between its parts may be a key. A text that is not closed
+# is skipped too, so that none is scanned twice.
 _KEYS = (
     r"""(?s)#[^\n]*+|"{3}(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']|'(?!''))*+(?:'{3,5})?"""
     rf"""|(?P<key>{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{2,}}+)"""
@@ -116,10 +116,10 @@ def _long_number(text: str) -> tuple[int, int]:
 
 def join_key(prefix: str, key: str) -> str:
     """Return ``x.table`` for ``x`` and ``table``; a key that is not bare is quoted."""
-    shown = key
+    part = key
     if not key or not _BARE_KEY.issuperset(key):
-        shown = '"' + key.encode("unicode_escape").decode().replace('"', '\\"') + '"'
-    return f"{prefix}.{shown}" if prefix else shown
+        part = '"' + key.encode("unicode_escape").decode().replace('"', '\\"') + '"'
+    return f"{prefix}.{part}" if prefix else part
 
 
 class _LongNumber(Exception):
@@ -136,7 +136,7 @@ class _KeyLines:
         self._at = 0
         self._line = 1
         self._lines: dict[str, int] = {}
-        self._elements: dict[str, int] = {}  # elements seen so far of each array of tables
+        self._elements: dict[str, int] = {}  # number of elements so far, of each array of tables
 
     def locate(self) -> dict[str, int]:
         table = ""

@@ -76,7 +76,7 @@ class _Pool:
     def __init__(self, function: Callable[..., Any], jobs: int) -> None:
         self._function, self._jobs = function, jobs
         self._tasks: queue.SimpleQueue[tuple[int, tuple[Any, ...]] | None] = queue.SimpleQueue()
-        self._done: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
+        self._results: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
         self._threads: list[threading.Thread] = []
         self._lock = threading.Lock()  # of what follows
         self._running: set[subprocess.Popen[bytes]] = set()
@@ -91,7 +91,7 @@ class _Pool:
 
     def take(self) -> tuple[int, Any]:
         """Return the next result, and wait for it."""
-        return self._done.get()
+        return self._results.get()
 
     def end(self) -> None:
         """End all workers, and wait for them: one that writes ends when its files are in place."""
@@ -114,15 +114,15 @@ class _Pool:
                 worker = worker or self._started()
                 result = _exchanged(worker, message)
             except (EOFError, OSError) as error:
-                status = self._gone(worker) if worker is not None else None
+                status = self._close(worker) if worker is not None else None
                 worker = None
                 why = f"the process of this task ended with status {status}" if status is not None else str(error)
                 result = WorkerDied(why)
             except Exception as error:  # what cannot be pickled
                 result = error
-            self._done.put((number, result))
+            self._results.put((number, result))
         if worker is not None:
-            self._gone(worker)
+            self._close(worker)
 
     def _started(self) -> "subprocess.Popen[bytes]":
         environment = {"OPENBLAS_NUM_THREADS": "1", **os.environ}
@@ -135,7 +135,7 @@ class _Pool:
             self._running.add(worker)
         return worker
 
-    def _gone(self, worker: "subprocess.Popen[bytes]") -> int:
+    def _close(self, worker: "subprocess.Popen[bytes]") -> int:
         """Close the pipes of a worker, which ends it, and wait; return its status."""
         assert worker.stdin is not None
         assert worker.stdout is not None

@@ -1,7 +1,7 @@
-"""Why a fit must not become a scanner's calibration: parameters that say nothing, and laws that miss what they fit.
+"""Checks that keep a meaningless fit out of a scanner file: insignificant parameters, and laws that miss the data.
 
-A remark says what to look at; a doubt says that the correction would be noise, or worse than none. The limits are
-those of the table in docs/calibration.md.
+A remark is advice; a doubt means that the correction would be noise, or worse than none. The limits are those of the
+table in docs/calibration.md.
 """
 
 from collections.abc import Iterator
@@ -16,20 +16,25 @@ from tablegen.calibration.laws.size import SizeFit
 from tablegen.fitting.estimate import Estimate, Fit
 from tablegen.fitting.growth import Growth
 
-_ERRORS = 2.0  # standard errors that cover the truth
-_LOOSE = 0.2  # a size or a frequency that may be off by a fifth is not calibrated
+_ERRORS = 2.0  # standard errors of a 95 % interval
+_LOOSE = 0.2  # relative error: a size or a frequency that may be wrong by a fifth is not calibrated
 _LOOSE_BETA = 0.1  # of (6): a tenth of the size at full scale
 _LOOSE_ALPHA = 0.01  # of (23), a decade
-_LOOSE_PEAK = 0.5  # of the sweep: the peak may be anywhere
+_LOOSE_PEAK = 0.5  # of the sweep: half of it leaves the peak anywhere
 _LOOSE_DELAY = 0.1  # periods of the resonance
 _SMALL_OFFSET = 0.01  # of the size
-_LAW_ERRORS, _LAW_SHARE = 10.0, 0.25  # a law that misses by so many errors, and by so much of what it describes
+_LAW_ERRORS, _LAW_SHARE = 10.0, 0.25  # misfit of a law, in standard errors and as a share of the effect
 
 
 def doubts(fit: Fit, points: bool = False) -> tuple[str, ...]:
-    """List what makes a fit meaningless, with what to do; empty for a fit that can be written.
+    """List the reasons why a fit is meaningless, with what to do; empty for a fit that can be written.
 
     With ``points`` measured values are written in place of a law, so that a law that misses them does not count.
+
+    Raises
+    ------
+    NotImplementedError
+        If the fit is of no known kind.
     """
     match fit:
         case HysteresisFit():
@@ -63,8 +68,8 @@ def _hysteresis(fit: HysteresisFit, points: bool) -> Iterator[str]:
                 )
             if _within(growth.u_peak, _LOOSE_PEAK):
                 yield f"{name}: u_peak = {_text(growth.u_peak)} may be anywhere; average more periods"
-            missed = growth.off_errors > _LAW_ERRORS and growth.off_share > _LAW_SHARE
-            if missed and not points:
+            misses = growth.off_errors > _LAW_ERRORS and growth.off_share > _LAW_SHARE
+            if misses and not points:
                 yield (
                     f"{name}: (22) misses the measured residuals by {growth.off_errors:.3g} standard errors, "
                     f"{100.0 * growth.off_share:.0f} % of the largest; look at the traces one by one, or take --points"
@@ -77,7 +82,8 @@ def _offset(fit: OffsetFit) -> Iterator[str]:
         if _within(m, _LOOSE):
             yield f"{name} = {_text(m)} may be off by a fifth or more; {_MORE_OFFSETS}"
     if all(_within(m, max(abs(m.value - 1.0), _SMALL_OFFSET)) for _, m in both):
-        yield f"m_minus = {_text(fit.m_minus)} and m_plus = {_text(fit.m_plus)} cannot be told from 1; {_MORE_OFFSETS}"
+        values = f"m_minus = {_text(fit.m_minus)} and m_plus = {_text(fit.m_plus)}"
+        yield f"{values} cannot be distinguished from 1; {_MORE_OFFSETS}"
 
 
 _MORE_OFFSETS = "measure at more offsets, or a larger object"
@@ -88,12 +94,13 @@ def _size(fit: SizeFit) -> Iterator[str]:
     if _within(fit.k_nm_per_v, _LOOSE * fit.k_nm_per_v.value):
         yield f"k_nm_per_v = {_text(fit.k_nm_per_v)} may be off by a fifth or more; {more}"
     if _within(fit.beta, max(abs(fit.beta.value), _LOOSE_BETA)):
-        yield f"beta = {_text(fit.beta)} cannot be told from 0, the linear scanner; {more}"
+        yield f"beta = {_text(fit.beta)} cannot be distinguished from 0, the linear scanner; {more}"
 
 
 def _frequency(fit: FrequencyFit) -> Iterator[str]:
     if _within(fit.alpha, max(fit.alpha.value, _LOOSE_ALPHA)):
-        yield f"alpha = {_text(fit.alpha)} cannot be told from 0, no loss; measure over more decades, and more often"
+        more = "measure over more decades, and more often"
+        yield f"alpha = {_text(fit.alpha)} cannot be distinguished from 0, no loss; {more}"
 
 
 def _resonance(fit: ResonanceFit) -> Iterator[str]:
@@ -107,7 +114,7 @@ def _resonance(fit: ResonanceFit) -> Iterator[str]:
 
 
 def _within(estimate: Estimate, size: float) -> bool:
-    """Whether two standard errors reach over a size; an error that is not known does not."""
+    """Return True if two standard errors exceed a size; an unknown error does not."""
     return isfinite(estimate.standard_error) and _ERRORS * estimate.standard_error >= size
 
 

@@ -1,4 +1,4 @@
-"""A calibration for the terminal: parameters with errors, what they leave, of each measurement."""
+"""A calibration for the terminal: parameters with errors, residuals, and a table of the measurements."""
 
 from collections.abc import Sequence
 from math import floor, isfinite, log10
@@ -13,11 +13,11 @@ from tablegen.images.files import ScanImage
 from tablegen.images.pair_fit import ImageFit
 
 _TRACE_HEAD = ("turn", "V_scan", "rate [Hz]", "periods", "noise [%]", "drift [%]")
-_IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "apart [%]")
+_IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "gap [%]")
 
 
 def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanImage]) -> list[str]:
-    """Lines of text; ``tables`` are what was fitted."""
+    """Return lines of text; ``tables`` are the measurements of the fit."""
     hysteresis = isinstance(fit, HysteresisFit)
     rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
@@ -34,7 +34,7 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanI
     metric = "position error [% of the scan]" if hysteresis else "scale error [%]"
     lines += [
         "",
-        f"{metric}: up to {fit.before_percent:.2f} without correction; left {fit.rms_percent:.2g} rms, "
+        f"{metric}: up to {fit.before_percent:.2f} without correction; with it {fit.rms_percent:.2g} rms, "
         f"{fit.largest_percent:.2g} at most",
         "",
     ]
@@ -46,7 +46,7 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanI
 
 
 def image_lines(fit: Fit) -> list[str]:
-    """What each image says: a table."""
+    """Format a table of the images, a row each."""
     offsets = fit.images[0].v_offset is not None
     head = (
         "V_scan",
@@ -58,45 +58,45 @@ def image_lines(fit: Fit) -> list[str]:
         "drift [%]",
         "open [%]",
     )
-    rows: list[tuple[str, ...]] = [(*head, "left [%]", "image")]
-    for one, left in zip(fit.images, fit.residual_percent, strict=True):
+    rows: list[tuple[str, ...]] = [(*head, "residual [%]", "image")]
+    for one, residual in zip(fit.images, fit.residual_percent, strict=True):
         at = (f"{one.v_offset:.4g}",) if one.v_offset is not None else ()
-        drift, apart = (
+        drift, gap = (
             f"{value:.2g}" if isfinite(value) else "-" for value in (100.0 * one.size.drift, one.open_percent)
         )
-        shown = f"{one.periods:.3g}", f"{one.size.angle_deg:.1f}", f"{one.noise_percent:.2g}", drift, apart
-        rows.append((f"{one.v_scan:.4g}", *at, " ".join(figures(one.size.nm)), *shown, f"{left:+.2f}", one.name))
+        quality = f"{one.periods:.3g}", f"{one.size.angle_deg:.1f}", f"{one.noise_percent:.2g}", drift, gap
+        rows.append((f"{one.v_scan:.4g}", *at, " ".join(figures(one.size.nm)), *quality, f"{residual:+.2f}", one.name))
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines.append("open: how far trace and retrace are apart at the turns, where they meet, of the line")
+    lines.append("open: distance of trace and retrace at the turns, where they should meet, of the line")
     return lines
 
 
 def _traces(fit: HysteresisFit) -> list[str]:
-    """What each trace says by itself, and how good it is."""
+    """Format a table of the traces, two rows each: their fits and their quality."""
     images = isinstance(fit.branches[0].traces[0], ImageFit)
     offsets = any(branch.offsets_v for branch in fit.branches)
     at = ("offset [V]",) if offsets else ()
-    head = (*at, *(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "left [% p-p]")
+    head = (*at, *(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "residual [% p-p]")
     rows: list[tuple[str, ...]] = [head]
     for branch in fit.branches:
         for trace in branch.traces:
             record = (f"{trace.v_offset or 0.0:.4g}",) * offsets + _record(trace)
-            for side, left in zip(("forward", "backward"), trace.scaling_percent, strict=True):
+            for side, residual in zip(("forward", "backward"), trace.scaling_percent, strict=True):
                 measured: MeasuredBranch = getattr(trace, side)
                 start = record if side == "forward" else ("",) * len(record)
                 branch_figures = (" ".join(figures(measured.beta)), " ".join(figures(measured.u_peak)))
-                rows.append((*start, side, *branch_figures, f"{left:.2g}"))
+                rows.append((*start, side, *branch_figures, f"{residual:.2g}"))
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines.append("left: scaling error that the model does not describe, over x = 0.1..0.9")
+    lines.append("residual: scaling error that the model does not describe, over x = 0.1..0.9")
     if images:
-        lines.append("apart: where trace and retrace show the same, as far apart as they come, of the line")
+        lines.append("gap: largest distance between trace and retrace of one feature, of the line")
     return lines
 
 
 def _record(trace: AmplitudeFit) -> tuple[str, ...]:
-    """What a row says of a trace or of a pair of images."""
+    """Return the cells of a trace or of a pair of images."""
     shape = f"{trace.turn.value:.3f}", f"{trace.v_scan:.4g}"
     quality = f"{trace.noise_percent:.2g}", f"{trace.drift_percent:.2g}"
     match trace:
@@ -108,7 +108,7 @@ def _record(trace: AmplitudeFit) -> tuple[str, ...]:
 
 
 def figures(estimate: Estimate) -> tuple[str, str]:
-    """Value and error, as far as two digits of the error; without an error six digits."""
+    """Return a value and its error, in two digits of the error; without an error in six digits."""
     value, error = estimate.value, estimate.standard_error
     if not isfinite(error):
         return f"{value:.6g}", ""

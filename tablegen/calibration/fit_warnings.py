@@ -1,4 +1,4 @@
-"""What to know of a fit before it is used, the worst first: what makes it meaningless, outliers, remarks."""
+"""Warnings of a fit, the worst first: reasons why it is meaningless, outliers, remarks."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,15 @@ from tablegen.fitting.estimate import Fit
 
 
 def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[Finding]:
-    """``places`` are files and lines of the outliers, ``points`` what would be written."""
+    """Return the warnings of a fit.
+
+    Parameters
+    ----------
+    places
+        File and line of each outlier.
+    points
+        True if measured values are written in place of a law.
+    """
     part = "image" if fit.images else "row"
     findings = [Finding("limit", 0.0, text, "\u2717 means nothing", "warning") for text in doubts(fit, points)]
     findings += [

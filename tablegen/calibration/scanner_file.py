@@ -1,4 +1,4 @@
-"""A calibration into a scanner file: values in place, comments and order kept, a comment on where they came from."""
+"""Write a calibration into a scanner file: values in place, comments and order preserved, a comment on their origin."""
 
 import re
 import tomllib
@@ -27,9 +27,9 @@ _FILE_MARK = re.compile(r"# (from .*, sha256 [0-9a-f]{16}|standard errors: .*)$"
 
 @dataclass(frozen=True)
 class Change:
-    """What one calibration writes into ``[AXIS.KIND]``.
+    """Changes that one calibration makes in ``[AXIS.KIND]``.
 
-    ``values`` replace keys or add them, ``removed`` keys go since they would contradict. ``branches`` are for
+    ``values`` replace keys or add them, ``removed`` keys are deleted since they would contradict. ``branches`` are for
     ``[[AXIS.hysteresis.branches]]``: an entry of the same turn is updated, another one added. ``provenance`` holds the
     lines of the comment above, for the table or for each of the branches: a summary, then "from FILE, sha256 DIGITS",
     then "standard errors: KEY VALUE +- ERROR, ...".
@@ -72,7 +72,7 @@ def updated(text: str, name: str, axis: str, change: Change) -> str:
     try:
         changed = _spaced(_with_provenance(tomlkit.dumps(document), name, axis, change), text)
         faithful = tomllib.loads(changed) == expected
-    except (Rejected, ValueError):  # what came out is no TOML
+    except (Rejected, ValueError):  # the result is no TOML
         changed, faithful = text, False
     if not faithful:
         why = "its layout is too unusual to be edited in place; write the values by hand, or one table below the other"
@@ -85,7 +85,12 @@ def with_own_hysteresis(text: str, name: str) -> str:
     """Return the text with a hysteresis table of y that names its model itself, where y has that of x by ``like``.
 
     An operator is that of the axis that was measured. So y keeps what it had before x gets one: the model and branches
-    that it shared, or no compensation where there was none. Raises ``Rejected``.
+    that it shared, or no compensation where there was none.
+
+    Raises
+    ------
+    Rejected
+        If the text is no TOML, or cannot be edited in place.
     """
     values, document = parse_toml(text, name)
     y = values.get("y")
@@ -116,7 +121,7 @@ def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, c
     if change.kind not in parent:
         parent[change.kind] = tomlkit.inline_table() if isinstance(parent, InlineTable) else tomlkit.table()
     table: Any = parent[change.kind]
-    if isinstance(table, Table) and table.is_super_table():  # its header appears now, with the comment of the next one
+    if isinstance(table, Table) and table.is_super_table():  # its header takes the next table's comment
         table.trivia.comment_ws = table.trivia.comment = ""
     for key in change.removed:
         table.pop(key, None)
@@ -144,7 +149,7 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
             if not isinstance(value, Mapping):
                 _set(entry, key, value)
                 continue
-            # The two ways of a branch exclude each other.
+            # A branch has either the keys of the law or measured points.
             old = {*LAW} if {*MEASURED} & {*value} else {*MEASURED}
             present = entry.get(key)
             if not isinstance(present, Mapping) or (isinstance(present, InlineTable) and old & {*present}):
@@ -196,18 +201,18 @@ def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
 
 def _spaced(text: str, before: str) -> str:
     """Put a blank line above the tables that are new, as between the others."""
-    known = set(pairwise(before.split("\n")))
+    old_pairs = set(pairwise(before.split("\n")))
     rows: list[str] = []
     for row in text.split("\n"):
         starts = row.startswith(("[", _PROVENANCE_MARK))
-        if starts and rows and rows[-1] and not rows[-1].startswith("#") and (rows[-1], row) not in known:
+        if starts and rows and rows[-1] and not rows[-1].startswith("#") and (rows[-1], row) not in old_pairs:
             rows.append("")
         rows.append(row)
     return "\n".join(rows)
 
 
 def _old(rows: list[str], at: int, kind: str, turn: float | None) -> tuple[int, int]:
-    """First and last line of an earlier calibration's comment above a line; without one, nothing just above it."""
+    """Return the bounds of an earlier calibration's comment above a line; without one, nothing just above it."""
     end = at
     while end > 0:
         first = end
@@ -231,16 +236,16 @@ def _entry(text: str, key: str, turn: float) -> str:
 
 
 def _check(old: str, new: str, name: str) -> None:
-    """Refuse what the new text has wrong and the old one had not; a file may be incomplete while it is calibrated."""
+    """Raise ``Rejected`` for faults that the new text has and the old one had not; it may be incomplete."""
     problem_lists = []
     for text in (old, new):
         problems = Problems()
         values, document = parse_toml(text, name)
         decode(Scanner, values, document, problems, lambda *_: None)
         problem_lists.append(problems.entries)
-    known = {(problem.key, problem.why) for problem in problem_lists[0]}
-    added = [p for p in problem_lists[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
-    if added:  # at lines that are not in the file
+    old_faults = {(problem.key, problem.why) for problem in problem_lists[0]}
+    added = [p for p in problem_lists[1] if (p.key, p.why) not in old_faults and not p.why.startswith("missing")]
+    if added:  # without a line, since the new text is not in the file
         raise Rejected([Problem(name, 0, p.key, f"{p.why}; nothing was written") for p in added])
 
 

@@ -1,4 +1,4 @@
-"""Calibrations as lines of parameters, as plain data, and as what goes into the scanner file."""
+"""A calibration as rows of parameters, as plain data, and as changes of the scanner file."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -27,7 +27,13 @@ _WIDTH = 116  # of a line of a comment
 
 
 def parameters(fit: Fit) -> list[tuple[str, Estimate, str]]:
-    """Key, estimate and meaning of each parameter; of hysteresis under the turn, which is a row of its own."""
+    """Return key, estimate and meaning of each parameter; of hysteresis below a row for each turn.
+
+    Raises
+    ------
+    NotImplementedError
+        If the fit is of no known kind.
+    """
     match fit:
         case OffsetFit():
             return [
@@ -85,7 +91,14 @@ def change(
     """Return the change that the fit makes in the scanner file, and the comment with its origin.
 
     With ``points`` hysteresis is written as it was measured at each amplitude, in place of (22). With ``response``, the
-    name of a file, the measured response takes the place of the resonance. ``forced`` is said in the comment.
+    name of a file, the measured response takes the place of the resonance. The comment states ``forced``.
+
+    Raises
+    ------
+    NotImplementedError
+        If the fit is of no known kind.
+    Unphysical
+        With ``points``, if a residual has the wrong sign or makes no branch.
     """
     by_force = ", meaningless, written by --force" if forced else ""
     counted = "images" if fit.images else "points"
@@ -119,10 +132,10 @@ def change(
         rows = [{key: value.rounded for key, value, _ in parameters(one) if key in _FACTORS} for one in fit.sizes]
         entries = [{"size_v": one.size_v, **row} for one, row in zip(fit.sizes, rows, strict=True)]
         law = ", drive factors by the size law"
-        gone = (*_FACTORS, "alpha", "beta", "points")
-        known = [(f"sizes[{i}].{key}", one) for i, size in enumerate(fit.sizes) for key, one, _ in parameters(size)]
-        errors = _errors([(key, one) for key, one in known if key.endswith(_FACTORS)])
-        return Change("offset", {"sizes": entries}, gone, (), [[residual + law, *files, *errors]])
+        removed = (*_FACTORS, "alpha", "beta", "points")
+        pairs = [(f"sizes[{i}].{key}", one) for i, size in enumerate(fit.sizes) for key, one, _ in parameters(size)]
+        errors = _errors([(key, one) for key, one in pairs if key.endswith(_FACTORS)])
+        return Change("offset", {"sizes": entries}, removed, (), [[residual + law, *files, *errors]])
     files += _errors([(key, estimate) for key, estimate, _ in parameters(fit) if not key.startswith("(")])
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
     match fit:
@@ -142,7 +155,7 @@ def change(
 
 
 def _branch_errors(branch: TurnFit, points: bool) -> list[tuple[str, Estimate]]:
-    """Keys within the entry of a turn, and their estimates."""
+    """Return keys within the entry of a turn, and their estimates."""
     if not points:
         return [(f"{side}.{key}", getattr(getattr(branch, side), key)) for side in _DIRECTIONS for key in LAW]
     return [
@@ -154,14 +167,14 @@ def _branch_errors(branch: TurnFit, points: bool) -> list[tuple[str, Estimate]]:
 
 
 def _errors(estimates: Sequence[tuple[str, Estimate]]) -> list[str]:
-    """Lines of the comment: each value with its standard error, where that is known. `tablegen compare` reads them."""
-    known = [
+    """Format lines of the comment: each value with its standard error, if known. `tablegen compare` reads them."""
+    texts = [
         f"{key} {one.rounded:.9g} +- {one.standard_error:.2g}"
         for key, one in estimates
         if isfinite(one.standard_error) and one.standard_error > 0.0
     ]
     lines: list[str] = []
-    for one in known:
+    for one in texts:
         if lines and len(lines[-1]) + len(one) < _WIDTH:
             lines[-1] += f", {one}"
         else:
@@ -170,7 +183,7 @@ def _errors(estimates: Sequence[tuple[str, Estimate]]) -> list[str]:
 
 
 def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
-    """Plain data for JSON; a standard error that is not known is null."""
+    """Return plain data for JSON; an unknown standard error is null."""
     kind = change(fit, sources)
     data: dict[str, Any] = {
         "kind": kind.kind,
@@ -204,7 +217,7 @@ def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
 
 
 def _image_record(image: ImageSize) -> dict[str, Any]:
-    shown = {
+    optional = {
         "aspect": image.size.aspect,
         "drift": image.size.drift,
         "open_percent": image.open_percent,
@@ -218,7 +231,7 @@ def _image_record(image: ImageSize) -> dict[str, Any]:
         "periods": image.periods,
         "angle_deg": image.size.angle_deg,
         "noise_percent": image.noise_percent,
-        **{key: value if isfinite(value) else None for key, value in shown.items()},
+        **{key: value if isfinite(value) else None for key, value in optional.items()},
     }
 
 

@@ -17,8 +17,8 @@ from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.terminal import guard_streams
 from tablegen.version import __version__
 
-# Python looks for cycles of objects whenever there are 700 more, which is nearly a tenth of a build, though almost all
-# are of modules and stay. What so many at most leave lying about between two searches is small.
+# Python searches for cycles of objects whenever there are 700 more, which takes nearly a tenth of a build, though
+# almost all objects belong to modules and stay. The garbage of this many objects between two searches is small.
 _OBJECTS_BETWEEN_SEARCHES = 50_000
 
 # Commands by name: the module in this folder, and the command in it.
@@ -51,7 +51,7 @@ _COMMANDS = {
 
 
 class _Commands(click.Group):
-    """Commands are imported when they are asked for: a build is called often, and needs one of them."""
+    """Commands that are imported on demand: a build is called often, and needs one of them."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
         return sorted(_COMMANDS)
@@ -60,11 +60,17 @@ class _Commands(click.Group):
         if name not in _COMMANDS:
             return None
         module, command = _COMMANDS[name]
-        found: click.Command = getattr(import_module(f"tablegen.cli.{module}"), command)
-        return found
+        imported: click.Command = getattr(import_module(f"tablegen.cli.{module}"), command)
+        return imported
 
     def invoke(self, context: click.Context) -> object:
-        """Run a command. Click takes every broken pipe for that of stdout, and ends without a word."""
+        """Run a command; click takes every broken pipe for that of stdout, and ends without a message.
+
+        Raises
+        ------
+        OSError
+            If the command raises it, but for a broken pipe that is not stdout.
+        """
         try:
             return super().invoke(context)
         except OSError as error:
@@ -123,7 +129,7 @@ def main() -> None:
     """Run the command line and exit with its status."""
     gc.set_threshold(_OBJECTS_BETWEEN_SEARCHES)
     status = _run()
-    gc.freeze()  # all goes with the process: to look for cycles in it first is a tenth of what a build takes
+    gc.freeze()  # memory goes with the process: a search for cycles would take a tenth of a build
     sys.exit(status)
 
 
@@ -153,7 +159,7 @@ def _ended(error: BaseException, stdout: IO[str] | None) -> int:
         return _exited(error, stdout)
     if isinstance(error, OSError) and _of_stdout(error):
         if isinstance(error, BrokenPipeError):
-            return _reader_left()
+            return _closed_pipe()
         sys.stdout = None
         click.echo(f"cannot write to stdout: {error.strerror or error}", err=True)
         return ExitStatus.CANNOT_WRITE
@@ -161,29 +167,29 @@ def _ended(error: BaseException, stdout: IO[str] | None) -> int:
 
 
 def _interrupted(error: BaseException) -> int:
-    if isinstance(error.__cause__, EOFError):  # click takes it for the end of an answer; nothing asks here
+    if isinstance(error.__cause__, EOFError):  # click takes it for an end of input; there is no prompt here
         return _unexpected(error.__cause__)
-    where = str(error.__cause__ or "") or str(error)  # that of a plug-in says so
+    where = str(error.__cause__ or "") or str(error)  # an interruption of a plug-in names it
     click.echo(f"interrupted {where}".rstrip(), err=True)
     return ExitStatus.INTERRUPTED
 
 
 def _exited(end: SystemExit, stdout: IO[str] | None) -> int:
-    """Click ends so after a broken pipe, having replaced stdout, and after completing for a shell."""
+    """Return the status of an exit by click: after a broken pipe, where it replaces stdout, or after completion."""
     if sys.stdout is not stdout:
-        return _reader_left()
+        return _closed_pipe()
     if isinstance(end.code, int) and _raised_in(end, "click"):
         return end.code
     return _unexpected(end)
 
 
 def _of_stdout(error: OSError) -> bool:
-    """True if it was text for stdout or stderr that could not be written, and not a file or another pipe."""
+    """Return True if text for stdout or stderr could not be written, and not a file or another pipe."""
     return error.filename is None and _raised_in(error, "click", "tablegen.cli")
 
 
 def _raised_in(error: BaseException, *packages: str) -> bool:
-    """True if the innermost frame of an exception is of a module of one of these packages."""
+    """Return True if the innermost frame of an exception is of a module of one of these packages."""
     trace, name = error.__traceback__, ""
     while trace is not None:
         name = str(trace.tb_frame.f_globals.get("__name__", ""))
@@ -192,7 +198,7 @@ def _raised_in(error: BaseException, *packages: str) -> bool:
 
 
 def _unexpected(error: BaseException) -> int:
-    """Explain what no command expects; a traceback of Python would end with status 1, which means something else."""
+    """Explain an unexpected error; a traceback of Python would end with status 1, which means something else."""
     try:
         from tablegen.cli.shared.unexpected import report
 
@@ -202,7 +208,7 @@ def _unexpected(error: BaseException) -> int:
         return ExitStatus.UNEXPECTED
 
 
-def _reader_left() -> int:
-    """The reader of a pipe went away: nothing is left to say, and Python's own flush at exit must not complain."""
+def _closed_pipe() -> int:
+    """Return the status after the reader of a pipe closed it; Python's own flush at exit must not complain."""
     sys.stdout = None
     return ExitStatus.OK

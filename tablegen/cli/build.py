@@ -1,4 +1,4 @@
-"""``tablegen build``: the main job."""
+"""``tablegen build``: write the files of a scan."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from tablegen.cli.shared.common import (
     written,
 )
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, show_plot
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
@@ -88,7 +88,7 @@ def build(
     Exit status: 0 done, 1 DIR is not up to date (--check), 2 wrong input, 3 a limit of the
     certificate is exceeded (with --strict: or there is a warning), 4 cannot write.
 
-    `tablegen paths` prints the include files that run this command from make or CMake. Compiled templates are kept in
+    `tablegen paths` prints the include files that run this command from make or CMake. Compiled templates are cached in
     ~/.cache/tablegen; the output does not depend on them.
     """
     _check_usage(only_check, depfile, depfile_target, plot)
@@ -98,27 +98,28 @@ def build(
         built = planned(scan, list(formats) or None, strict)
         files = rendered(built)
     except KeyboardInterrupt as interruption:
-        where = f" {interruption}".rstrip()  # that of a plug-in says so
+        where = f" {interruption}".rstrip()  # that of a plug-in names it
         fail([f"interrupted{where}; {output} was left as it was"], ExitStatus.INTERRUPTED)
     if only_check:
-        if found := _stale(built, files, output):
-            click.echo("\n".join(found))
+        if differences := _stale(built, files, output):
+            click.echo("\n".join(differences))
             again = "".join(f" -f {name}" for name in formats)
             fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
         return ExitStatus.OK
     if rule is not None:
         rule.note(built.setup, built.formats)
     removed: list[str] = []
-    kept: list[str] = []
+    leftovers: list[str] = []
 
     def outdated_now() -> list[str]:
-        removed[:], kept[:] = built.outdated(output), built.leftovers(output)  # by the manifest that is replaced then
+        # The manifest that is there lists them; it is replaced after this.
+        removed[:], leftovers[:] = built.outdated(output), built.leftovers(output)
         return removed
 
     changed = written(output, files, outdated_now)
     if rule is not None:
         rule.write()
-    for name in kept:
+    for name in leftovers:
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
         _print_certificate(built)
@@ -129,7 +130,7 @@ def build(
         from tablegen.html_report.scan_charts import scan_charts
 
         brief = in_terminal(plot)
-        put_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
+        show_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
     return ExitStatus.OK
 
 
@@ -144,7 +145,7 @@ def _check_usage(only_check: bool, depfile: Path | None, depfile_target: str | N
 
 
 def _stale(built: "Build", files: dict[str, bytes], output: Path) -> list[str]:
-    """Return what differs in the directory from what this build makes, a line each."""
+    """Return the differences of the directory from the files of this build, a line each."""
     from tablegen.cli.shared.directory_difference import differences
 
     lines = differences(output, files)
@@ -153,7 +154,7 @@ def _stale(built: "Build", files: dict[str, bytes], output: Path) -> list[str]:
 
 
 def _print_certificate(built: "Build") -> None:
-    """Print the certificate, what spoils it, and what the build chose."""
+    """Print the certificate, the findings that impair the image, and the choices of the build."""
     from tablegen.cli.certificate_text import certificate_table
 
     click.echo("\n".join(certificate_table(built.plan, built.certificates)))
@@ -167,7 +168,7 @@ def _print_certificate(built: "Build") -> None:
 
 
 def _few(names: list[str]) -> str:
-    """Names with commas between; of many the first ones."""
+    """Return names with commas between; of many the first ones."""
     more = [f"and {len(names) - _NAMES_SHOWN} more"] if len(names) > _NAMES_SHOWN else []
     return ", ".join([*names[:_NAMES_SHOWN], *more])
 
@@ -179,7 +180,7 @@ def _leftover(path: Path) -> str:
 
 
 def _state(built: "Build", changed: list[str]) -> str:
-    """What was written; the runtime, which changes with tablegen only, is many files and one thing."""
+    """Describe what was written; the runtime, which changes with tablegen only, is many files and one thing."""
     runtime = built.runtime
     own, count = sum(name not in runtime for name in changed), len(built.files) - len(runtime)
     if not changed:

@@ -1,4 +1,4 @@
-"""The table of a build for the terminal."""
+"""Format the certificate of a build for the terminal."""
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import expected_lines, rate
@@ -6,7 +6,7 @@ from tablegen.planning.line_plan import Plan
 
 
 def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
-    """The certificate of both axes, a line an axis."""
+    """Format the certificate of both axes, a line an axis."""
     schedule = plan.schedule
     lines = [
         f"{plan.name} on {plan.scanner!r}: {rate(schedule.line_rate)} lines of {schedule.ticks} ticks, "
@@ -33,16 +33,16 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
                 f"{line.axis:<4}  rests at {line.drive.v_offset:.6g} V, code {certificate.lowest_code}; {step}"
             )
     for line in plan.lines:
-        for side, moved in (certificates[line.axis].refinement or {}).items():
+        for side, effect in (certificates[line.axis].refinement or {}).items():
             lines.append(
-                f"{line.axis:<4}  refinement, {side}: moves up to {moved.position:.3g} % of the line and takes away "
-                f"{moved.scaling:.3g} % of scaling error, peak to peak"
+                f"{line.axis:<4}  refinement, {side}: moves up to {effect.position:.3g} % of the line and takes away "
+                f"{effect.scaling:.3g} % of scaling error, peak to peak"
             )
         expected = certificates[line.axis].expected
         if expected is not None and expected.basis == "traces":
-            told = expected_lines(expected)
+            texts = expected_lines(expected)
             lines += [
                 f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
-                for i, text in enumerate(told)
+                for i, text in enumerate(texts)
             ]
     return lines

@@ -1,4 +1,4 @@
-"""``tablegen check``: is this scan right? Silence and a status."""
+"""``tablegen check``: check a scan without output, by the exit status."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def check(scan: Path, strict: bool) -> None:
 
     Prints nothing if both are correct. Otherwise it prints all errors to stderr, each as file:line: key: why. A
     scaling error above 1 %, or above that of the uncompensated line, is a warning, with remedies that were tried; so is
-    a pixel whose places in trace and retrace are more than a quarter of a pixel apart.
+    a pixel whose positions in trace and retrace differ by more than a quarter of a pixel.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""``tablegen compare``: two scans, builds or calibrations side by side."""
+"""``tablegen compare``: compare two scans, builds or calibrations."""
 
 import json
 import os
@@ -9,7 +9,7 @@ import click
 
 from tablegen.cli.shared.common import OutputFile, fail, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -33,16 +33,18 @@ Exit status: 0 the same, 1 different, 2 wrong input, 4 cannot write, 6 a library
 )
 @click.argument("a", type=_path, metavar="A")
 @click.argument("b", type=_path, metavar="B")
-@click.option("--all", "everything", is_flag=True, help="Also print what is the same.")
+@click.option("--all", "everything", is_flag=True, help="Also print the quantities that are equal.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Also write an HTML page with all charts.")
 @plot_option("A and B in the same charts, those that differ first,")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path | None, as_json: bool) -> int:
-    """Compare A and B, which are two scan files, two directories of builds, a scan file and a build, two scanner
-    files, or two operator files. Print each quantity that differs, the difference, and its percentage.
+    """Compare A and B, and print each quantity that differs, the difference, and its percentage.
 
-    Of scanner files the standard errors are compared too, if `tablegen calibrate --write` wrote both: a parameter has
-    changed if it differs by more than twice the standard error of the difference.
+    A and B are two scan files, two directories of builds, a scan file and a build, two scanner files, or two operator
+    files.
+
+    Scanner files are also compared by their standard errors, if `tablegen calibrate --write` wrote both: a parameter
+    has changed if it differs by more than twice the standard error of the difference.
 
     A build contains neither the limits of its scan file nor the scanner file, so these are not compared with it.
     """
@@ -51,19 +53,19 @@ def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path 
         raise click.UsageError(f"-o {output}: the page would replace a scan or a scanner file; give a name in .html")
     check_plot(plot, as_json)
     with Progress() as progress:
-        found = _compared(a, b, progress)
+        comparison = _compared(a, b, progress)
         if output is not None or plot is not None:
             progress.now("playing both and drawing")
-            found.charts()
+            comparison.charts()
     if as_json:
-        click.echo(json.dumps(found.both.record(everything), indent=2, allow_nan=False))
+        click.echo(json.dumps(comparison.both.record(everything), indent=2, allow_nan=False))
     else:
-        click.echo(found.summary(everything))
-    if plot is not None and found.charts().charts:
-        put_plot(plot, found.charts)
+        click.echo(comparison.summary(everything))
+    if plot is not None and comparison.charts().charts:
+        show_plot(plot, comparison.charts)
     if output is not None:
-        written(output.parent, {output.name: found.page()})
-    return ExitStatus.OK if found.same else ExitStatus.STALE
+        written(output.parent, {output.name: comparison.page()})
+    return ExitStatus.OK if comparison.same else ExitStatus.STALE
 
 
 def _compared(a: Path, b: Path, progress: Progress) -> "Compared":

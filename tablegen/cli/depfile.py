@@ -1,4 +1,4 @@
-"""``tablegen build --depfile``: what a build has read, for make, CMake and Ninja."""
+"""``tablegen build --depfile``: the files that a build has read, for make, CMake and Ninja."""
 
 import os
 import stat
@@ -56,7 +56,7 @@ class Depfile:
         written(self._path.parent, {self._path.name: depfile(self._target, self._prerequisites)})
         newest = max(times, key=lambda path: times[path])
         ahead_ns = times[newest] - _changed_ns(self._path)
-        if ahead_ns > 0:  # whatever depends on it is out of date when it is built: make would not end
+        if ahead_ns > 0:  # its target would be out of date as soon as it is built, and make would not end
             self._path.unlink()
             why = (
                 f"was changed {ahead_ns * 1e-9:.1f} s in the future by its time stamp; set the clock, or touch the file"
@@ -66,7 +66,7 @@ class Depfile:
 
 
 def _changed_ns(path: Path) -> int:
-    """When a file was last changed; one that has been removed meanwhile, never."""
+    """Return the time of the last change of a file; 0 for one that has been removed meanwhile."""
     try:
         return path.stat().st_mtime_ns
     except OSError:
@@ -82,7 +82,7 @@ def _remove(path: Path, scan: Path) -> None:
         if scan.exists() and path.samefile(scan):
             fail([f"{path}: is the scan file; --depfile needs its own file"], ExitStatus.WRONG_INPUT)
         path.unlink()
-        settle(path.parent)  # before anything else: a cut of power must not bring it back
+        settle(path.parent)  # before anything else: the file must not come back after a power failure
     except FileNotFoundError:
         pass
     except OSError as error:

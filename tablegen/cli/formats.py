@@ -1,4 +1,4 @@
-"""``tablegen formats``: what a build can be written as."""
+"""``tablegen formats``: list the output formats of a build."""
 
 import click
 
@@ -24,9 +24,9 @@ def formats() -> None:
 
     for name in names():
         try:
-            found = get(name)
+            output_format = get(name)
         except UnknownFormat as error:
             click.echo(f"{name:<16}cannot be used: {error}", err=True)
             continue
-        tell(f"{name:<16}{found.purpose}", bold=True)
-        tell(f"{'':16}{found.file_names}")
+        tell(f"{name:<16}{output_format.purpose}", bold=True)
+        tell(f"{'':16}{output_format.file_names}")

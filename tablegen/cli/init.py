@@ -1,4 +1,4 @@
-"""``tablegen init``: a commented scanner and scan to start from."""
+"""``tablegen init``: write a commented scanner file and scan file to start from."""
 
 import os
 import re
@@ -23,15 +23,22 @@ _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\u00b5s": 1e-6, "ns": 1e-9}
 def _quantity(
     units: dict[str, float], example: str
 ) -> Callable[[click.Context, click.Parameter, str | None], float | None]:
-    """A callback of options: a positive number with one of some units, in the one whose factor is 1."""
+    """Return a callback of options: a positive number with a unit, in the unit whose factor is 1."""
 
     def read(_context: click.Context, _option: click.Parameter, value: str | None) -> float | None:
+        """Convert the value of the option.
+
+        Raises
+        ------
+        click.BadParameter
+            If it is no positive number with such a unit.
+        """
         if value is None:
             return None
-        found = _NUMBER.fullmatch(value.strip())
-        factor = None if found is None else units.get(found[2].lower())
+        match = _NUMBER.fullmatch(value.strip())
+        factor = None if match is None else units.get(match[2].lower())
         try:
-            number = float(found[1]) * factor if found is not None and factor is not None else 0.0
+            number = float(match[1]) * factor if match is not None and factor is not None else 0.0
         except ValueError:
             number = 0.0
         if not 0.0 < number < 1e12:
@@ -43,8 +50,8 @@ def _quantity(
 
 @click.command(short_help="Write a scan file and scanner file to start from.")
 @click.argument("folder", type=OutputFolder(), default=Path("."), metavar="[DIR]")
-@click.option("--image-nm", type=float, callback=finite, metavar="NM", help="Size of the image.  [default: 200]")
-@click.option("--image-um", type=float, callback=finite, metavar="UM", help="The same in micrometres.")
+@click.option("--image-nm", type=float, callback=finite, metavar="NM", help="Size of the image in nm.  [default: 200]")
+@click.option("--image-um", type=float, callback=finite, metavar="UM", help="Size of the image in micrometres.")
 @click.option("--pixels", type=int, metavar="N", help="Pixels per line and direction.  [default: 200]")
 @click.option("--lines", type=int, metavar="N", help="Lines of the image.  [default: as many as pixels]")
 @click.option(
@@ -55,7 +62,7 @@ def _quantity(
     help="flyback: every image goes up. up-down: images go up and down in turn.",
 )
 @click.option("--line-rate", type=float, callback=finite, metavar="HZ", help="Lines per second.")
-@click.option("--frame-rate", type=float, callback=finite, metavar="HZ", help="Frames per second, in place of it.")
+@click.option("--frame-rate", type=float, callback=finite, metavar="HZ", help="Frames per second; or --line-rate.")
 @click.option("--bits", type=int, default=16, show_default=True, metavar="N", help="Bits of the DAC.")
 @click.option(
     "--clock", callback=_quantity(_HERTZ, "500k or 1MHz"), metavar="HZ", help="Update rate of the DAC.  [default: 500k]"
@@ -63,7 +70,7 @@ def _quantity(
 @click.option(
     "--tick", callback=_quantity(_SECONDS, "2us"), metavar="TIME", help="Time between two updates, in place of --clock."
 )
-@click.option("--name", metavar="NAME", help="Name of the scan, and of its file.  [default: after the size]")
+@click.option("--name", metavar="NAME", help="Name of the scan, and of its file.  [default: from the size]")
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
 def init(
     folder: Path,
@@ -82,8 +89,9 @@ def init(
 ) -> int:
     """Write a scan file and a scanner file with comments to DIR: scanner.toml and annexin_200nm.toml.
 
-    The default of DIR is the current directory. The options go into the files; whatever they do not say is chosen so
-    that the scan can be built. The scanner is an example whose range fits the image: calibrate yours and keep the scan.
+    The default of DIR is the current directory. The options set values in the files; the command chooses all
+    other values so that the scan can be built. The scanner is an example whose range fits the image: calibrate your own
+    scanner, and keep the scan file.
 
     \b
     Examples:
@@ -117,20 +125,20 @@ def init(
         rate=rate,
         name=name or "",
     )
-    made = files(wishes)
-    there = [folder / name for name in made if os.path.lexists(folder / name)]
+    texts = files(wishes)
+    there = [folder / name for name in texts if os.path.lexists(folder / name)]
     if there and not force:
         fail([f"{path} exists; --force overwrites it" for path in there], ExitStatus.WRONG_INPUT)
     if wishes != Wishes():
-        made = _checked(wishes)
-    written(folder, {name: text.encode("utf-8") for name, text in made.items()})
-    for name in made:
+        texts = _checked(wishes)
+    written(folder, {name: text.encode("utf-8") for name, text in texts.items()})
+    for name in texts:
         click.echo(folder / name)
     return ExitStatus.OK
 
 
 def _checked(wishes: "Wishes") -> dict[str, str]:
-    """The files, with tables as long as the scan needs; where none can be built the command ends, with the reasons."""
+    """Return the files, with tables as long as the scan needs; if no build is possible, end with the reasons."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.api.build import BrokenLimit, build
     from tablegen.base.input_errors import Rejected
@@ -138,9 +146,9 @@ def _checked(wishes: "Wishes") -> dict[str, str]:
     from tablegen.cli.init_files import SCANNER_FILE, TABLE_LENGTHS, files
 
     for length in TABLE_LENGTHS:
-        made = files(replace(wishes, table_length=length))
-        scan_file = next(name for name in made if name != SCANNER_FILE)
-        values, scanner = (parse_toml(made[name], name)[0] for name in (scan_file, SCANNER_FILE))
+        texts = files(replace(wishes, table_length=length))
+        scan_file = next(name for name in texts if name != SCANNER_FILE)
+        values, scanner = (parse_toml(texts[name], name)[0] for name in (scan_file, SCANNER_FILE))
         try:
             built = build(scan=values, scanner=scanner)
         except Rejected as rejected:
@@ -152,4 +160,4 @@ def _checked(wishes: "Wishes") -> dict[str, str]:
         for warning in built.warnings:
             click.echo(f"warning: {scan_file}{warning.removeprefix('scan')}", err=True)
         break
-    return made
+    return texts

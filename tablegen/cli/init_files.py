@@ -1,4 +1,4 @@
-"""The pair of files that ``tablegen init`` writes, in words, for what was asked for."""
+"""Texts of the two files that ``tablegen init`` writes."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -16,7 +16,7 @@ _FEW_BITS = 16  # below, the scan has to use most of the converter
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the scan should be; ``rate`` is a key of ``[timing]`` and its value, None for a rate that suits."""
+    """Requirements of the scan; ``rate`` is a key of ``[timing]`` and its value, None for a suitable rate."""
 
     bits: int = 16
     update_rate_hz: float = 500e3
@@ -30,7 +30,7 @@ class Wishes:
 
     @property
     def scan_name(self) -> str:
-        """As given, or after the size of the image: annexin_200nm for the example's own."""
+        """The name that was given, or one from the size of the image: annexin_200nm for the example's size."""
         if self.name:
             return self.name
         if self.image_nm == 200.0:
@@ -39,7 +39,7 @@ class Wishes:
 
     @property
     def timing(self) -> tuple[str, float, str]:
-        """Key, value and comment of the rate: without one, a pixel is a whole number of ticks, two at least."""
+        """Key, value and comment of the rate; by default a pixel is a whole number of ticks, two at least."""
         if self.rate is not None:
             return (*self.rate, "")
         ticks = max(2, ceil(0.5 * _SHARE * self.update_rate_hz / (self.pixels * _FASTEST_HZ)))
@@ -48,7 +48,7 @@ class Wishes:
 
 
 def files(wishes: Wishes) -> dict[str, str]:
-    """Scanner file and scan file by their names."""
+    """Return the texts of scanner file and scan file by their names."""
     return {SCANNER_FILE: _scanner(wishes), f"{wishes.scan_name}.toml": _scan(wishes)}
 
 
@@ -89,7 +89,7 @@ def _scanner(wishes: Wishes) -> str:
     larger = "" if factor == 1.0 else f", with a range {factor:g} times as large"
     return f"""\
 # The instrument: converter, amplifier, and a high-speed AFM scanner as the paper measured it{larger}.
-# `tablegen calibrate` writes what your scanner does in place of these values. Voltages are at the piezo.
+# `tablegen calibrate` writes the values of your scanner in their place. Voltages are at the piezo.
 name = "hs-afm"
 {_line(f"v_max = {_number(_V_MAX)}", "V, maximum output of the piezo driver; normalised voltages refer to it")}
 
@@ -151,7 +151,7 @@ backward = { beta_max = 0.037, rho = 4.0, u_peak = 0.37 }
 
 
 def _factor(wishes: Wishes) -> float:
-    """How many times the example's range the scanner has, so that the image uses enough of it, and of few bits most."""
+    """Return the range over that of the example: the image uses enough of it, with few bits most of it."""
     law = SizeLaw.calibrated(_K, _V_MAX, _BETA, _BASE_NM, 0.5)
     line_nm = wishes.image_nm / _SHARE
     if wishes.bits < _FEW_BITS:
@@ -161,12 +161,12 @@ def _factor(wishes: Wishes) -> float:
 
 
 def _line(text: str, comment: str) -> str:
-    """A line with its comment in the column of the others."""
+    """Return a line with its comment in the column of the others."""
     return f"{text:<32} # {comment}".rstrip() if comment else text
 
 
 def _number(value: float) -> str:
-    """A float of TOML, without digits that it does not need."""
+    """Format a float of TOML, without digits that it does not need."""
     short = f"{value:.10g}"
     if float(short) != value:
         short = repr(value)

@@ -1,4 +1,4 @@
-"""``tablegen paths``: where the files of this installation are that other tools need."""
+"""``tablegen paths``: print the paths of installed files that other tools need."""
 
 import os
 
@@ -12,7 +12,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 @click.option("--cmake", is_flag=True, help="Print the directory of TablegenConfig.cmake.")
 @click.option("--runtime-c", is_flag=True, help="Print the directory of dac_*.h and dac_*.c.")
 @click.option("--runtime-verilog", is_flag=True, help="Print the directory of dac_*.v.")
-def paths(**asked: bool) -> int:
+def paths(**options: bool) -> int:
     """Print the paths of installed files that other tools need. Without an option, print all of them as a table.
 
     \b
@@ -37,15 +37,15 @@ def paths(**asked: bool) -> int:
     from tablegen.base.resources import resource_folder
 
     folder = resource_folder("firmware_templates")
-    found = {
+    places = {
         "make": folder / "make" / "tablegen.mk",
         "cmake": folder / "cmake",
         "runtime-c": folder / "c",
         "runtime-verilog": folder / "verilog",
     }
-    chosen = [name for name in found if asked[name.replace("-", "_")]]
-    width = max(map(len, found))
-    for name in chosen or found:
-        # As bytes: a path has to come out as it is, whatever the terminal can show.
-        click.echo((b"" if chosen else f"{name:<{width}}  ".encode()) + os.fsencode(found[name]))
+    selection = [name for name in places if options[name.replace("-", "_")]]
+    width = max(map(len, places))
+    for name in selection or places:
+        # As bytes: the path is printed unchanged, even if the terminal cannot show it.
+        click.echo((b"" if selection else f"{name:<{width}}  ".encode()) + os.fsencode(places[name]))
     return ExitStatus.OK

@@ -1,4 +1,4 @@
-"""``tablegen report``: a scan or a build as one page to look at and to pass on."""
+"""``tablegen report``: write an HTML page of a scan or a build."""
 
 import os
 from pathlib import Path
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     default=Path("report.html"),
     show_default=True,
     metavar="FILE",
-    help="The page.",
+    help="HTML file to write.",
 )
 @click.option(
     "--verified",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Also show what `tablegen verify DIR --junit FILE` found.",
+    help="Also show the results of `tablegen verify DIR --junit FILE`.",
 )
 @click.option("--svg", type=OutputFolder(), metavar="DIR", help="Also write every chart as SVG into DIR.")
-@click.option("--png", type=OutputFolder(), metavar="DIR", help="The same as PNG; needs matplotlib.")
-@click.option("--pdf", type=OutputFolder(), metavar="DIR", help="The same as PDF; needs matplotlib.")
+@click.option("--png", type=OutputFolder(), metavar="DIR", help="Also write every chart as PNG; needs matplotlib.")
+@click.option("--pdf", type=OutputFolder(), metavar="DIR", help="Also write every chart as PDF; needs matplotlib.")
 @click.option(
     "--figure",
     "figures",
@@ -51,11 +51,13 @@ def report(
     pdf: Path | None,
     figures: tuple[str, ...],
 ) -> int:
-    """Write one HTML file that shows a scan: what spoils the image first, the certificate with its limits, drive and
-    position, errors before and after, spectrum, corrections, usable sizes, calibration, and the files.
+    """Write one HTML file that shows a scan, and has all its charts.
 
-    The file needs no network and no other file. Given a directory of `tablegen build`, the page shows what the
-    directory has: not the limits, not the errors on the scanner, not the calibration.
+    It shows the findings, the most serious first, the certificate with its limits, drive and position, errors before
+    and after, spectrum, corrections, usable sizes, calibration, and the files.
+
+    The file needs no network and no other file. A directory of `tablegen build` has no limits, no errors on the scanner
+    and no calibration, so its page does not show them.
 
     The page is written even if the certificate exceeds a limit, since it shows why.
 
@@ -76,13 +78,13 @@ def report(
     if png or pdf:
         require("matplotlib", extra="plot", otherwise="; or write --svg, which needs nothing")
     with Progress() as progress:
-        found = _reported(source, verified, progress)
-    charts = _chosen(found.figures, figures)
-    written(output.parent, {output.name: found.content})
+        page = _reported(source, verified, progress)
+    charts = _select_charts(page.figures, figures)
+    written(output.parent, {output.name: page.content})
     _write_charts(charts, svg, png, pdf)
-    click.echo(f"{output}: {len(found.content) / 1000:.0f} kB")
-    if found.broken:
-        fail([f"{output}: the certificate exceeds a limit", *found.broken], ExitStatus.BROKEN_LIMIT)
+    click.echo(f"{output}: {len(page.content) / 1000:.0f} kB")
+    if page.broken:
+        fail([f"{output}: the certificate exceeds a limit", *page.broken], ExitStatus.BROKEN_LIMIT)
     return ExitStatus.OK
 
 
@@ -99,11 +101,11 @@ def _reported(source: Path, verified: Path | None, progress: Progress) -> "Repor
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def _chosen(charts: "dict[str, Chart]", wanted: tuple[str, ...]) -> "dict[str, Chart]":
-    unknown = [name for name in wanted if name not in charts]
+def _select_charts(charts: "dict[str, Chart]", names: tuple[str, ...]) -> "dict[str, Chart]":
+    unknown = [name for name in names if name not in charts]
     if unknown:
         raise click.UsageError(f"--figure {unknown[0]}: the page has no such chart; it has {', '.join(charts)}")
-    return {name: charts[name] for name in wanted} if wanted else charts
+    return {name: charts[name] for name in names} if names else charts
 
 
 def _write_charts(charts: "dict[str, Chart]", svg: Path | None, png: Path | None, pdf: Path | None) -> None:

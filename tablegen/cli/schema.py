@@ -1,4 +1,4 @@
-"""``tablegen schema``: JSON Schema for editors."""
+"""``tablegen schema``: print the JSON Schema for editors."""
 
 import click
 

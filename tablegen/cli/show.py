@@ -1,4 +1,4 @@
-"""``tablegen show``: what would be built."""
+"""``tablegen show``: show drive, rates, accuracy and plots of a scan."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tablegen.cli.shared.common import format_option, planned, rendered, require, scan_argument
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, show_plot
 from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None, no_plot: bool, optimum: bool) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
-    In the plots > is forward and < is backward; the axis is doubled where the image is taken.
+    In the plots, > is forward and < is backward; a double axis marks the imaged part.
 
     \b
     Examples:
@@ -45,7 +45,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
     built = planned(scan, list(formats) or None)
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
-        put_plot(plot, lambda: _charts(built, plot))
+        show_plot(plot, lambda: _charts(built, plot))
         return
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
@@ -55,14 +55,14 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         from tablegen.certificate.optimum import with_optimum
         from tablegen.certificate.summary import summary
 
-        found: dict[str, Certificate] = {
+        certificates: dict[str, Certificate] = {
             line.axis: with_optimum(line, built.certificates[line.axis]) for line in plan.lines
         }
-        lines = summary(plan, found)
+        lines = summary(plan, certificates)
     for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
     click.echo()
-    put_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)
+    show_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)
     for choice in built.choices:
         click.echo(f"chosen: {choice}")
     for finding in built.findings:

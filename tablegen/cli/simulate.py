@@ -1,4 +1,4 @@
-"""``tablegen simulate``: what a scan would do on a virtual scanner."""
+"""``tablegen simulate``: simulate a scan on a virtual scanner."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ OWN, DEFAULT = "own", "default"
     "--scanner-truth",
     "truth_file",
     metavar="own|default|duhem|FILE",
-    help="Scanner to play on. own: the operator of the scanner file, wrong by its own uncertainty, several times at "
-    "random. default: built in, with a Preisach operator. duhem: built in, with another kind of hysteresis, two "
-    "resonances and a memory of the offset. Both were identified on numbers of the paper, and are scaled to the "
+    help="Scanner to play on. own: the operator of the scanner file, with random errors of its own uncertainty, "
+    "several times. default: built in, with a Preisach operator. duhem: built in, with another kind of hysteresis, two "
+    "resonances and a memory of the offset. Both were fitted to numbers of the paper, and are scaled to the "
     "drive range, the nm per V and the resonances of the scanner file. FILE: parameters as in docs/virtual.md.  "
     "[default: own if the scanner file has an operator, else default]",
 )
@@ -35,8 +35,8 @@ OWN, DEFAULT = "own", "default"
     "csv_file",
     type=OutputFile(),
     metavar="FILE",
-    help="Write drive and displacement to FILE, for one line of x and one frame of y. Longer records than 10000 ticks "
-    "are thinned.",
+    help="Write drive and displacement to FILE, for one line of x and one frame of y. Records of more than 10000 "
+    "ticks are thinned.",
 )
 @plot_option("residual and scaling error")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
@@ -62,7 +62,7 @@ OWN, DEFAULT = "own", "default"
     default=0,
     show_default=True,
     metavar="N",
-    help="Random seed of that noise, and of what own is wrong by.",
+    help="Random seed of that noise, and of the errors of own.",
 )
 @click.pass_context
 def simulate(
@@ -84,7 +84,7 @@ def simulate(
     file as it is, then with parameters calibrated on simulated sensor data.
 
     Where the scanner file has an operator, your own scanner is simulated: the command plays the uncompensated triangle,
-    the laws and the operator on scanners that depart from the operator as much as it is uncertain.
+    the laws and the operator on scanners that differ from the operator by its uncertainty.
 
     \b
     Examples:
@@ -107,7 +107,7 @@ def simulate(
             require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
         truth = OWN if own else truth_file or DEFAULT
         with Progress() as progress:
-            found = simulated(
+            result = simulated(
                 setup, truth, calibrated=calibrated, noise_percent=noise, seed=seed, progress=progress.now
             )
     except Rejected as faults:
@@ -115,13 +115,13 @@ def simulate(
     except Unphysical as reason:
         fail([reason], ExitStatus.WRONG_INPUT)
     if csv_file is not None:
-        written(csv_file.parent, {csv_file.name: found.csv().encode()})
-    click.echo(found.to_json() if as_json else found.summary())
-    put_plot(plot, found.charts)
+        written(csv_file.parent, {csv_file.name: result.csv().encode()})
+    click.echo(result.to_json() if as_json else result.summary())
+    show_plot(plot, result.charts)
 
 
 def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -> bool:
-    """Whether the operator of the scanner file is the scanner; what does not go with that is a usage error."""
+    """Return True if the operator of the scanner file is the scanner; contradicting options are a usage error."""
     from tablegen.virtual.own_run import own_axes
 
     if truth_file not in (None, OWN) or not (own_axes(setup) or truth_file):
@@ -129,7 +129,7 @@ def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -
     if not own_axes(setup):
         path = setup.scanner_file.name
         raise click.UsageError(
-            f"--scanner-truth {OWN}: {path} has no operator; identify one with tablegen calibrate operator"
+            f"--scanner-truth {OWN}: {path} has no operator; fit one with tablegen calibrate operator"
         )
     for parameter, name in (
         ("csv_file", "--csv"),

@@ -1,4 +1,4 @@
-"""``tablegen sweep``: many scans, as a library of programs."""
+"""``tablegen sweep``: build many scans as a library of programs."""
 
 import json
 from pathlib import Path
@@ -66,7 +66,7 @@ def sweep(
     --set. A firmware picks a program by its number or its name.
 
     Scans are built in parallel. A second run builds only what is missing or has changed. Scans that cannot be built are
-    listed with their reasons, and the others are built. Programs of an earlier sweep that are no longer asked for are
+    listed with their reasons, and the others are built. Programs of an earlier sweep that this one does not have are
     removed from DIR.
 
     \b
@@ -88,17 +88,17 @@ def sweep(
     from tablegen.emit.write import CannotWrite, NoPlace
     from tablegen.sweeping.sweep import build_library
 
-    found = _library(scan, texts, output)
-    chosen = list(formats) or None
+    library = _library(scan, texts, output)
+    names = list(formats) or None
     if only_list:
-        return _listed(found, chosen)
+        return _listed(library, names)
     bar = Bar(unit="scans")
     try:
-        build_library(found, formats=chosen, jobs=jobs, strict=strict, only_check=only_check, progress=bar)
+        build_library(library, formats=names, jobs=jobs, strict=strict, only_check=only_check, progress=bar)
     except KeyboardInterrupt:
         bar.close()
         again = "" if only_check else "; what was built stays, and the same command goes on from there"
-        fail([f"interrupted after {found.done} of {len(found.variants)} scans{again}"], ExitStatus.INTERRUPTED)
+        fail([f"interrupted after {library.done} of {len(library.variants)} scans{again}"], ExitStatus.INTERRUPTED)
     except NoPlace as error:
         fail([error], ExitStatus.WRONG_INPUT)
     except CannotWrite as error:
@@ -107,11 +107,11 @@ def sweep(
         fail([f"{output}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
     finally:
         bar.close()
-    return _told(found, only_check, quiet)
+    return _report_outcome(library, only_check, quiet)
 
 
 def _library(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
-    """The scans of the library; a file that cannot be read, or a wrong setting, ends the command."""
+    """Read the scans of the library; a file that cannot be read, or a wrong setting, ends the command."""
     from tablegen.base.input_errors import Rejected
     from tablegen.config.settings import parse_setting
     from tablegen.sweeping.sweep import planned_library
@@ -122,8 +122,8 @@ def _library(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
-    """A line a scan: what a sweep would do with it."""
+def _listed(library: "ScanLibrary", formats: list[str] | None) -> int:
+    """Print a line for each scan: its settings, and what a sweep would do."""
     from tablegen.base.input_errors import Rejected
     from tablegen.library.entry import Entry
     from tablegen.sweeping.inputs import Inputs
@@ -131,38 +131,38 @@ def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
     from tablegen.sweeping.written_records import WrittenRecords
 
     inputs, written, wrong = Inputs(), WrittenRecords(), 0
-    width = max(len(variant.name) for variant in found.variants)
-    for variant in found.variants:
-        told = ", ".join(f"{key} = {json.dumps(value, default=str)}" for key, value in variant.settings.items())
+    width = max(len(variant.name) for variant in library.variants)
+    for variant in library.variants:
+        settings = ", ".join(f"{key} = {json.dumps(value, default=str)}" for key, value in variant.settings.items())
         try:
-            what = "up to date" if isinstance(state(found, variant, formats, inputs, written), Entry) else "to build"
+            what = "up to date" if isinstance(state(library, variant, formats, inputs, written), Entry) else "to build"
         except Rejected as rejected:
             wrong += 1
             what = f"wrong: {rejected.problems[0]}"
-        click.echo(f"{variant.name:<{width}}  {told}: {what}" if told else f"{variant.name:<{width}}  {what}")
+        click.echo(f"{variant.name:<{width}}  {settings}: {what}" if settings else f"{variant.name:<{width}}  {what}")
     if not wrong:
         return ExitStatus.OK
-    return ExitStatus.WRONG_INPUT if wrong == len(found.variants) else ExitStatus.PARTIAL
+    return ExitStatus.WRONG_INPUT if wrong == len(library.variants) else ExitStatus.PARTIAL
 
 
-def _told(found: "ScanLibrary", only_check: bool, quiet: bool) -> int:
-    """Print what became of a sweep, and return the status."""
-    for line in found.remarks():
+def _report_outcome(library: "ScanLibrary", only_check: bool, quiet: bool) -> int:
+    """Print the outcome of a sweep, and return the status."""
+    for line in library.remarks():
         click.echo(line, err=True)
-    status = _status(found)
-    if only_check and found.different:
-        click.echo("\n".join(f"{found.folder / name}: not up to date" for name in found.different))
-        click.echo(f"{found.folder} is stale; run the same command without --check", err=True)
+    status = _status(library)
+    if only_check and library.different:
+        click.echo("\n".join(f"{library.folder / name}: not up to date" for name in library.different))
+        click.echo(f"{library.folder} is stale; run the same command without --check", err=True)
         return status if status not in (ExitStatus.OK, ExitStatus.PARTIAL) else ExitStatus.STALE
     if not quiet:
-        click.echo(found.verdict())
+        click.echo(library.verdict())
     return status
 
 
-def _status(found: "ScanLibrary") -> ExitStatus:
-    if not found.failed:
+def _status(library: "ScanLibrary") -> ExitStatus:
+    if not library.failed:
         return ExitStatus.OK
-    if found.entries:
+    if library.entries:
         return ExitStatus.PARTIAL
-    limits = any(failed.kind == "limit" for failed in found.failed)
+    limits = any(failed.kind == "limit" for failed in library.failed)
     return ExitStatus.BROKEN_LIMIT if limits else ExitStatus.WRONG_INPUT

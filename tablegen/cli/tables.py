@@ -1,4 +1,4 @@
-"""``tablegen tables``: which tables would do, and the smallest of them."""
+"""``tablegen tables``: list the feasible tables of a scan."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -7,7 +7,7 @@ import click
 
 from tablegen.cli.shared.common import fail, quiet_blas, scan_argument
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 from tablegen.cli.shared.terminal import tell
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=PlottingCommand,
-    short_help="Show which tables would do, and the smallest of them.",
+    short_help="List the feasible tables of a scan, and the smallest.",
     epilog="""\b
 Examples:
   tablegen tables annexin_200nm.toml
@@ -32,28 +32,29 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 @plot_option("memory and error of the tables")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_json: bool) -> None:
-    """Show which tables would do for a scan, and the smallest of them. Writes no file of a build.
+    """List the feasible tables of a scan, and the smallest of them. Writes no file of a build.
 
     A table stores one period of the waveform. With more words, wider words, or more arithmetic between the words
-    (mode), the emitted codes are nearer to what was asked for. A code is rounded to a whole LSB of the converter, so
-    that it errs by up to 0.5 LSB, whatever its table is.
+    (mode), the emitted codes are nearer to the requested waveform. A code is rounded to a whole LSB of the converter,
+    so it has an error of up to 0.5 LSB with any table.
 
-    Each line is a table of which there is none smaller, as simple to play, and better by 5 %: memory in bits, the
-    largest and the rms error of a code over all ticks, and what the mode takes of a device for a sample. * is the
-    least memory within [x.table] max_error_lsb of the scan file; without that key within limits.max_error_lsb, or
-    within 1 LSB if that is less. Tables that not all formats of the scan file play are marked -, and not chosen.
+    Each line is one table; a table is left out if a smaller one, as simple to play, is better by 5 %. The columns are
+    memory in bits, the largest and the rms error of a code over all ticks, and the device resources that the mode takes
+    for a sample. * is the least memory within [x.table] max_error_lsb of the scan file; without that key within
+    limits.max_error_lsb, or within 1 LSB if that is less. A table that some format of the scan file cannot play is
+    marked - and not chosen.
     """
     check_plot(plot, as_json)
-    found = _feasible(scan, axis)
+    feasible = _feasible(scan, axis)
     if as_json:
-        click.echo(found.to_json())
+        click.echo(feasible.to_json())
     else:
-        for i, lines in enumerate(found.texts()):
+        for i, lines in enumerate(feasible.texts()):
             if i:
                 click.echo()
             for number, text in enumerate(lines):
                 tell(text, bold=number == 0)
-    put_plot(plot, found.charts)
+    show_plot(plot, feasible.charts)
 
 
 def _feasible(scan: Path, axis: Literal["x", "y"] | None) -> "FeasibleTables":

@@ -1,4 +1,4 @@
-"""``tablegen verify``: the emitted sequencer, simulated or compiled, against the manifest."""
+"""``tablegen verify``: simulate or run the emitted sequencer, and compare it with the manifest."""
 
 import os
 import signal
@@ -79,7 +79,7 @@ _CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
     "--other-version",
     is_flag=True,
     help="Accept a build of another version of tablegen. Its runtime cannot be compared with the installed one: only "
-    "what is played can tell whether it is right. Without this option such a build fails.",
+    "the played checks can show whether it is correct. Without this option such a build fails.",
 )
 @click.option(
     "--junit",
@@ -107,9 +107,9 @@ def verify(
 ) -> int:
     """Verify that the sequencer of the build in DIR plays the scan that its manifest describes, bit for bit.
 
-    This compiles and runs what is in DIR. Do not verify a directory whose code you would not run.
+    This compiles and runs the code in DIR. Do not verify a directory whose code you would not run.
 
-    First the command checks the files: that DIR has those of such a build, their SHA-256, the constants and tables
+    First the command checks the files: that DIR has all files of such a build, their SHA-256, the constants and tables
     against the manifest, and the sequencer against the installed one. A build of another version of tablegen fails,
     unless --other-version is given. The command computes the certificate again from the words. Then it runs the
     sequencer of DIR. Short programs play every request and every fault on purpose: ramps, clamps and the slew guard
@@ -117,8 +117,8 @@ def verify(
     change of programs and back within a frame, and park.
 
     Every code, marker and fault must equal the integer model. Every code must be as close to the ideal waveform as the
-    words of the manifest make it, and every code and step within its limits. A check that had no occasion to fail is
-    "not exercised". "not played:" names the files and options that nothing has played.
+    words of the manifest make it, and every code and step within its limits. A check without stimulus is
+    "not exercised". "not played:" names the files and options that no check has played.
 
     \b
     verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and the
@@ -131,7 +131,7 @@ def verify(
     files     checks only the files.
 
     Icarus plays a long frame in a second process, with multiplier blocks (PLAIN_MULTIPLIER = 1), which it simulates
-    twice as fast; --ticks or --axis plays it as the device is placed. If a frame has more ticks than --ticks, only a
+    twice as fast; with --ticks or --axis it plays the selected variant. If a frame has more ticks than --ticks, only a
     part of it is played, and a note reports this. With --fourier, rendering takes longer than all the rest.
 
     \b
@@ -152,7 +152,7 @@ def verify(
     from tablegen.verification.failures import ToolMissing
     from tablegen.verification.run import verify as verify_build
 
-    digest = _digest(folder)  # before it is played: whoever changes it meanwhile has verified nothing
+    digest = _digest(folder)  # before it is played: a later change of the files is not verified
     try:
         if fourier and target_name in (None, "verilog") and (simulator or "icarus") == "icarus":
             _say_how_long(folder, axis or "pipelined")
@@ -197,7 +197,7 @@ def verify(
 
 
 def _say_how_long(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> None:
-    """Rendering is most of what Icarus has to do: it is said before it is done."""
+    """Print how long Icarus will render, before it does."""
     from tablegen.verification.run import rendering_clocks
 
     clocks = rendering_clocks(folder, axis)
@@ -211,9 +211,16 @@ def _say_how_long(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) 
 
 @contextmanager
 def _terminated_as_interrupted() -> Iterator[None]:
-    """A runner that cancels a job with SIGTERM leaves nothing behind either."""
+    """Treat SIGTERM as Ctrl-C, so that a runner that cancels a job leaves no files behind."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
+        """Handle the signal.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            Always.
+        """
         raise KeyboardInterrupt
 
     try:
@@ -228,7 +235,7 @@ def _terminated_as_interrupted() -> Iterator[None]:
 
 
 def _digest(folder: Path) -> str:
-    """The SHA-256 of the manifest; empty where it cannot be read, which is reported elsewhere."""
+    """Return the SHA-256 of the manifest; empty if it cannot be read, which is reported elsewhere."""
     from tablegen.base.reading import file_sha256
     from tablegen.manifest.format import MANIFEST
 

@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
-from tablegen.images.model_start import begin, grown, prepared
+from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
 from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
 from tablegen.numerics.arrays import Bools, Floats
@@ -126,9 +126,9 @@ def periodic_scan(
     """
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
-    geometry, heights = prepared(trace, retrace, turn, window, delay_pixels)
+    geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
     spot, bends = begin(geometry, heights, retrace_mirrored)
-    model, state, free = grown(geometry, heights, spot, bends)
+    model, state, free = fit_spots(geometry, heights, spot, bends)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
     return _scan(model, state)

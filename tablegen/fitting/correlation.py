@@ -1,4 +1,4 @@
-"""Correlation of residuals: what the standard errors of a fit have to be widened by."""
+"""Correlation of residuals, by which the standard errors of a fit are widened."""
 
 import numpy as np
 
@@ -6,9 +6,14 @@ from tablegen.numerics.arrays import Floats
 
 
 def correlation_length(residuals: Floats) -> float:
-    """Over how many samples residuals depend on each other: 1 for white noise. Shape (n,), or (n, series) of one kind.
+    """Return over how many samples residuals depend on each other: 1 for white noise.
 
-    The integrated autocorrelation, summed up to five times itself: far enough for what it finds, not for noise.
+    The integrated autocorrelation, summed up to five times itself: far enough for correlated residuals, not for noise.
+
+    Parameters
+    ----------
+    residuals
+        Residuals in any unit, shape (n,), or (n, series) for several series of one kind.
     """
     power = float(np.vdot(residuals, residuals))
     total = 1.0

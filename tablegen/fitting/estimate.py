@@ -1,4 +1,4 @@
-"""What a calibration returns: estimates with standard errors, residuals, remarks, and curves to draw."""
+"""Results of a calibration: estimates with standard errors, residuals, remarks, and curves to draw."""
 
 from dataclasses import dataclass
 from math import isfinite, nan
@@ -12,8 +12,7 @@ from tablegen.numerics.arrays import Floats
 class Estimate:
     """A value and its standard error: twice of it covers the truth in 95 % of measurements, however few the points.
 
-    The error is nan where it is not known, since there are no more points than parameters, or since the value was
-    given and not fitted.
+    The error is nan where it is unknown: with no more points than parameters, or for a value that was set, not fitted.
     """
 
     value: float
@@ -21,7 +20,7 @@ class Estimate:
 
     @property
     def rounded(self) -> float:
-        """The value in as many digits as mean something: rounded by at most a hundredth of its standard error."""
+        """The value in its significant digits: rounded by at most a hundredth of its standard error."""
         digits = 9
         if isfinite(self.standard_error) and self.standard_error > 0.0 and self.value:
             while digits > 3 and abs(_significant(self.value, digits - 1) - self.value) <= 0.01 * self.standard_error:
@@ -48,10 +47,11 @@ class Curve:
 
 @dataclass(frozen=True)
 class LineSize:
-    """From turn to turn, in nm, with the error of this image; ``shared`` is the relative error of all such images.
+    """Size of a line from turn to turn, in nm, with the error of this image.
 
-    ``angle_deg`` is that of the first wave, or the cell's first side, from the fast axis; ``aspect`` the frame's height
-    over the line's length as a lattice shows it, and ``drift`` along x in the frame, of the line; nan of a grating.
+    ``shared`` is the relative error of all such images. ``angle_deg`` is that of the first wave, or the cell's first
+    side, from the fast axis; ``aspect`` the frame's height over the line's length as a lattice shows it, and ``drift``
+    along x in the frame, of the line; nan of a grating.
     """
 
     nm: Estimate
@@ -63,9 +63,9 @@ class LineSize:
 
 @dataclass(frozen=True)
 class ImageSize:
-    """What an image says: ``size``, the periods of its first wave, the noise in percent of the contrast.
+    """Size of an image's line: ``size``, the periods of its first wave, the noise in percent of the contrast.
 
-    ``open_percent`` is how far trace and retrace are apart at the turns, of the line; nan where nothing shows it.
+    ``open_percent`` is the distance of trace and retrace at the turns, of the line; nan where nothing shows it.
     """
 
     name: str
@@ -79,12 +79,12 @@ class ImageSize:
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """What all calibrations have in common.
+    """Fields that all calibrations have in common.
 
     ``residual_percent`` is in the paper's metric: scale error of each point in percent for sizes and gains, position
     error in percent of the scan for hysteresis. ``before_percent`` is the largest error without the correction.
-    ``outliers`` are the rows, counted from 0, that do not fit to the others; they were kept. ``images`` are those of
-    which sizes were taken, a row each; none where sizes were given.
+    ``outliers`` are the rows, counted from 0, far from the other points; they stay in the fit. ``images`` are the
+    images from which sizes were measured, a row each; none where sizes were given.
     """
 
     points: int
@@ -97,12 +97,12 @@ class Fit:
 
     @property
     def rms_percent(self) -> float:
-        """Root mean square of the residuals."""
+        """Root mean square of the residuals, in percent."""
         return float((self.residual_percent**2).mean() ** 0.5)
 
     @property
     def largest_percent(self) -> float:
-        """The largest residual."""
+        """The largest residual, in percent."""
         return float(abs(self.residual_percent).max())
 
 

@@ -1,4 +1,4 @@
-"""Growth of one branch's residual with the amplitude -> beta_max and rho, equation (22), and one u_peak."""
+"""Fit the growth of one branch's residual with the amplitude: beta_max and rho of equation (22), and one u_peak."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,18 +17,19 @@ from tablegen.numerics.arrays import Floats
 
 _SIGNIFICANCE_LEVEL = 0.01
 _STRAIGHT_RHO = 1e-9  # below it (22) is a straight line to the last place
-_LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
+_LARGEST_RHO, _OPEN_RHO = (
+    60.0,
+    5.0,
+)  # above the first (22) is a step; an error above the second leaves rho undetermined
 _NOISE_LIMIT_ERRORS = 3.0  # standard errors of a residual that may be noise
 _CHI2_LIMIT = 4.0  # in chi squared, two standard errors
-_NO_HYSTERESIS = (
-    f'no hysteresis can be told from noise, and hence no u_peak; model = "{UNCOMPENSATED}" does, or average more'
-)
+_NO_HYSTERESIS = f'no hysteresis above the noise, and hence no u_peak; take model = "{UNCOMPENSATED}", or average more'
 _LEAST_BETA_ERROR = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
 
 
 @dataclass(frozen=True)
 class Growth:
-    """One branch: beta_max (of the scan), rho and u_peak; remarks on what they rest on.
+    """Growth of one branch: beta_max (of the scan), rho and u_peak, and remarks on how well they are determined.
 
     ``off_errors`` is by how many of their standard errors (22) misses the measured residuals, rms; ``off_share`` the
     rms of what it misses as a fraction of the largest residual. Both are 0 for one amplitude.
@@ -42,14 +43,32 @@ class Growth:
     off_share: float = 0.0
 
     def beta(self, v: Floats) -> Floats:
-        """Equation (22) at normalised amplitudes."""
+        """Return the peak residual at normalised amplitudes, equation (22).
+
+        Parameters
+        ----------
+        v
+            V_scan / v_max, any shape.
+
+        Returns
+        -------
+        Floats
+            Shares of the scan, of the shape of ``v``.
+        """
         return self.beta_max.value * _share(v, self.rho.value)
 
 
 def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Growth:
-    """Fit (22) to the residuals of one direction at normalised amplitudes, weighted by their standard errors.
+    """Fit (22) to the residuals of one direction, weighted by their standard errors.
 
-    ``rho`` is kept where the amplitudes do not determine it.
+    Parameters
+    ----------
+    v
+        Normalised amplitudes V_scan / v_max, shape (amplitudes,).
+    branches
+        The measured branch at each amplitude.
+    rho
+        Decay constant, used where the amplitudes do not determine it.
 
     Raises
     ------
@@ -67,10 +86,10 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
         steep = _steepest(v, beta, error, rho)
         fit = _height(v, beta, error, steep or rho, remarks)
         remarks.append(
-            Remark(f"the residual hardly grows with the amplitude: rho is only known to be large, {steep:g} was taken")
+            Remark(f"the residual hardly grows with the amplitude: rho is only known to be large, and set to {steep:g}")
             if steep
             else spoils(
-                f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
+                f"rho is not determined by these amplitudes and was set to {rho:g}; it takes two or "
                 f"more, best from 0.2 to 1 of v_max"
             )
         )
@@ -85,18 +104,25 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     top = float(np.max(v))
     if top < 0.6:
         remarks.append(spoils(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there"))
-    missed = beta_max.value * _share(v, estimate.value) - beta
-    off_errors = sqrt(float(np.sum((missed / error) ** 2)) / freedom)
-    off_share = sqrt(float(np.sum(missed**2)) / freedom) / float(np.max(np.abs(beta)))
+    misfit = beta_max.value * _share(v, estimate.value) - beta
+    off_errors = sqrt(float(np.sum((misfit / error) ** 2)) / freedom)
+    off_share = sqrt(float(np.sum(misfit**2)) / freedom) / float(np.max(np.abs(beta)))
     return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks), off_errors, off_share)
 
 
 def _both(
     v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Remark]
 ) -> tuple[Estimate, Estimate] | None:
-    """beta_max and rho, or None where rho stays open."""
+    """Fit beta_max and rho; return None where rho stays undetermined."""
 
     def residuals(x: Floats) -> Floats:
+        """Compute the misfit of (22) in standard errors.
+
+        Returns
+        -------
+        Floats
+            Shape (amplitudes,).
+        """
         misfit: Floats = (x[0] * _share(v, float(x[1])) - beta) / error
         return misfit
 
@@ -121,12 +147,12 @@ def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | Non
 
     costs = [cost(one) for one in grid.tolist()]
     best = int(np.argmin(costs))
-    spread = max(costs[best] / max(len(v) - 1, 1), 1.0)  # what it misses itself counts as error
+    spread = max(costs[best] / max(len(v) - 1, 1), 1.0)  # the misfit itself counts as an error
     return float(f"{grid[best]:.3g}") if cost(rho) - costs[best] > _CHI2_LIMIT * spread else None
 
 
 def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Remark]) -> tuple[Estimate, Estimate]:
-    """beta_max alone."""
+    """Fit beta_max alone."""
     share = _share(v, rho) / error
     value = float(share @ (beta / error)) / float(share @ share)
     misfit = value * share - beta / error
@@ -136,31 +162,31 @@ def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Re
 
 
 def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[Remark]) -> Estimate:
-    """Return the mean of u_peak over the amplitudes, weighted by its errors: the paper has the same at all."""
-    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
-    if not seen:
+    """Return the mean of u_peak over the amplitudes, weighted by its errors: the paper has one u_peak for all."""
+    peaks = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
+    if not peaks:
         raise Unphysical(_NO_HYSTERESIS)
-    value = np.array([estimate.value for estimate in seen])
-    spread = np.maximum([estimate.standard_error for estimate in seen], _LEAST_BETA_ERROR)
+    value = np.array([estimate.value for estimate in peaks])
+    spread = np.maximum([estimate.standard_error for estimate in peaks], _LEAST_BETA_ERROR)
     weight = 1.0 / spread**2
     mean = float(value @ weight) / float(np.sum(weight))
     misfit = (value - mean) / spread
     low, high = float(np.min(value)), float(np.max(value))
     what = f"u_peak differs from amplitude to amplitude, {low:.3g} to {high:.3g}, where the scanner file has one,"
     more = "; --points writes it as measured, or leave out amplitudes that you do not scan with"
-    variance = _variance(misfit, len(seen) - 1, what, remarks, more=more)
+    variance = _variance(misfit, len(peaks) - 1, what, remarks, more=more)
     return Estimate(mean, sqrt(variance / float(np.sum(weight))))
 
 
-def _percent(missed: Floats) -> float:
+def _percent(residuals: Floats) -> float:
     """Return the rms residual in percent of the scan."""
-    return 100.0 * sqrt(float(np.mean(missed**2)))
+    return 100.0 * sqrt(float(np.mean(residuals**2)))
 
 
 def _variance(
     residuals: Floats, freedom: int, what: str, remarks: list[Remark], percent: float = 0.0, more: str = ""
 ) -> float:
-    """1 where errors explain what is left; otherwise by how much they have to be widened, which is remarked."""
+    """Return 1 where errors explain the residuals; otherwise the factor that widens the variance, with a remark."""
     total = float(residuals @ residuals)
     if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANCE_LEVEL:
         return 1.0
@@ -170,7 +196,7 @@ def _variance(
 
 
 def _share(v: Floats, rho: float) -> Floats:
-    """(1 - exp(-rho v)) / (1 - exp(-rho))."""
+    """Return (1 - exp(-rho v)) / (1 - exp(-rho)), equation (22) of unit height."""
     if rho < _STRAIGHT_RHO:
         return np.asarray(v, dtype=np.float64)
     share: Floats = np.expm1(-rho * np.asarray(v)) / expm1(-rho)

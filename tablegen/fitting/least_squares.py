@@ -1,4 +1,4 @@
-"""Least squares with standard errors that can be believed, and with the parameters that data cannot determine."""
+"""Least squares with reliable standard errors, and with the names of the parameters that the data do not determine."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,18 +12,18 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.fitting.estimate import Estimate
 from tablegen.numerics.arrays import Floats
 
-_NORMAL_AT_2_SIGMA = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
+_NORMAL_AT_2_SIGMA = 0.9772498680518208  # of the normal distribution: below two standard errors, one-sided
 _SCATTER_STEPS = 20
-_SINGULAR_VALUE_LIMIT = 1e-10  # relative to the largest; finite differences leave less than this of a zero
+_SINGULAR_VALUE_LIMIT = 1e-10  # relative to the largest; finite differences turn a zero into less than this
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Values, their covariance for a unit variance of the residuals, and what is left.
+    """Values, their covariance for a unit variance of the residuals, and the residuals.
 
-    ``undetermined`` names the parameters that can move by their whole scale without the data noticing.
-    ``known_errors`` says that residuals are in standard errors, known without their scatter, unless that is more:
-    then ``scatter`` is what was added to each error, a share of the value.
+    ``undetermined`` names the parameters that can move by their whole scale without an effect on the data.
+    With ``absolute_errors`` residuals are in standard errors that hold without their scatter; where they scatter more,
+    ``scatter`` is what was added to each error, a share of the value.
     """
 
     names: tuple[str, ...]
@@ -32,25 +32,25 @@ class Solution:
     residuals: Floats
     jacobian: Floats
     undetermined: tuple[str, ...]
-    known_errors: bool = False
+    absolute_errors: bool = False
     scatter: float = 0.0
 
     @property
     def freedom(self) -> int:
-        """Points less parameters that were fitted."""
+        """Number of points less that of fitted parameters."""
         return len(self.residuals) - len(self.names)
 
     @property
     def variance(self) -> float:
-        """Variance of the residuals; nan where it is not known and there are no more points than parameters."""
-        if self.known_errors:
+        """Variance of the residuals; nan if it is unknown and there are no more points than parameters."""
+        if self.absolute_errors:
             return 1.0
         return float(self.residuals @ self.residuals) / self.freedom if self.freedom > 0 else nan
 
     def estimate(self, name: str) -> Estimate:
-        """One parameter, its error widened for few points."""
+        """Return one parameter, its error widened for few points."""
         i = self.names.index(name)
-        if self.known_errors:
+        if self.absolute_errors:
             widened = few_points(self.freedom) if self.scatter > 0.0 else 1.0
             return Estimate(float(self.values[i]), sqrt(self.unit_covariance[i, i]) * widened)
         error = sqrt(self.unit_covariance[i, i] * self.variance) if self.freedom > 0 else nan
@@ -58,7 +58,7 @@ class Solution:
 
 
 def few_points(freedom: int) -> float:
-    """By how much Student's distribution widens what two standard errors have to be; nan where nothing is left."""
+    """Return the factor by which Student's distribution widens two standard errors; nan without degrees of freedom."""
     return float(stdtrit(freedom, _NORMAL_AT_2_SIGMA)) / 2.0 if freedom > 0 else nan
 
 
@@ -72,13 +72,26 @@ def solve(
 ) -> Solution:
     """Minimise the sum of squares of ``residuals``.
 
-    ``scales`` says of each parameter by how much it could at most differ from scanner to scanner: one whose standard
-    error is larger was not determined.
+    Parameters
+    ----------
+    residuals
+        Function of parameters, shape (parameters,), to residuals, shape (points,).
+    start
+        Parameters to begin with, shape (parameters,).
+    names
+        Name of each parameter.
+    scales
+        Range of each parameter from scanner to scanner, in its unit, shape (parameters,): one whose standard error is
+        larger is undetermined.
+    bounds
+        Lower and upper limits, shape (parameters,) each.
+    jacobian
+        Function of parameters to derivatives of the residuals, shape (points, parameters); differences by default.
 
     Raises
     ------
     Unphysical
-        If no minimum is found.
+        If the minimisation does not converge.
     """
     start = np.asarray(start, dtype=np.float64)
     scales = np.asarray(scales, dtype=np.float64)
@@ -105,7 +118,7 @@ def solve(
     rows = directions[: len(size)]
     covariance = (rows.T * inverse[: len(rows)]) @ rows * np.outer(scales, scales)
     blind = np.sqrt(np.sum(rows[weak[: len(rows)]] ** 2, axis=0)) > 0.1
-    if len(rows) < len(values):  # fewer points than parameters: what no row sees
+    if len(rows) < len(values):  # fewer points than parameters: directions without any point
         blind |= np.sum(rows**2, axis=0) < 0.99
     freedom = len(misfit) - len(values)
     if freedom > 0:
@@ -116,21 +129,23 @@ def solve(
 
 
 def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Floats) -> Solution:
-    """Fit values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
+    """Fit values whose standard errors are given; ``fit`` solves for some errors, residuals in units of them.
 
     Where values scatter by more than that, since no law is exact, all get one relative error more: as much as makes
     their scatter the expected one (Paule and Mandel, 1982). Else precise values would bend the law for all others.
 
     Parameters
     ----------
+    fit
+        Function of standard errors, shape (points,), to a solution.
     values
         Measured values, shape (points,).
     errors
-        Their standard errors, shape (points,).
+        Their standard errors, in the unit of the values, shape (points,).
     """
 
     def at(share: float) -> Solution:
-        return replace(fit(np.hypot(errors, share * values)), known_errors=True, scatter=share)
+        return replace(fit(np.hypot(errors, share * values)), absolute_errors=True, scatter=share)
 
     def excess(solution: Solution) -> float:
         return float(solution.residuals @ solution.residuals) - solution.freedom

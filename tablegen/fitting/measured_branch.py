@@ -1,4 +1,4 @@
-"""What is measured at one amplitude: the peak residual of each branch and where it is, whatever measured it."""
+"""Measurement at one amplitude: the peak residual of each branch and its place, from a sensor or from images."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ WINDOW = slice(2, 18)  # x = 0.1 .. 0.9
 
 @dataclass(frozen=True)
 class MeasuredBranch:
-    """The peak residual and where it is, (17), as a fraction of the scan, in sweep-aligned coordinates."""
+    """The peak residual and its place, (17), as fractions of the scan, in sweep-aligned coordinates."""
 
     beta: Estimate
     u_peak: Estimate
@@ -22,9 +22,9 @@ class MeasuredBranch:
 
 @dataclass(frozen=True, kw_only=True)
 class AmplitudeFit:
-    """What one amplitude says.
+    """Fit of the measurement at one amplitude.
 
-    ``v_scan`` is peak to peak in V, ``v_offset`` its middle, None where it is not known. ``residual_percent`` is the
+    ``v_scan`` is peak to peak in V, ``v_offset`` its middle, None where it is unknown. ``residual_percent`` is the
     position error that the model leaves, in percent of the scan, averaged in bins of a twentieth of the line, forward
     then backward; ``scaling_percent`` the local scaling error that it leaves, peak to peak over x = 0.1..0.9, of each
     direction. ``noise_percent`` is that of the scan for a sensor, of the contrast for an image; ``drift_percent`` of
@@ -45,7 +45,15 @@ class AmplitudeFit:
 
 
 def measured_branch(shape: Floats, covariance: Floats) -> MeasuredBranch:
-    """Return the branch at these coordinates, (2,), with their covariance, (2, 2)."""
+    """Return the peak of a branch with its standard errors.
+
+    Parameters
+    ----------
+    shape
+        Coordinates of the branch, shape (2,).
+    covariance
+        Their covariance, shape (2, 2).
+    """
     beta, u_peak = BranchShape.at(shape).peak()
     step = 1e-6 * max(float(np.max(np.abs(shape))), 1e-3)
     steps = step * np.eye(len(shape))

@@ -1,4 +1,4 @@
-"""Points that do not fit to the others: found to be named, never to be dropped."""
+"""Find outliers, to name them; they stay in the fit."""
 
 import numpy as np
 from scipy.special import stdtrit
@@ -11,10 +11,9 @@ _FALSE_ALARM_RATE = 0.01  # per set of points, whatever their number
 def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ...]:
     """Return the indices of points that the fit to all others would not have left there, the worst first.
 
-    Each residual is held against the scatter of the fit without it (an externally studentised residual), at a level
-    that is divided by the number of points. The worst is set aside and the rest is looked at again, while
-    at least three quarters of the points and two degrees of freedom remain. ``least`` is the scatter that
-    counts as none, in the unit of the residuals.
+    Each residual is compared with the scatter of the fit without it (an externally studentised residual), at a level
+    that is divided by the number of points. The worst is set aside and the rest is tested again, while
+    at least three quarters of the points and two degrees of freedom remain.
 
     Parameters
     ----------
@@ -22,6 +21,8 @@ def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ..
         Derivatives of the residuals, shape (points, parameters).
     residuals
         Shape (points,).
+    least
+        Scatter that counts as none, in the unit of the residuals.
     """
     count, parameters = jacobian.shape
     remaining = np.arange(count)
@@ -39,9 +40,9 @@ def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ..
 def _studentised(jacobian: Floats, residuals: Floats, least: float) -> Floats:
     orthogonal, _ = np.linalg.qr(jacobian)
     deviation = residuals - orthogonal @ (orthogonal.T @ residuals)
-    share = np.clip(1.0 - np.sum(orthogonal**2, axis=1), 1e-9, 1.0)  # share of its own error that a point keeps
+    share = np.clip(1.0 - np.sum(orthogonal**2, axis=1), 1e-9, 1.0)  # share of an error that stays in the residual
     freedom = len(deviation) - jacobian.shape[1]
     without = (float(deviation @ deviation) - deviation**2 / share) / (freedom - 1)
     spread = np.sqrt(np.maximum(without, least**2))
-    # A point that alone decides a parameter has no residual of its own to judge it by.
+    # A point that alone determines a parameter has no residual by which to test it.
     return np.where(share > 1e-6, np.abs(deviation) / (spread * np.sqrt(share)), 0.0)

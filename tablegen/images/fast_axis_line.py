@@ -1,7 +1,7 @@
-"""Where the fast axis was at each column of an image of a periodic sample, whatever its hysteresis.
+"""Fit the position of the fast axis at each column of an image of a periodic sample, whatever its hysteresis.
 
 (17) begins the fit. Then each sweep's position gets a polynomial that vanishes at both turns, of as high a degree as
-the image can tell (Akaike's criterion), so that periods are counted from turn to turn on any piezo.
+the image supports (Akaike's criterion), so that periods are counted from turn to turn on any piezo.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.measured_branch import BINS
-from tablegen.images.model_start import begin, grown, prepared
+from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_checks import ALIASING_HINT, MIN_PERIODS
 from tablegen.images.periodic_model import BASES, FitState, Geometry, PeriodicModel, settle
 from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
@@ -23,27 +23,27 @@ from tablegen.numerics.arrays import Bools, Floats, Ints
 _MOST_RIPPLES = 12  # of each sweep
 _RIPPLES_PER_PERIOD = 0.6
 _LEAST_RIPPLES = 2
-_WHOLE = 0.02  # of the sweep: how much of it a window may leave out and still show the turns
-_HOPELESS, _AS_GOOD = 300.0, 60.0  # by how much Akaike's criterion may be worse
-_NEIGHBOURS = 3  # degrees: which other fits say how much their number matters
-_UNSEEN_GAP = 5e-4  # of the line: what is open at the turns where no retrace shows it
-_RIPPLES_OF_A_WINDOW = 8  # where the turns are not in the image, and higher degrees would go anywhere
-_UNSEEN_TURNS = 0.02  # of what a window leaves out of the sweep: how far its ends are told by what is seen
+_WHOLE = 0.02  # share of the sweep that a window may leave out and still show the turns
+_HOPELESS, _AS_GOOD = 300.0, 60.0  # how much worse Akaike's criterion may be
+_NEIGHBOURS = 3  # degrees: the fits whose spread is the error of choosing a degree
+_UNSEEN_GAP = 5e-4  # share of the line: assumed gap at the turns where there is no retrace
+_RIPPLES_OF_A_WINDOW = 8  # where the turns are not in the image: higher degrees extrapolate badly
+_UNSEEN_TURNS = 0.02  # share of what a window leaves out of the sweep: error of its extrapolated ends
 _MIN_EXPLAINED = 0.03  # share of an image's variance
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
-_MIN_OPENING = 0.004  # of the line: what is a loop, and has a sign
+_MIN_OPENING = 0.004  # share of the line: least opening of a loop that has a sign
 _LARGEST_GAP, _GAP_ERRORS = 0.01, 4.0  # of the line, and in standard errors
-_LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.008, 6.0, 6  # of the line; what few periods cannot tell is not
+_LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.008, 6.0, 6  # share of the line, standard errors, degrees
 _NEAR_TURN, _LEAST_WIDTH = (0.1, 0.9), 1e-3  # of the line
-_LAG_GAP = 0.004  # of the line: so far apart dynamics and creep may keep both sweeps; more where one is fast
+_LAG_GAP = 0.004  # share of the line: gap that dynamics and creep may cause; more where one sweep is fast
 
 
 @dataclass(frozen=True, eq=False)
 class ImageLine:
-    """One trace, and the retrace if there is one, of a triangle's scan; positions are shares of the way between turns.
+    """A fitted trace, and its retrace if there is one, of a triangle's scan; positions are 0..1 between the turns.
 
     ``waves`` has a row of q and s for each base wave, periods in the line and in the frame; ``waves_covariance`` is of
-    q_1, s_1, q_2, s_2. ``spots`` are the waves seen, whole numbers of the base waves, with their ``amplitudes``.
+    q_1, s_1, q_2, s_2. ``spots`` are the visible waves, whole numbers of the base waves, with their ``amplitudes``.
     ``gap`` is how far trace and retrace are apart at the left and the right turn, shares of the line, (2,), and
     ``gap_error``; nan where there is no retrace, or where the window leaves the turns out. ``explained`` is the share
     of the heights' variance that is periodic, ``noise_percent`` that of a pixel, of the contrast.
@@ -64,13 +64,25 @@ class ImageLine:
 
     @property
     def waves(self) -> Floats:
-        """(bases, 2)."""
+        """Base waves of the image.
+
+        Returns
+        -------
+        Floats
+            q and s of each base wave, periods in the line and in the frame, shape (bases, 2).
+        """
         x = self.state.parameters
         return np.stack([self.model.q(x), self.model.s(x)[:, 0]], axis=1)
 
     @property
     def waves_covariance(self) -> Floats:
-        """(2 bases, 2 bases)."""
+        """Covariance of q_1, s_1, q_2, s_2.
+
+        Returns
+        -------
+        Floats
+            In squared periods, shape (2 bases, 2 bases).
+        """
         step = self.model.order + 1
         at = [
             self.model.rippled_from - (self.model.bases - j) * step + k for j in range(self.model.bases) for k in (0, 1)
@@ -80,22 +92,47 @@ class ImageLine:
 
     @property
     def spots(self) -> Ints:
-        """(spots, bases)."""
+        """Waves of the fit, as whole numbers of the base waves.
+
+        Returns
+        -------
+        Ints
+            Shape (spots, bases).
+        """
         return self.model.spots
 
     @property
     def amplitudes(self) -> Floats:
-        """(spots,), of unit variance of the heights."""
+        """Amplitudes of the spots, for heights of unit variance.
+
+        Returns
+        -------
+        Floats
+            Magnitudes, dimensionless, shape (spots,).
+        """
         magnitudes: Floats = np.abs(self.state.amplitudes)
         return magnitudes
 
     @property
     def both(self) -> bool:
-        """Whether there is a retrace."""
+        """True if there is a retrace."""
         return len(self.model.images) == 2
 
     def position(self, drive: Floats, forward: bool) -> Floats:
-        """Return positions, of the shape of ``drive`` (0..1 between the turns), on the way up or down."""
+        """Return the positions along the line at these drives.
+
+        Parameters
+        ----------
+        drive
+            Normalised drive, 0..1 between the turns, shape (n,).
+        forward
+            True on the way up.
+
+        Returns
+        -------
+        Floats
+            Positions, 0..1 between the turns, shape (n,).
+        """
         i = 0 if forward else 2
         along = drive if forward else 1.0 - drive
         tau = BranchShape.at(self.state.parameters[i : i + 2]).inverse(along)
@@ -104,11 +141,24 @@ class ImageLine:
         return place
 
     def position_error(self, drive: Floats, forward: bool) -> Floats:
-        """Its standard error."""
+        """Return the standard errors of ``position`` that come from the polynomials.
+
+        Parameters
+        ----------
+        drive
+            Normalised drive, 0..1 between the turns, shape (n,).
+        forward
+            True on the way up.
+
+        Returns
+        -------
+        Floats
+            Shares of the line, shape (n,).
+        """
         first = self.model.rippled_from + (0 if forward else self.degrees)
         part = self.covariance[first : first + self.degrees, first : first + self.degrees]
-        shown = bubbles(drive if forward else 1.0 - drive, self.degrees)
-        errors: Floats = np.sqrt(np.einsum("ic,ij,jc->c", shown, part, shown))
+        polynomials = bubbles(drive if forward else 1.0 - drive, self.degrees)
+        errors: Floats = np.sqrt(np.einsum("ic,ij,jc->c", polynomials, part, polynomials))
         return errors
 
     def _coefficients(self, forward: bool) -> Floats:
@@ -117,7 +167,20 @@ class ImageLine:
 
 
 def bubbles(u: Floats, count: int) -> Floats:
-    """(count, n): polynomials that vanish at 0 and 1, of the degrees from 2 on: integrals of Legendre's."""
+    """Return polynomials that vanish at 0 and 1, of the degrees from 2 on: integrals of Legendre's.
+
+    Parameters
+    ----------
+    u
+        Arguments in 0..1, shape (n,).
+    count
+        Number of polynomials.
+
+    Returns
+    -------
+    Floats
+        Values, shape (count, n).
+    """
     coefficients = np.zeros((count + 2, count))
     for j in range(count):
         coefficients[[j, j + 2], j] = -1.0, 1.0
@@ -132,9 +195,22 @@ def fit_line(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> ImageLine:
-    """Fit positions and periods to heights in any unit, rows x columns, rows in the order of time.
+    """Fit positions and periods to an image of a triangle's scan.
 
-    Columns are evenly spread in time over ``window`` of each sweep of a triangle; the rest is as in ``fit_pair``.
+    Columns are evenly spread in time over ``window`` of each sweep; the rest is as in ``fit_pair``.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns) each, rows in the order of time.
+    turn
+        Share of the period in which the drive rises.
+    window
+        First and last share of each sweep that the columns span.
+    retrace_mirrored
+        True if the retrace is stored in the order of time, its right end first.
+    delay_pixels
+        Columns by which the image is late.
 
     Raises
     ------
@@ -143,9 +219,9 @@ def fit_line(
     """
     if retrace is not None and retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
-    geometry, heights = prepared(trace, retrace, turn, window, delay_pixels)
+    geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
     spot, bends = begin(geometry, heights, retrace_mirrored)
-    model, state, free = grown(geometry, heights, spot, bends)
+    model, state, free = fit_spots(geometry, heights, spot, bends)
     fits = _rippled(model, state, free)
     best = min(fits, key=lambda fit: fit.loss)
     _check(best.model, best.state)
@@ -154,13 +230,13 @@ def fit_line(
 
 
 def shows_turns(geometry: Geometry) -> bool:
-    """Whether the columns reach to both turns."""
+    """Return True if the columns reach to both turns."""
     return geometry.window[0] <= _WHOLE and geometry.window[1] >= 1.0 - _WHOLE
 
 
 @dataclass(frozen=True, eq=False)
 class _Degree:
-    """The fit with so many polynomials on each sweep, and what it would lose by Akaike's criterion."""
+    """The fit with a number of polynomials on each sweep, and its value of Akaike's criterion."""
 
     model: PeriodicModel
     state: FitState
@@ -169,15 +245,17 @@ class _Degree:
 
 
 def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree]:
-    """Fit polynomials on both sweeps: of every degree, from the highest that such an image may show."""
+    """Fit polynomials on both sweeps, of every degree from the highest that such an image may show."""
     geometry = model.geometry
     along = np.abs(model.spots @ model.q(state.parameters))
-    seen = np.abs(state.amplitudes)
+    magnitudes = np.abs(state.amplitudes)
     most = _MOST_RIPPLES if shows_turns(geometry) else _RIPPLES_OF_A_WINDOW
-    most = min(most, int(_LEAST_RIPPLES + _RIPPLES_PER_PERIOD * float(np.max(along[seen > 0.3 * np.max(seen)]))))
+    most = min(
+        most, int(_LEAST_RIPPLES + _RIPPLES_PER_PERIOD * float(np.max(along[magnitudes > 0.3 * np.max(magnitudes)])))
+    )
     plain = np.zeros(geometry.columns), np.zeros(geometry.columns)
     base = state.parameters
-    known = [
+    starts = [
         np.linalg.lstsq(ripple.T, off, rcond=None)[0]
         for ripple, off in zip(_ripples(geometry, most), model.off, strict=True)
     ]
@@ -185,9 +263,9 @@ def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree
     spots = list(map(tuple, model.spots.tolist()))
     fits: list[_Degree] = []
     for count in range(most, 0, -1):
-        start = np.concatenate([base, *(coefficients[:count] for coefficients in known)])
+        start = np.concatenate([base, *(coefficients[:count] for coefficients in starts)])
         loose = np.concatenate([free, np.ones(count, bool), np.full(count, len(model.images) == 2)])
-        loose[:4] = False  # the polynomials have what (17) has
+        loose[:4] = False  # the polynomials contain the shapes of (17)
         one = PeriodicModel(geometry, model.images, spots, model.order, plain, _ripples(geometry, count))
         settled = settle(one, start, loose)
         loss = pixels * float(np.log(2.0 * settled.cost / pixels)) + 2.0 * float(np.sum(loose))
@@ -195,7 +273,7 @@ def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree
         if loss > min(fit.loss for fit in fits) + _HOPELESS:
             break
         base = settled.parameters[: one.rippled_from]
-        known = list(settled.parameters[one.rippled_from :].reshape(2, -1))
+        starts = list(settled.parameters[one.rippled_from :].reshape(2, -1))
     return fits
 
 
@@ -204,7 +282,7 @@ def _ripples(geometry: Geometry, count: int) -> tuple[Floats, Floats]:
 
 
 def _check(model: PeriodicModel, state: FitState) -> None:
-    """Whether it is a fit at all, and of a trace and its retrace."""
+    """Raise ``Unphysical`` unless the fit explains the image, and trace and retrace are of one scan."""
     for name, (_, image), residual in zip(("trace", "retrace"), model.images, state.residuals, strict=False):
         share = 1.0 - float(np.mean(residual**2)) / float(np.mean(image**2))
         if share < _MIN_EXPLAINED:
@@ -232,20 +310,20 @@ def _check(model: PeriodicModel, state: FitState) -> None:
 
 
 def _opening(model: PeriodicModel, state: FitState) -> Floats:
-    """How far the retrace is to the right of the trace at each column, of the line."""
+    """Return by how much the retrace is to the right of the trace at each column, a share of the line."""
     gap: Floats = model.columns(state.parameters, False).x - model.columns(state.parameters, True).x
     return gap
 
 
 def _cropped(model: PeriodicModel, state: FitState, gap: Floats) -> Floats:
-    """How much of the line is missing at each end, (2,), if that is what keeps trace and retrace apart there."""
+    """Return how much of the line is missing at each end, (2,), if cropping explains the gap there."""
     width = np.abs(np.interp(_NEAR_TURN, model.geometry.place, _opening(model, state)))
     size: Floats = np.abs(gap) / np.maximum(width, _LEAST_WIDTH) * _NEAR_TURN[0]
     return size
 
 
 def _gap(fit: _Degree) -> tuple[Floats, Floats]:
-    """How far trace and retrace are apart at the turns, where they meet if the columns are the whole sweep."""
+    """Fit the gap of trace and retrace at the turns, where they meet if the columns are the whole sweep."""
     model, state, free = fit.model, fit.state, fit.free
     unknown = np.full(2, np.nan)
     if len(model.images) < 2 or not shows_turns(model.geometry):
@@ -264,7 +342,7 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     errors = covariance(wider, settled, loose, watched, 1.0, list(settled.residuals))[0]
     gap, error = settled.parameters[-2:], np.sqrt(np.diag(errors)[-2:])
     worst = int(np.argmax(np.abs(gap)))
-    # A narrow loop is as little open where much is cropped: how much, its width a tenth of the line further says.
+    # With a narrow loop a large crop opens a small gap; the loop's width a tenth of the line further gives the crop.
     cropped = float(_cropped(model, state, gap)[worst])
     significance = abs(gap[worst]) / error[worst]
     fast = min(sqrt(0.5 / min(geometry.turn, 1.0 - geometry.turn)), 3.0)
@@ -291,9 +369,9 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
     indices = np.arange(len(free))
     watched = free & ((indices >= 5) & (indices < model.rippled_from) & ((indices - 5) % (model.order + 1) == 0))
     matrix, widened = covariance(model, state, free, watched, max(misfit, 1.0), [one.clean for one in binned])
-    matrix = matrix + _of_the_form(best, fits, gap, gap_error)
+    matrix = matrix + _model_choice_covariance(best, fits, gap, gap_error)
     power = sum(float(np.vdot(image, image)) for _, image in model.images)
-    drawn = np.concatenate(
+    modelled = np.concatenate(
         [image - residual for (_, image), residual in zip(model.images, state.residuals, strict=True)]
     )
     return ImageLine(
@@ -306,14 +384,14 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
         gap=gap,
         gap_error=gap_error,
         explained=1.0 - 2.0 * state.cost / power,
-        noise_percent=100.0 * pixel_noise(state) / float(np.ptp(drawn)),
+        noise_percent=100.0 * pixel_noise(state) / float(np.ptp(modelled)),
         widened=sqrt(widened),
         strays=loud_rows(state),
     )
 
 
-def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> Floats:
-    """Return what the choice of the polynomials adds to the covariance of the base waves, and the open ends.
+def _model_choice_covariance(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> Floats:
+    """Return the covariance of the base waves that comes from the choice of the polynomials, and from the gap.
 
     Fits of neighbouring degrees describe the image about as well.
     """
@@ -321,11 +399,11 @@ def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Flo
     whole = np.zeros((len(best.free), len(best.free)))
     count = len(best.model.ripples[0])
     others = [fit for fit in fits if 0 < abs(len(fit.model.ripples[0]) - count) <= _NEIGHBOURS]
-    moved = [
+    shifts = [
         fit.state.parameters[:end] - best.state.parameters[:end] for fit in others if fit.loss < best.loss + _AS_GOOD
     ]
-    if moved:
-        whole[:end, :end] = np.mean([np.outer(one, one) for one in moved], axis=0)
+    if shifts:
+        whole[:end, :end] = np.mean([np.outer(one, one) for one in shifts], axis=0)
     open_by = _UNSEEN_GAP
     if np.isfinite(gap).all():
         clear = np.abs(gap) > _GAP_ERRORS * gap_error

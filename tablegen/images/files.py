@@ -1,6 +1,6 @@
 """Images of heights from files: those of instruments, Gwyddion's .gwy, .npy, .tif, .png, and numbers as text.
 
-Needs the extra ``images`` for .tif, .png and .jpk. What each format says is in docs/image_files.md.
+Needs the extra ``images`` for .tif, .png and .jpk. docs/image_files.md lists the values that each format has.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ from tablegen.images.formats.channel import (
     FirstRow,
     choose,
     partner,
-    quoted,
+    quote,
 )
 from tablegen.images.formats.gwyddion import gwy_channels
 from tablegen.images.formats.igor import ibw_channels
@@ -45,10 +45,10 @@ MODULES = {".png": "PIL", **dict.fromkeys((".tif", ".tiff", ".jpk", ".jpk-qi-ima
 
 @dataclass(frozen=True, eq=False)
 class ScanImage:
-    """Heights, rows x columns, and what the file says of them; ``file`` as messages call it.
+    """Heights, rows x columns, with the data of their file; ``file`` is its name in messages.
 
-    Row 0 is the first in time, as far as the file tells; the left end of the line is at the left in both directions.
-    What a file does not say is None, or empty.
+    Row 0 is the first in time as far as the file states it; the left end of the line is at the left in both directions.
+    A value that the file does not have is None, or empty.
     """
 
     file: str
@@ -88,7 +88,7 @@ def read_image(
         If the file cannot be read or has no such heights; the message has file and reason.
     """
     file = _opened(path)
-    with file.named():
+    with file.rejecting():
         return _read(file, choose(file.channels, channel, direction), frame)
 
 
@@ -102,24 +102,30 @@ def read_pair(
     """Read trace and retrace of one scan, from two files, or from one that has both.
 
     The retrace is ``retrace_channel``, or the retrace that belongs to the trace's channel, or the channel of the same
-    name. Raises ``Rejected`` with file and reason, also where a file calls the trace a retrace, or the reverse.
+    name.
+
+    Raises
+    ------
+    Rejected
+        If a file cannot be read, has no such channel, or calls the trace a retrace, or the reverse; the message has
+        file and reason.
     """
     first = _opened(trace)
     second = first if retrace is None or retrace == trace else _opened(retrace)
-    with first.named():
+    with first.rejecting():
         one = _required(choose(first.channels, channel, "trace"), "trace")
         read = _read(first, one, frame)
-    with second.named():
+    with second.rejecting():
         other = partner(second.channels, one) if retrace_channel is None else None
         other = _required(other or choose(second.channels, retrace_channel or channel, "retrace"), "retrace")
         if first is second and one is other:
-            raise ValueError(f"channel {one.number} ({quoted(one.title)}) has no retrace in this file; give it too")
+            raise ValueError(f"channel {one.number} ({quote(one.title)}) has no retrace in this file; give it too")
         return read, _read(second, other, frame)
 
 
 def _required(channel: Channel, direction: Direction) -> Channel:
     if channel.direction not in (None, direction):
-        what = f"channel {channel.number} ({quoted(channel.title)}) is the {channel.direction} by the file"
+        what = f"channel {channel.number} ({quote(channel.title)}) is the {channel.direction} by the file"
         raise ValueError(f"{what}; the {direction} is needed here. Are trace and retrace exchanged?")
     return channel
 
@@ -133,14 +139,14 @@ def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
         If the file cannot be read, or a channel is no image of heights.
     """
     file = _opened(path)
-    with file.named():
+    with file.rejecting():
         if not file.channels:
             raise ValueError("contains no image")
         return [_read(file, channel, frame) for channel in file.channels]
 
 
 def channels_of(path: Path) -> list[Channel]:
-    """Return the channels of a file, without reading more of it than its format needs for that.
+    """Return the channels of a file, without reading more of it than its format needs.
 
     Raises
     ------
@@ -152,15 +158,21 @@ def channels_of(path: Path) -> list[Channel]:
 
 @dataclass(frozen=True, eq=False)
 class _ImageFile:
-    """A file whose structure was read, and where it came from."""
+    """A file with its channels, and its origin."""
 
     name: str
     source: Source
     channels: list[Channel]
 
     @contextmanager
-    def named(self) -> Iterator[None]:
-        """Turn a ``ValueError`` into ``Rejected`` with the name of the file."""
+    def rejecting(self) -> Iterator[None]:
+        """Turn a ``ValueError`` into ``Rejected`` with the name of the file.
+
+        Raises
+        ------
+        Rejected
+            If the block raises ``ValueError``.
+        """
         try:
             yield
         except ValueError as reason:
@@ -173,7 +185,7 @@ def _opened(path: Path) -> _ImageFile:
     file = _ImageFile(name, Source(path.name, ""), [])
     ending = path.suffix.lower()
     reader = spm_channels if _NUMBERED.fullmatch(ending) else _READERS.get(ending)
-    with file.named():
+    with file.rejecting():
         if reader is None:
             what = path.suffix or "no ending"
             raise ValueError(f"{what} is not one of {', '.join(_READERS)}; export it as one of these")
@@ -187,7 +199,7 @@ def _opened(path: Path) -> _ImageFile:
 
 def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
     """Return the image of a channel. Raise ``ValueError`` unless it has heights."""
-    what = f"channel {channel.number} ({quoted(channel.title)}): " if len(file.channels) > 1 else ""
+    what = f"channel {channel.number} ({quote(channel.title)}): " if len(file.channels) > 1 else ""
     size = " x ".join(map(str, channel.shape))
     if len(channel.shape) != 2:
         raise ValueError(f"{what}has the shape {shortened(size, 60)}; rows x columns are needed")
@@ -198,11 +210,11 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         raise ValueError(
             f"{what}is a movie of {channel.frames} frames; choose one with --frame, 0 to {channel.frames - 1}"
         )
-    chosen = frame or 0
-    if not 0 <= chosen < channel.frames:
-        raise ValueError(f"{what}has no frame {chosen}; the last one is {channel.frames - 1}")
+    frame_number = frame or 0
+    if not 0 <= frame_number < channel.frames:
+        raise ValueError(f"{what}has no frame {frame_number}; the last one is {channel.frames - 1}")
     with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
-        matrix = channel.load(chosen)
+        matrix = channel.load(frame_number)
         if matrix.dtype.kind not in "iufb":
             raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
         if matrix.shape != channel.shape:
@@ -228,7 +240,7 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         height_nm=channel.height_nm,
         line_rate_hz=channel.line_rate_hz,
         first_row=channel.first_row,
-        frame=chosen,
+        frame=frame_number,
         frames=channel.frames,
         angle_deg=channel.angle_deg,
     )

@@ -1,6 +1,7 @@
-"""How long the line of an image is, from a lattice or a grating of known constant.
+"""Length of the line of an image, from a lattice or a grating of known constant.
 
-A lattice says it by itself: base waves of q_j periods in the line are those of a cell with the direct vectors a_j where
+A lattice determines it by itself: base waves of q_j periods in the line are those of a cell with the direct vectors a_j
+where
 
     L^2 = sum over i, j of q_i q_j a_i . a_j
 
@@ -20,17 +21,17 @@ from tablegen.fitting.estimate import Estimate, LineSize
 from tablegen.images.periodic_model import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 
-ASPECT_ERROR = 0.1  # standard error of a frame's height over its width, where only the pixels say it
-DRIFT_ERROR = 0.02  # of the line, in a frame: the drift along x that one wave cannot tell from its angle
+ASPECT_ERROR = 0.1  # standard error of a frame's height over its width, where it follows from the pixels alone
+DRIFT_ERROR = 0.02  # share of the line, in a frame: drift along x that one wave cannot tell from its angle
 _MAX_ANGLE = 40.0  # degrees of a grating whose angle is not given
 _MAX_ANGLE_OFF = 12.0  # degrees between a given angle and what the rows show
-_ASPECT_SPREAD, _SHEAR_SPREAD = 0.15, 0.1  # what a slow axis and a drift may make of a lattice
-_MAX_STRAIN = 3.0  # of these
-_CLEARLY = 1.5  # how much worse another reading of the waves has to be, in these
-_SAME_SIZE = 0.01  # share: two readings that are one
+_ASPECT_SPREAD, _SHEAR_SPREAD = 0.15, 0.1  # distortions of a lattice by the slow axis and by drift
+_MAX_STRAIN = 3.0  # in units of both spreads
+_CLEARLY = 1.5  # in the same units: how much worse another reading of the waves has to be
+_SAME_SIZE = 0.01  # share: readings that differ by less are one
 _LARGEST_INDEX = 2
 _SUPERCELLS = (2, 3)
-_MIN_PART = 0.05  # of the strongest amplitude: a wave between the others that counts
+_MIN_PART = 0.05  # share of the strongest amplitude: least wave between the others that counts
 _MIN_PART_ERRORS = 8.0
 
 
@@ -45,17 +46,23 @@ class Cell:
 
     @classmethod
     def hexagonal(cls, constant_nm: float) -> "Cell":
-        """Sides of one length under 120 degrees."""
+        """Return a cell with sides of one length under 120 degrees."""
         return cls(constant_nm, constant_nm, 120.0, "hexagonal")
 
     @classmethod
     def square(cls, constant_nm: float) -> "Cell":
-        """Sides of one length under 90 degrees."""
+        """Return a cell with sides of one length under 90 degrees."""
         return cls(constant_nm, constant_nm, 90.0, "square")
 
     @property
     def vectors(self) -> Floats:
-        """(2, 2): a row each side."""
+        """Direct vectors of the cell.
+
+        Returns
+        -------
+        Floats
+            A row for each side, in nm, shape (2, 2).
+        """
         g = radians(self.gamma_deg)
         return np.array([[self.a_nm, 0.0], [self.b_nm * cos(g), self.b_nm * sin(g)]])
 
@@ -73,27 +80,45 @@ class ImagedWaves(Protocol):
 
     @property
     def geometry(self) -> Geometry:
-        """How it was taken."""
+        """Rows, columns and timing of the image."""
 
     @property
     def model(self) -> PeriodicModel:
-        """The waves that were fitted."""
+        """The model that was fitted."""
 
     @property
     def state(self) -> FitState:
-        """At these parameters."""
+        """The model at the fitted parameters."""
 
     @property
     def waves(self) -> Floats:
-        """(bases, 2): periods in the line and in the frame of each base wave."""
+        """Base waves of the image.
+
+        Returns
+        -------
+        Floats
+            q and s, periods in the line and in the frame, shape (bases, 2).
+        """
 
     @property
     def waves_covariance(self) -> Floats:
-        """Of q_1, s_1, q_2, s_2."""
+        """Covariance of q_1, s_1, q_2, s_2.
+
+        Returns
+        -------
+        Floats
+            In squared periods, shape (2 bases, 2 bases).
+        """
 
     @property
     def amplitudes(self) -> Floats:
-        """(spots,)."""
+        """Amplitudes of the spots, for heights of unit variance.
+
+        Returns
+        -------
+        Floats
+            Magnitudes, dimensionless, shape (spots,).
+        """
 
 
 def size_of_line(
@@ -152,17 +177,17 @@ def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expecte
 
 def _of_grating(wave: Floats, covariance: Floats, grating: Grating, aspect: float) -> LineSize:
     q, s = float(wave[0]), float(wave[1])
-    seen = atan(s / (aspect * q))
+    row_angle = atan(s / (aspect * q))
     if grating.angle_deg is not None:
         angle, error = radians(grating.angle_deg.value), radians(grating.angle_deg.standard_error)
-        if abs(abs(angle) - abs(seen)) > radians(_MAX_ANGLE_OFF):
+        if abs(abs(angle) - abs(row_angle)) > radians(_MAX_ANGLE_OFF):
             raise Unphysical(
-                f"the rows show bars under {np.degrees(abs(seen)):.3g} degrees, and {abs(np.degrees(angle)):.3g} were "
-                f"given; is the frame as high as its pixels say (--aspect)?"
+                f"the rows show bars under {np.degrees(abs(row_angle)):.3g} degrees, and {abs(np.degrees(angle)):.3g} "
+                f"were given; is the frame as high as its pixels say (--aspect)?"
             )
         own, shared = 0.0, abs(tan(angle)) * error
     else:
-        angle = seen
+        angle = row_angle
         if abs(angle) > radians(_MAX_ANGLE):
             raise Unphysical(
                 f"the bars are turned by {np.degrees(abs(angle)):.3g} degrees; turn the sample to have the lines cross "
@@ -186,7 +211,7 @@ def _of_lattice(waves: Floats, covariance: Floats, cell: Cell, aspect: float) ->
             continue
         inverse = np.linalg.inv(np.array([first, second], dtype=np.float64))
         q, s = inverse @ waves[:, 0], inverse @ waves[:, 1]
-        way = q @ direct  # the line, in the crystal's frame
+        way = q @ direct  # the line as a vector in the crystal's frame
         size = float(np.hypot(*way))
         along = way / size
         across = np.array([-along[1], along[0]])
@@ -207,11 +232,11 @@ def _of_lattice(waves: Floats, covariance: Floats, cell: Cell, aspect: float) ->
             f"which is {aspect:.3g} now, and the kind of lattice?"
         )
     others = [one for score, one in readings if score < strain + _CLEARLY]
-    apart = max(others, key=lambda one: abs(one.nm.value - best.nm.value))
-    if abs(apart.nm.value / best.nm.value - 1.0) > _SAME_SIZE:
+    farthest = max(others, key=lambda one: abs(one.nm.value - best.nm.value))
+    if abs(farthest.nm.value / best.nm.value - 1.0) > _SAME_SIZE:
         raise Unphysical(
             f"the line may be {best.nm.value:.4g} nm long in a frame {best.aspect:.3g} times as high, or "
-            f"{apart.nm.value:.4g} nm in one {apart.aspect:.3g} times as high; say how high it is with --aspect"
+            f"{farthest.nm.value:.4g} nm in one {farthest.aspect:.3g} times as high; say how high it is with --aspect"
         )
     return best
 
@@ -223,7 +248,7 @@ def _turned(angle_deg: float, cell: Cell) -> float:
 
 
 def _check_whole_period(line: ImagedWaves) -> None:
-    """Whether the wave is the grating's first."""
+    """Raise ``Unphysical`` unless the wave is the grating's first harmonic."""
     for part in _SUPERCELLS:
         strongest = _strongest_part(line, part)
         if strongest is not None:
@@ -239,7 +264,7 @@ def _primitive(line: ImagedWaves, waves: Floats, covariance: Floats) -> tuple[Fl
         between = _strongest_part(line, part)
         if between is None:
             continue
-        # The lattice of both base waves and of this one: two of the three, and sums of them, that make all.
+        # Find two base waves of which both base waves and this one are whole multiples.
         for change in product(range(-part, part + 1), repeat=4):
             basis = np.array(change, dtype=np.float64).reshape(2, 2) / part
             determinant = float(np.linalg.det(basis))

@@ -1,4 +1,4 @@
-"""From a trace and a retrace image to a settled model: levelled, begun, checked for left and right, and grown."""
+"""Begin the fit of a trace and a retrace image: level, find the strongest spot, check left and right, add spots."""
 
 from math import sqrt
 
@@ -20,14 +20,37 @@ _MIN_SPOT_AMPLITUDE = 0.003  # share of the strongest amplitude
 _MAX_DELAY = 0.1  # share of the line
 _MIN_TRACKED_PERIODS = 8.0  # periods
 _PHASE_TOLERANCE = 0.01  # periods, rms
-_SAME_WAVE = 0.5  # periods: how near waves are that are one
+_SAME_WAVE = 0.5  # periods: waves nearer than this are one
 _MIN_MISFIT_RATIO = 1.5  # how much worse another count of periods has to be
 
 
-def prepared(
+def prepare_heights(
     trace: Floats, retrace: Floats | None, turn: float, window: tuple[float, float], delay: float
 ) -> tuple[Geometry, list[Floats]]:
-    """Levelled heights of unit variance, of the trace and of the retrace if there is one."""
+    """Check the images, level their rows and scale them to unit variance.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns) each; no retrace is None.
+    turn
+        Share of the period in which the drive rises.
+    window
+        First and last share of each sweep that the columns span.
+    delay
+        Columns by which the image is late.
+
+    Returns
+    -------
+    tuple
+        The geometry, and the heights of the trace and of the retrace if there is one, dimensionless, each of shape
+        (rows, columns).
+
+    Raises
+    ------
+    Unphysical
+        If an image has too few pixels or no contrast, or the turn, the window or the delay is out of range.
+    """
     if retrace is None:
         check_heights("trace", trace)
     else:
@@ -53,7 +76,20 @@ def prepared(
 
 
 def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Spot, tuple[Bend, ...]]:
-    """Find the strongest spot and each image's shape; check that the retrace, if any, belongs to the trace."""
+    """Find the strongest spot and each image's branch; check that the retrace, if any, belongs to the trace.
+
+    Parameters
+    ----------
+    heights
+        Levelled heights of the trace, and of the retrace if there is one, shape (rows, columns) each.
+    mirrored
+        True if the retrace was mirrored before.
+
+    Raises
+    ------
+    Unphysical
+        If no spot stands out, the retrace does not show the trace's pattern, or a sweep leads the drive.
+    """
     spot = strongest(geometry, heights[0])
     forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
     if len(heights) == 1:
@@ -66,13 +102,19 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
         raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{ALIASING_HINT}")
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
-    # A grating square to the lines looks the same mirrored; then the bend tells.
+    # A grating square to the lines looks the same mirrored; then the bend decides.
     check_signs(forward.shape.lag, backward.shape.lag, 0.02, advice)
     return spot, (forward, backward)
 
 
 def check_signs(forward: float, backward: float, least: float, advice: str) -> None:
-    """Each sweep has to lag; 0 for one that there is not."""
+    """Check that each sweep lags the drive; the lag of a sweep that is not there is 0.
+
+    Raises
+    ------
+    Unphysical
+        If a sweep leads the drive by more than ``least``.
+    """
     if forward < -least and backward < -least:
         raise Unphysical(
             f"both sweeps lead the drive; trace and retrace are exchanged, or both mirrored{ALIASING_HINT}"
@@ -88,17 +130,22 @@ def row_order() -> int:
     return _ROW_POLYNOMIAL_ORDER
 
 
-def grown(
+def fit_spots(
     geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, ...]
 ) -> tuple[PeriodicModel, FitState, Bools]:
     """Fit the strongest spot, then another base vector if there is one, and all visible spots.
 
-    The shape of a retrace that there is not stays straight.
+    The branch of a retrace that is not there stays straight.
 
     Parameters
     ----------
     heights
-        Levelled images, each (rows, columns).
+        Levelled heights, shape (rows, columns) each.
+
+    Returns
+    -------
+    tuple
+        The model, its state at the fitted parameters, and the parameters that are free, shape (parameters,).
     """
     images = list(zip((True, False), heights, strict=False))
     start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
@@ -120,29 +167,36 @@ def grown(
             start[:4] = settle(
                 PeriodicModel(geometry, [images[i]], [(1,)], _ROW_POLYNOMIAL_ORDER, off), start, alone
             ).parameters[:4]
-    return described(geometry, images, start, free, off)
+    return fit_from_start(geometry, images, start, free, off)
 
 
-def described(
+def fit_from_start(
     geometry: Geometry, images: list[tuple[bool, Floats]], start: Floats, free: Bools, off: tuple[Floats, Floats]
 ) -> tuple[PeriodicModel, FitState, Bools]:
-    """Fit from the parameters of one base vector: with another one if there is one, and all visible spots.
-
-    ``start`` has a polynomial of ``row_order()`` in the rows.
+    """Fit from the parameters of one base vector: add another one if there is one, and all visible spots.
 
     Parameters
     ----------
     images
-        Whether each is forward, and its heights, (rows, columns).
+        True if forward, and the heights, shape (rows, columns), of each image.
     start
-        Parameters, with a polynomial of ``row_order()`` in the rows.
+        Parameters, with a polynomial of ``row_order()`` in the rows, shape (parameters,).
+    free
+        Parameters that are fitted, shape (parameters,).
+    off
+        Offsets of x, forward and backward, shares of the line, shape (columns,) each.
+
+    Returns
+    -------
+    tuple
+        The model, its state at the fitted parameters, and the parameters that are free.
     """
     nowhere = np.zeros(geometry.columns)
     model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
     state = settle(model, start, free)
     model = _with_spots(model, state)
     state = settle(model, state.parameters, free)
-    if np.any(off):  # what was left of the phase may have been the phase's own error
+    if np.any(off):  # the rest of the phase may be an error of the phase itself
         plain = PeriodicModel(
             geometry, images, list(map(tuple, model.spots.tolist())), _ROW_POLYNOMIAL_ORDER, 2 * (nowhere,)
         )
@@ -194,6 +248,13 @@ def _tracked(
     count = 2 * len(sides)
 
     def residuals(x: Floats) -> Floats:
+        """Compute the phases less those of the branches.
+
+        Returns
+        -------
+        Floats
+            In periods, shape (images x columns,).
+        """
         if min(BranchShape.at(x[i : i + 2]).least_slope() for i in range(0, count, 2)) < 0.1:
             return np.full(len(sides) * geometry.columns, 1e3)
         columns = [Columns.of(geometry, side[1], x[2 * i : 2 * i + 2]) for i, side in enumerate(sides)]
@@ -209,31 +270,31 @@ def _tracked(
     return best[:count], float(best[count]), (first, second)
 
 
-def _turns(place: Floats, apart: Floats, q: float) -> int:
+def _turns(place: Floats, difference: Floats, q: float) -> int:
     """Return the whole number of periods between the phases of trace and retrace: they meet where the drive turns.
 
     Raises ``Unphysical`` where one number does as well as another.
     """
     loop = (place * (1.0 - place))[:, None] * np.vander(place, 4)
     across = np.linalg.qr(loop)[0]
-    centre = round(float(np.median(apart)))
+    centre = round(float(np.median(difference)))
     reach = int(np.ceil(0.3 * q)) + 1
-    tried = []
+    misfits = []
     for turns in range(centre - reach, centre + reach + 1):
-        misfit = apart - turns
+        misfit = difference - turns
         misfit = misfit - across @ (across.T @ misfit)
-        tried.append((float(np.sqrt(np.mean(misfit**2))), turns))
-    tried.sort()
-    if tried[1][0] < _MIN_MISFIT_RATIO * tried[0][0]:
+        misfits.append((float(np.sqrt(np.mean(misfit**2))), turns))
+    misfits.sort()
+    if misfits[1][0] < _MIN_MISFIT_RATIO * misfits[0][0]:
         raise Unphysical(
             f"the retrace may be one of the {q:.3g} periods further left or right; scan fewer of them, or take images "
             f"of more of the sweep, with a --window near 0 1"
         )
-    return tried[0][1]
+    return misfits[0][1]
 
 
 def _part_of(state: FitState, model: PeriodicModel, other: Spot, polynomial: Floats) -> int:
-    """2 or 3 where the other wave is halves or thirds of the first: then one grating has both. 1 where it is not."""
+    """Return 2 or 3 where the other wave is halves or thirds of the first, of one grating then; 1 otherwise."""
     q, s = float(model.q(state.parameters)[0]), float(model.s(state.parameters)[0, 0])
     other_s = float(polynomial[0])
     for part in (2, 3):
@@ -244,29 +305,29 @@ def _part_of(state: FitState, model: PeriodicModel, other: Spot, polynomial: Flo
 
 
 def _multiples(model: PeriodicModel, parameters: Floats) -> Floats:
-    """(n, 2): q and s of the harmonics of the first base vector."""
+    """Return q and s of the harmonics of the first base vector, (n, 2)."""
     n = np.arange(1, 41)[:, None]
     start: Floats = n * np.array([model.q(parameters)[0], model.s(parameters)[0, 0]])
     return start
 
 
 def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:
-    """With the spots that can be seen in what is left, the strongest first."""
+    """Add the spots that stand out of the residuals, the strongest first."""
     geometry, highest = model.geometry, _MAX_SPOT_INDEX[model.bases]
     ranges = [np.arange(0, highest + 1), *[np.arange(-highest, highest + 1)] * (model.bases - 1)]
     spots: Ints = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, model.bases)
     along, across = spots @ model.q(state.parameters), spots @ model.s(state.parameters)[:, 0]
-    known = model.spots
+    fitted = model.spots
     span = geometry.window[1] - geometry.window[0]
-    seen = np.abs(along) * span < 0.45 * geometry.columns
-    seen &= np.abs(across) < 0.45 * geometry.rows
-    seen &= np.hypot(along * span, across) > 1.2  # the rest goes with the parabolas of the lines
-    for q, s in zip(known @ model.q(state.parameters), known @ model.s(state.parameters)[:, 0], strict=True):
+    visible = np.abs(along) * span < 0.45 * geometry.columns
+    visible &= np.abs(across) < 0.45 * geometry.rows
+    visible &= np.hypot(along * span, across) > 1.2  # slower waves are removed with the parabolas of the rows
+    for q, s in zip(fitted @ model.q(state.parameters), fitted @ model.s(state.parameters)[:, 0], strict=True):
         for sign in (1.0, -1.0):
-            seen &= np.hypot(sign * along - q, sign * across - s) > 1.2
+            visible &= np.hypot(sign * along - q, sign * across - s) > 1.2
     leading = spots[np.arange(len(spots)), np.argmax(spots != 0, axis=1)]
-    spots = spots[seen & (leading > 0)]
-    room = _MAX_SPOTS - len(known)
+    spots = spots[visible & (leading > 0)]
+    room = _MAX_SPOTS - len(fitted)
     if not len(spots) or room < 1:
         return model
     strength = model.strengths(state, spots)
@@ -276,4 +337,4 @@ def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:
         _MIN_SPOT_AMPLITUDE * float(np.max(np.abs(state.amplitudes))),
     )
     best = [i for i in np.argsort(-strength)[:room] if strength[i] > least]
-    return model.with_spots([*map(tuple, known.tolist()), *map(tuple, spots[best].tolist())])
+    return model.with_spots([*map(tuple, fitted.tolist()), *map(tuple, spots[best].tolist())])

@@ -1,4 +1,4 @@
-"""An array from the bytes of a ``.npy`` file: its header is held against the bytes, and nothing is unpickled."""
+"""Read an array from the bytes of a ``.npy`` file: its header is compared with the bytes, and nothing is unpickled."""
 
 from io import BytesIO
 from math import prod

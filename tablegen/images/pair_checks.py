@@ -1,4 +1,4 @@
-"""What is wrong with images of a scan, before anything is fitted to them and after; shared by all that reads images.
+"""Checks of the images of a scan, before and after a fit; shared by every reader of images.
 
 Each check raises ``Unphysical``, whose message says what to do. Names are those of the images: "trace", "retrace".
 """
@@ -10,24 +10,35 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Floats
 
-MIN_PIXELS = 32  # along and across
+MIN_PIXELS = 32  # rows and columns
 MIN_PERIODS = 3.0  # in the line
 MAX_PERIODS_PER_COLUMN = 0.33  # where a branch may compress them by a third
 ALIASING_HINT = " (periods finer than two pixels look like that too)"
 _MAX_CLIPPED = 0.04  # share of the pixels that may have the least height, or the largest
-_CLIPPED_STEP = 0.01  # of the heights' range: how near to a limit the heights are that a limit is compared with
+_CLIPPED_STEP = 0.01  # share of the heights' range: heights this near to a limit are compared with it
 _CLIPPED_SPIKE = 4.0  # times the pixels next to it
 _MAX_LINE_POWER = 100.0  # times the usual power of a line
 _FLAT, _MANY_FLAT = 1e-9, 0.02  # share of the largest power of a line; share of all lines
-_MAX_SIZE_RATIO = 1.4  # between the size that is seen and the one that was said: below the root of two
+_MAX_SIZE_RATIO = 1.4  # of the measured and the nominal size: below the root of two
 _STRIPS = 8  # of the columns, in each of which trace and retrace are matched
-_REACH = 0.12  # of the columns: how far apart trace and retrace are searched
-_MIRRORED = 1.5, 0.25  # how much better the mirrored retrace has to match, and how well
+_REACH = 0.12  # share of the columns: largest distance of trace and retrace in the search
+_MIRRORED = 1.5, 0.25  # ratio to the straight match, and least correlation, of a mirrored retrace
 _LEAST_POWER = 1e-12  # of unit variance: what has less is a constant
 
 
 def check_pair(trace: Floats, retrace: Floats) -> None:
-    """Two images that can be of one scan: of one shape, and not the same image."""
+    """Check that two images can be of one scan: they have one shape, and are not the same image.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns) each.
+
+    Raises
+    ------
+    Unphysical
+        If the shapes differ, the images are equal, or one of them fails ``check_heights``.
+    """
     if trace.shape != retrace.shape:
         sizes = " and ".join(f"{image.shape[0]} x {image.shape[1]}" for image in (trace, retrace))
         raise Unphysical(f"trace and retrace have {sizes} pixels; both must be from one scan")
@@ -41,7 +52,20 @@ def check_pair(trace: Floats, retrace: Floats) -> None:
 
 
 def check_heights(name: str, image: Floats) -> None:
-    """Rows and columns enough, numbers, and not cut off at the end of the converter's range."""
+    """Check an image: enough rows and columns, finite heights, contrast, no saturation at the end of a range.
+
+    Parameters
+    ----------
+    name
+        Name of the image in a message.
+    image
+        Heights in any unit, shape (rows, columns).
+
+    Raises
+    ------
+    Unphysical
+        If the image fails a check.
+    """
     if image.ndim != 2 or min(image.shape) < MIN_PIXELS:
         raise Unphysical(f"{' x '.join(map(str, image.shape))} pixels are too few; {MIN_PIXELS} rows and columns do")
     if not np.all(np.isfinite(image)):
@@ -63,7 +87,22 @@ def check_heights(name: str, image: Floats) -> None:
 
 
 def check_lines(name: str, level: Floats, largest: float) -> None:
-    """Levelled lines that have contrast, all about as much; ``largest`` is the largest height before."""
+    """Check that levelled lines have contrast, and all about as much.
+
+    Parameters
+    ----------
+    name
+        Name of the image in a message.
+    level
+        Levelled heights, shape (rows, columns).
+    largest
+        Largest height before levelling, in the unit of ``level``.
+
+    Raises
+    ------
+    Unphysical
+        If there is no contrast along the lines, many lines are flat, or a few have most of the contrast.
+    """
     if not np.max(np.abs(level)) > 1e-12 * largest:
         raise Unphysical(f"the {name} has no contrast along its lines")
     power = np.sum(level**2, axis=1)
@@ -79,7 +118,13 @@ def check_lines(name: str, level: Floats, largest: float) -> None:
 
 
 def check_periods(periods: float, span: float, columns: int) -> None:
-    """Enough periods in the line, of which the columns show ``span``, and none finer than the columns can show."""
+    """Check the number of periods in the line, of which the columns show ``span``.
+
+    Raises
+    ------
+    Unphysical
+        If they are too few to fit, or finer than the columns resolve.
+    """
     if periods * span > MAX_PERIODS_PER_COLUMN * columns:
         raise Unphysical(f"{periods:.3g} periods in {columns} columns are too fine; scan less, or take more pixels")
     if periods < MIN_PERIODS - 0.2:
@@ -88,25 +133,43 @@ def check_periods(periods: float, span: float, columns: int) -> None:
         )
 
 
-def check_size(measured_nm: float, stated_nm: float, stated_by: str, side: Literal["line", "frame"] = "line") -> None:
-    """Check the size by the sample's constant against the one stated by ``stated_by``.
+def check_size(measured_nm: float, nominal_nm: float, source: str, side: Literal["line", "frame"] = "line") -> None:
+    """Check the size in nm by the sample's constant against the nominal one, whose origin is ``source``.
 
     A constant of another direction of a lattice is wrong by the root of two or of three, an alias by more.
+
+    Raises
+    ------
+    Unphysical
+        If the sizes differ by a factor of 1.4 or more.
     """
-    ratio = measured_nm / stated_nm
+    ratio = measured_nm / nominal_nm
     long = "long" if side == "line" else "high"
     if not 1.0 / _MAX_SIZE_RATIO < ratio < _MAX_SIZE_RATIO:
         raise Unphysical(
-            f"the {side} is {measured_nm:.4g} nm {long} by the sample's constant, and {stated_nm:.4g} nm by "
-            f"{stated_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
+            f"the {side} is {measured_nm:.4g} nm {long} by the sample's constant, and {nominal_nm:.4g} nm by "
+            f"{source}; is the constant that of this sample, the lattice of this kind, and a period more than "
             f"two pixels?"
         )
 
 
 def check_mirrored(trace: Floats, retrace: Floats, advice: str) -> None:
-    """Whether the retrace, left on the left, shows what the trace shows; of any sample but its own mirror image.
+    """Check that the retrace, with its left end on the left, shows what the trace shows.
 
-    Strips of both are matched by themselves, so that hysteresis does not hide it.
+    It holds for any sample but its own mirror image. Strips of both images are matched by themselves, so that
+    hysteresis does not hide the match.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns) each.
+    advice
+        What the message suggests.
+
+    Raises
+    ------
+    Unphysical
+        If the mirrored retrace matches better.
     """
     straight, turned = _match(trace, retrace), _match(trace, retrace[:, ::-1])
     if turned > _MIRRORED[0] * max(straight, 0.0) and turned > _MIRRORED[1]:
@@ -114,7 +177,7 @@ def check_mirrored(trace: Floats, retrace: Floats, advice: str) -> None:
 
 
 def _match(one: Floats, other: Floats) -> float:
-    """Median over strips of the best correlation of one's strip with the other's columns near by."""
+    """Return the median over strips of the best correlation of one's strip with the other's columns near by."""
     columns = one.shape[1]
     width, reach = max(columns // _STRIPS, 8), max(round(_REACH * columns), 2)
     lags = []
@@ -128,7 +191,7 @@ def _match(one: Floats, other: Floats) -> float:
 
 
 def _plain(strip: Floats) -> Floats:
-    """Without the rows' means and slopes, of unit variance."""
+    """Remove the rows' means and slopes, and scale to unit variance."""
     ramp = np.linspace(-1.0, 1.0, strip.shape[1])
     level = strip - strip.mean(axis=1, keepdims=True)
     level = level - np.outer(level @ ramp / (ramp @ ramp), ramp)

@@ -1,4 +1,4 @@
-"""One trace and one retrace image of a periodic sample -> both branches of the model."""
+"""Fit both branches of the model to one trace and one retrace image of a periodic sample."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -10,7 +10,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Curve, Estimate
 from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measured_branch
-from tablegen.images.model_start import begin, check_signs, grown, prepared
+from tablegen.images.model_start import begin, check_signs, fit_spots, prepare_heights
 from tablegen.images.pair_checks import MIN_PERIODS
 from tablegen.images.periodic_model import FitState, PeriodicModel
 from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
@@ -25,12 +25,11 @@ _MIN_SIGNED_BETA = 0.004  # least |beta| that is a sign
 
 @dataclass(frozen=True, kw_only=True)
 class ImageFit(AmplitudeFit):
-    """What a pair says; see ``AmplitudeFit``.
+    """Fit of a pair of images; see ``AmplitudeFit``.
 
     ``periods`` in the line of the spot that carries most, ``spots`` how many were fitted; ``explained`` the share of
-    the heights' variance that is periodic; ``registration_percent`` how far trace and retrace are apart where they are
-    farthest, of the line. ``widened`` is the factor on standard errors; ``strays`` are rows unlike the others, counted
-    from 0.
+    the heights' variance that is periodic; ``registration_percent`` the largest distance of trace and retrace, of the
+    line. ``widened`` is the factor on standard errors; ``strays`` are rows unlike the others, counted from 0.
     """
 
     periods: float
@@ -51,33 +50,58 @@ def fit_pair(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> ImageFit:
-    """Fit both branches to heights in any unit, rows x columns, rows in the order of time.
+    """Fit both branches to a pair of images.
 
-    Columns are evenly spread in time over ``window`` of each sweep; the retrace is stored with left on the left, or
-    ``retrace_mirrored`` in the order of time. Columns show the sample ``delay_pixels`` late, as of a feedback.
+    Columns are evenly spread in time over ``window`` of each sweep.
+
+    Parameters
+    ----------
+    trace, retrace
+        Heights in any unit, shape (rows, columns) each, rows in the order of time.
+    v_scan
+        Drive peak to peak in V.
+    turn
+        Share of the period in which the drive rises.
+    window
+        First and last share of each sweep that the columns span.
+    retrace_mirrored
+        True if the retrace is stored in the order of time; otherwise its left end is at the left.
+    delay_pixels
+        Columns by which the images are late, as of a feedback.
 
     Raises
     ------
     Unphysical
         If the images do not support the fit.
     """
-    geometry, heights = prepared(
+    geometry, heights = prepare_heights(
         trace, np.ascontiguousarray(retrace[:, ::-1]) if retrace_mirrored else retrace, turn, window, delay_pixels
     )
     spot, bends = begin(geometry, heights, retrace_mirrored)
-    model, state, free = grown(geometry, heights, spot, bends)
+    model, state, free = fit_spots(geometry, heights, spot, bends)
     check_fit(model, state, free)
     return _result(model, state, free, v_scan)
 
 
 def _carrying(model: PeriodicModel, state: FitState) -> float:
-    """Periods in the line of the spot that says most of x."""
+    """Return the periods in the line of the spot that determines x best."""
     along = np.abs(model.spots @ model.q(state.parameters))
     return float(along[np.argmax(along * np.abs(state.amplitudes))])
 
 
 def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
-    """Whether it is a fit at all."""
+    """Check that the model explains both images, with enough periods and sweeps that lag.
+
+    Parameters
+    ----------
+    free
+        Parameters that were fitted, shape (parameters,).
+
+    Raises
+    ------
+    Unphysical
+        If the fit fails a check.
+    """
     shares = [
         1.0 - float(np.mean(residual**2)) / float(np.mean(image**2)) for (_, image), residual in _both(model, state)
     ]
@@ -115,19 +139,19 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
     forward, backward = (measured_branch(x[i : i + 2], matrix[i : i + 2, i : i + 2]) for i in (0, 2))
     line = np.linspace(0.0, 1.0, 201)
     lagging = [BranchShape.at(x[i : i + 2]) for i in (0, 2)]
-    apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
+    distance = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
     carrying = _carrying(model, state)
     slope = max(float(np.max(model.columns(x, side).steep)) for side in (True, False))
     span = geometry.window[1] - geometry.window[0]
     bent = model.s(x)[0, 1:] @ model.y_powers[2:]
-    drawn = np.concatenate([image - rest for (_, image), rest in _both(model, state)])
+    modelled = np.concatenate([image - rest for (_, image), rest in _both(model, state)])
     return ImageFit(
         turn=Estimate(geometry.turn),
         v_scan=v_scan,
         samples=2 * geometry.rows * geometry.columns,
         forward=forward,
         backward=backward,
-        noise_percent=100.0 * noise / float(np.ptp(drawn)),
+        noise_percent=100.0 * noise / float(np.ptp(modelled)),
         drift_percent=100.0 * float(np.ptp(bent)) / max(carrying, 1.0),
         residual_percent=residual,
         scaling_percent=scaling,
@@ -136,7 +160,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
         pixels_a_period=geometry.columns / (span * slope * carrying),
         spots=len(model.spots),
         explained=1.0 - 2.0 * state.cost / sum(float(np.vdot(image, image)) for _, image in model.images),
-        registration_percent=100.0 * float(apart[np.argmax(np.abs(apart))]),
+        registration_percent=100.0 * float(distance[np.argmax(np.abs(distance))]),
         widened=sqrt(widened),
         strays=loud_rows(state),
     )
@@ -159,11 +183,11 @@ def _positions(
         place = binned.place
         count = np.bincount(place, minlength=BINS)
         # The model's own x is without what was added to it: that is a part of the error.
-        known = np.bincount(place, model.off[0 if forward else 1], minlength=BINS) / count
-        off = known + binned.off
+        offset = np.bincount(place, model.off[0 if forward else 1], minlength=BINS) / count
+        off = offset + binned.off
         beyond += float(np.sum((off / binned.error) ** 2))
         at, x = (np.bincount(place, values, minlength=BINS) / count for values in (geometry.place, columns.x))
-        x = x - known
+        x = x - offset
         stretch = np.diff(x + off) / np.diff(at)
         residuals.append(100.0 * off if forward else -100.0 * off)
         inside = np.diff(off)[WINDOW] / span * BINS

@@ -1,4 +1,4 @@
-"""A periodic sample seen on both sweeps: the least squares that shares one sample and both branches of the hysteresis.
+"""Model of a periodic sample on both sweeps: least squares that share one sample and both branches of the hysteresis.
 
 height = sum over spots of Re(A exp(i phase)) + a parabola in each row
 phase / 2 pi = q x + s_1 y + s_2 y^2 + ...
@@ -24,14 +24,14 @@ Complexes = npt.NDArray[np.complex128]
 
 LAG, BASES = 4, 5  # indices of parameters; the coordinates of both branches come before them
 _COLUMN_TERMS = 5  # 1, x, and x by both coordinates; the time within the line; ripples follow
-_MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a branch that is tried
+_MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a trial branch
 _ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
 _MAX_STEPS = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """How images were taken: rows and columns, the turn, the window of each sweep that the columns span.
+    """Layout of the images: rows and columns, the turn, the window of each sweep that the columns span.
 
     Columns show the sample ``delay`` columns late.
     """
@@ -44,26 +44,61 @@ class Geometry:
 
     @cached_property
     def place(self) -> Floats:
-        """The drive in the middle of each column, on the way up; 0 is left."""
+        """Normalised drive in the middle of each column, on the way up; 0 is left.
+
+        Returns
+        -------
+        Floats
+            Shape (columns,).
+        """
         low, high = self.window
         return low + (high - low) * (np.arange(self.columns) + 0.5) / self.columns
 
     @cached_property
     def y(self) -> Floats:
-        """Position of each row, -1/2..1/2."""
+        """Position of each row in the frame.
+
+        Returns
+        -------
+        Floats
+            -1/2..1/2, shape (rows,).
+        """
         return (np.arange(self.rows) + 0.5) / self.rows - 0.5
 
     @cached_property
     def parabola(self) -> Floats:
-        """Orthonormal columns."""
+        """Orthonormal parabolas along a row.
+
+        Returns
+        -------
+        Floats
+            Shape (columns, 3).
+        """
         return np.linalg.qr(np.vander(self.place - np.mean(self.place), _ROW_PARABOLA_TERMS))[0]
 
     def levelled(self, rows: npt.NDArray[np.inexact]) -> npt.NDArray[np.inexact]:
-        """Rows less their parabolas."""
+        """Subtract each row's parabola.
+
+        Parameters
+        ----------
+        rows
+            Heights in any unit, shape (..., columns).
+
+        Returns
+        -------
+        numpy.ndarray
+            Levelled heights of the same shape and unit.
+        """
         return rows - (rows @ self.parabola) @ self.parabola.T
 
     def sweep(self, forward: bool) -> Floats:
-        """Return the drive along the sweep, 0..1, that each column shows: shape (columns,)."""
+        """Return the drive along the sweep that each column shows.
+
+        Returns
+        -------
+        Floats
+            0..1 from the start of the sweep, shape (columns,).
+        """
         low, high = self.window
         way = self.place if forward else 1.0 - self.place
         return np.clip(way - self.delay * (high - low) / self.columns, 0.0, 1.0)
@@ -71,9 +106,9 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """One direction: the position at each column, its derivatives by the branch's coordinates, the time in the line.
+    """One direction: positions ``x``, their derivatives ``slopes`` by the branch's coordinates, the time in the line.
 
-    ``steep`` is dx/du.
+    Arrays have a value for each column; ``steep`` is dx/du.
     """
 
     x: Floats
@@ -83,7 +118,13 @@ class Columns:
 
     @classmethod
     def of(cls, geometry: Geometry, forward: bool, shape: Floats) -> "Columns":
-        """Return the columns of one direction, for a branch of these coordinates, (2,)."""
+        """Return the columns of one direction for a branch.
+
+        Parameters
+        ----------
+        shape
+            Coordinates of the branch, shape (2,).
+        """
         branch = BranchShape.at(shape)
         u = geometry.sweep(forward)
         tau = branch.inverse(u)
@@ -96,7 +137,7 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class FitState:
-    """The model at some parameters: ``amplitudes`` of the spots, what is left of each image, half its sum of squares.
+    """The model at some parameters: ``amplitudes`` of the spots, residuals of each image, half their sum of squares.
 
     ``hessian`` and ``scores`` (of each row, both images together) are of all parameters, then of the real and the
     imaginary parts of the amplitudes.
@@ -143,19 +184,53 @@ class PeriodicModel:
         self.rippled_from = BASES + self.bases * (order + 1)  # the first parameter of the ripples
 
     def q(self, parameters: Floats) -> Floats:
-        """Periods in the line of each base vector."""
+        """Return the periods in the line of each base vector.
+
+        Parameters
+        ----------
+        parameters
+            Shape (parameters,).
+
+        Returns
+        -------
+        Floats
+            Shape (bases,).
+        """
         return parameters[BASES : self.rippled_from : self.order + 1]
 
     def s(self, parameters: Floats) -> Floats:
-        """(bases, order)."""
+        """Return the coefficients s_1, s_2, ... of each base vector's polynomial in y.
+
+        Parameters
+        ----------
+        parameters
+            Shape (parameters,).
+
+        Returns
+        -------
+        Floats
+            In periods, shape (bases, order).
+        """
         return parameters[BASES : self.rippled_from].reshape(self.bases, self.order + 1)[:, 1:]
 
     def allowed(self, parameters: Floats) -> bool:
-        """Whether both branches run forward."""
+        """Return True if both branches run forward.
+
+        Parameters
+        ----------
+        parameters
+            Shape (parameters,).
+        """
         return all(BranchShape.at(parameters[i : i + 2]).least_slope() > _MIN_BRANCH_SLOPE for i in (0, 2))
 
     def at(self, parameters: Floats) -> FitState:
-        """Everything at these parameters, the amplitudes the best for them."""
+        """Evaluate the model at these parameters, with the amplitudes that fit best.
+
+        Parameters
+        ----------
+        parameters
+            Shape (parameters,).
+        """
         count = len(self.spots)
         rows = self._rows(parameters)
         columns = [self._columns(parameters, forward) for forward, _ in self.images]
@@ -174,8 +249,8 @@ class PeriodicModel:
         residuals, steepness = [], []
         for (forward, heights), column in zip(self.images, columns, strict=True):
             coefficients = terms[0] if forward else terms[1]
-            drawn = (rows[0].T * amplitudes) @ column[0]
-            residuals.append(heights - np.real(drawn))
+            modelled = (rows[0].T * amplitudes) @ column[0]
+            residuals.append(heights - np.real(modelled))
             waves = 2j * pi * (self.spots @ self.q(parameters))
             steepness.append(np.real((rows[0].T * (amplitudes * waves)) @ column[0]))
             r, c, places = self._laid_out(rows, column)
@@ -186,7 +261,13 @@ class PeriodicModel:
         return FitState(parameters, amplitudes, tuple(residuals), tuple(steepness), cost, hessian, scores)
 
     def columns(self, parameters: Floats, forward: bool) -> Columns:
-        """Where the columns of a direction are, ``off`` and ripples with it."""
+        """Return the columns of a direction, with ``off`` and ripples in their positions.
+
+        Parameters
+        ----------
+        parameters
+            Shape (parameters,).
+        """
         i = 0 if forward else 2
         column = Columns.of(self.geometry, forward, parameters[i : i + 2])
         at = 0 if forward else 1
@@ -198,14 +279,25 @@ class PeriodicModel:
         return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples, self.row_off)
 
     def with_offsets(self, off: tuple[Floats, Floats], row_off: Floats) -> "PeriodicModel":
-        """Return the same model with other ``off`` and ``row_off``."""
+        """Return the same model with other offsets.
+
+        Parameters
+        ----------
+        off
+            Offsets of x, forward and backward, shares of the line, shape (columns,) each.
+        row_off
+            Offsets of the polynomials, in periods, shape (bases, rows).
+        """
         spots = [tuple(spot) for spot in self.spots.tolist()]
         return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
 
     def row_waves(self, state: FitState) -> Complexes:
-        """Each base vector's wave as each row of both images has it; its phase is what the polynomials miss.
+        """Return each base vector's wave in each row of both images; its phase is the error of the polynomials.
 
-        Of shape (bases, rows).
+        Returns
+        -------
+        Complexes
+            Sums of heights over the columns, shape (bases, rows).
         """
         other = self.with_spots([tuple(one) for one in np.eye(self.bases, dtype=np.int64).tolist()])
         row = np.conj(other._rows(state.parameters)[0])
@@ -215,7 +307,13 @@ class PeriodicModel:
         return waves
 
     def phase_slopes(self, state: FitState) -> list[Floats]:
-        """Of each image what more phase of each base vector does, in heights a period: (bases, rows, columns)."""
+        """Return the derivative of each image by the phase of each base vector.
+
+        Returns
+        -------
+        list of Floats
+            In heights per period, shape (bases, rows, columns) each.
+        """
         rows = self._rows(state.parameters)[0]
         derivatives = []
         for forward, _ in self.images:
@@ -233,7 +331,18 @@ class PeriodicModel:
         return model, replace(state, parameters=parameters)
 
     def scores_of(self, state: FitState, residuals: Sequence[Floats]) -> Floats:
-        """Return ``FitState.scores`` for other residuals of each image."""
+        """Return ``FitState.scores`` for other residuals.
+
+        Parameters
+        ----------
+        residuals
+            One array for each image, shape (rows, columns).
+
+        Returns
+        -------
+        Floats
+            Shape (rows, parameters + 2 spots).
+        """
         forward_terms, backward_terms = self._terms(state.parameters, state.amplitudes)
         rows = self._rows(state.parameters)
         scores = np.zeros((self.geometry.rows, len(forward_terms)))
@@ -243,13 +352,13 @@ class PeriodicModel:
         return scores
 
     def _rows(self, parameters: Floats) -> Complexes:
-        """(order + 1, spots, rows): each spot's row part, times the powers of y."""
+        """Return each spot's row part, times the powers of y: (order + 1, spots, rows)."""
         phase = self.spots @ (self.s(parameters) @ self.y_powers[1:] + self.row_off)
         rows: Complexes = self.y_powers[:, None, :] * np.exp(2j * pi * phase)
         return rows
 
     def _columns(self, parameters: Floats, forward: bool) -> Complexes:
-        """(parts, spots, columns): each spot's column part, times what derivatives need; levelled."""
+        """Return each spot's levelled column part, times the factors of its derivatives: (parts, spots, columns)."""
         column = self.columns(parameters, forward)
         time = column.time / self.geometry.rows
         along = self.q(parameters)[:, None] * column.x + float(parameters[LAG]) * self.s(parameters)[:, :1] * time
@@ -260,7 +369,7 @@ class PeriodicModel:
         return levelled
 
     def _laid_out(self, rows: Complexes, columns: Complexes) -> tuple[Complexes, Complexes, tuple[Ints, Ints]]:
-        """Parts as rows of two matrices, and which of them make each term: (1, each column part), (y^n, 1)."""
+        """Return the parts as rows of two matrices, and the indices of each term: (1, each column part), (y^n, 1)."""
         count, terms = len(self.spots), _COLUMN_TERMS + len(self.ripples[0])
         spot = np.arange(count)
         row = [spot] * terms + [spot + n * count for n in range(1, self.order + 1)]
@@ -300,7 +409,18 @@ class PeriodicModel:
         return tables[0], tables[1]
 
     def strengths(self, state: FitState, spots: Ints) -> Floats:
-        """How strong other spots are in what is left of both images: amplitudes, as far as levelling leaves them."""
+        """Return the amplitudes of other spots in the residuals of both images, as far as levelling leaves them.
+
+        Parameters
+        ----------
+        spots
+            Whole numbers of the base vectors, shape (n, bases).
+
+        Returns
+        -------
+        Floats
+            In heights, shape (n,).
+        """
         other = self.with_spots([tuple(spot) for spot in spots.tolist()])
         total = np.zeros(len(spots), dtype=np.complex128)
         power = np.zeros(len(spots))
@@ -315,12 +435,19 @@ class PeriodicModel:
 
 
 def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
-    """Minimise the sum of squares by Levenberg and Marquardt; parameters that are not ``free`` stay.
+    """Minimise the sum of squares by Levenberg and Marquardt.
+
+    Parameters
+    ----------
+    start
+        Parameters, shape (parameters,).
+    free
+        Parameters that are fitted; the others stay, shape (parameters,).
 
     Raises
     ------
     Unphysical
-        If no minimum is found.
+        If the steps do not converge.
     """
     state = model.at(start)
     joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
@@ -332,16 +459,16 @@ def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
         scaled, target = hessian / np.outer(scale, scale), gradient / scale
         while True:
             step = np.linalg.solve(scaled + damping * np.eye(len(scaled)), target) / scale
-            moved = start.copy()
-            moved[free] += step[: int(np.sum(free))]
-            tried = model.at(moved) if model.allowed(moved) else None
-            if tried is not None and tried.cost <= state.cost:
+            trial = start.copy()
+            trial[free] += step[: int(np.sum(free))]
+            trial_state = model.at(trial) if model.allowed(trial) else None
+            if trial_state is not None and trial_state.cost <= state.cost:
                 break
             damping = max(4.0 * damping, 1e-6)
             if damping > 1e8:
                 return state
-        gained = state.cost - tried.cost
-        start, state = moved, tried
+        gained = state.cost - trial_state.cost
+        start, state = trial, trial_state
         damping = damping / 10.0 if damping > 1e-14 else 0.0
         if gained <= 1e-11 * state.cost or float(np.max(np.abs(step[: int(np.sum(free))]))) < 1e-11:
             return state
@@ -362,14 +489,14 @@ def _products(
 def _scores(
     coefficients: Complexes, laid_out: tuple[Complexes, Complexes, tuple[Ints, Ints]], residual: Floats
 ) -> Floats:
-    """For each row, the residual times each parameter's derivative, summed: (rows, parameters)."""
+    """Return, for each row, the residual times each parameter's derivative, summed: (rows, parameters)."""
     row, column, (at, across) = laid_out
     scores: Floats = np.real(coefficients @ ((column @ residual.T)[across] * row[at])).T
     return scores
 
 
 def _gram(coefficients: Complexes, products: tuple[Complexes, Complexes]) -> Floats:
-    """Inner products of the images Re(sum of coefficients times terms)."""
+    """Return the inner products of the images Re(sum of coefficients times terms)."""
     first, second = products
     total = np.conj(coefficients) @ first @ coefficients.T + coefficients @ second @ coefficients.T
     result: Floats = 0.5 * np.real(total)

@@ -1,4 +1,4 @@
-"""How well a fitted periodic sample tells positions: covariances from the lines, and what the model leaves."""
+"""Position errors of a fitted periodic sample: covariances from the lines, and residuals of the model."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,9 @@ _ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
 
 @dataclass(frozen=True, eq=False)
 class BinnedResidual:
-    """How far an image is off its model in each twentieth of its columns, as a share of the line, and the error.
+    """Position error of the model in each twentieth of the columns, as a share of the line, and its standard error.
 
-    ``place`` is the bin of each column; ``clean`` the image that is left without that.
+    ``place`` is the bin of each column; ``clean`` the residual of the image without that error.
     """
 
     place: Ints
@@ -26,7 +26,15 @@ class BinnedResidual:
 
     @classmethod
     def of(cls, geometry: Geometry, residual: Floats, steep: Floats) -> "BinnedResidual":
-        """From what is left of an image, and how steep it is."""
+        """Average the residual of an image in bins of its columns.
+
+        Parameters
+        ----------
+        residual
+            Heights less the model, shape (rows, columns).
+        steep
+            d height / dx of the model, shape (rows, columns).
+        """
         place = np.minimum((np.arange(geometry.columns) * BINS) // geometry.columns, BINS - 1)
         bins = np.arange(BINS)[:, None] == place
         weights, products = (bins @ values.T for values in (steep**2, steep * residual))  # (bins, rows)
@@ -40,19 +48,35 @@ class BinnedResidual:
 def covariance(
     model: PeriodicModel, state: FitState, free: Bools, watched: Bools, misfit: float, clean: list[Floats]
 ) -> tuple[Floats, float]:
-    """Return the covariance of all parameters, 0 for those that are not free, and its widening factor.
+    """Return the covariance of all parameters, and its widening factor.
 
     It comes from each line by itself, so that noise may have any spectrum along the line. It is widened where
-    neighbouring lines agree on the error of the ``watched`` parameters, and by ``misfit``; ``clean`` are the images
-    less the model.
+    neighbouring lines agree on the error of the ``watched`` parameters, and by ``misfit``.
+
+    Parameters
+    ----------
+    free, watched
+        Parameters that were fitted, and those whose correlation widens the errors, shape (parameters,) each.
+    misfit
+        Least widening factor of the variance.
+    clean
+        Images less the model, shape (rows, columns) each.
+
+    Returns
+    -------
+    tuple
+        The covariance, 0 for parameters that are not free, shape (parameters, parameters), and the factor on it.
     """
     joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
     inverse = np.linalg.pinv(state.hessian[np.ix_(joint, joint)], rcond=1e-13, hermitian=True)
     count = int(np.sum(free))
     influence = (model.scores_of(state, clean)[:, joint] @ inverse)[:, :count]
     lines = len(influence)
-    seen = influence[:, watched[free]]
-    widened = max(correlation_length(seen / np.maximum(np.sqrt(np.mean(seen**2, axis=0)), 1e-300)), misfit)
+    watched_influence = influence[:, watched[free]]
+    widened = max(
+        correlation_length(watched_influence / np.maximum(np.sqrt(np.mean(watched_influence**2, axis=0)), 1e-300)),
+        misfit,
+    )
     part = influence.T @ influence * (widened * lines / max(lines - len(inverse), 1))
     whole = np.zeros((len(free), len(free)))
     whole[np.ix_(free, free)] = part
@@ -60,7 +84,7 @@ def covariance(
 
 
 def loud_rows(state: FitState) -> tuple[int, ...]:
-    """Rows, counted from 0, that leave far more than the others do."""
+    """Return the rows, counted from 0, whose residuals are far larger than those of the others."""
     power = np.sqrt(np.mean(np.stack(state.residuals) ** 2, axis=(0, 2)))
     middle = float(np.median(power))
     spread = 1.4826 * float(np.median(np.abs(power - middle)))
@@ -68,6 +92,6 @@ def loud_rows(state: FitState) -> tuple[int, ...]:
 
 
 def pixel_noise(state: FitState) -> float:
-    """Noise of a pixel, rms, from the differences of neighbouring pixels."""
+    """Return the noise of a pixel, rms, from the differences of neighbouring pixels."""
     residuals = np.concatenate(state.residuals)
     return float(np.sqrt(np.mean(np.diff(residuals, axis=1) ** 2) / 2.0))

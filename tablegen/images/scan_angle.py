@@ -33,9 +33,14 @@ def angle_text(angle_deg: float) -> str:
 
 
 def require_fast_axis(images: Sequence[ScanImage], axis: str) -> None:
-    """Raise ``Rejected`` where lines at the angle of an image do not tell the branches of ``axis``.
+    """Check that lines at the angle of each image show the branches of ``axis``.
 
     An angle of 0 passes for y too: instruments state it where the drives were exchanged by hand.
+
+    Raises
+    ------
+    Rejected
+        If an image has another fast axis, or its lines move both piezos.
     """
     problems = [Problem(one.file, 0, "", text) for one in images if is_turned(one) and (text := _conflict(one, axis))]
     if problems:
@@ -43,12 +48,12 @@ def require_fast_axis(images: Sequence[ScanImage], axis: str) -> None:
 
 
 def angle_remarks(images: Iterable[object], axis: str) -> list[Remark]:
-    """Return a remark on each image whose angle is not 0, or whose fast axis was not ``axis``; tables are passed over.
+    """Return a remark on each image whose angle is not 0, or whose fast axis was not ``axis``; tables are skipped.
 
     Parameters
     ----------
     images
-        What a fit was made from.
+        Measurements of a fit.
     axis
         The axis that the fit takes for the fast one.
     """
@@ -66,7 +71,7 @@ def angle_remarks(images: Iterable[object], axis: str) -> list[Remark]:
 
 
 def running_scan_remarks(images: Iterable[ScanImage]) -> list[Remark]:
-    """Return a remark on each image of a running scan, whose fast axis is x, that was taken at another angle."""
+    """Return a remark on each image of a running scan, whose fast axis is x, that was scanned at another angle."""
     remarks: dict[Remark, None] = {}
     for image in images:
         if is_turned(image) and image.angle_deg is not None:

@@ -1,4 +1,4 @@
-"""Where a periodic sample begins to be fitted: its strongest spot, and roughly how each sweep bends it.
+"""Begin the fit of a periodic sample: find its strongest spot, and roughly how each sweep bends it.
 
 Hysteresis chirps a grating by several periods, which smears its spot. A family of branches undoes that until the spot
 is sharp; then the shape is searched on the column's profile alone, which costs little.
@@ -16,14 +16,14 @@ from tablegen.images.pair_checks import MAX_PERIODS_PER_COLUMN, MIN_PERIODS
 from tablegen.images.periodic_model import Geometry
 from tablegen.numerics.arrays import Bools, Floats
 
-_MIN_SEARCHED_PERIODS = 1.4  # periods; what is slower goes with the parabola of the rows
+_MIN_SEARCHED_PERIODS = 1.4  # periods; slower waves are removed with the parabola of the rows
 _MAX_BEND = 0.13  # first coordinate of a branch: a tenth of the scan, and what a skew peak adds
 _MAX_SKEW = 0.2  # second coordinate
 _COARSE_STEP = 0.02
 _FINE_STEP_PERIODS = 0.25  # periods between neighbours of the search
 _MIN_SECOND_AMPLITUDE = 0.1  # share of the strongest amplitude
 _MIN_SIDE_DISTANCE = 0.12  # share of the frame: over it another wave of the same q, of another s, averages out
-_MIN_SPOT_POWER = 25.0  # times the mean power: what white noise does not reach
+_MIN_SPOT_POWER = 25.0  # times the mean power: white noise does not reach it
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,17 @@ class Bend:
 
 
 def strongest(geometry: Geometry, heights: Floats) -> Spot:
-    """Find the strongest spot of a levelled forward image, (rows, columns).
+    """Find the strongest spot of a forward image.
+
+    Parameters
+    ----------
+    heights
+        Levelled heights, shape (rows, columns).
 
     Raises
     ------
     Unphysical
-        If no spot stands out.
+        If no spot stands out, or its periods are too few or too fine.
     """
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     best = (0.0, 0, 0, 0.0, 1.0)
@@ -66,8 +71,8 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
             best = (float(power[row, column]) * column, row, column, float(shape), span)
             best_power = power
     _, row, column, sharpest, span = best
-    # A rough surface has spectrum all around; held against what lies beside it, none of that stands out. The median,
-    # as the mean of what is random, does not see another spot of a lattice.
+    # A rough surface has power at all frequencies: compared with its neighbours, none stands out. The median is the
+    # mean of random power, by the factor 1.44, and ignores another spot of a lattice.
     beside = np.concatenate([np.arange(3, 13), -np.arange(3, 13)])
     near = best_power[
         np.ix_((row + beside) % geometry.rows, np.arange(max(column - 2, 0), min(column + 3, best_power.shape[1])))
@@ -87,9 +92,16 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
 
 
 def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, around: float | None = None) -> Bend:
-    """Return the branch with which a spot of this s is sharpest in a levelled image.
+    """Return the branch with which a spot of this s is sharpest.
 
-    Its first coordinate is near ``around``, or any.
+    Parameters
+    ----------
+    heights
+        Levelled heights, shape (rows, columns).
+    forward
+        True for the trace.
+    around
+        First coordinate of the branch near which to search; everywhere by default.
     """
     weight = np.hanning(geometry.rows + 2)[1:-1]
     profile = (weight * np.exp(-2j * np.pi * spot.s * geometry.y)) @ heights
@@ -121,11 +133,31 @@ def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, arou
 def row_polynomial(
     geometry: Geometry, heights: Floats, bend: Bend, spot: Spot, order: int, smoothed: float = 0.01
 ) -> Floats:
-    """s_1, s_2, ... of a forward image: the phase of the spot along the rows, ``smoothed`` over a part of the frame."""
+    """Fit a polynomial in y to the phase of the spot along the rows of a forward image.
+
+    Parameters
+    ----------
+    heights
+        Levelled heights, shape (rows, columns).
+    order
+        Order of the polynomial.
+    smoothed
+        Share of the frame over which the phase is averaged.
+
+    Returns
+    -------
+    Floats
+        s_1, s_2, ... in periods, shape (order,).
+
+    Raises
+    ------
+    Unphysical
+        If the branch runs backwards.
+    """
     tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(True)))
-    seen = (heights @ np.exp(-2j * np.pi * bend.q * tau)) * np.exp(-2j * np.pi * spot.s * geometry.y)
+    wave = (heights @ np.exp(-2j * np.pi * bend.q * tau)) * np.exp(-2j * np.pi * spot.s * geometry.y)
     box = np.ones(max(round(smoothed * geometry.rows), 1) | 1)
-    smooth = np.convolve(np.convolve(seen, box, "same"), box, "same")
+    smooth = np.convolve(np.convolve(wave, box, "same"), box, "same")
     phase = np.unwrap(np.angle(smooth)) / (2.0 * np.pi)
     coefficients = np.polynomial.polynomial.polyfit(geometry.y, phase, order, w=np.abs(smooth))[1:]
     coefficients[0] += spot.s
@@ -135,16 +167,33 @@ def row_polynomial(
 def column_phase(
     geometry: Geometry, heights: Floats, forward: bool, bend: Bend, polynomial: Floats
 ) -> tuple[Floats, Bools]:
-    """Return a spot's phase along a levelled image, in periods, and where it is known: each (columns,).
+    """Return a spot's phase along a levelled image, and where it is measured.
 
     Of every column it is the mean over one period. Over a whole period of x the harmonics, and the spot's other half,
     cancel. Within half a period of the ends the phase is that of the last whole one.
+
+    Parameters
+    ----------
+    heights
+        Levelled heights, shape (rows, columns).
+    polynomial
+        s_1, s_2, ... in periods, shape (order,).
+
+    Returns
+    -------
+    tuple
+        The phase in periods, and True where it is measured, shape (columns,) each.
+
+    Raises
+    ------
+    Unphysical
+        If the branch runs backwards.
     """
     tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(forward)))
     x = tau if forward else 1.0 - tau
     turns = np.polynomial.polynomial.polyval(geometry.y, np.append(0.0, polynomial))
-    seen = (np.exp(-2j * np.pi * turns) @ heights) * np.exp(-2j * np.pi * bend.q * x)
-    steps = 0.5 * (seen[1:] + seen[:-1]) * np.diff(x)
+    wave = (np.exp(-2j * np.pi * turns) @ heights) * np.exp(-2j * np.pi * bend.q * x)
+    steps = 0.5 * (wave[1:] + wave[:-1]) * np.diff(x)
     total = np.append(0.0, np.cumsum(steps))
     half = 0.5 / bend.q
     middle = np.clip(x, x[0] + half, x[-1] - half)
@@ -169,7 +218,7 @@ def _grid() -> tuple[Floats, Floats, Floats]:
 
 
 def _inverse(coordinates: Floats, u: Floats) -> Floats | None:
-    """tau(u) near enough to begin with; None where the branch runs backwards."""
+    """Return tau(u), near enough to begin with; None where the branch runs backwards."""
     tau, first, second = _grid()
     value = tau + coordinates[0] * first + coordinates[1] * second
     if np.min(np.diff(value)) < 0.1 / 512:
@@ -188,11 +237,28 @@ def _required(tau: Floats | None) -> Floats:
 
 
 def second_base(
-    geometry: Geometry, heights: Floats, shape: Floats, known: Floats, amplitude: float, order: int
+    geometry: Geometry, heights: Floats, shape: Floats, harmonics: Floats, amplitude: float, order: int
 ) -> tuple[Spot, Floats] | None:
-    """Another spot in what the first and its harmonics, ``known`` as rows of q and s, leave of a forward image.
+    """Find another spot in the residual of a forward image, beside the first one and its harmonics.
 
-    With its polynomial in the rows; None where no spot has a tenth of ``amplitude``.
+    Parameters
+    ----------
+    heights
+        Residual heights, shape (rows, columns).
+    shape
+        Coordinates of the branch, shape (2,).
+    harmonics
+        q and s of the first wave and its harmonics, in periods, shape (n, 2).
+    amplitude
+        Amplitude of the first wave, in heights.
+    order
+        Order of the polynomial in the rows.
+
+    Returns
+    -------
+    tuple or None
+        The spot, and its polynomial in the rows, in periods, shape (order,); None where no spot has a tenth of
+        ``amplitude``.
     """
     branch = BranchShape.at(shape)
     straight, span = _straightened(geometry, heights, branch)
@@ -200,7 +266,7 @@ def second_base(
     power = np.abs(np.fft.rfft2(weight * straight)) ** 2
     q, s = np.arange(power.shape[1]) / span, np.arange(geometry.rows)
     power[:, q < 1.0] = 0.0
-    for one_q, one_s in known:
+    for one_q, one_s in harmonics:
         away = (s - one_s + 0.5 * geometry.rows) % geometry.rows - 0.5 * geometry.rows
         power[np.ix_(np.abs(away) < 2.5, np.abs(q - one_q) < 2.5)] = 0.0
     row, column = divmod(int(np.argmax(power)), power.shape[1])

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.images.model_start import prepared
+from tablegen.images.model_start import prepare_heights
 from tablegen.images.pair_checks import ALIASING_HINT, check_periods
 from tablegen.images.periodic_model import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
@@ -107,7 +107,7 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     turn, window = line.drive.turn, line.band_limit.window
     if options.retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
-    geometry, heights = prepared(trace, retrace, turn, window, options.delay_pixels)
+    geometry, heights = prepare_heights(trace, retrace, turn, window, options.delay_pixels)
     moves = plan.y.program.hold == 1
     modes = column_modes(plan, geometry, START_DEGREE)
     advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"

@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
-from tablegen.images.model_start import described, row_order
+from tablegen.images.model_start import fit_from_start, row_order
 from tablegen.images.periodic_model import BASES, LAG, FitState, Geometry, PeriodicModel
 from tablegen.images.spots import Bend, bend_of, column_phase, row_polynomial, strongest
 from tablegen.numerics.arrays import Floats, Ints
@@ -70,7 +70,7 @@ def lattice_start(
     free = np.ones(len(start), bool)
     free[: LAG + 1] = False
     sides = list(zip((True, False), heights, strict=True))
-    model, state, _ = described(geometry, sides, start, free, (off[0], off[1]))
+    model, state, _ = fit_from_start(geometry, sides, start, free, (off[0], off[1]))
     x = state.parameters
     rows = model.q(x) * float(np.mean(modes.requested)) + (model.s(x) @ model.y_powers[1:]).T
     begun = FreeRowsState(error, model.q(x).copy(), state.amplitudes, rows)

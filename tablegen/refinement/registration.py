@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.fitting.correlation import correlation_length
-from tablegen.images.model_start import prepared
+from tablegen.images.model_start import prepare_heights
 from tablegen.images.pair_checks import check_mirrored
 from tablegen.images.periodic_model import Geometry
 from tablegen.numerics.arrays import Floats
@@ -57,7 +57,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
     window = line.band_limit.window
     if options.retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
-    geometry, heights = prepared(trace, retrace, line.drive.turn, window, options.delay_pixels)
+    geometry, heights = prepare_heights(trace, retrace, line.drive.turn, window, options.delay_pixels)
     advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
     check_mirrored(heights[0], heights[1], advice)
     modes = column_modes(plan, geometry, _DEGREES[-1])

@@ -194,7 +194,7 @@ def test_a_round_from_the_trace_before_is_refused(lab: Path, laboratory: tablege
     untimed = {key: trace[key] for key in ("time_s", "displacement_nm")}
     tablegen.refine(scan, untimed, axis="x", triggered=True).write()
     again = tablegen.refine(scan, untimed, axis="x", triggered=True, harmonics=4)
-    assert "already learnt from this trace" in again.refused or "the residual grew" in again.refused
+    assert "already refined by this trace" in again.refused or "the residual grew" in again.refused
     with pytest.raises(tablegen.Rejected, match=r"annexin_200nm\.toml: x: "):
         again.write()
 

@@ -166,7 +166,7 @@ def test_a_threshold_outside_the_points_is_not_guessed(drives: np.ndarray) -> No
     sizes = actual(drives, 10.0, 0.53, 0.5, 200.0) * (1.0 + 0.002 * np.random.default_rng(5).standard_normal(9))
     fit = fit_size(drives, sizes, V_MAX)
     assert fit.v_threshold.value == 0.5
-    assert any("the threshold is not determined by these points and was left at 0.5" in r for r in fit.remarks)
+    assert any("the threshold is not determined by these points and was set to 0.5" in r for r in fit.remarks)
 
 
 def test_a_linear_scanner_has_no_threshold() -> None:

@@ -79,7 +79,7 @@ def test_the_first_of_three_periods_is_left_out() -> None:
     told = replace(trace, displacement_nm=unsettled)
     assert shapes(fitted(told)) == pytest.approx([0.037, 0.37, 0.080, 0.48], abs=2e-6)
     assert abs(shapes(fitted(told, settle_periods=0))[0] - 0.037) > 2e-4, "or the test would show nothing"
-    assert fitted(told).left_out == pytest.approx(250, abs=1)
+    assert fitted(told).settling_samples == pytest.approx(250, abs=1)
 
 
 def test_drift_is_taken_off_as_far_as_a_polynomial_follows_it() -> None:
@@ -262,7 +262,7 @@ def test_one_amplitude_does_not_determine_rho() -> None:
     assert np.isnan(growth.rho.standard_error)
     assert float(growth.beta(np.array(0.5))) == pytest.approx(grown(50.0, 0.08, 1.5), abs=0.002)
     said = " ".join(fit.remarks)
-    assert "rho is not determined by these amplitudes and was left at 2" in said
+    assert "rho is not determined by these amplitudes and was set to 2" in said
     assert "beta_max is extrapolated from 0.5 of v_max" in said
 
 
@@ -273,7 +273,7 @@ def test_no_hysteresis_has_no_peak() -> None:
     for seed in range(4):
         trace = scanner.trace(100.0, noise=noise(1000, seed))
         signs.add(fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm).forward.beta.value > 0.0)
-        with pytest.raises(Unphysical, match=r"turn 0.\d+, (for|back)ward: no hysteresis can be told from noise"):
+        with pytest.raises(Unphysical, match=r"turn 0.\d+, (for|back)ward: no hysteresis above the noise"):
             fit_hysteresis([trace], V_MAX)
     assert signs == {True, False}, "or the test would show half"
 

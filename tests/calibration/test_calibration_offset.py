@@ -74,4 +74,4 @@ def test_several_sizes_are_fitted_one_by_one_and_doubted_one_by_one() -> None:
     only = fit_offset_sizes(offset_v[5:], apparent[5:], size_v[5:], V_MAX, size)
     assert (only.points, type(only)) == (5, type(alone))
     near = fit_offset_sizes(offset_v, apparent, np.where(size_v > 20.0, 20.0, size_v), V_MAX, size)
-    assert any("hardly tell how m changes" in remark for remark in near.remarks)
+    assert any("hardly show how m changes" in remark for remark in near.remarks)

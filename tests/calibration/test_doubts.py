@@ -70,8 +70,8 @@ def test_a_measurement_with_noise_of_a_sensor_is_not_doubted(kind: str, noise: f
     ("kind", "noise", "said"),
     [
         ("offset", 0.4, "may be off by a fifth or more; measure at more offsets"),
-        ("size", 0.4, "beta = .* cannot be told from 0, the linear scanner"),
-        ("frequency", 0.15, r"alpha = .* cannot be told from 0, no loss"),
+        ("size", 0.4, "beta = .* cannot be distinguished from 0, the linear scanner"),
+        ("frequency", 0.15, r"alpha = .* cannot be distinguished from 0, no loss"),
     ],
 )
 def test_noise_that_hides_the_correction_is(kind: str, noise: float, said: str) -> None:

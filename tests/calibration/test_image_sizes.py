@@ -194,7 +194,7 @@ def test_another_size_than_said_and_an_alias_are_named() -> None:
     wrong_volts = [right[0], replace(right[1], v_scan=35.0), right[2]]
     fine = replace(shown(grating(128.0 + 22.0, 1.0, pixels=128, lines=64), v=70.0), name="70 V")
     for images in (wrong_volts, [right[0], replace(shown(grating(32.0, pixels=128, lines=64), v=70.0), name="70 V")]):
-        with pytest.raises(Unphysical, match=r"nm per volt, and .*is each image of the voltage that was said"):
+        with pytest.raises(Unphysical, match=r"nm per volt, and .*is each image of the stated voltage"):
             sizes_of(images, V_MAX, BARS, Acquisition())
     with pytest.raises(Unphysical, match="70 V"):
         sizes_of([right[0], fine, right[2]], V_MAX, BARS, Acquisition())

@@ -315,6 +315,6 @@ def test_loud_lines_are_named() -> None:
     loud = images.trace.copy()
     loud[100:103] += 2.0 * np.random.default_rng(5).standard_normal((3, 256))
     fit = fit_images([replace(images, trace=loud)], V_MAX)
-    assert any("3 lines differ from the others (row 101, 102, 103); they were kept" in text for text in fit.remarks)
+    assert any("3 lines differ from the others (row 101, 102, 103); they were used" in text for text in fit.remarks)
     loud[100:103] *= 30.0
     assert "rows 101 to 103 have most of the trace's contrast; crop them" in refused(loud, images.retrace)

@@ -138,7 +138,7 @@ def test_too_few_and_too_similar_traces_are_refused() -> None:
     with pytest.raises(Unphysical, match="2 traces are not enough"):
         fit_operator(two, None, lambda _: 1.0)
     alike = [line(plant, 0.5, stroke, 0) for stroke in (0.5, 0.55, 0.6)]
-    with pytest.raises(Unphysical, match=r"strokes of 50 to 60 % of v_max are too much alike"):
+    with pytest.raises(Unphysical, match=r"strokes of 50 to 60 % of v_max are too similar"):
         fit_operator(alike, None, lambda _: 1.0)
 
 

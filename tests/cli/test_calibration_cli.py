@@ -116,7 +116,7 @@ def test_without_write_nothing_is_written(kind: str, lab: Path) -> None:
     for name in CALIBRATIONS[kind][1]:
         if name != "model":
             assert any(line.startswith(f"{name} ") for line in lines), name
-    assert any("without correction; left" in line for line in lines)
+    assert any("without correction; with it" in line for line in lines)
     assert max(map(len, (line for line in lines if not line.startswith(("note", "outlier"))))) <= 120
 
 

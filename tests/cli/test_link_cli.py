@@ -141,7 +141,7 @@ def test_a_dry_run_without_the_key_ends_as_the_upload_does(
     key_file.chmod(0o600)
     outcome = keyed.run("upload", folder, *options, "--key-file", key_file)
     assert outcome.status == 0
-    assert outcome.out.rstrip().endswith("if the key is right, which only an upload tells") == bool(options)
+    assert outcome.out.rstrip().endswith("if the key is right, which only an upload shows") == bool(options)
     keyed.run("upload", folder, "--key-file", key_file)
     assert "already active" in keyed.run("upload", folder, *options).out
     assert keyed.run("upload", folder, *options, "--force").status == 9

@@ -206,7 +206,7 @@ def test_a_trace_is_learnt_from_once(folder: Path) -> None:
     outcome = refining(folder, trace, "--write")
     assert outcome.status == 2
     assert outcome.messages == [
-        f"{trace}: [x.refinement] was already learnt from this trace; build, upload and record again"
+        f"{trace}: [x.refinement] was already refined by this trace; build, upload and record again"
     ]
     assert path.read_text("utf-8") == text
     assert refining(folder, trace, "--write", "--force").status == 0

@@ -64,7 +64,7 @@ def test_rounds_by_hand(folder: Path) -> None:
     assert "periods in the line" in rows[1]
     again = refining(folder, files, "--write")
     assert again.status == 2
-    assert "was already learnt from these images; build, upload and record again" in again.err
+    assert "was already refined by these images; build, upload and record again" in again.err
     (folder / "scan.toml").write_text(text.replace("before_percent = ", "before_percent = 0.00001 # "), "utf-8")
     worse = refining(folder, take(folder, seed=7), "--write")
     assert worse.status == 2

@@ -103,7 +103,7 @@ def test_both_axes_are_told_unless_one_rests_or_is_named(tmp_path: Path) -> None
     assert [one["axis"] for one in json.loads(run("tables", path, "--json").out)["axes"]] == ["x"]
     outcome = run("tables", path, "--axis", "y")
     assert outcome.status == 2
-    assert "y rests in this scan" in outcome.err
+    assert "y is static in this scan" in outcome.err
 
 
 def test_the_error_asked_for_is_that_of_the_file(tmp_path: Path) -> None:

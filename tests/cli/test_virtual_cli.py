@@ -219,7 +219,7 @@ def test_what_goes_with_the_own_operator(tmp_path: Path) -> None:
     assert "its operator is that of the piezo on which it was measured" in built_in.out
     none = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", "own")
     assert none.status == ExitStatus.WRONG_INPUT
-    assert "scanner.toml has no operator; identify one with tablegen calibrate operator" in none.err
+    assert "scanner.toml has no operator; fit one with tablegen calibrate operator" in none.err
 
 
 @pytest.mark.common

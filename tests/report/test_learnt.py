@@ -45,4 +45,4 @@ def test_rounds_have_pages(tmp_path: Path) -> None:
     assert outcome.status == 2
     read = Page((tmp_path / "round.html").read_text("utf-8"))
     assert read.verdicts == ["bad"]
-    assert "was already learnt from this trace" in read.said
+    assert "was already refined by this trace" in read.said

@@ -1,4 +1,4 @@
-"""Gain against scan frequency -> alpha, equation (23)."""
+"""Fit alpha to gains at scan frequencies, equation (23)."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -18,7 +18,7 @@ _LARGEST_ALPHA = 0.5  # as in the schema
 
 @dataclass(frozen=True, kw_only=True)
 class FrequencyFit(Fit):
-    """alpha, the share of the amplitude at ``reference_hz`` that a decade takes, and the gain there."""
+    """The share alpha of the amplitude at ``reference_hz`` that a decade takes, and the gain there."""
 
     alpha: Estimate
     reference_hz: float
@@ -54,6 +54,13 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
     scale = float(np.mean(gain))
 
     def residuals(x: Floats) -> Floats:
+        """Compute the relative errors of (23).
+
+        Returns
+        -------
+        Floats
+            Dimensionless, shape (points,).
+        """
         errors: Floats = x[1] * (1.0 - x[0] * decades) * scale / gain - 1.0
         return errors
 
@@ -100,7 +107,7 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
 
 
 def _rises(frequency_hz: Floats, residuals: Floats, jacobian: Floats) -> bool:
-    """Whether a term in f^2, as of a resonance above, would take a significant part of the residuals."""
+    """Return True if a term in f^2, as of a resonance above, would take a significant part of the residuals."""
     freedom = len(residuals) - jacobian.shape[1] - 1
     if freedom < 2:
         return False

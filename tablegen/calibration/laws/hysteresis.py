@@ -1,4 +1,4 @@
-"""Traces at several amplitudes and turns -> beta_max, rho and u_peak of each branch, equations (17)-(22)."""
+"""Fit beta_max, rho and u_peak of each branch to traces at several amplitudes and turns, equations (17)-(22)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _MAX_DRIVE_DEPARTURE = 0.01  # rms departure of the drive from a triangle
 
 @dataclass(frozen=True)
 class Trace:
-    """What one record holds: times in s, the drive at the piezo in V, displacements in any unit; and its name."""
+    """One record and its name: times in s, the drive at the piezo in V, displacements in any unit."""
 
     name: str
     time_s: Floats
@@ -37,9 +37,9 @@ class Trace:
 
 @dataclass(frozen=True)
 class TurnFit:
-    """Both directions at one turning point, and the traces or image pairs that they rest on, by ascending amplitude.
+    """Both directions at one turning point, and their traces or image pairs, by ascending amplitude.
 
-    ``offsets_v`` are the offsets of these traces; empty where all have one, or where they are not known.
+    ``offsets_v`` are the offsets of these traces; empty where all have one, or where they are unknown.
     """
 
     turn: Estimate
@@ -69,7 +69,10 @@ def fit_hysteresis(
 ) -> HysteresisFit:
     """Fit both branches at each turn that was measured; see ``fit_trace`` for the treatment of a trace.
 
-    ``rho`` is kept where a turn was measured at one amplitude only.
+    Parameters
+    ----------
+    rho
+        Decay constant of (22) where a turn was measured at one amplitude only.
 
     Raises
     ------
@@ -142,13 +145,13 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
 def _offsets(group: Sequence[AmplitudeFit], span: float) -> tuple[float, ...]:
     """Return the offset of each amplitude, those near each other as one.
 
-    Empty where there is but one, and where no offset has two sizes: traces that all begin at 0 V say nothing of it.
+    Empty for one offset, and where no offset has two sizes: traces that all begin at 0 V do not show its effect.
     """
-    known = sorted(fit.v_offset for fit in group if fit.v_offset is not None)
-    if len(known) < len(group):
+    offsets = sorted(fit.v_offset for fit in group if fit.v_offset is not None)
+    if len(offsets) < len(group):
         return ()
-    clusters = [[known[0]]]
-    for volts in known[1:]:
+    clusters = [[offsets[0]]]
+    for volts in offsets[1:]:
         if volts - clusters[-1][0] > OFFSET_TOLERANCE * span:
             clusters.append([])
         clusters[-1].append(volts)
@@ -193,8 +196,8 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             )
         )
     if fit.strays:
-        shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept"))
+        numbers = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
+        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {numbers}); they were used"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
             remarks.append(
@@ -204,7 +207,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
 
 
 def _curves(branches: Sequence[TurnFit], span: float) -> list[Curve]:
-    """For each turn: the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
+    """Return two curves for each turn: the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
     curves: list[Curve] = []
     line = np.linspace(0.0, 1.0, 101)
     for branch in branches:

@@ -1,4 +1,4 @@
-"""Images of a sample of known constant -> how long each line was, in nm: what calibrates size and offset."""
+"""Measure how long the line of each image of a sample of known constant was, in nm, to calibrate size and offset."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from tablegen.numerics.driver import Driver
 
 _MAX_STEP = 1.35  # between the nm per volt of neighbouring images: below the root of two
 _MIN_PIXELS_PER_PERIOD = 4.0
-_LOOSE_SHARE = 0.01  # relative error of a size that is said
+_LOOSE_SHARE = 0.01  # relative error of a size that is remarked
 
 
 @dataclass(frozen=True, eq=False)
 class SampleImage:
     """A trace, and its retrace if there is one, of a scan of ``v_scan`` V peak to peak about ``v_offset``; and a name.
 
-    ``aspect`` is the frame's height over the line's length where the file says both.
+    Heights are in any unit, rows x columns; ``aspect`` is the frame's height over the line's length by the file.
     """
 
     name: str
@@ -38,7 +38,7 @@ class SampleImage:
 
 @dataclass(frozen=True)
 class KnownSample:
-    """What was imaged: a lattice, a grating, or both on one instrument; two waves in an image are the lattice."""
+    """The sample: a lattice, a grating, or both on one instrument; two waves in an image are the lattice."""
 
     cell: Cell | None = None
     grating: Grating | None = None
@@ -46,7 +46,7 @@ class KnownSample:
 
 @dataclass(frozen=True)
 class Acquisition:
-    """How all images were taken: as in ``fit_pair``; ``aspect`` where it is not that of the pixels, or of the file."""
+    """Timing of all images, as in ``fit_pair``; ``aspect`` where it is not that of the pixels, or of the file."""
 
     turn: float = 0.5
     window: tuple[float, float] = (0.0, 1.0)
@@ -57,7 +57,7 @@ class Acquisition:
 
 @dataclass(frozen=True, eq=False)
 class ImageSizes:
-    """All images, in the order in which they were given; ``shared`` is the relative error that they have together."""
+    """Sizes of all images, in their order, in nm; ``shared`` is the relative error that they have in common."""
 
     images: tuple[ImageSize, ...]
     nm: Floats
@@ -124,9 +124,14 @@ def sizes_of(
 
 
 def apparent_of(sizes: ImageSizes, law: SizeLaw, driver: Driver | float, sample: KnownSample) -> tuple[Floats, Floats]:
-    """How large the sample's constant looks in nm, were each line as long as the size law has it; and the errors.
+    """Return how large the sample's constant appears if each line is as long as by the size law.
 
-    With a law that is right it looks as large as it is at the offset at which the law was measured.
+    With the right law it is the true constant, at the offset at which the law was measured.
+
+    Returns
+    -------
+    tuple of Floats
+        Apparent constants and their standard errors in nm, shape (images,) each.
     """
     constant = sample.cell.a_nm if sample.cell is not None else sample.grating.pitch_nm if sample.grating else 1.0
     lawful = np.array([law.size_nm(one.v_scan / Driver.of(driver).span) for one in sizes.images])
@@ -146,7 +151,7 @@ def _check_drive(image: SampleImage, driver: Driver) -> None:
 
 
 def _check_steps(sizes: Sequence[ImageSize]) -> None:
-    """Neighbouring drives, or offsets, have about as many nm per volt: else one was another size than said."""
+    """Raise ``Unphysical`` unless neighbouring drives, or offsets, have about as many nm per volt."""
     for _, group in _groups(sizes):
         for less, more in pairwise(group):
             ratio = more.size.nm.value / more.v_scan / (less.size.nm.value / less.v_scan)
@@ -154,13 +159,13 @@ def _check_steps(sizes: Sequence[ImageSize]) -> None:
                 continue
             raise Unphysical(
                 f"{less.name} has {less.size.nm.value / less.v_scan:.4g} nm per volt, and {more.name} "
-                f"{more.size.nm.value / more.v_scan:.4g}: is each image of the voltage that was said, of the sample "
-                f"whose constant was given, and a period more than two pixels?"
+                f"{more.size.nm.value / more.v_scan:.4g}: is each image of the stated voltage, of the sample "
+                f"of this constant, and a period more than two pixels?"
             )
 
 
 def _groups(sizes: Sequence[ImageSize]) -> list[tuple[float, list[ImageSize]]]:
-    """By offset for each scan voltage where offsets are given, ascending; else all by scan voltage."""
+    """Group by scan voltage, each by ascending offset, where offsets are given; else return all by scan voltage."""
     if all(one.v_offset is None for one in sizes):
         return [(0.0, sorted(sizes, key=lambda one: one.v_scan))]
     volts = sorted({one.v_scan for one in sizes})
@@ -191,6 +196,6 @@ def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
     if finest < _MIN_PIXELS_PER_PERIOD:
         remarks.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels"))
     if line.strays:
-        shown = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
-        remarks.append(Remark(f"{len(line.strays)} lines differ from the others (row {shown}); they were kept"))
+        numbers = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
+        remarks.append(Remark(f"{len(line.strays)} lines differ from the others (row {numbers}); they were used"))
     return remarks

@@ -1,4 +1,7 @@
-"""Trace and retrace images of a periodic sample at several amplitudes -> beta_max, rho and u_peak of each branch."""
+"""Fit beta_max, rho and u_peak of each branch to trace and retrace images of a periodic sample, at several amplitudes.
+
+Each pair of images is one amplitude.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +22,7 @@ _MIN_PIXELS_PER_PERIOD = 4.0  # pixels in the shortest period
 
 @dataclass(frozen=True)
 class Pair:
-    """Two images of one scan at ``v_scan`` V peak to peak, rows x columns each; and a name."""
+    """Two images of one scan at ``v_scan`` V peak to peak, heights in any unit, rows x columns each; and a name."""
 
     name: str
     v_scan: float
@@ -38,7 +41,10 @@ def fit_images(
 ) -> HysteresisFit:
     """Fit both branches to images of a triangle's scan; see ``fit_pair`` for the treatment of a pair.
 
-    ``rho`` is kept where there is one amplitude only.
+    Parameters
+    ----------
+    rho
+        Decay constant of (22) where there is one amplitude only.
 
     Raises
     ------
@@ -102,8 +108,8 @@ def _remarks(fit: ImageFit) -> list[Remark]:
             Remark(f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
         )
     if fit.strays:
-        shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        remarks.append(Remark(f"{len(fit.strays)} lines differ from the others (row {shown}); they were kept"))
+        numbers = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
+        remarks.append(Remark(f"{len(fit.strays)} lines differ from the others (row {numbers}); they were used"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
             remarks.append(spoils(f"u_peak {name} is not determined by these images; scan more periods, or average"))

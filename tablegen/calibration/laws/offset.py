@@ -1,4 +1,4 @@
-"""Apparent sizes of one object at several offset voltages -> m_minus and m_plus, equations (1)-(4)."""
+"""Fit m_minus and m_plus to apparent sizes of one object at several offset voltages, equations (1)-(4)."""
 
 from dataclasses import dataclass
 
@@ -73,14 +73,35 @@ def fit_offset(
     start = [law.factor(-1.0), law.factor(1.0), float(np.mean(apparent_nm) / np.mean(factors))]
 
     def looks(m: Floats) -> Floats:
-        """Apparent size, relative to that at m = 1."""
+        """Return apparent sizes, relative to that at m = 1.
+
+        Returns
+        -------
+        Floats
+            Dimensionless, of the shape of ``m``.
+        """
         if size_law is None or size_v is None:
             return m
         v = size_v / driver.span
         return size_law.size_nm(v) / np.array([size_law.size_nm(v / one) for one in np.maximum(m, 0.1).tolist()])
 
     def solved(errors: Floats) -> Solution:
+        """Fit with these standard errors.
+
+        Parameters
+        ----------
+        errors
+            Standard errors in nm, shape (points,).
+        """
+
         def residuals(x: Floats) -> Floats:
+            """Compute the misfit in standard errors.
+
+            Returns
+            -------
+            Floats
+                Shape (points,).
+            """
             misfits: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / errors
             return misfits
 
@@ -116,14 +137,14 @@ def fit_offset(
 
 
 def _shape(p: Floats) -> Floats:
-    """Columns that give m(p) when multiplied by 1, m_minus and m_plus: (1) with (3) and (4) put in."""
+    """Return columns that give m(p) when multiplied by 1, m_minus and m_plus: (1) with (3) and (4) inserted."""
     columns: Floats = np.stack([1.0 - p * p, 0.5 * (p * p - p), 0.5 * (p * p + p)], axis=1)
     return columns
 
 
 def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[Remark]:
     remarks: list[Remark] = []
-    if solution.freedom == 0 and solution.known_errors:
+    if solution.freedom == 0 and solution.absolute_errors:
         remarks.append(
             Remark("three points fit exactly: errors are those of the images alone; measure at two more offsets")
         )

@@ -1,4 +1,4 @@
-"""Apparent sizes at several offsets, in images of several scan voltages -> (1)-(4) of each scan voltage."""
+"""Fit (1)-(4) at each scan voltage to apparent sizes at several offsets, in images of several scan voltages."""
 
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ from tablegen.fitting.estimate import Fit
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 
-_WIDE = 2.0  # the largest scan voltage over the smallest, from which on they say how m changes with the size
+_WIDE = 2.0  # ratio of the scan voltages above which they determine how m changes with the size
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +73,7 @@ def fit_offset_sizes(
     if volts[-1] < _WIDE * volts[0]:
         remarks.append(
             Remark(
-                f"scan voltages of {volts[0]:g} to {volts[-1]:g} V hardly tell how m changes with the size; "
+                f"scan voltages of {volts[0]:g} to {volts[-1]:g} V hardly show how m changes with the size; "
                 f"take some further apart"
             )
         )

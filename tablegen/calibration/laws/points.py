@@ -1,4 +1,4 @@
-"""Hysteresis as it was measured at each amplitude, for scanners that (22) and one u_peak do not describe."""
+"""Hysteresis as measured at each amplitude, for scanners that (22) and one u_peak do not describe."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Estimate
 from tablegen.fitting.measured_branch import MeasuredBranch
 
-_MIN_BETA_ERRORS = 3.0  # standard errors of a beta that has a peak worth looking at
+_MIN_BETA_ERRORS = 3.0  # standard errors of a beta whose peak is significant
 _MAX_PEAK_ERROR = 0.1  # standard error of a u_peak that was not determined
 
 
@@ -29,7 +29,13 @@ def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
 
 
 def estimates(branch: TurnFit, direction: str) -> list[tuple[dict[str, float], Estimate, Estimate]]:
-    """Where each of these points is, and beta and u_peak with their standard errors. Raises as ``measured_points``."""
+    """Return the place of each of these points, and beta and u_peak with their standard errors.
+
+    Raises
+    ------
+    Unphysical
+        If a residual has the wrong sign or makes no branch, or an amplitude was measured twice.
+    """
     points: list[tuple[dict[str, float], Estimate, Estimate]] = []
     offsets = branch.offsets_v or (None,) * len(branch.traces)
     for trace, offset_v in sorted(zip(branch.traces, offsets, strict=True), key=lambda one: one[1] or 0.0):

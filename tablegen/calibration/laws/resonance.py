@@ -1,4 +1,4 @@
-"""A frequency response -> resonance, quality and delay of the second-order model."""
+"""Fit resonance, quality and delay of the second-order model to a frequency response."""
 
 from dataclasses import dataclass
 from math import log, pi
@@ -20,7 +20,7 @@ _POOR_PERCENT, _POOR_DEGREES = 5.0, 5.0
 class ResonanceFit(Fit):
     """The undamped resonance in Hz, the quality factor, the delay in s, and the gain at 0 Hz.
 
-    ``response`` is what was measured, for ``resonance.response`` of the scanner file: rows of ascending Hz, gain, and
+    ``response`` is the measurement, for ``resonance.response`` of the scanner file: rows of ascending Hz, gain, and
     phase in degrees, unwrapped and without an inversion; None where no phase was measured.
     """
 
@@ -32,9 +32,16 @@ class ResonanceFit(Fit):
 
 
 def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None = None) -> ResonanceFit:
-    """Fit ``SecondOrder`` to gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
+    """Fit ``SecondOrder`` to gain and phase; without a phase the delay is 0.
 
-    Without a phase the delay cannot be told and is 0.
+    Parameters
+    ----------
+    frequency_hz
+        Frequencies in Hz, shape (points,).
+    gain
+        Gains in any unit, with errors in proportion, shape (points,).
+    phase_deg
+        Phases in degrees, a lag negative, shape (points,).
 
     Raises
     ------
@@ -80,10 +87,10 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
         remarks.append(spoils(text, rms))
     decibels = 20.0 * np.log10(g), 20.0 * np.log10(model)
     if phase is not None:
-        missed = float(np.degrees(np.sqrt(np.mean((lag - phase) ** 2))))
-        if missed > _POOR_DEGREES:
-            text = f"the phase is missed by {missed:.2g} degrees rms; are the points near enough to follow it?"
-            remarks.append(spoils(text, 100.0 * float(np.radians(missed))))  # of a harmonic, which it moves
+        phase_error = float(np.degrees(np.sqrt(np.mean((lag - phase) ** 2))))
+        if phase_error > _POOR_DEGREES:
+            text = f"the phase is missed by {phase_error:.2g} degrees rms; are the points near enough to follow it?"
+            remarks.append(spoils(text, 100.0 * float(np.radians(phase_error))))  # of a harmonic
     curves = [Curve("gain", "frequency [Hz]", "gain [dB]", (f, decibels[0]), (line, decibels[1]))]
     if phase is not None:
         degrees = (line, np.degrees(model_phase))
@@ -109,7 +116,7 @@ def _unwrapped(phase_deg: Floats, remarks: list[Remark]) -> Floats:
     phase = np.unwrap(np.radians(phase_deg))
     turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
     if turned % 2:
-        remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were taken off"))
+        remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were subtracted"))
     return np.asarray(phase - pi * turned)
 
 
@@ -126,7 +133,7 @@ def _delay(solution: Solution, resonance_hz: float, remarks: list[Remark]) -> Es
 
 
 def _response(f: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Gain and phase in radians, unwrapped; x holds ln gain, ln resonance, ln quality, delay times resonance."""
+    """Return gain and unwrapped phase in radians; x has ln gain, ln resonance, ln quality, delay times resonance."""
     at = np.exp(x[1])
     r = f / at
     real, imaginary = 1.0 - r * r, r / np.exp(x[2])
@@ -139,6 +146,13 @@ def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
     weight = np.ones(2)
 
     def residuals(x: Floats) -> Floats:
+        """Compute the misfit: the logarithm of the gain, then the phase in radians, each weighted.
+
+        Returns
+        -------
+        Floats
+            Shape (points,), or (2 points,) with a phase.
+        """
         gain, lag = _response(f, x)
         amplitude: Floats = weight[0] * np.log(gain / g)
         return amplitude if phase is None else np.concatenate([amplitude, weight[1] * (lag - phase)])
@@ -151,7 +165,7 @@ def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
     for at in (peak, float(np.sqrt(f[0] * f[-1])), float(f[-1]) / 1.2):
         start = [log(low), log(at), log(quality)]
         if phase is not None:
-            # What a second-order lag of at most half a turn leaves at the highest frequency is the delay's.
+            # The delay takes the phase at the highest frequency beyond the half turn of a second-order lag.
             start.append(max(-(float(phase[-1]) + (pi if f[-1] > at else 0.0)) / (2.0 * pi * float(f[-1]) / at), 0.0))
         try:
             solution = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])

@@ -1,4 +1,4 @@
-"""Actual against set scan sizes -> k, beta and the threshold, equations (6)-(12)."""
+"""Fit k, beta and the threshold to actual and set scan sizes, equations (6)-(12)."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -18,14 +18,14 @@ from tablegen.numerics.driver import Driver
 TYPICAL_THRESHOLD = 0.5  # as in the paper
 _NAMES = ("k_nm_per_v", "beta", "v_threshold")
 _MIN_SCATTER = 1e-7
-_STEP_SCALES = (0.5, 2.0, 0.25)  # k relative to its start; the others absolute
-_LEAST_DRIVE = 1e-6  # of the driver's range: below it nothing is told from noise
+_STEP_SCALES = (0.5, 2.0, 0.25)  # k relative to its start; beta and threshold absolute
+_LEAST_DRIVE = 1e-6  # of the driver's range: smaller drives are noise
 _LEAST_BETA, _LARGEST_BETA = -0.49, 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class SizeFit(Fit):
-    """k in nm/V at ``base_nm``; beta; the threshold as a fraction of v_max."""
+    """The sensitivity k in nm/V at ``base_nm``; beta; the threshold as a fraction of v_max."""
 
     k_nm_per_v: Estimate
     beta: Estimate
@@ -89,6 +89,13 @@ def fit_size(
     if errors_nm is not None:
 
         def weighed(errors: Floats) -> Solution:
+            """Fit with these standard errors.
+
+            Parameters
+            ----------
+            errors
+                Standard errors in nm, shape (points,).
+            """
             model = _SizeModel(v, actual_nm, errors, span, base_nm)
             return (model.best_threshold() if free is not None else None) or model.solve(fixed)
 
@@ -97,7 +104,7 @@ def fit_size(
     if free is None and threshold is None:
         remarks.append(
             Remark(
-                f"the threshold is not determined by these points and was left at {fixed:g}; it takes four sizes or "
+                f"the threshold is not determined by these points and was set to {fixed:g}; it takes four sizes or "
                 f"more, some of them above 0.6 of v_max and some below 0.4"
             )
         )
@@ -149,11 +156,30 @@ class _SizeModel:
         self._start_k = float(np.sum(v * actual_nm) / np.sum(v * v)) / v_max
 
     def size(self, x: Floats, v: Floats) -> Floats:
-        """Return sizes in nm at normalised voltages, of their shape."""
+        """Return sizes in nm at normalised voltages.
+
+        Parameters
+        ----------
+        x
+            k in nm/V, beta and threshold, shape (3,).
+        v
+            V_scan / v_max, any shape.
+
+        Returns
+        -------
+        Floats
+            Sizes in nm, of the shape of ``v``.
+        """
         return self._base * _unit(v, x[1], x[2]) / _unit(np.array(self.at_base(x)), x[1], x[2])
 
     def at_base(self, x: Floats) -> float:
-        """Return the normalised voltage of the base size."""
+        """Return the normalised voltage of the base size.
+
+        Parameters
+        ----------
+        x
+            k in nm/V, beta and threshold, shape (3,).
+        """
         return self._base / (float(x[0]) * self._v_max)
 
     def solve(self, threshold: float | None, start: tuple[float, float, float] | None = None) -> Solution:
@@ -163,6 +189,13 @@ class _SizeModel:
         count = 3 - len(fixed)
 
         def residuals(x: Floats) -> Floats:
+            """Compute the misfit in units of the weights.
+
+            Returns
+            -------
+            Floats
+                Shape (points,).
+            """
             return (self.size(np.append(x, fixed), self._v) - self._actual) / self._weight
 
         scales = [_STEP_SCALES[0] * self._start_k, *_STEP_SCALES[1:]]
@@ -183,7 +216,7 @@ class _SizeModel:
         )
 
     def best_threshold(self) -> Solution | None:
-        """All three, from the best of a grid of thresholds; None where the threshold is not determined."""
+        """Fit all three, from the best of a grid of thresholds; return None where the threshold is undetermined."""
         inside = np.unique(self._v)
         begin = min(np.linspace(0.1, 0.9, 33).tolist(), key=lambda threshold: self._linear(threshold)[0])
         _, alpha, bend = self._linear(begin)
@@ -197,7 +230,7 @@ class _SizeModel:
         return solution
 
     def _linear(self, threshold: float) -> tuple[float, float, float]:
-        """Sum of squares, alpha and alpha beta at a threshold, in which the law is linear."""
+        """Return sum of squares, alpha and alpha beta at a threshold, for which the law is linear."""
         v = self._v
         basis = np.stack([v, np.where(v <= threshold, v * v, 2.0 * threshold * v - threshold**2)], axis=1)
         basis = basis / self._weight[:, None]
@@ -213,7 +246,7 @@ def _unit(v: Floats, beta: float, threshold: float) -> Floats:
 
 def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[Remark]:
     remarks: list[Remark] = []
-    if solution.known_errors and len(solution.residuals) == len(solution.names):
+    if solution.absolute_errors and len(solution.residuals) == len(solution.names):
         remarks.append(Remark("as many sizes as parameters: errors are those of the images alone; measure more sizes"))
     elif solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
         remarks.append(

@@ -1,4 +1,4 @@
-"""One trace, displacement against a triangular drive over one or more periods -> both branches of the model."""
+"""Fit both branches of the model to one trace: displacement against a triangular drive over one or more periods."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ _REVERSED_BRANCH_RESIDUAL = 1e3  # the residual of a branch that runs backwards
 
 @dataclass(frozen=True, kw_only=True)
 class TraceFit(AmplitudeFit):
-    """What one trace says, of which whole ``periods`` count and ``left_out`` samples do not.
+    """Fit of one trace over ``periods``, without the ``settling_samples`` samples before them.
 
     ``correlated`` is over how many samples residuals depend on each other; ``strays`` are samples far off the curve,
     counted from 0.
@@ -28,7 +28,7 @@ class TraceFit(AmplitudeFit):
 
     triangle: Triangle
     periods: float
-    left_out: int
+    settling_samples: int
     delay_s: Estimate
     correlated: float
     inverted: bool
@@ -43,13 +43,26 @@ def fit_trace(
     drift_order: int | None = None,
     delay_s: float | None = 0.0,
 ) -> TraceFit:
-    """Fit both branches of one trace: times ascending (s), drive at the piezo (V), displacement (any unit).
+    """Fit both branches of one trace.
 
     Every sample is fitted at its own phase, so that periods are aligned to a fraction of a sample and averaged,
-    whatever the sampling rate. The first ``settle_periods`` are left out (of three periods or more the first, if not
-    given). Drift is a polynomial of ``drift_order`` over the record: a line, a parabola from two periods on, a cubic
-    from four; creep goes with it as far as these follow it. ``delay_s`` is that of the sensor against the drive; None
-    fits it.
+    whatever the sampling rate.
+
+    Parameters
+    ----------
+    time_s
+        Ascending times in s, shape (samples,).
+    drive_v
+        Drive at the piezo in V, shape (samples,).
+    displacement_nm
+        Displacement in any unit, shape (samples,).
+    settle_periods
+        Periods at the start that are not fitted; by default one of three periods or more.
+    drift_order
+        Order of the polynomial that takes the drift, and creep as far as it follows it; by default a line, a parabola
+        from two periods on, a cubic from four.
+    delay_s
+        Delay of the sensor after the drive; None fits it.
 
     Raises
     ------
@@ -87,9 +100,9 @@ def fit_trace(
 
 
 class _TraceModel:
-    """displacement = low + height tau(t - delay) + drift.
+    """Model of a trace: displacement = low + height tau(t - delay) + drift.
 
-    Of the branches their coordinates are fitted, in which (17) is linear, and not their peaks, which have poles.
+    It fits the branches by their coordinates, in which (17) is linear, and not by their peaks, which have poles.
     """
 
     def __init__(self, triangle: Triangle, time_s: Floats, measured: Floats, order: int, delay_s: float | None) -> None:
@@ -108,12 +121,29 @@ class _TraceModel:
         self.names = (*shape, "low", "height", *drifts, *(["delay"] if self.fits_delay else []))
 
     def delay(self, x: Floats) -> float:
-        """In periods."""
+        """Return the delay in periods.
+
+        Parameters
+        ----------
+        x
+            Parameters, shape (parameters,).
+        """
         return float(x[-1]) if self.fits_delay else self.fixed_delay
 
     def position(self, x: Floats) -> tuple[Floats, Floats, Bools, Floats]:
-        """Return u and tau along the sweep, whether it rises, and the normalised displacement; each (samples,)."""
-        if self._last is None or not np.array_equal(self._last[0], x):  # residuals and their derivatives ask in turn
+        """Return u and tau along the sweep, True where it rises, and the normalised displacement.
+
+        Parameters
+        ----------
+        x
+            Parameters, shape (parameters,).
+
+        Returns
+        -------
+        tuple
+            Four arrays of shape (samples,), dimensionless.
+        """
+        if self._last is None or not np.array_equal(self._last[0], x):  # residuals and jacobian share it
             self._last = x.copy(), self._position(x)
         return self._last[1]
 
@@ -128,25 +158,69 @@ class _TraceModel:
         return u, tau, rising, np.where(rising, tau, 1.0 - tau)
 
     def expected(self, x: Floats) -> Floats:
-        """Return the modelled normalised displacement, with drift, shape (samples,)."""
+        """Return the modelled normalised displacement, with drift.
+
+        Parameters
+        ----------
+        x
+            Parameters, shape (parameters,).
+
+        Returns
+        -------
+        Floats
+            Share of the measured range, shape (samples,).
+        """
         _, _, _, position = self.position(x)
         return float(x[4]) + float(x[5]) * position + self.drift @ x[6 : 6 + self.drift.shape[1]]
 
     def residuals(self, x: Floats) -> Floats:
-        """Model less measurement; far off where a branch would run backwards."""
+        """Compute the model less the measurement; far off where a branch would run backwards.
+
+        Parameters
+        ----------
+        x
+            Parameters, shape (parameters,).
+
+        Returns
+        -------
+        Floats
+            Share of the measured range, shape (samples,).
+        """
         if min(branch.least_slope() for branch in _branches(x)) < 0.02:
             return np.full(len(self.measured), _REVERSED_BRANCH_RESIDUAL)
         return self.expected(x) - self.measured
 
     def jacobian(self, x: Floats) -> Floats:
-        """Return the derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
+        """Return the derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau).
+
+        Parameters
+        ----------
+        x
+            Parameters, shape (parameters,).
+
+        Returns
+        -------
+        Floats
+            Shape (samples, parameters).
+        """
         columns, steep = self._shape_columns(x)
         if self.fits_delay:
             columns.append(-steep * self._by_delay(x))
         return np.column_stack(columns)
 
     def timing_jacobian(self, x: Floats) -> Floats:
-        """By the period, start and turn of the drive."""
+        """Return the derivatives of the displacement by the period, start and turn of the drive.
+
+        Parameters
+        ----------
+        x
+            Parameters, shape (parameters,).
+
+        Returns
+        -------
+        Floats
+            Shares of the measured range per s, per s and per unit of the turn, shape (samples, 3).
+        """
         _, steep = self._shape_columns(x)
         delayed = self.time_s - self.delay(x) * self.triangle.period_s
         return self.triangle.timing_slopes(delayed) * steep[:, None]
@@ -168,7 +242,7 @@ class _TraceModel:
         return [*columns, np.ones_like(tau), position, *self.drift.T], steep
 
     def solve(self) -> Solution:
-        """From a linear first guess: in u, tau and a small residual, the displacement itself is near enough to tau."""
+        """Fit from a linear first guess: for a small residual the displacement itself is near enough to tau."""
         start = np.zeros(len(self.names))
         start[5] = 1.0
         u, _, rising, _ = self.position(start)
@@ -189,14 +263,16 @@ class _TraceModel:
         return solve(self.residuals, start, self.names, scales, jacobian=self.jacobian)
 
 
-def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods: float, left_out: int) -> TraceFit:
+def _result(
+    model: _TraceModel, solution: Solution, triangle: Triangle, periods: float, settling_samples: int
+) -> TraceFit:
     x, residuals = solution.values, solution.residuals
     correlated = correlation_length(residuals)
     freedom = max(len(residuals) / correlated - len(x), 1.0)
     covariance = solution.unit_covariance * float(residuals @ residuals) / freedom
-    # Errors of the drive's timing move the branches too.
-    moved = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
-    covariance = covariance + moved @ triangle.timing_covariance @ moved.T
+    # Errors of the drive's timing change the branches too.
+    timing_effect = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
+    covariance = covariance + timing_effect @ triangle.timing_covariance @ timing_effect.T
     forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
     delay = Estimate(model.fixed_delay * triangle.period_s)
     if model.fits_delay:
@@ -211,7 +287,7 @@ def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods:
         v_offset=0.5 * (triangle.v_low + triangle.v_high),
         periods=periods,
         samples=len(residuals),
-        left_out=left_out,
+        settling_samples=settling_samples,
         forward=forward,
         backward=backward,
         delay_s=delay,
@@ -221,7 +297,7 @@ def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods:
         scaling_percent=scaling,
         correlated=correlated,
         inverted=bool(x[5] < 0.0),
-        strays=tuple((left_out + np.flatnonzero(np.abs(residuals) > max(7.0 * spread, 1e-6))).tolist()),
+        strays=tuple((settling_samples + np.flatnonzero(np.abs(residuals) > max(7.0 * spread, 1e-6))).tolist()),
         curves=(curve,),
     )
 
@@ -234,7 +310,7 @@ def _averaged(model: _TraceModel, x: Floats, rest: Floats) -> tuple[Floats, tupl
     """Average the residual over the periods; return it, its noise, and the measured residual as a curve."""
     u, tau, rising, _ = model.position(x)
     height = float(x[5])
-    residuals, scaling, drawn = [], [], []
+    residuals, scaling, branches = [], [], []
     for side, sign, shape in ((rising, 1.0, x[:2]), (~rising, -1.0, x[2:4])):
         errors = -rest[side] / height * sign  # along the sweep, measured less model
         place = np.minimum((tau[side] * BINS).astype(np.int64), BINS - 1)
@@ -244,9 +320,9 @@ def _averaged(model: _TraceModel, x: Floats, rest: Floats) -> tuple[Floats, tupl
         scaling.append(100.0 * float(np.ptp(np.diff(mean)[WINDOW]) * BINS))
         at = np.bincount(place, u[side], minlength=BINS) / count
         fitted = BranchShape.at(shape).inverse(at)
-        drawn.append((at, 100.0 * (mean + fitted - at), 100.0 * (fitted - at)))
+        branches.append((at, 100.0 * (mean + fitted - at), 100.0 * (fitted - at)))
     # As figure 5a has it: against the drive, the backward branch mirrored.
-    (f_at, f_measured, f_fitted), (b_at, b_measured, b_fitted) = drawn
+    (f_at, f_measured, f_fitted), (b_at, b_measured, b_fitted) = branches
     along = np.concatenate([f_at, 1.0 - b_at])
     curve = Curve(
         "residual against the drive",

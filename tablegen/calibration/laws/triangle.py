@@ -17,8 +17,8 @@ _MIN_SWEEP_SAMPLES = 4  # samples in the middle half of a sweep
 class Triangle:
     """A drive that rises for ``turn`` of its period from a minimum at ``start_s``, and falls for the rest.
 
-    ``timing_covariance`` is that of (period_s, start_s, turn); ``departure`` the rms of what was recorded
-    less the triangle, as a fraction of its height.
+    ``timing_covariance`` is that of (period_s, start_s, turn); ``departure`` the rms of the recorded drive less the
+    triangle, as a fraction of its height.
     """
 
     period_s: float
@@ -30,17 +30,50 @@ class Triangle:
     departure: float
 
     def phase(self, time_s: Floats) -> Floats:
-        """Periods since a minimum, in [0, 1)."""
+        """Return the periods since a minimum.
+
+        Parameters
+        ----------
+        time_s
+            Times in s, any shape.
+
+        Returns
+        -------
+        Floats
+            In [0, 1), of the shape of ``time_s``.
+        """
         t = (time_s - self.start_s) / self.period_s
         return t - np.floor(t)
 
     def value(self, time_s: Floats) -> Floats:
-        """Return the normalised drive, from 0 to 1, of the shape of ``time_s``."""
+        """Return the normalised drive.
+
+        Parameters
+        ----------
+        time_s
+            Times in s, any shape.
+
+        Returns
+        -------
+        Floats
+            From 0 to 1, of the shape of ``time_s``.
+        """
         phase = self.phase(time_s)
         return np.where(phase < self.turn, phase / self.turn, (1.0 - phase) / (1.0 - self.turn))
 
     def timing_slopes(self, time_s: Floats) -> Floats:
-        """Return the derivatives of ``value`` by period_s, start_s and turn, a column each."""
+        """Return the derivatives of ``value`` by period_s, start_s and turn.
+
+        Parameters
+        ----------
+        time_s
+            Times in s, shape (samples,).
+
+        Returns
+        -------
+        Floats
+            Per s, per s and per unit of the turn, a column each, shape (samples, 3).
+        """
         phase = self.phase(time_s)
         rising = phase < self.turn
         slope = np.where(rising, 1.0 / self.turn, -1.0 / (1.0 - self.turn))
@@ -71,13 +104,34 @@ def find_triangle(time_s: Floats, drive_v: Floats) -> Triangle:
     start = first.start_s + round((middle - first.start_s) / first.period_s) * first.period_s
 
     def triangle(x: Floats) -> Triangle:
+        """Return the triangle of these parameters: period and start in s, turn, low and high in V.
+
+        Parameters
+        ----------
+        x
+            Shape (5,).
+        """
         return Triangle(float(x[0]), float(x[1]), float(x[2]), float(x[3]), float(x[4]), np.zeros((3, 3)), 0.0)
 
     def residuals(x: Floats) -> Floats:
+        """Compute the triangle less the drive.
+
+        Returns
+        -------
+        Floats
+            Share of the height, shape (samples,).
+        """
         low, high = float(x[3]), float(x[4])
         return (low + (high - low) * triangle(x).value(time_s) - drive_v) / height
 
     def jacobian(x: Floats) -> Floats:
+        """Compute the derivatives of ``residuals``.
+
+        Returns
+        -------
+        Floats
+            Shape (samples, 5).
+        """
         shape = triangle(x)
         value = shape.value(time_s)
         timing = shape.timing_slopes(time_s) * (shape.v_high - shape.v_low)
@@ -124,7 +178,7 @@ def _first_guess(time_s: Floats, drive_v: Floats) -> Triangle:
 
 
 def _sweeps(time_s: Floats, level: Floats) -> list[tuple[float, float]]:
-    """Time of the middle and slope (1/s) of each sweep that goes all the way from a quarter to three quarters."""
+    """Return the time of the middle and the slope (1/s) of each sweep from a quarter of the range to three quarters."""
     far = np.flatnonzero((level < 0.25) | (level > 0.75))
     ends = np.flatnonzero(np.diff(level[far] > 0.75))
     crossings = []

@@ -1,1 +1,1 @@
-"""Traces of a sensor -> an operator of the piezo; see docs/operator.md."""
+"""Fit an operator of the piezo to traces of a sensor; see docs/operator.md."""

@@ -1,4 +1,4 @@
-"""Which further trace would help most: the stroke and centre at which the fields are known least, and the rate."""
+"""Advise the next trace: the stroke and centre at which the fields are most uncertain, and the rate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +13,17 @@ from tablegen.numerics.driver import Driver
 
 _STROKES = np.arange(0.1, 1.0, 0.05)
 _CENTRES = np.arange(0.1, 0.91, 0.05)
-_JITTER = 1e-5  # what every trace leaves open, of all that there is to know
+_JITTER = 1e-5  # relative variance that every trace leaves
 _LEAST_RMS = 1e-4  # percent
-_DECADE = 8.0  # ratio of rates that tells creep from hysteresis
+_DECADE = 8.0  # ratio of rates that separates creep from hysteresis
 
 
 @dataclass(frozen=True, slots=True)
 class NextTrace:
-    """Where to measure next, in V, and how little is known there: 1 is nothing, 0 all."""
+    """Where to measure next, in V, and ``unknown``, the relative variance of the fields there.
+
+    It is 1 without data, and 0 without uncertainty.
+    """
 
     size_v: float
     offset_v: float
@@ -32,7 +35,7 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver |
     """Return the trace that helps most; ``rate_hz`` is a second rate if all traces have the same."""
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
     unknown = _unknown(fit, np.array(reach))
-    # Of two that the traces leave equal, as those at equal distances to both sides are, the lower one on every machine.
+    # Of two equal ones, such as those at equal distances to both sides, every machine takes the lower one.
     best = int(np.argmax(np.round(unknown, 9)))
     rates = [line.rate_hz for line in lines]
     other = None if max(rates) > _DECADE * min(rates) else 10.0 * max(rates)
@@ -44,17 +47,18 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver |
 def expected_rms(fit: OperatorFit, points: Floats) -> Floats:
     """Return the expected rms residual of lines.
 
-    Where everything is known it is the residual of the fit; it grows with the uncertainty of the fields there, as much
+    Without uncertainty it is the residual of the fit; it grows with the uncertainty of the fields there, as much
     as it does for the lines that were left out.
 
     Parameters
     ----------
     points
-        Points (stroke, centre), shape (n, 2).
+        Points (stroke, centre), shares of v_max, shape (n, 2).
 
     Returns
     -------
-    Residuals in percent of the line, shape (n,).
+    Floats
+        Residuals in percent of the line, shape (n,).
     """
     inverse = _inverse(fit)
     without = np.sqrt(1.0 / np.diag(inverse))  # of each line, by all others
@@ -65,11 +69,11 @@ def expected_rms(fit: OperatorFit, points: Floats) -> Floats:
 
 def _inverse(fit: OperatorFit) -> Floats:
     points = fit.operator.residual.points
-    known = covariance(points, points, fit.operator.residual.lengths)
-    return np.asarray(np.linalg.inv(known + _JITTER * np.eye(len(points))), dtype=np.float64)
+    prior = covariance(points, points, fit.operator.residual.lengths)
+    return np.asarray(np.linalg.inv(prior + _JITTER * np.eye(len(points))), dtype=np.float64)
 
 
 def _unknown(fit: OperatorFit, points: Floats) -> Floats:
-    """How little the fields know at points: 1 is nothing, 0 all."""
+    """Return the relative variance of the fields at points: 1 without data, 0 without uncertainty."""
     near = covariance(points, fit.operator.residual.points, fit.operator.residual.lengths)
     return np.asarray(1.0 - np.einsum("ij,jk,ik->i", near, _inverse(fit), near), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Bouc and Wen's equation for settled lines: its exponent and coefficients, and how much of it is in them."""
+"""Fit Bouc and Wen's equation to settled lines: its exponent, coefficients and depth."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -16,7 +16,7 @@ _RIDGE = 1e-5
 
 
 class BoucWenProblem(FamilyProblem):
-    """Its own numbers are n, beta, gamma, the asymmetry and both bends; its one weight is the depth."""
+    """Fit of n, beta, gamma, the asymmetry and both bends; its one weight is the depth."""
 
     shape_limits = ((1.0, 3.0), (0.05, 40.0), (-30.0, 30.0), (-0.9, 0.9), (-0.6, 0.6), (-0.6, 0.6))
     shape_steps = (0.02, 0.05, 0.05, 0.02, 0.01, 0.01)
@@ -28,8 +28,19 @@ class BoucWenProblem(FamilyProblem):
         super().__init__(lines, main, creep)
         self.penalty = _RIDGE * np.eye(1 + 2 * DEGREE)
 
-    def moved(self, shape: Floats) -> list[Floats]:
-        """By a depth of 1."""
+    def unit_displacements(self, shape: Floats) -> list[Floats]:
+        """Return the displacement for a depth of 1.
+
+        Parameters
+        ----------
+        shape
+            n, beta, gamma, asymmetry and both bends, shape (6,).
+
+        Returns
+        -------
+        list of Floats
+            For each line, shape (phases, 1).
+        """
         model, out = _model(1.0, shape), []
         for line, u in zip(self.lines, self.drives, strict=True):
             rising, falling = (model.branch(u, line.low, line.high, going) for going in (True, False))
@@ -37,7 +48,17 @@ class BoucWenProblem(FamilyProblem):
         return out
 
     def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
-        """Without plays."""
+        """Return the family, without plays.
+
+        Parameters
+        ----------
+        shape
+            n, beta, gamma, asymmetry and both bends, shape (6,).
+        weights
+            Depth in nm, shape (1,).
+        reversible
+            Coefficients of u, u^2, ... in nm, shape (DEGREE,).
+        """
         bare = Family(NO_PLAYS, _model(float(weights[0]), shape))
         return bare.over(reversible)
 

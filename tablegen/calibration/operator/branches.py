@@ -1,4 +1,4 @@
-"""What a line leaves of a family: both branches as Chebyshev series of the position along the drive."""
+"""Residual of a line beside a family: both branches as Chebyshev series of the position along the drive."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,9 @@ _LAGS = 4  # phases
 
 @dataclass(frozen=True, eq=False)
 class BranchResidual:
-    """``coefficients`` of both branches, 2 ``DEGREE`` + 2 of them; ``extent_nm`` between the turns.
+    """Chebyshev ``coefficients`` of both branches, 2 ``DEGREE`` + 2 of them; ``extent_nm`` between the turns.
 
-    ``variance`` is what the noise of the trace gives each coefficient.
+    ``variance`` is that of each coefficient by the noise of the trace.
     """
 
     coefficients: Floats
@@ -26,7 +26,7 @@ class BranchResidual:
 
 
 def branch_residual(line: PeriodicLine, family: Family) -> BranchResidual:
-    """Measured less family, both about from 0 to 1 between the turns: ``Operator.loop`` closes their sum."""
+    """Fit the measured line less the family, both about from 0 to 1 between the turns; ``Operator.loop`` adds both."""
     u, rising = line.drive, line.rising
     low, high = line.low, line.high
     x = 2.0 * (u - low) / (high - low) - 1.0
@@ -46,13 +46,13 @@ def branch_residual(line: PeriodicLine, family: Family) -> BranchResidual:
     right = np.append((measured - offset) / scale - modelled, [0.0, 0.0])
     coefficients = np.linalg.lstsq(matrix, right, rcond=None)[0]
     remain = right[: len(u)] - matrix[: len(u)] @ coefficients
-    spread = np.diag(np.linalg.inv(matrix.T @ matrix)) * float(np.mean(remain * remain)) * _together(remain)
+    spread = np.diag(np.linalg.inv(matrix.T @ matrix)) * float(np.mean(remain * remain)) * _correlation(remain)
     begin, end = (float(edge @ (coefficients[:count] + coefficients[count:])) / 2.0 for edge in edges)
     return BranchResidual(coefficients, float(scale) * (1.0 + end - begin), spread)
 
 
-def _together(noise: Floats) -> float:
-    """By how much neighbouring phases, which may come of the same sample, vary together: 1 where they do not."""
+def _correlation(noise: Floats) -> float:
+    """Return the factor on the variance from the correlation of neighbouring phases: 1 where there is none."""
     power = float(noise @ noise)
     if power <= 0.0:
         return 1.0

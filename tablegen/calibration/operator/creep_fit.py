@@ -1,7 +1,7 @@
-"""How much an axis creeps whose hysteresis is no sum of plays: by the fields of its settled lines.
+"""Fit the creep of an axis whose hysteresis is no sum of plays, by the fields of its settled lines.
 
-Sizes tell, which lose the same share with every decade of rate; at one rate shapes do, since creep gives width to a
-line of no size, and hysteresis does not.
+Sizes determine it, which lose the same share with every decade of rate; at one rate shapes do, since creep gives width
+to a line of no size, and hysteresis does not.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,8 +17,8 @@ from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.numerics.arrays import Floats
 
 _LOSSES = tuple(0.004 * i for i in range(13))  # of creep, per decade
-_SEVERAL_RATES = 2.0  # of the highest over the lowest, from which sizes tell creep
-_SAME_TURN = 0.1  # in periods: by which the turns of lines may differ whose shapes tell creep
+_SEVERAL_RATES = 2.0  # ratio of the highest rate to the lowest, from which sizes determine creep
+_SAME_TURN = 0.1  # in periods: largest difference of turns of lines whose shapes determine creep
 _STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 _CENTRE_LENGTH = 1.0
 _NOISE = 1e-4  # variance of the noise, of the field's
@@ -54,7 +54,7 @@ def creep_of_fields(
 
 
 def _unlikelihood(lines: Sequence[PeriodicLine], rows: Floats, still: bool) -> float:
-    """-2 log of the likelihood of a field through rows of one variance, of the best length; up to a constant.
+    """Return -2 log of the likelihood of a field through rows of one variance, of the best length; up to a constant.
 
     With ``still`` the field is 0 at a stroke of 0.
     """

@@ -1,7 +1,7 @@
-"""A hysteresis family for settled lines: its shape, its weights, the gains of offsets and creep, fitted together.
+"""Fit a hysteresis family to settled lines: its shape, its weights, the gains of offsets and creep together.
 
 The weights follow from the rest by non-negative least squares; the rest, some ten numbers, by steps of Levenberg and
-Marquardt on what the weights leave.
+Marquardt on the residual of the weights.
 """
 
 from abc import ABC, abstractmethod
@@ -20,12 +20,12 @@ from tablegen.compensation.operator.field import SAME_CENTRE, distinct
 from tablegen.numerics.arrays import Floats
 
 DEGREE = 4  # of the reversible polynomial
-STRIDE = 8  # every so many phases are fitted
-_MOST_GAIN = 0.5  # by which the gain at another centre may differ from 1
+STRIDE = 8  # of the phases that are fitted
+_MOST_GAIN = 0.5  # largest difference from 1 of the gain at another centre
 _MOST_LOSS = 0.06  # of creep, per decade
 _LOSS_STEP = 0.002  # for derivatives
 _GAIN_STEP = 1e-3
-_TRIALS = 4  # of a step, each shorter
+_TRIALS = 4  # of a step, each with more damping
 _CONVERGED = 1e-3  # of the cost
 _FIRST_ROUNDS = 4
 
@@ -34,7 +34,7 @@ CreepOf = Callable[[float], LogarithmicCreep]
 
 @dataclass(frozen=True, eq=False)
 class FamilyFit:
-    """The family, and what it rests on: its own numbers, creep's loss per decade, the gain of every other centre."""
+    """The family, and its basis: its own numbers, creep's loss per decade, the gain of every other centre."""
 
     family: Family
     loss_per_decade: float
@@ -42,9 +42,9 @@ class FamilyFit:
 
 
 def groups_of(centres: Sequence[float]) -> list[int]:
-    """Which lines share their centre: a number each, from 0 in the order of their first."""
-    known = distinct(centres)
-    return [next(i for i, one in enumerate(known) if abs(one - centre) < SAME_CENTRE) for centre in centres]
+    """Return a number for each line: equal for lines of one centre, from 0 in the order of their first."""
+    unique = distinct(centres)
+    return [next(i for i, one in enumerate(unique) if abs(one - centre) < SAME_CENTRE) for centre in centres]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,9 @@ class _WeightsFit:
 
 
 class FamilyProblem(ABC):
-    """The lines, prepared once. ``shape_limits`` and ``shape_steps`` are those of the family's own numbers.
+    """The lines of a fit. ``shape_limits`` and ``shape_steps`` are those of the family's own numbers.
 
-    ``starts`` are shapes and creep to begin from; ``penalty`` are rows that a quadratic penalty on the weights has.
+    ``starts`` are shapes and creep to begin from; ``penalty`` are the rows of a quadratic penalty on the weights.
     """
 
     shape_limits: ClassVar[tuple[tuple[float, float], ...]]
@@ -81,24 +81,53 @@ class FamilyProblem(ABC):
         self._share = [1.0 / (line.stroke * np.sqrt(len(u))) for line, u in zip(lines, self.drives, strict=True)]
         powers = [np.stack([u**n for n in range(1, DEGREE + 1)]) for u in self.drives]
         self._powers = [(part - part.mean(axis=1, keepdims=True)).T for part in powers]
-        self._moved = lru_cache(maxsize=4)(self._columns)
+        self._displacements = lru_cache(maxsize=4)(self._columns)
         self._measured = lru_cache(maxsize=4)(lambda loss: self._values(creep(loss)))
 
     @abstractmethod
-    def moved(self, shape: Floats) -> list[Floats]:
-        """Return what weights of 1 move each line by, in shares of v_max: shape (phases, weights) each."""
+    def unit_displacements(self, shape: Floats) -> list[Floats]:
+        """Return the displacement of each line for weights of 1.
+
+        Parameters
+        ----------
+        shape
+            The family's own numbers, shape (numbers,).
+
+        Returns
+        -------
+        list of Floats
+            For each line, shape (phases, weights).
+        """
 
     @abstractmethod
     def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
-        """With weights of what ``moved``, and coefficients of u, u^2, ..., in nm."""
+        """Return the family of these weights.
+
+        Parameters
+        ----------
+        shape
+            The family's own numbers, shape (numbers,).
+        weights
+            Weights of the columns of ``unit_displacements``, in nm, shape (weights,).
+        reversible
+            Coefficients of u, u^2, ... in nm, shape (DEGREE,).
+        """
 
     def fit(self, near: Floats | None, rounds: int) -> FamilyFit:
-        """From the best of the starts, or from numbers that are near; at most so many rounds."""
+        """Fit from the best of the starts, or from numbers that are near.
+
+        Parameters
+        ----------
+        near
+            Own numbers, creep's loss per decade and gains, shape (numbers,); the starts by default.
+        rounds
+            Largest number of steps.
+        """
         if near is None:
-            solutions = [self.settled(self.best_weights(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
-            best = self.settled(min(solutions, key=lambda one: one.cost), rounds)
+            solutions = [self.improve(self.best_weights(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
+            best = self.improve(min(solutions, key=lambda one: one.cost), rounds)
         else:
-            best = self.settled(self.best_weights(self._whole(near)), rounds)
+            best = self.improve(self.best_weights(self._whole(near)), rounds)
         weights, shape = best.weights * self.scale, best.numbers[: self._shapes]
         count = len(weights) - 2 * DEGREE
         reversible = weights[count : count + DEGREE] - weights[count + DEGREE :]
@@ -107,9 +136,15 @@ class FamilyProblem(ABC):
         )
 
     def best_weights(self, numbers: Floats) -> _WeightsFit:
-        """Return what the best weights leave of measured numbers."""
+        """Fit the weights for these numbers.
+
+        Parameters
+        ----------
+        numbers
+            Own numbers, creep's loss per decade and gains, shape (numbers,).
+        """
         parts, measured = (
-            self._moved(tuple(numbers[: self._shapes].tolist())),
+            self._displacements(tuple(numbers[: self._shapes].tolist())),
             self._measured(float(numbers[self._shapes])),
         )
         gains = [1.0 if at is None else float(numbers[at]) for at in self._gain_of]
@@ -119,8 +154,8 @@ class FamilyProblem(ABC):
         residual = np.concatenate([matrix @ weights - measured, self.penalty @ weights])
         return _WeightsFit(numbers, weights, residual, float(residual @ residual))
 
-    def settled(self, best: _WeightsFit, rounds: int) -> _WeightsFit:
-        """So many steps on, or fewer where they no longer help."""
+    def improve(self, best: _WeightsFit, rounds: int) -> _WeightsFit:
+        """Improve the fit by steps of Levenberg and Marquardt; stop early where they no longer help."""
         damping = 1e-3
         for _ in range(rounds):
             jacobian, before = self.jacobian(best), best.cost
@@ -137,35 +172,41 @@ class FamilyProblem(ABC):
         return best
 
     def jacobian(self, at: _WeightsFit) -> Floats:
-        """Of the residual by the numbers, with the weights that move along."""
+        """Return the derivatives of the residual by the numbers, with the weights that follow them.
+
+        Returns
+        -------
+        Floats
+            Shape (residuals, numbers).
+        """
         rows = []
         for i, step in enumerate([*self.shape_steps, _LOSS_STEP, *[_GAIN_STEP] * self._gains]):
-            moved = at.numbers.copy()
-            moved[i] += step
-            rows.append((self.best_weights(moved).residual - at.residual) / step)
+            numbers = at.numbers.copy()
+            numbers[i] += step
+            rows.append((self.best_weights(numbers).residual - at.residual) / step)
         return np.stack(rows, axis=1)
 
     def _whole(self, numbers: Floats) -> Floats:
-        """With gains of 1 where there are none."""
+        """Append gains of 1 where there are none."""
         count = self._shapes + 1 + self._gains
         return np.append(numbers, np.ones(count))[:count] if len(numbers) < count else numbers
 
     def _limited(self, numbers: Floats) -> Floats:
-        """Inside what the numbers may be."""
+        """Clip the numbers to their limits."""
         gain = (1.0 - _MOST_GAIN, 1.0 + _MOST_GAIN)
         low, high = zip(*self.shape_limits, (0.0, _MOST_LOSS), *[gain] * self._gains, strict=True)
         return np.clip(numbers, low, high)
 
     def _columns(self, shape: tuple[float, ...]) -> list[Floats]:
-        """All weights' columns of each line: the family's, and those of the polynomial, up and down."""
-        moved = self.moved(np.array(shape))
+        """Return the columns of all weights for each line: the family's, and those of the polynomial, up and down."""
+        displacements = self.unit_displacements(np.array(shape))
         return [
             share * np.hstack([part - part.mean(axis=0), powers, -powers])
-            for share, part, powers in zip(self._share, moved, self._powers, strict=True)
+            for share, part, powers in zip(self._share, displacements, self._powers, strict=True)
         ]
 
     def _values(self, creep: LogarithmicCreep) -> Floats:
-        """Return the measured values before their creep."""
+        """Return the measured values without their creep."""
         parts = [line.without(None, creep).displacement_nm[::STRIDE] for line in self.lines]
         return np.concatenate(
             [share / self.scale * (y - y.mean()) for share, y in zip(self._share, parts, strict=True)]

@@ -1,4 +1,4 @@
-"""An operator fit as the file that the scanner file names."""
+"""Format an operator fit as the file that the scanner file names."""
 
 from collections.abc import Sequence
 

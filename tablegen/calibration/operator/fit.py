@@ -1,4 +1,4 @@
-"""Settled lines -> the operator: family, creep, residual and size, by what each predicts of a line left out."""
+"""Fit the operator to settled lines: family, creep, residual and size, chosen by leave-one-out prediction."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_
 from tablegen.calibration.operator.loop_errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.plays_fit import PlaysProblem
-from tablegen.calibration.operator.shrinkage import shrunk
+from tablegen.calibration.operator.shrinkage import shrink
 from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
@@ -27,30 +27,30 @@ from tablegen.numerics.arrays import Floats
 
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)
-_NOISE = 1e-9  # variance of what passes for noise in the fields, whose rows have none
-_NOISE_OF_TWINS = 1e-4  # where two lines are as good as one point, whose rates or turns differ: they contradict a bit
-_TWINS = 0.03  # of v_max: how near strokes and centres of such lines are
-_ROUNDS = 8  # steps of the family's numbers at most, and where a line is left out
+_NOISE = 1e-9  # variance of the noise in the fields, whose rows have none
+_NOISE_OF_TWINS = 1e-4  # where two lines of one point differ slightly by their rates or turns
+_TWINS = 0.03  # of v_max: largest difference of strokes and centres of such lines
+_ROUNDS = 8  # most steps of the family's numbers; the second where a line is left out
 _ROUNDS_WITHOUT = 2
 _MIN_LINES = 3
 _MIN_SPREAD = 2.0  # of the largest stroke over the smallest
 _MAX_NOISE_PERCENT = 1.0
 _SHARES = (0.25, 0.5, 0.75)  # of the first family, where two are mixed
-_WORTH_MIXING = 3.0  # ratio of what two families miss lines by, up to which a mixture may be better than both
-_CLEARLY = 1.25  # by how much a mixture has to be better than each family alone, which has its own creep
+_WORTH_MIXING = 3.0  # ratio of the scores of two families, up to which a mixture may be better than both
+_CLEARLY = 1.25  # ratio by which a mixture has to be better than each family alone, which has its own creep
 NONE = "none"
 FAMILIES: dict[str, type[FamilyProblem]] = {"plays": PlaysProblem, "Bouc-Wen": BoucWenProblem}
-_DECADES = 1.0  # by which creep is taken to go on beyond the frequencies that were measured
+_DECADES = 1.0  # range of creep beyond the measured frequencies
 
 Factor = Callable[[float], float]
 
 
 @dataclass(frozen=True, eq=False)
 class OperatorFit:
-    """The operator, and what it leaves of each line: in the fit, and when the line is left out; in percent.
+    """The operator, and its errors of each line: in the fit, and when the line is left out; in percent.
 
-    ``rows`` and ``sizes`` are what its fields go through, a row a line; ``candidates`` has the families that were
-    tried, and the geometric mean of the rms of the lines left out, in percent.
+    Its fields go through ``rows`` and ``sizes``, a row a line; ``candidates`` has the families and their score, the
+    geometric mean of the rms of the lines left out, in percent.
     """
 
     operator: Operator
@@ -68,17 +68,17 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     Raises
     ------
     Unphysical
-        If the lines are too few, too much alike, or too noisy.
+        If the lines are too few, too similar, or too noisy.
     """
     _check(lines)
     still = [line.without(response, None) for line in lines]
     main = _main_centre(still)
     names = (*FAMILIES, NONE)
     alone = [_candidate(name, still, main, factor) for name in names]
-    fits = [_judged(one, still, factor) for one in alone]
+    fits = [_with_best_lengths(one, still, factor) for one in alone]
     scores = [one.candidates[one.family] for one in fits[: len(FAMILIES)]]
     if max(scores) < _WORTH_MIXING * min(scores):
-        fits += [_judged(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
+        fits += [_with_best_lengths(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
     best = min(fits, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
     candidates = {name: value for one in fits for name, value in one.candidates.items()}
     return replace(best, candidates=candidates)
@@ -92,7 +92,7 @@ def _check(lines: Sequence[PeriodicLine]) -> None:
     if max(strokes) < _MIN_SPREAD * min(strokes):
         low, high = (100.0 * share for share in (min(strokes), max(strokes)))
         raise Unphysical(
-            f"strokes of {low:.3g} to {high:.3g} % of v_max are too much alike; the largest has to be at least "
+            f"strokes of {low:.3g} to {high:.3g} % of v_max are too similar; the largest has to be at least "
             f"{_MIN_SPREAD:g} times the smallest"
         )
     for line in lines:
@@ -112,7 +112,7 @@ def _main_centre(lines: Sequence[PeriodicLine]) -> float:
 
 
 def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
-    """Creep over the decades that the lines show, for its loss per decade."""
+    """Return a function from a loss per decade to creep over the decades of the lines."""
     low = min(line.rate_hz for line in lines)
     high = max(line.rate_hz for line in lines)
     reference = float(np.exp(np.mean([np.log(line.rate_hz) for line in lines])))
@@ -127,7 +127,7 @@ def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
 
 
 def _any_twins(lines: Sequence[PeriodicLine]) -> bool:
-    """Whether two lines have the same stroke and centre, or nearly."""
+    """Return True if two lines have the same stroke and centre, or nearly."""
     return any(
         abs(one.stroke - other.stroke) < _TWINS and abs(one.centre - other.centre) < _TWINS
         for one, other in combinations(lines, 2)
@@ -135,7 +135,7 @@ def _any_twins(lines: Sequence[PeriodicLine]) -> bool:
 
 
 class _Fitted:
-    """A family and its creep; the lines before that creep, and what the family leaves of them."""
+    """A family and its creep; the lines before that creep, and their residuals beside the family."""
 
     def __init__(
         self,
@@ -152,9 +152,15 @@ class _Fitted:
         self.residuals = [branch_residual(line, family) for line in self.settled]
 
     def operator(self, lengths: Lengths, factor: Factor) -> tuple[Operator, Floats, Floats]:
-        """Both fields through what is left, and the rows and sizes that they go through."""
+        """Fit both fields to the residuals.
+
+        Returns
+        -------
+        tuple
+            The operator; the rows of its residual field, shape (lines, 2 DEGREE + 2); its relative sizes, (lines,).
+        """
         points = np.array([(line.stroke, line.centre) for line in self.settled])
-        rows = shrunk(points, self.residuals, lengths)
+        rows = shrink(points, self.residuals, lengths)
         residual = through(points, rows, lengths, straight=True)
         sizes = _sizes(self.family, residual, self.settled, self.residuals, self.main, factor)
         size = through(points, sizes[:, None], lengths)
@@ -169,7 +175,7 @@ class _Fitted:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A family of all lines, and of all but one; whatever is made of it, what it predicts of that one decides."""
+    """A family of all lines, and of all but one: its prediction of that one is its score."""
 
     name: str
     whole: _Fitted
@@ -183,7 +189,7 @@ class _Candidate:
 
 
 def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor) -> _Candidate:
-    """One family, with the creep that goes with it."""
+    """Fit one family, with the creep that goes with it."""
     creep_of = _creep_of(lines)
 
     def fitted(some: Sequence[PeriodicLine], near: _Fitted | None) -> _Fitted:
@@ -198,20 +204,20 @@ def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Fa
     return _Candidate(name, whole, [fitted([*lines[:i], *lines[i + 1 :]], whole) for i in range(len(lines))])
 
 
-def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor) -> OperatorFit:
+def _with_best_lengths(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor) -> OperatorFit:
     """Choose the best lengths for a family, and return the operator with them."""
     whole, without = candidate.whole, candidate.without
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
     noise = _NOISE_OF_TWINS if _any_twins(lines) else _NOISE
-    tried = []
+    trials = []
     for stroke, centre in product(STROKE_LENGTHS, CENTRE_LENGTHS if several else CENTRE_LENGTHS[-1:]):
         lengths = Lengths(stroke, centre, noise)
         out = [
             _errors(line, one.operator(lengths, factor)[0], factor) for line, one in zip(alone, without, strict=True)
         ]
-        tried.append((float(np.exp(np.mean([np.log(errors.rms) for errors in out]))), lengths, out))
-    score, lengths, out = min(tried, key=lambda one: one[0])
+        trials.append((float(np.exp(np.mean([np.log(errors.rms) for errors in out]))), lengths, out))
+    score, lengths, out = min(trials, key=lambda one: one[0])
     operator, rows, sizes = whole.operator(lengths, factor)
     inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
@@ -223,7 +229,7 @@ def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor
 
 
 def _straight(lines: Sequence[PeriodicLine]) -> Family:
-    """No family: a straight line with the mean gain."""
+    """Return a family without hysteresis: a straight line with the mean gain."""
     gain = float(np.mean([np.ptp(line.displacement_nm) / line.stroke for line in lines]))
     return Family(NO_PLAYS).over(np.array([gain]))
 
@@ -236,7 +242,7 @@ def _sizes(
     main: float,
     factor: Factor,
 ) -> Floats:
-    """Measured extents over expected ones, less 1."""
+    """Return measured extents over expected ones, less 1."""
     nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
     bare = Operator(family, residual, nothing, NO_CREEP, main, ())
 
@@ -244,7 +250,7 @@ def _sizes(
         here = factor(line.mean) / factor(main)
         try:
             return bare.loop(line.low, line.high, here, line.mean).extent_nm
-        except Unphysical:  # where a line is left out; its errors are the worst then
+        except Unphysical:  # possible where a line is left out; its errors are the worst then
             return bare.expected_extent(line.stroke, line.mean, here)
 
     return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(residuals, lines, strict=True)])

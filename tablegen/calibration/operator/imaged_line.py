@@ -1,4 +1,4 @@
-"""Trace and retrace images of a sample of known constant -> one settled line, as from a sensor."""
+"""Fit one settled line, as from a sensor, to trace and retrace images of a sample of known constant."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from tablegen.images.fast_axis_line import fit_line
 from tablegen.images.line_length import size_of_line
 from tablegen.numerics.driver import Driver
 
-_SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of the line on the plants of the tests
+_SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, with errors up to 0.4 % of the line in the tests
 
 
 def imaged_line(
@@ -18,8 +18,8 @@ def imaged_line(
 ) -> tuple[PeriodicLine, LineSize]:
     """Fit the line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
 
-    ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show both
-    sweeps almost from turn to turn.
+    ``noise_nm`` of the line is the rms standard error of the position without that of the size, which the size has. The
+    columns have to show both sweeps almost from turn to turn.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A predicted loop against a measured line, in the measures of the certificate: percent of the line over the window."""
+"""Compare a predicted loop with a measured line, in the measures of the certificate, percent of the line."""
 
 from dataclasses import dataclass, field
 
@@ -11,14 +11,14 @@ from tablegen.numerics.arrays import Floats
 WINDOW = (0.1, 0.9)
 _CHORD = 0.05  # of the line
 _POINTS = 321  # over the window
-_SMOOTHING = 12  # Chebyshev series over the window, which noise of single samples does not pass
+_SMOOTHING = 12  # degree of the Chebyshev series over the window, which suppresses noise
 
 
 @dataclass(frozen=True, slots=True)
 class LineErrors:
     """Rms and largest scaling error of both directions, largest distance of trace and retrace, error of the size.
 
-    ``sides`` has the residual, rising and falling, in percent at even positions over ``WINDOW``; None of no loop.
+    ``sides`` has the residual, rising and falling, in percent at even positions over ``WINDOW``; None without a loop.
     """
 
     rms: float
@@ -33,11 +33,11 @@ class LineErrors:
         return self.rms, self.scaling, self.mismatch, self.size
 
 
-WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of a loop that cannot be
+WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of an impossible loop
 
 
 def compare(line: PeriodicLine, loop: Loop) -> LineErrors:
-    """Return the errors of a scan linearised by ``loop`` on an axis that does what ``line`` measured."""
+    """Return the errors of a scan linearised by ``loop`` on an axis whose line is the measured one."""
     predicted = np.where(line.rising, loop.position(line.drive, True), loop.position(line.drive, False))
     measured = line.displacement_nm
     inside = (predicted > WINDOW[0]) & (predicted < WINDOW[1])

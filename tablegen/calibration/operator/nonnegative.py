@@ -19,7 +19,8 @@ def nonnegative(normal: Floats, right: Floats) -> Floats:
 
     Returns
     -------
-    x, shape (n,).
+    Floats
+        x, shape (n,).
     """
     n = len(right)
     x = np.zeros(n)

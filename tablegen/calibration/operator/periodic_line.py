@@ -1,4 +1,4 @@
-"""One trace to one settled period: drive and displacement on an even grid of phases, drift taken out."""
+"""Average one trace to one settled period: drive and displacement on an even grid of phases, without drift."""
 
 from dataclasses import dataclass, replace
 
@@ -15,12 +15,12 @@ from tablegen.numerics.driver import Driver
 PHASES = 1024  # of the grid
 _MIN_SAMPLES = 40  # samples a period
 _MAX_DRIFT_ORDER = 3
-# Share of a period that may be missing: a record of whole periods ends a sample before their end. It is no sample of a
-# round number of them, where the last bit of the period would decide.
+# Share of a period that may be missing: a record of whole periods ends a sample before their end. It is not a sample
+# of a round number of samples, where the last bit of the period would decide.
 _MISSING = 1.5e-3
-_LEVEL = 0.25  # of the drive's span: how far about the middle a crossing has to go to count
-_RESONANCE_SHARE = 0.3  # dynamics are taken out up to this share of the resonance; what lies above is noise
-_BACKWARDS = 0.02  # of the span: how far a sweep may go back, as noise of the record does
+_LEVEL = 0.25  # of the drive's span: distance from the middle that a crossing has to reach
+_RESONANCE_SHARE = 0.3  # dynamics are removed up to this share of the resonance; above it is noise
+_BACKWARDS = 0.02  # of the span: how far a sweep may go back by noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class PeriodicLine:
     """One period of a settled line, from the minimum of the drive on; arrays have ``PHASES`` values.
 
     ``drive`` is normalised to v_max, ``displacement_nm`` a mean over ``periods``; ``noise_nm`` is the standard
-    deviation of that mean, and ``drift_nm`` what was taken out over the record.
+    deviation of that mean, and ``drift_nm`` the drift over the record, which is removed.
     """
 
     name: str
@@ -61,16 +61,22 @@ class PeriodicLine:
 
     @property
     def mean(self) -> float:
-        """The mean of the drive over the period, of v_max, with which the sensitivity goes."""
+        """The mean of the drive over the period, of v_max, on which the sensitivity depends."""
         return float(np.mean(self.drive))
 
     @property
     def rising(self) -> Bools:
-        """Where the drive is on its way from its minimum to its maximum."""
+        """Phases at which the drive is on its way from its minimum to its maximum.
+
+        Returns
+        -------
+        Bools
+            Shape (PHASES,).
+        """
         return np.arange(PHASES) < int(np.argmax(self.drive))
 
     def highest_corrected_hz(self, response: Response) -> float:
-        """Up to which frequency dynamics are taken out."""
+        """Return the frequency up to which dynamics are removed."""
         return _RESONANCE_SHARE * response.resonance_hz
 
     def earlier(self, delay_s: float) -> "PeriodicLine":
@@ -80,7 +86,7 @@ class PeriodicLine:
         return replace(self, displacement_nm=np.fft.irfft(np.fft.rfft(self.displacement_nm) * ahead, PHASES))
 
     def without(self, response: Response | None, creep: LogarithmicCreep | None) -> "PeriodicLine":
-        """Return the line with the displacement before the dynamics, which come behind the hysteresis."""
+        """Return the line without the dynamics and the creep, which act on the displacement after the hysteresis."""
         n = np.arange(PHASES // 2 + 1, dtype=np.float64)
         spectrum = np.fft.rfft(self.displacement_nm)
         f_hz: Floats = n * self.rate_hz
@@ -98,7 +104,12 @@ class PeriodicLine:
 def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
     """Average the periods of a trace: times ascending in s, drive at the piezo in V, displacement in nm.
 
-    The first of three periods or more is left out. Raises ``Unphysical``, without the trace's name.
+    The first of three periods or more is not used.
+
+    Raises
+    ------
+    Unphysical
+        If the record is no settled line; the message leaves the trace's name to the caller.
     """
     check_record(trace)
     driver = Driver.of(driver)
@@ -144,14 +155,14 @@ def _period(time: Floats, drive: Floats) -> float:
     middle = 0.5 * (float(np.max(drive)) + float(np.min(drive)))
     level = (drive - middle) / float(np.ptp(drive))
     side = np.where(level > _LEVEL, 1, np.where(level < -_LEVEL, -1, 0))
-    known = np.flatnonzero(side)
-    rises = known[1:][(side[known[1:]] > 0) & (side[known[:-1]] < 0)]
-    falls = known[1:][(side[known[1:]] < 0) & (side[known[:-1]] > 0)]
+    outside = np.flatnonzero(side)
+    rises = outside[1:][(side[outside[1:]] > 0) & (side[outside[:-1]] < 0)]
+    falls = outside[1:][(side[outside[1:]] < 0) & (side[outside[:-1]] > 0)]
     crossings = []
     for edges, sign in ((rises, 1.0), (falls, -1.0)):
         at = []
         for edge in edges.tolist():
-            before = known[np.searchsorted(known, edge) - 1]
+            before = outside[np.searchsorted(outside, edge) - 1]
             part = slice(int(before), edge + 1)
             slope, offset = np.polyfit(time[part] - time[before], level[part] * sign, 1)
             at.append(float(time[before]) - offset / slope)
@@ -164,13 +175,13 @@ def _period(time: Floats, drive: Floats) -> float:
 
 
 def _check_sweeps(drive: Floats) -> None:
-    """One rise and one fall: other waveforms have inner loops, which the closed form of a line does not know."""
+    """Raise ``Unphysical`` unless the drive rises and falls once: other waveforms have inner loops."""
     top = int(np.argmax(drive))
     span = float(np.ptp(drive))
     for sweep in (drive[: top + 1], -drive[top:]):
         back = float(np.max(np.maximum.accumulate(sweep) - sweep)) if len(sweep) else 0.0
         if back > _BACKWARDS * span:
             raise Unphysical(
-                f"the drive goes back by {100.0 * back / span:.2g} % in the middle of a sweep; one rise and "
-                "one fall a period are understood"
+                f"the drive goes back by {100.0 * back / span:.2g} % in the middle of a sweep; only one rise and "
+                "one fall a period are supported"
             )

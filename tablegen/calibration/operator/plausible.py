@@ -1,4 +1,4 @@
-"""Records that say nothing of a settled line, refused with the reason: gaps, clipping, a drive that does not repeat."""
+"""Refuse records without a settled line, with the reason: gaps, clipping, a drive that does not repeat."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.spans import check_spans
 from tablegen.numerics.arrays import Floats
 
-_MOST_AT_REST = 0.04  # of a record at its largest or least value: coarse steps of a sine's turn are 0.03
-_FEW = 4  # samples at a turn that may be the same, where there are few of a period
+_MOST_AT_REST = 0.04  # share of a record at its largest or least value: a coarsely sampled sine has 0.03
+_FEW = 4  # samples at one turn that may be equal, in a period of few samples
 _SAME = 1e-9  # of the span
 _MOST_DIFFERENCE = 0.02  # of the drive's span, rms, from period to period
 
@@ -42,7 +42,12 @@ def check_record(trace: Trace) -> None:
 
 
 def check_repeats(drives: Floats) -> None:
-    """Refuse a drive, (periods, phases), that is not the same in every period.
+    """Refuse a drive that is not the same in every period.
+
+    Parameters
+    ----------
+    drives
+        Drive in any unit, shape (periods, phases).
 
     Raises
     ------

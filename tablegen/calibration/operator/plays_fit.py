@@ -1,4 +1,4 @@
-"""Plays whose envelopes and weights describe settled lines; the weights are smooth in the threshold."""
+"""Fit plays to settled lines: their envelopes and weights, which are smooth in the threshold."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -16,8 +16,8 @@ THRESHOLDS = 160
 _HIGHEST = 0.495  # of v_max; above it no play moves
 _SPACING = 1.5  # thresholds grow with this power of their number
 # The density is a trend and scatter about it. Weights of the differences of the trend and of the scatter, against
-# residuals that are shares of the stroke, are in proportion to the noise of a line, as a share of it: as those of a
-# prior. Their floor is what the plays themselves miss.
+# residuals that are shares of the stroke, are in proportion to the relative noise of a line, as in a Bayesian
+# prior. Their floor is the model error of the plays.
 _TREND, _SCATTER = 1.25, 0.35
 _LEAST_NOISE, _MOST_NOISE, _UNKNOWN_NOISE = 8e-5, 1.2e-2, 4e-4  # unknown where no line has two periods
 _RIDGE = 1e-5
@@ -25,11 +25,11 @@ _MOST_BEND = 0.6  # an envelope still rises everywhere
 
 
 class PlaysProblem(FamilyProblem):
-    """Its own numbers are the four bends."""
+    """Fit of the four bends of the envelopes, and of the density of plays."""
 
     shape_limits = ((-_MOST_BEND, _MOST_BEND),) * 4
     shape_steps = (0.02,) * 4
-    # Where both envelopes are the same, none of them can tell which way to part.
+    # No start has two equal envelopes: its derivatives could not separate them.
     starts: ClassVar[tuple[Floats, ...]] = tuple(
         np.array([*bends, 0.02])
         for bends in ((-0.1, 0.0, 0.1, 0.0), (-0.3, 0.0, -0.1, 0.0), (0.1, 0.0, 0.3, 0.0), (0.0, -0.2, 0.0, 0.2))
@@ -41,8 +41,19 @@ class PlaysProblem(FamilyProblem):
         self._spread = _spread(self._thresholds)
         self.penalty = _penalty(_noise(lines))
 
-    def moved(self, shape: Floats) -> list[Floats]:
-        """By plays of a density of 1 at a node."""
+    def unit_displacements(self, shape: Floats) -> list[Floats]:
+        """Return the displacement for plays of a density of 1 at one node.
+
+        Parameters
+        ----------
+        shape
+            The four bends, shape (4,).
+
+        Returns
+        -------
+        list of Floats
+            For each line, shape (phases, NODES).
+        """
         out = []
         for line, u in zip(self.lines, self.drives, strict=True):
             rising, falling = (
@@ -52,7 +63,17 @@ class PlaysProblem(FamilyProblem):
         return out
 
     def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
-        """Of plays alone."""
+        """Return the family, of plays alone.
+
+        Parameters
+        ----------
+        shape
+            The four bends, shape (4,).
+        weights
+            Density at the nodes, in nm, shape (NODES,).
+        reversible
+            Coefficients of u, u^2, ... in nm, shape (DEGREE,).
+        """
         return Family(Plays(self._thresholds, (weights @ self._spread)[None, :], reversible, shape[None, :].copy()))
 
 
@@ -65,13 +86,13 @@ def _spread(thresholds: Floats) -> Floats:
 
 
 def _noise(lines: Sequence[PeriodicLine]) -> float:
-    """Of a line, as a share of it."""
+    """Return the noise of a line, as a share of it."""
     noise = [line.noise_nm / float(np.ptp(line.displacement_nm)) for line in lines if line.periods > 1]
     return float(np.clip(np.median(noise), _LEAST_NOISE, _MOST_NOISE)) if noise else _UNKNOWN_NOISE
 
 
 def _penalty(noise: float) -> Floats:
-    """Rows for the density: of what covariance the prior has; and a ridge."""
+    """Return the rows of the penalty on the density: those of the prior's covariance, and a ridge."""
     step = _TREND * noise * np.diff(np.eye(NODES), axis=0)
     trend = np.linalg.inv(step.T @ step + _RIDGE * _RIDGE * np.eye(NODES))
     prior = trend + np.eye(NODES) / (_SCATTER * noise) ** 2

@@ -1,7 +1,7 @@
-"""What lines leave of a family, freed of noise: each Chebyshev order is as strong as the lines together show it to be.
+"""Reduce the noise of the lines' residuals: each Chebyshev order is as strong as the lines together show it to be.
 
-Of a Gaussian process with a variance for each order, and the noise that each coefficient is known to have, the mean at
-the measured points. The variances are those of the largest likelihood.
+The result is the mean of a Gaussian process at the measured points, with a variance for each order, and the noise of
+each coefficient. The variances are those of the largest likelihood.
 """
 
 from collections.abc import Sequence
@@ -13,18 +13,29 @@ from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.numerics.arrays import Floats
 
 _POWERS = np.geomspace(1e-4, 1e12, 65)  # variance of an order over that of its noise
-_FLOOR = 1e-14  # variance below which no coefficient is known
+_FLOOR = 1e-14  # least variance of a coefficient
 
 
-def shrunk(points: Floats, residuals: Sequence[BranchResidual], lengths: Lengths) -> Floats:
-    """Rows without noise, shape (lines, 2 ``DEGREE`` + 2), for lines at points (stroke, centre)."""
-    known = covariance(points, points, lengths, straight=True)
+def shrink(points: Floats, residuals: Sequence[BranchResidual], lengths: Lengths) -> Floats:
+    """Return the coefficients of the lines with less noise.
+
+    Parameters
+    ----------
+    points
+        Strokes and centres, shares of v_max, shape (lines, 2).
+
+    Returns
+    -------
+    Floats
+        Dimensionless, shape (lines, 2 DEGREE + 2).
+    """
+    prior = covariance(points, points, lengths, straight=True)
     rows = np.stack([one.coefficients for one in residuals])
     noise = np.maximum(np.stack([one.variance for one in residuals]), _FLOOR)
-    # The noise of a line times that of an order: nearly all lines have their samples at the same places.
+    # The noise is that of a line times that of an order, since nearly all lines have their samples at the same phases.
     of_line = np.sqrt(np.mean(noise, axis=1) / np.mean(noise))
     of_order = np.sqrt(np.mean(noise, axis=0))
-    values, vectors = np.linalg.eigh(known / of_line[:, None] / of_line)
+    values, vectors = np.linalg.eigh(prior / of_line[:, None] / of_line)
     values = np.maximum(values, 0.0)
     along = vectors.T @ (rows / of_line[:, None] / of_order)
     # The likelihood of every order, of both branches together, at every power.

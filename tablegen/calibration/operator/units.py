@@ -1,4 +1,4 @@
-"""Lines that cannot all be in V at the piezo and nm, refused before an operator is made of them."""
+"""Refuse lines that cannot all be in V at the piezo and nm, before an operator is fitted to them."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 
-_LEAST_STROKE = 0.05  # of v_max: that of the largest trace
+_LEAST_STROKE = 0.05  # of v_max: least stroke of the largest trace
 _MOST_RATIO = 3.0  # of the sensitivities of two traces, or of a trace and the scanner file
 
 
@@ -36,7 +36,7 @@ def check_units(lines: Sequence[PeriodicLine]) -> None:
 
 
 def check_size(lines: Sequence[PeriodicLine], nm_per_full_scale: float, where: str) -> None:
-    """Refuse lines that are far from the sensitivity that is known otherwise, by ``where``.
+    """Refuse lines that are far from another calibration of the sensitivity, whose origin is ``where``.
 
     Raises
     ------
@@ -52,5 +52,5 @@ def check_size(lines: Sequence[PeriodicLine], nm_per_full_scale: float, where: s
 
 
 def sensitivity(line: PeriodicLine) -> float:
-    """In nm for the whole of v_max."""
+    """Return the sensitivity in nm for the whole of v_max."""
     return float(np.ptp(line.displacement_nm)) / line.stroke

@@ -22,7 +22,7 @@ _HOW = "np.savez(FILE, time_s=..., displacement_nm=...)"
 
 
 def is_array_file(path: Path) -> bool:
-    """Whether a name says that numpy wrote it."""
+    """Return True if the ending of a name is one of numpy's."""
     return path.suffix.lower() in _SUFFIXES
 
 
@@ -41,7 +41,21 @@ def columns_of(content: bytes, name: str) -> dict[str, AnyArray]:
 
 
 def numbers_of(column: AnyArray, name: str, spelt: str) -> Floats:
-    """Convert a column of real numbers to floats, shape (rows,).
+    """Convert a column of real numbers to floats.
+
+    Parameters
+    ----------
+    column
+        Values of any type of element, shape (rows,).
+    name
+        Name of the file in a message.
+    spelt
+        Name of the column in the file.
+
+    Returns
+    -------
+    Floats
+        In the unit of the file, shape (rows,).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The columns that measurements have: a quantity, its unit in the name, and the range that it can have."""
+"""Columns of measurements: a quantity, its unit in the name, and the range that it can have."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ class Times:
     factor: float
 
     def __call__(self, value: float) -> float:
-        """In the unit of the fits."""
+        """Return the value in the unit of the fits."""
         return value * self.factor
 
 
@@ -42,7 +42,7 @@ class Column:
 
     @property
     def name(self) -> str:
-        """The column as the fits take it, such as ``offset_v``."""
+        """The name of the column in the unit of the fits, such as ``offset_v``."""
         return self.spelt(next(iter(self.units)))
 
     def spelt(self, unit: str) -> str:

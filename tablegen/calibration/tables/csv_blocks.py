@@ -1,4 +1,4 @@
-"""Long CSV files a block at a time: plain numbers by numpy's parser, and nothing else, so that lines keep numbers."""
+"""Read long CSV files a block at a time: plain numbers by numpy's parser, anything else by line, with its number."""
 
 import io
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tablegen.base.reading import Kind, chunks_of
 from tablegen.numerics.arrays import Floats
 
 _NUMBERS = b"0123456789+-.eE \n"
-_MAX_LINE = 1 << 20  # characters; a longer line is left to whoever says so
+_MAX_LINE = 1 << 20  # characters; longer lines are refused by the reader of single lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +46,14 @@ def blocks_of(path: Path, kind: Kind) -> Iterator[Block]:
 
 
 def plain_rows(content: bytes, separator: str, width: int) -> Floats | None:
-    """Numbers of shape (lines, width), where every line is a row of plain numbers; None where any is something else.
+    """Parse lines that are all rows of plain numbers.
 
     Between other separators than commas a comma is a decimal one, if all are.
+
+    Returns
+    -------
+    Floats or None
+        Shape (lines, width); None where a line is something else.
     """
     mark = separator.encode("ascii")
     content = content.replace(b"\r\n", b"\n")
@@ -72,5 +77,5 @@ def plain_rows(content: bytes, separator: str, width: int) -> Floats | None:
 
 
 def _count(content: bytes) -> int:
-    """Lines, as Unix, Windows and old Macintosh end them."""
+    """Count lines, as Unix, Windows and old Macintosh end them."""
     return content.count(b"\n") + content.count(b"\r") - content.count(b"\r\n")

@@ -1,4 +1,4 @@
-"""A measured response as the CSV file that ``resonance.response`` of the scanner file names."""
+"""Write a measured response as the CSV file that ``resonance.response`` of the scanner file names."""
 
 from collections.abc import Sequence
 from itertools import pairwise

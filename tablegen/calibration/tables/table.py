@@ -1,4 +1,4 @@
-"""Files of measurements: columns with units in their names; every fault at its line and column."""
+"""Read files of measurements: columns with units in their names; every fault at its line and column."""
 
 import hashlib
 from array import array
@@ -45,12 +45,12 @@ class MeasuredTable:
 
 
 def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
-    """Read the columns that are needed, and the optional ones that are there; others are passed over.
+    """Read the columns that are needed, and the optional ones that are there; others are skipped.
 
     ``.npz`` and ``.npy`` are numpy's, with an array or a field a column; everything else is CSV with a header.
 
     Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
-    Lines that are blank or begin with # count for nothing.
+    Lines that are blank or begin with # are skipped.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def _array_table(path: Path, name: str, expected: Sequence[Column], needed: Sequ
     content = file_content(path, name)
     source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
     arrays = columns_of(content, name)
-    del content  # an archive has it a second time
+    del content  # an archive is in memory a second time
     places = _places(name, 0, list(arrays), expected, needed)
     written = [numbers_of(list(arrays.values())[place[0]], name, place[3]) for place in places]
     if len({len(column) for column in written}) > 1:
@@ -103,11 +103,11 @@ def _array_table(path: Path, name: str, expected: Sequence[Column], needed: Sequ
     return MeasuredTable(name, source, columns, lines)
 
 
-_Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt
+_Place = tuple[int, Column, Conversion, str]  # index in the header, column, conversion, name in the file
 
 
 class _Reader:
-    """Rows of text to columns of numbers; notes what is wrong and goes on."""
+    """Parser of rows of text to columns of numbers; notes faults and goes on."""
 
     def __init__(self, name: str, separator: str, width: int, places: list[_Place]) -> None:
         self.problems: list[Problem] = []
@@ -117,32 +117,43 @@ class _Reader:
 
     @property
     def full(self) -> bool:
-        """Whether there are more faults than are told."""
+        """True if there are more faults than one message lists."""
         return len(self.problems) > _MAX_PROBLEMS
 
     def add(self, block: Block) -> None:
-        """All lines of a block: at once where they are plain numbers in their ranges, otherwise one by one."""
+        """Add all lines of a block: at once where they are plain numbers in their ranges, otherwise one by one."""
         rows = plain_rows(block.content, self._separator, self._width)
         converted = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
         values = [each for each in converted if each is not None]
         if rows is None or len(values) < len(self._places):
             self.add_rows(_rows(file_text(block.content, self._name, block.line), self._name, block.line))
             return
-        for known, each in zip(self._values, values, strict=True):
-            known.frombytes(each.tobytes())
+        for buffer, each in zip(self._values, values, strict=True):
+            buffer.frombytes(each.tobytes())
         self._lines.frombytes(np.arange(block.line, block.line + len(rows), dtype=np.int64).tobytes())
 
     def add_rows(self, rows: Iterator[tuple[int, str]]) -> None:
-        """Lines one by one, until there are too many faults."""
+        """Add lines one by one, until there are too many faults."""
         for line, text in rows:
-            for known, value in zip(self._values, self.row(line, text), strict=False):
-                known.append(value)
+            for buffer, value in zip(self._values, self.row(line, text), strict=False):
+                buffer.append(value)
             self._lines.append(line)
             if self.full:
                 return
 
     def values(self, written: Floats, place: _Place) -> Floats:
-        """Convert a column to the unit of the fits: at once if all are in range, otherwise one by one."""
+        """Convert a column to the unit of the fits: at once if all are in range, otherwise one by one.
+
+        Parameters
+        ----------
+        written
+            Values in the unit of the file, shape (rows,).
+
+        Returns
+        -------
+        Floats
+            Values in the unit of the fits, shape (rows,).
+        """
         numbers = _converted(written, place)
         if numbers is None:
             numbers = np.zeros(len(written))
@@ -153,7 +164,13 @@ class _Reader:
         return numbers
 
     def refuse(self) -> None:
-        """Raise ``Rejected`` with all that was wrong, if anything was."""
+        """End the reading of a faulty table.
+
+        Raises
+        ------
+        Rejected
+            If there was a fault; the message has all of them.
+        """
         if self.problems:
             problems = self.problems[:_MAX_PROBLEMS]
             if self.full:
@@ -163,13 +180,18 @@ class _Reader:
     def columns(self) -> tuple[dict[str, Floats], Ints]:
         """Return the columns by name, and the line of every row.
 
+        Returns
+        -------
+        tuple
+            Columns in the units of the fits, shape (rows,) each, and line numbers, shape (rows,).
+
         Raises
         ------
         Rejected
-            If anything was wrong; the message has all of it.
+            If there was a fault; the message has all of them.
         """
         self.refuse()
-        values = (np.frombuffer(known, dtype=np.float64) for known in self._values)
+        values = (np.frombuffer(buffer, dtype=np.float64) for buffer in self._values)
         columns = {place[1].name: each for place, each in zip(self._places, values, strict=True)}
         return columns, np.frombuffer(self._lines, dtype=np.int64)
 
@@ -237,10 +259,10 @@ def _places(
             places.append((at, column, spelt[cell], cell))
         elif column in needed:
             others = [cell for cell in spelt if cell != column.name]
-            shown = ", ".join(cell[:40] for cell in header[:_MAX_CELLS_SHOWN])
-            shown += ", ..." if len(header) > _MAX_CELLS_SHOWN else ""
+            columns_text = ", ".join(cell[:40] for cell in header[:_MAX_CELLS_SHOWN])
+            columns_text += ", ..." if len(header) > _MAX_CELLS_SHOWN else ""
             instead = f" (or {', '.join(others)})" if others else ""
-            why = f"missing{instead}; the header has {shown}"
+            why = f"missing{instead}; the header has {columns_text}"
             problems.append(Problem(name, line, column.name, why))
     if problems:
         raise Rejected(problems)

@@ -1,4 +1,4 @@
-"""Tables to traces: one a file, or several that a column numbers or whose time starts again."""
+"""Split tables into traces: one a file, or several that a column numbers or whose time starts again."""
 
 import numpy as np
 

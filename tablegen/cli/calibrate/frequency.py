@@ -1,4 +1,4 @@
-"""``tablegen calibrate frequency``: gains at several frequencies to (23)."""
+"""``tablegen calibrate frequency``: fit (23) to gains at several frequencies."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""``tablegen calibrate``: measurements to parameters of the scanner file, with standard errors."""
+"""``tablegen calibrate``: fit parameters of the scanner file to measurements, with standard errors."""
 
 import click
 
@@ -26,12 +26,12 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 def calibrate() -> None:
     """Fit the parameters of a scanner to measurements, in CSV files or images.
 
-    The header of a CSV file names the columns; each name contains the unit. In its place the commands take .npz files
-    of numpy, with an array a column. Each command prints the parameters with standard errors, and the scan error that
+    The header of a CSV file names the columns; each name contains the unit. The commands also read .npz files of numpy,
+    with one array for each column. Each command prints the parameters with standard errors, and the scan error that
     remains. Outliers are reported, and never removed.
 
     With --write, the command updates the scanner file, and adds a comment that names the data files and their SHA-256.
-    Without --write, it changes no file. A fit that says nothing, such as a parameter below two standard errors, is not
+    Without --write, it changes no file. An insignificant fit, such as a parameter below two standard errors, is not
     written; --force writes it. Numbers in parentheses, such as (22), are equations of the paper.
     """
 

@@ -1,4 +1,4 @@
-"""``tablegen calibrate hysteresis``: sensor traces to (17)-(22)."""
+"""``tablegen calibrate hysteresis``: fit (17)-(22) to sensor traces."""
 
 from pathlib import Path
 

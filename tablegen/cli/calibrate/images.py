@@ -1,4 +1,4 @@
-"""``tablegen calibrate images``: trace and retrace images to (17)-(22)."""
+"""``tablegen calibrate images``: fit (17)-(22) to trace and retrace images."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tablegen.cli.calibrate.options import (
     turn_option,
     window_option,
 )
-from tablegen.cli.calibrate.run import Common, ended_by_input, put, scanner_options, shared_options
+from tablegen.cli.calibrate.run import Common, ended_by_input, output_fit, scanner_options, shared_options
 from tablegen.cli.images.pairs import (
     CommandOfPairs,
     channel_option,
@@ -51,7 +51,7 @@ def images(
 ) -> int:
     """Fit beta_max and rho, (22), and u_peak, (17), to trace and retrace images. No sensor is needed.
 
-    Scan a grating or a lattice with a triangle, three periods of it or more in a line. Take a pair of images at each of
+    Scan a grating or a lattice with a triangle, with three periods or more in a line. Take a pair of images at each of
     several amplitudes.
 
     \b
@@ -61,7 +61,7 @@ def images(
     Rows:    scan lines in order of time. Both images have the left end of the line at the
              left; otherwise give --retrace-mirrored.
     Angle:   files of instruments state the scan angle. The fast axis is x at 0 degrees and y
-             at 90; --axis has to be that one.
+             at 90; --axis must be the fast axis.
 
     \b
     Example:
@@ -73,7 +73,7 @@ def images(
     require_readers({path for _, *files in pairs for path in files})
     with ended_by_input(), Progress() as progress:
         progress.now("fitting")
-        found = calibrate_images(
+        fit = calibrate_images(
             [(volts, trace, retrace) for volts, trace, retrace in pairs],
             axis=common.axis,
             points=points,
@@ -87,4 +87,4 @@ def images(
             rho=rho,
             **scanner_options(common),
         )
-    return put(common, found)
+    return output_fit(common, fit)

@@ -1,4 +1,4 @@
-"""``tablegen calibrate offset``: apparent sizes at several offsets, or images, to (1)-(4)."""
+"""``tablegen calibrate offset``: fit (1)-(4) to apparent sizes at several offsets, or to images."""
 
 from pathlib import Path
 from typing import Any
@@ -32,8 +32,8 @@ from tablegen.cli.shared.exit_status import ExitStatus
     "VOLTS OFFSET_V",
     2,
     "In place of DATA.CSV: scan voltage and offset at the piezo in volts, and an image of a sample of known constant, "
-    "scanned with a triangle. Without RETRACE, the trace alone, or both if the file has them. Repeat the option for "
-    "each offset.",
+    "scanned with a triangle. Without RETRACE, the retrace is that of the first file, if it has one. Repeat the option "
+    "for each offset.",
 )
 @sample_options
 @click.option(
@@ -48,7 +48,7 @@ def offset(
     data: Path | None,
     images: tuple[tuple[float, float, Path, Path], ...],
     size_v: float | None,
-    **given: Any,
+    **sample: Any,
 ) -> int:
     """Fit m_minus and m_plus, equations (1)-(4), to apparent sizes at three or more offset voltages.
 
@@ -61,8 +61,8 @@ def offset(
     With images of several scan voltages, each at three or more offsets, m is fitted for each of them. Builds then use
     m of their scan size.
 
-    Or take trace and retrace of a lattice or a grating at each offset, and give them with --image; the size
-    calibration of the scanner file is used.
+    Or scan a lattice or a grating at each offset, and give trace and retrace with --image; the command uses the size
+    calibration of the scanner file.
 
     \b
     Examples:
@@ -77,10 +77,10 @@ def offset(
     if images:
         if data is not None or size_v is not None:
             raise click.UsageError("DATA.CSV and --size-v are for sizes in a table, and --image for images")
-        return of_sample_images("offset", common, images, given)
+        return of_sample_images("offset", common, images, sample)
     if data is None:
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS OFFSET_V TRACE [RETRACE]")
-    refuse_sample(given)
+    refuse_sample(sample)
     table = read_columns(data, [OFFSET, APPARENT], [SIZE])
     driver = driver_of(common)
     if SIZE in table:

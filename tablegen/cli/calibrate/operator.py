@@ -1,4 +1,4 @@
-"""``tablegen calibrate operator``: traces of a sensor, or images, to an operator of the piezo, in a file of its own."""
+"""``tablegen calibrate operator``: fit an operator of the piezo to sensor traces or images."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tablegen.api.calibrate_operator import CalibratedOperator
 
 
-@click.command(cls=CommandOfOperatorPairs, short_help="Identify an operator of the piezo from sensor traces or images.")
+@click.command(cls=CommandOfOperatorPairs, short_help="Fit an operator of the piezo to sensor traces or images.")
 @shared_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="[DATA.CSV]...", nargs=-1)
 @delay_option
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     "VOLTS OFFSET_V RATE_HZ",
     3,
     "Scan voltage and offset at the piezo in volts, line rate in Hz, and two images of a sample of known constant, "
-    "scanned with a triangle. RETRACE is left out if the first file has both. Repeat the option for each scan.",
+    "scanned with a triangle. Omit RETRACE if the first file has both. Repeat the option for each scan.",
     (PAIR_NAME,),
 )
 @sample_options
@@ -42,26 +42,26 @@ def operator(
     data: tuple[Path, ...],
     delay_s: str,
     images: tuple[tuple[float, float, float, Path, Path], ...],
-    **given: Any,
+    **sample: Any,
 ) -> int:
-    """Identify what the piezo does at every size and offset from sensor traces, from images, or both: an operator.
+    """Fit an operator, a model of the piezo at every size and offset, to sensor traces, to images, or to both.
 
-    Builds then find waveforms that are straight on this operator, and `show` says what to expect on the scanner. The
-    laws (1) to (23) of the scanner file stay: m of (1) gives the size at offsets without a trace.
+    Builds then invert this operator, and `show` prints the errors to expect on the scanner. The laws (1) to (23) stay
+    in the scanner file: m of (1) gives the size at offsets without a trace.
 
-    Record three settled periods or more, at six sizes from 10 % of v_max to its full range, all at the offset that you
-    use most. Two sizes at each further offset make scans there as good. One rise and one fall a period; any shape, rate
-    and turn.
+    Record three settled periods or more at six sizes, from 10 % of v_max to its full range, all at the offset that you
+    use most. Two sizes at each further offset make scans there as accurate. Each period must have one rise and one
+    fall; shape, rate and turn are free.
 
     \b
     Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
     trace, a number for each trace; without it, a new trace starts where time_s goes back.
 
-    In place of a trace, or beside traces, a pair of images of a lattice or a grating of known constant does, from turn
-    to turn of a triangle: --pair.
+    A pair of images can replace a trace (--pair): of a lattice or a grating of known constant, scanned with a triangle,
+    from turn to turn.
 
-    Calibrate `resonance` and `offset` first: their parts of the scanner file are used. `--delay-s fit` needs drives
-    with sharp turns, as triangles have.
+    Calibrate `resonance` and `offset` first: the command reads them from the scanner file. `--delay-s fit` needs drives
+    with sharp turns, such as triangles.
 
     \b
     Examples:
@@ -75,34 +75,34 @@ def operator(
     if not data and delay is None:
         raise click.UsageError("--delay-s fit is for traces of a sensor; images have --delay-pixels")
     if images:
-        check_sample(given)
+        check_sample(sample)
     else:
-        refuse_sample(given)
+        refuse_sample(sample)
     rows = named_images(images)
     with ended_by_input(), Progress() as progress:
         progress.now("reading the measurements")
-        found = calibrate_operator(
+        fit = calibrate_operator(
             data,
             axis=common.axis,
             images=rows,
             delay_s="fit" if delay is None else delay,
             progress=progress.now,
             **scanner_options(common),
-            **given,
+            **sample,
         )
     if common.as_json:
-        click.echo(found.to_json())
+        click.echo(fit.to_json())
     else:
-        click.echo(found.summary())
-    plot_fit(common, found.charts)
+        click.echo(fit.summary())
+    plot_fit(common, fit.charts)
     if common.report is not None:
-        written(common.report.parent, {common.report.name: found.page()})
+        written(common.report.parent, {common.report.name: fit.page()})
     if common.write:
-        _write(common, found)
+        _write(common, fit)
     return ExitStatus.OK
 
 
-def _write(common: Common, found: "CalibratedOperator") -> None:
+def _write(common: Common, fit: "CalibratedOperator") -> None:
     """Write the operator's file, then the scanner file that names it."""
     from tablegen.calibration.scanner_file import with_own_hysteresis
 
@@ -111,10 +111,10 @@ def _write(common: Common, found: "CalibratedOperator") -> None:
     with ended_by_input():
         text = read_text(path, CONFIGURATION) if path.exists() and common.axis == "x" else ""
         keeps_y = bool(text) and with_own_hysteresis(text, name) != text
-        (beside, operator), (own, scanner) = found.content(common.scanner).items()
+        (beside, operator), (own, scanner) = fit.content(common.scanner).items()
     changed = written(common.scanner.parent, {beside: operator})
     changed += written(path.parent, {own: scanner})
-    done = "written" if changed else "up to date"
-    click.echo(f"{name}: {common.axis}.hysteresis and {beside} {done}", err=common.as_json)
+    state = "written" if changed else "up to date"
+    click.echo(f"{name}: {common.axis}.hysteresis and {beside} {state}", err=common.as_json)
     if keeps_y:
         click.echo(f"{name}: y.hysteresis keeps the model that it had by like", err=common.as_json)

@@ -1,4 +1,4 @@
-"""Options that several calibrations have."""
+"""Options that several calibrations share."""
 
 from math import isfinite
 from pathlib import Path
@@ -63,7 +63,13 @@ delay_option = click.option(
 
 
 def delay_of(text: str) -> float | None:
-    """In s, as the option has it; None where it is to be fitted."""
+    """Return the delay in s that the option states; None where it is to be fitted.
+
+    Raises
+    ------
+    click.UsageError
+        If it is no number.
+    """
     try:
         delay = None if text == "fit" else float(text)
         if delay is not None and not isfinite(delay):

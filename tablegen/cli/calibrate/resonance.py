@@ -1,4 +1,4 @@
-"""``tablegen calibrate resonance``: gain and phase through the resonance to its parameters, or the response itself."""
+"""``tablegen calibrate resonance``: fit a resonance to gain and phase, or store the response itself."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What all calibrations of the command line share: options, reading, and what is done with a fit."""
+"""Code that all calibration commands share: options, reading of tables, output of a fit."""
 
 import os
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import click
 from tablegen.cli.images.samples import check_sample, named_images
 from tablegen.cli.shared.common import OutputFile, fail, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _REQUIRED_MODULES = ("scipy", "tomlkit")
 
 @dataclass(frozen=True)
 class Common:
-    """The options that all calibrations share."""
+    """Options that all calibrations share."""
 
     axis: Literal["x", "y"]
     scanner: Path | None
@@ -50,7 +50,13 @@ class Common:
 
 
 def shared_options(command: F) -> F:
-    """Add the options that all calibrations share, as ``common``."""
+    """Add the options that all calibrations share, as ``common``.
+
+    Raises
+    ------
+    click.UsageError
+        When the command runs, if these options contradict each other.
+    """
     options = [
         click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured."),
         click.option(
@@ -101,11 +107,18 @@ def shared_options(command: F) -> F:
         as_json: bool,
         **rest: Any,
     ) -> Any:
+        """Check the shared options and run the command.
+
+        Raises
+        ------
+        click.UsageError
+            If they contradict each other.
+        """
         if write and scanner is None:
             raise click.UsageError("--write needs --scanner FILE")
         if force and not write:
             raise click.UsageError("--force is for --write")
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and further threads would only spin
         require(*_REQUIRED_MODULES, extra="calibrate")
         check_plot(plot, as_json)
         common = Common(axis, scanner, v_max, v_min, write, force, plot, no_plot, report, as_json)
@@ -119,7 +132,7 @@ def shared_options(command: F) -> F:
 
 
 def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "MeasuredTable":
-    """A CSV with these columns; what is wrong with it ends the command."""
+    """Read a CSV with these columns; a fault ends the command."""
     from tablegen.base.input_errors import Rejected
     from tablegen.calibration.tables.table import read_table
 
@@ -132,32 +145,44 @@ def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Col
 
 
 def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTable":
-    """The rows from one frequency to the other; none ends the command."""
+    """Return the rows from one frequency to the other; no row ends the command."""
     from dataclasses import replace
 
     from tablegen.calibration.tables.columns import FREQUENCY
 
-    kept = (table[FREQUENCY] >= from_hz) & (table[FREQUENCY] <= to_hz)
-    if not kept.any():
+    rows = (table[FREQUENCY] >= from_hz) & (table[FREQUENCY] <= to_hz)
+    if not rows.any():
         fail([f"{table.file}: no row is between {from_hz:g} and {to_hz:g} Hz"], ExitStatus.WRONG_INPUT)
     return replace(
-        table, columns={name: values[kept] for name, values in table.columns.items()}, lines=table.lines[kept]
+        table, columns={name: values[rows] for name, values in table.columns.items()}, lines=table.lines[rows]
     )
 
 
 def scanner_options(common: Common) -> dict[str, Any]:
-    """The keywords of a calibrating function that say what is known of the scanner; no range ends the command."""
+    """Return the keywords of a calibrating function that describe the scanner.
+
+    Raises
+    ------
+    click.UsageError
+        If nothing gives the range of the driver.
+    """
     begun = common.scanner is None or (common.write and not common.scanner.exists())
     if begun and common.v_max is None:
         raise click.UsageError(_NO_RANGE)
-    # Of a file that is missing and is not begun, reading says what is wrong.
-    known = begun or (common.scanner is not None and common.scanner.exists())
-    return {"scanner": common.scanner, "v_max": common.v_max if known else None, "v_min": common.v_min}
+    # A file that is missing and is not begun is reported when it is read.
+    has_range = begun or (common.scanner is not None and common.scanner.exists())
+    return {"scanner": common.scanner, "v_max": common.v_max if has_range else None, "v_min": common.v_min}
 
 
 @contextmanager
 def ended_by_input() -> "Iterator[None]":
-    """End the command where the input is wrong, or is of no scanner; messages name the file."""
+    """End the command if the input is wrong, or is of no scanner; messages name the file.
+
+    Raises
+    ------
+    click.UsageError
+        If nothing gives the range of the driver.
+    """
     from tablegen.api.known_scanner import NoRange
     from tablegen.base.input_errors import Rejected, Unphysical
 
@@ -174,7 +199,7 @@ def ended_by_input() -> "Iterator[None]":
 
 
 def known_scanner(common: Common) -> "KnownScanner":
-    """What the scanner file says now, and the range of the driver; what is wrong with it ends the command."""
+    """Read the scanner file as it is, with the range of the driver; a fault ends the command."""
     from tablegen.api.known_scanner import KnownScanner
 
     with ended_by_input():
@@ -182,19 +207,19 @@ def known_scanner(common: Common) -> "KnownScanner":
 
 
 def driver_of(common: Common) -> "Driver":
-    """The range of the scanner file, or as given where there is none."""
-    known = known_scanner(common)
+    """Return the range of the scanner file, or that of the options without a file."""
+    scanner_file = known_scanner(common)
     with ended_by_input():
-        return known.driver
+        return scanner_file.driver
 
 
 def in_file(common: Common, kind: str, key: str) -> float | None:
-    """A number of the scanner file as it is, or None; no length or frequency is 0 or less."""
+    """Return a number of the scanner file as it is, or None; no length or frequency is 0 or less."""
     return known_scanner(common).number(kind, key)
 
 
 def size_law(common: Common, source: str) -> "SizeLaw":
-    """The size law of the scanner file, for ``source`` of scan voltages; the rest of the file may be incomplete."""
+    """Return the size law of the scanner file, for ``source`` of scan voltages; other tables may be incomplete."""
     with ended_by_input():
         return known_scanner(common).size_law(source)
 
@@ -212,51 +237,51 @@ def finish(
             fit = run()
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
-    return put(common, Calibrated(fit, common.axis, tuple(tables), points))
+    return output_fit(common, Calibrated(fit, common.axis, tuple(tables), points))
 
 
 def of_sample_images(
-    kind: 'Literal["size", "offset"]', common: Common, images: "Sequence[tuple[Any, ...]]", given: dict[str, Any]
+    kind: 'Literal["size", "offset"]', common: Common, images: "Sequence[tuple[Any, ...]]", options: dict[str, Any]
 ) -> int:
-    """Fit sizes, or sizes at several offsets, to images of a sample of known constant, and do with it as ``put``."""
+    """Fit sizes, or sizes at several offsets, to images of a sample of known constant; continue as ``output_fit``."""
     from tablegen.api.calibrate import calibrate
 
-    check_sample(given)
+    check_sample(options)
     rows = named_images(images)
     with ended_by_input(), Progress() as progress:
         progress.now("fitting")
-        found = calibrate(kind, axis=common.axis, images=rows, **given, **scanner_options(common))
-    return put(common, found)
+        fit = calibrate(kind, axis=common.axis, images=rows, **options, **scanner_options(common))
+    return output_fit(common, fit)
 
 
-def put(common: Common, found: "Calibrated") -> int:
-    """Print, draw and write a fit. One that says nothing is printed with its doubts, and not written unless forced."""
+def output_fit(common: Common, fit: "Calibrated") -> int:
+    """Print, draw and write a fit; a meaningless one is printed with its doubts, and written only by --force."""
     if common.as_json:
-        click.echo(found.to_json())
-        plot_fit(common, found.charts)
+        click.echo(fit.to_json())
+        plot_fit(common, fit.charts)
     else:
-        click.echo("\n".join(found.table()))
-        plot_fit(common, found.charts)
-        for finding in found.findings():
+        click.echo("\n".join(fit.table()))
+        plot_fit(common, fit.charts)
+        for finding in fit.findings():
             click.echo(finding.line)
     if common.report is not None:
-        written(common.report.parent, {common.report.name: found.page()})
+        written(common.report.parent, {common.report.name: fit.page()})
     if common.write:
-        meaningless = found.doubts
+        meaningless = fit.doubts
         if meaningless and not common.force:
             where = f"{common.scanner}: {common.axis}"
-            advice = "nothing was written; correct the measurement, or write it all the same with --force"
+            advice = "nothing was written; correct the measurement, or write it with --force"
             fail([*(f"{where}: {doubt}" for doubt in meaningless), f"{where}: {advice}"], ExitStatus.WRONG_INPUT)
-        _write(common, found)
+        _write(common, fit)
     return ExitStatus.OK
 
 
 def plot_fit(common: Common, charts: "Callable[[], PlottedCharts]") -> None:
-    """Draw as the options say."""
-    put_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
+    """Draw the charts as the options require."""
+    show_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
 
 
-def _write(common: Common, found: "Calibrated") -> None:
+def _write(common: Common, fit: "Calibrated") -> None:
     from tablegen.base.input_errors import Rejected, Unphysical
 
     assert common.scanner is not None
@@ -264,7 +289,7 @@ def _write(common: Common, found: "Calibrated") -> None:
     path = common.scanner.resolve()
     try:
         driver = None if path.exists() else driver_of(common)
-        files = found.content(common.scanner, driver, force=True)
+        files = fit.content(common.scanner, driver, force=True)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:
@@ -274,6 +299,6 @@ def _write(common: Common, found: "Calibrated") -> None:
     except OSError as error:
         fail([f"{error.filename or name}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     *beside, own = files
-    changed = written(common.scanner.parent, {one: files[one] for one in beside}) if beside else []  # it is named
+    changed = written(common.scanner.parent, {one: files[one] for one in beside}) if beside else []
     changed += written(path.parent, {own: files[own]})
-    click.echo(f"{name}: {common.axis}.{found.kind} {'written' if changed else 'up to date'}", err=common.as_json)
+    click.echo(f"{name}: {common.axis}.{fit.kind} {'written' if changed else 'up to date'}", err=common.as_json)

@@ -1,4 +1,4 @@
-"""``tablegen calibrate size``: actual against set scan sizes, or images, to (6)-(12)."""
+"""``tablegen calibrate size``: fit (6)-(12) to actual and set scan sizes, or to images."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -32,8 +32,8 @@ from tablegen.cli.shared.exit_status import ExitStatus
     "VOLTS",
     1,
     "In place of DATA.CSV: scan voltage at the piezo in volts, peak to peak, and an image of a sample of known "
-    "constant, scanned with a triangle. Without RETRACE, the trace alone, or both if the file has them. Repeat the "
-    "option for each size.",
+    "constant, scanned with a triangle. Without RETRACE, the retrace is that of the first file, if it has one. Repeat "
+    "the option for each size.",
 )
 @sample_options
 @click.option(
@@ -69,7 +69,7 @@ def size(
     base_nm: float | None,
     threshold: float | None,
     noise: Literal["relative", "absolute"],
-    **given: Any,
+    **sample: Any,
 ) -> int:
     """Fit k_nm_per_v, beta and v_threshold, equations (6)-(12), to actual scan sizes at several drives.
 
@@ -79,8 +79,8 @@ def size(
     and      actual_nm (size measured by a sensor),
              or apparent_nm and true_nm (a lattice in the image) with nominal_nm.
 
-    Or take trace and retrace of a lattice or a grating at several scan voltages, and give each with --image. The sizes
-    are fitted to all pixels, hysteresis included, with standard errors.
+    Or scan a lattice or a grating at several scan voltages, and give trace and retrace of each with --image. The sizes
+    are fitted to all pixels together with the hysteresis, and have standard errors.
 
     \b
     Examples:
@@ -94,10 +94,10 @@ def size(
     if images:
         if data is not None or k is not None or noise != "relative":
             raise click.UsageError("DATA.CSV, --k and --noise are for sizes in a table, and --image for images")
-        return of_sample_images("size", common, images, {**given, "base_nm": base_nm, "threshold": threshold})
+        return of_sample_images("size", common, images, {**sample, "base_nm": base_nm, "threshold": threshold})
     if data is None:
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS TRACE [RETRACE]")
-    refuse_sample(given)
+    refuse_sample(sample)
     table = read_columns(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE])
     if DRIVE not in table and (NOMINAL not in table or k is None):
         fail([f"{table.file}: drive_v is missing; or give nominal_nm, and --k NM/V"], ExitStatus.WRONG_INPUT)

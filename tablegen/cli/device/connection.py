@@ -1,4 +1,4 @@
-"""What the commands that talk to a device share: options, the way to it, and how its errors end a command."""
+"""Code that the commands of a device share: options, the connection, and the exit statuses of its errors."""
 
 import binascii
 import os
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _KEY_BYTES = range(16, 33)
-_OF_OTHERS = 0o077  # what a group or others may do with a file
+_OF_OTHERS = 0o077  # permissions of a group and of others
 
 baud_option = click.option(
     "--baud",
@@ -41,7 +41,7 @@ source_argument = click.argument("source", type=click.Path(path_type=Path), meta
 
 
 def port_option(required: bool = True) -> Callable[[Command], Command]:
-    """``--port``."""
+    """Return the option ``--port``."""
     return click.option(
         "--port",
         required=required,
@@ -54,21 +54,21 @@ def port_option(required: bool = True) -> Callable[[Command], Command]:
 
 
 def timeout_option(what: str) -> Callable[[Command], Command]:
-    """``--timeout``; ``what`` is bounded, and by how much if it is not given."""
+    """Return the option ``--timeout``; ``what`` names what it limits, and its default."""
     return click.option("--timeout", type=click.FloatRange(min=0.1, max=1e6), metavar="S", help=what)
 
 
 @contextmanager
 def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as before") -> "Iterator[Device]":
-    """A device, until the end of the block; whatever goes wrong there ends the command with its status.
+    """Connect to a device until the end of the block; an error in the block ends the command with its status.
 
-    ``goes_on`` is how a device goes on of which nothing was asked before the command was interrupted.
+    ``goes_on`` says how a device continues that got no request before the command was interrupted.
     """
     key = None if key_file is None else _read_key(key_file)
     from tablegen.link import errors
     from tablegen.link.device import Device
 
-    # The first that fits.
+    # The first kind that matches counts.
     statuses = (
         (errors.SerialMissing, ExitStatus.TOOL_MISSING),
         (errors.NoPort, ExitStatus.NO_PORT),
@@ -79,19 +79,19 @@ def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as be
         (errors.NotPlaying, ExitStatus.MISMATCH),
         (errors.LinkError, ExitStatus.LINK_LOST),
     )
-    known: Device | None = None
+    open_device: Device | None = None
     try:
         with Device(port, baud=baud, key=key) as device:
-            known = device
+            open_device = device
             yield device
     except errors.LinkError as error:
         fail([error], next(status for kind, status in statuses if isinstance(error, kind)))
     except KeyboardInterrupt:
-        fail([f"interrupted; {_left_behind(known, goes_on)}"], ExitStatus.INTERRUPTED)
+        fail([f"interrupted; {_interrupted_state(open_device, goes_on)}"], ExitStatus.INTERRUPTED)
 
 
-def _left_behind(device: "Device | None", goes_on: str) -> str:
-    """What is known of a device when a command is interrupted."""
+def _interrupted_state(device: "Device | None", goes_on: str) -> str:
+    """Describe the state of a device when a command is interrupted."""
     from tablegen.link.messages import Request
 
     upload = None if device is None else device.upload_state
@@ -128,7 +128,7 @@ def _read_key(path: Path) -> bytes:
 
 
 def read_scan(source: Path) -> "PreparedScan":
-    """The scan of a TOML file, or of a directory that ``tablegen build`` wrote."""
+    """Read the scan of a TOML file, or of a directory that ``tablegen build`` wrote."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.link.prepare import PreparedScan
     from tablegen.manifest.read import NotABuild

@@ -1,4 +1,4 @@
-"""``tablegen park``, ``trigger`` and ``clear``: what a scan in a device does."""
+"""``tablegen park``, ``trigger`` and ``clear``: control the scan of a device."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _PARK_WAIT_S = 60.0
 _START_WAIT_S = 1.0
-_LOOKS = 20  # at the status, until a request that was passed on shows there: it acts on the next tick
+_LOOKS = 20  # times that the status is read until it shows a request, which acts on the next tick
 
 
 @click.command(short_help="Stop the scan of a device and ramp to the park codes.")
@@ -33,8 +33,8 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
       tablegen park --wait --port /dev/ttyUSB0
 
     \b
-    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or it still
-    plays, 10 link lost or timeout, 12 invalid answers.
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or the device
+    still plays, 10 link lost or timeout, 12 invalid answers.
     """
     from tablegen.link.messages import DeviceState
 
@@ -48,17 +48,17 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
             ["the device took the request to park, but still plays; see `tablegen status`, and try again"],
             ExitStatus.REFUSED,
         )
-    said = {
+    texts = {
         DeviceState.NO_PROGRAM: "the device has no scan yet, and nothing to park",
         DeviceState.PARKED: "parked",
         DeviceState.PARKING: "ramping to the park codes",
     }
-    click.echo(said[status.state])
+    click.echo(texts[status.state])
     return ExitStatus.OK
 
 
 def _look(device: "Device", shows: "Callable[[DeviceStatus], bool]") -> "DeviceStatus":
-    """The first status that shows it, or the last one after some looks."""
+    """Return the first status for which ``shows`` is true, or the last one after some trials."""
     status = device.status()
     for _ in range(_LOOKS):
         if shows(status):
@@ -88,8 +88,8 @@ def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
       tablegen trigger --frames 10 --port /dev/ttyUSB0
 
     \b
-    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or it does
-    not play, 10 link lost, 12 invalid answers.
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or the device
+    does not play, 10 link lost, 12 invalid answers.
     """
     from tablegen.link.errors import OutOfTime
     from tablegen.link.messages import DeviceState
@@ -137,8 +137,8 @@ def clear(port: str, baud: int, key_file: Path | None) -> int:
       tablegen clear --port /dev/ttyUSB0
 
     \b
-    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or faults come
-    again, 10 link lost, 12 invalid answers.
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or the faults
+    come again, 10 link lost, 12 invalid answers.
     """
     with connected(port, baud, key_file) as device:
         device.clear()

@@ -1,4 +1,4 @@
-"""``tablegen ports``: the serial ports of this machine."""
+"""``tablegen ports``: list the serial ports of this machine."""
 
 import click
 
@@ -22,18 +22,18 @@ def ports(as_json: bool) -> int:
         from serial.tools.list_ports import comports
     except ImportError:
         fail([f"pyserial is missing; {install_advice('serial')}"], ExitStatus.TOOL_MISSING)
-    found = sorted(comports(), key=lambda port: port.device)
+    serial_ports = sorted(comports(), key=lambda port: port.device)
     if as_json:
         import json
 
         click.echo(
-            json.dumps([{"port": p.device, "description": p.description, "id": p.hwid} for p in found], indent=2)
+            json.dumps([{"port": p.device, "description": p.description, "id": p.hwid} for p in serial_ports], indent=2)
         )
-    width = max((len(port.device) for port in found), default=0)
-    for port in [] if as_json else found:
-        told = "" if port.description in (None, "n/a") else port.description
-        click.echo(f"{port.device:<{width}}  {told}".rstrip())
-    if not found:
+    width = max((len(port.device) for port in serial_ports), default=0)
+    for port in [] if as_json else serial_ports:
+        description = "" if port.description in (None, "n/a") else port.description
+        click.echo(f"{port.device:<{width}}  {description}".rstrip())
+    if not serial_ports:
         fail(
             ["this machine has no serial port; is the cable connected? URLs like socket://host:port work as well"],
             ExitStatus.NO_PORT,

@@ -1,4 +1,4 @@
-"""``tablegen readback``: what a device plays, byte for byte."""
+"""``tablegen readback``: read the active scan of a device, byte for byte."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
     "--output",
     type=OutputFile(),
     metavar="FILE",
-    help="Write the program image, as the device holds it, to FILE.",
+    help="Write the program image of the device to FILE.",
 )
 @timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time]")
 def readback(
@@ -50,9 +50,9 @@ def readback(
     if scan is not None:
         from tablegen.link.word_difference import differences
 
-        found = differences(scan, image)
-        if found:
-            more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-            fail([f"the device plays a different scan than {scan.name}: {found[0]}{more}"], ExitStatus.MISMATCH)
+        mismatches = differences(scan, image)
+        if mismatches:
+            more = f" (and {len(mismatches) - 1} more)" if len(mismatches) > 1 else ""
+            fail([f"the device plays a different scan than {scan.name}: {mismatches[0]}{more}"], ExitStatus.MISMATCH)
         click.echo(f"the device plays {scan.name} {scan.digest[:12]}: {len(image)} bytes, all equal")
     return ExitStatus.OK

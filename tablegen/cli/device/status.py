@@ -1,4 +1,4 @@
-"""``tablegen status``: what a device is and does."""
+"""``tablegen status``: show the state and limits of a device."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,7 +50,7 @@ def _features(info: "DeviceInfo") -> list[str]:
 
 
 def _record(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "DeviceStatus") -> dict[str, Any]:
-    """Everything, by the names of docs/protocol.md."""
+    """Return all values, by the names of docs/protocol.md."""
     return {
         "device": {
             "version": info.version,
@@ -92,7 +92,7 @@ def _fields(values: "AxisShape | AxisLimits") -> dict[str, int]:
 
 
 def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "DeviceStatus") -> list[tuple[str, str]]:
-    """What people want to know, the most urgent first."""
+    """Return the rows of the table, the most urgent first."""
     from tablegen.link.messages import DeviceState, Feature, Upload
 
     state = {

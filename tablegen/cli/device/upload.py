@@ -1,4 +1,4 @@
-"""``tablegen upload``: a new scan into a running instrument."""
+"""``tablegen upload``: send a scan to a running device."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,7 +52,7 @@ _BITS_PER_BYTE = 10
 @click.option(
     "--any-rate", is_flag=True, help="Accept a device whose tick rate differs from update_rate_hz of the scan."
 )
-@timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time, plus what answers come late]")
+@timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time, plus the delay of late answers]")
 def upload(
     source: Path,
     port: str | None,
@@ -111,7 +111,7 @@ def upload(
 
 
 def _sizes(scan: "PreparedScan", baud: int) -> list[str]:
-    """Bytes and seconds of both forms."""
+    """Return bytes and seconds of both forms."""
     from tablegen.link.errors import Unsuitable
     from tablegen.link.messages import DATA_BYTES
 
@@ -130,13 +130,13 @@ def _sizes(scan: "PreparedScan", baud: int) -> list[str]:
 
 
 def _verdict(device: "Device", image: "ProgramImage", force: bool) -> str:
-    """Describe what an upload would come to; raises ``Refused`` where the device has a key and none was given."""
+    """Describe the outcome of an upload; raise ``Refused`` where the device has a key and none was given."""
     status = device.hello
     if status.hash == image.info.hash and not force:
         return "\nthe scan is already active on the device"
     keyed = device.needs_key()
     text = f"\nthe device would accept the scan: {len(image.data)} bytes as {_form(image)}"
-    text += ", if the key is right, which only an upload tells" if keyed else ""
+    text += ", if the key is right, which only an upload shows" if keyed else ""
     return text if status.permits else f"{text}, but its interlock is open: no upload can become active"
 
 

@@ -1,4 +1,4 @@
-"""``tablegen channels``: what the files of instruments contain."""
+"""``tablegen channels``: list the channels of image files."""
 
 import json
 from pathlib import Path
@@ -15,15 +15,15 @@ from tablegen.cli.shared.terminal import tell
 @click.argument("files", type=click.Path(path_type=Path), metavar="IMAGE...", nargs=-1, required=True)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def channels(files: tuple[Path, ...], as_json: bool) -> int:
-    """List the channels of image files, with what each file says: direction, pixels, size and unit.
+    """List the channels of image files: direction, pixels, size and unit.
 
     \b
     Files: .asd, .ibw, .spm and .000 to .999, .jpk, .jpk-qi-image, .sxm, .gwy,
            .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
 
     The options --channel and --retrace-channel of other commands take the number, or the name. A name without the
-    direction, such as Height, finds trace and retrace. A column is empty where a file does not say. A scan angle other
-    than 0 has a column of its own: at 90 degrees the fast axis is the other piezo.
+    direction, such as Height, selects trace and retrace. A column is empty if the file does not have the value. A scan
+    angle other than 0 has a column of its own: at 90 degrees the fast axis is the other piezo.
 
     \b
     Example:
@@ -36,16 +36,16 @@ def channels(files: tuple[Path, ...], as_json: bool) -> int:
     from tablegen.base.input_errors import Rejected
 
     require_readers(files)
-    listed: list[Channels] = []
+    contents: list[Channels] = []
     for path in files:
         try:
-            listed.append(channels_of(path))
+            contents.append(channels_of(path))
         except Rejected as rejected:
             fail(rejected.problems, ExitStatus.WRONG_INPUT)
     if as_json:
-        click.echo(json.dumps([one.record for one in listed], indent=2, allow_nan=False))
+        click.echo(json.dumps([one.record for one in contents], indent=2, allow_nan=False))
         return ExitStatus.OK
-    for one in listed:
+    for one in contents:
         tell(str(one.path), bold=True)
         for row in one.rows():
             tell(row)

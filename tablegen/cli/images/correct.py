@@ -1,4 +1,4 @@
-"""``tablegen correct``: images that are already taken, put straight by the scanner file or by a fit to the image."""
+"""``tablegen correct``: correct existing images by the scanner file, or by a fit to the image."""
 
 import json
 import os
@@ -11,7 +11,7 @@ import click
 
 from tablegen.cli.shared.common import fail, finite, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 from tablegen.cli.shared.progress_bar import Bar
 
@@ -29,7 +29,7 @@ def _number(name: str, metavar: str, text: str, kind: Any = _POSITIVE, **more: A
 
 @click.command(
     cls=PlottingCommand,
-    short_help="Put images that were already taken straight.",
+    short_help="Correct existing images.",
     epilog="""\b
 Examples:
   tablegen correct old.gwy --scanner scanner.toml --size-v 90 --offset-v 50 --rate-hz 2
@@ -46,9 +46,10 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE|DIRECTORY",
-    help="Corrected image: .gwy, .tif, .npy or .png. With --each or --pairs a directory. Without it none.",
+    help="Corrected image: .gwy, .tif, .npy or .png. With --each or --pairs a directory. "
+    "Without this option, no file is written.",
 )
-@click.option("--scanner", type=click.Path(path_type=Path), metavar="FILE", help="Scanner file that knows the scanner.")
+@click.option("--scanner", type=click.Path(path_type=Path), metavar="FILE", help="Scanner file of the instrument.")
 @click.option(
     "--scan",
     type=click.Path(path_type=Path),
@@ -56,7 +57,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     help="Scan file that the image was taken with, for its drive.",
 )
 @click.option("--fit", is_flag=True, help="Fit a periodic sample in the image; no scanner file is needed.")
-@_number("--pitch-nm", "NM", "With --fit: distance of the bars of the grating, for the size.")
+@_number("--pitch-nm", "NM", "With --fit: pitch of the grating, for the size.")
 @_number("--lattice-nm", "NM", "With --fit: constant of a hexagonal or square lattice, for size, height and shear.")
 @_number("--size-v", "V", "Scan voltage of the fast axis at the piezo, peak to peak.")
 @_number("--size-nm", "NM", "Instead of --size-v: scan size by the size calibration of the scanner file.")
@@ -90,7 +91,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     help="Part of each sweep that the columns span.",
 )
 @_number("--slow-size-v", "V", "Scan voltage of the slow axis.  [default: as the fast axis]")
-@_number("--slow-size-nm", "NM", "Instead of --slow-size-v: its size.")
+@_number("--slow-size-nm", "NM", "Instead of --slow-size-v: its size by the size calibration.")
 @_number(
     "--slow-offset-v", "V", "Offset voltage of the slow axis.  [default: as the fast axis]", click.FloatRange(-1e5, 1e5)
 )
@@ -110,16 +111,16 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     metavar="LOW HIGH",
     help="Part of the slow sweep that the rows span.",
 )
-@click.option("--slow-back", is_flag=True, help="The rows are of the slow axis' way back.")
+@click.option("--slow-back", is_flag=True, help="The rows were scanned while the slow axis moved back.")
 @_number(
     "--delay-pixels", "N", "Delay of the images relative to the drive in pixels.", float, default=0.0, show_default=True
 )
 @click.option(
     "--channel",
     metavar="NAME|N",
-    help="Channel that is judged and fitted; all are corrected.  [default: the height, if the file says which]",
+    help="Channel to fit and to compare; all channels are corrected.  [default: the height, if the file names it]",
 )
-@click.option("--retrace-channel", metavar="NAME|N", help="Its retrace.  [default: by the names of the channels]")
+@click.option("--retrace-channel", metavar="NAME|N", help="Retrace of that channel.  [default: by its name]")
 @click.option(
     "--retrace-mirrored",
     is_flag=True,
@@ -130,7 +131,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @click.option(
     "--pairs",
     is_flag=True,
-    help="The images are a trace and a retrace by turns; correct each pair, into the directory -o.",
+    help="The images are pairs, each a trace and then its retrace; correct each pair, into the directory -o.",
 )
 @click.option(
     "--format",
@@ -140,22 +141,22 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     show_default=True,
     help="With --each or --pairs: format of the corrected images.",
 )
-@plot_option("before, after and what is left")
-@click.option("--force", is_flag=True, help="Replace files that are there.")
+@plot_option("the image before and after, and the remaining difference,")
+@click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def correct(images: tuple[Path, ...], **options: Any) -> int:
-    """Put images that are already taken straight, in x and y: by the scanner file, or by a fit to the image itself.
+    """Correct existing images in x and y: by the scanner file, or by a fit to the image itself.
 
-    All channels of the file are resampled once, onto a straight grid of as many pixels, with cubic splines. What was
-    not imaged is masked. The output keeps what was done, with the SHA-256 of the files.
+    All channels of the file are resampled once, with cubic splines, onto a regular grid of as many pixels. Pixels that
+    were not imaged are masked. The output contains a record of the correction, with the SHA-256 of the files.
 
     \b
-    By a scanner file:  give how the image was taken: --size-v, --offset-v, --rate-hz; or --scan.
+    By a scanner file:  give the drive of the image: --size-v, --offset-v, --rate-hz; or --scan.
     By a fit (--fit):   trace and retrace of a grating or a lattice, three periods or more in the
                         line, better ten. A lattice gives both axes, a grating the fast one.
 
-    A file may have trace and retrace as channels; otherwise give both files. Their difference, before and after, tells
-    whether the correction is right; it is printed.
+    A file may have trace and retrace as channels; otherwise give both files. The command prints their difference before
+    and after, which shows whether the correction is right.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _check_usage(images, options)
@@ -166,7 +167,7 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
     jobs = _jobs(images, options)
     targets = _targets(jobs, options, suffix)
     records: list[dict[str, Any]] = []
-    refused: list[object] = []  # the others of a batch are corrected all the same
+    refused: list[object] = []  # the other images of a batch are still corrected
     bar = Bar(unit="images") if several else None
     for number, (trace, retrace) in enumerate(jobs):
         if bar is not None:
@@ -175,10 +176,10 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
             with nullcontext() if bar is not None else Progress() as progress:
                 if progress is not None:
                     progress.now(f"correcting {trace.name}")
-                found = _corrected(trace, retrace, options)
+                corrected = _corrected(trace, retrace, options)
             if bar is not None:
                 bar.hide()
-            records.append(_put(found, targets[number], suffix, options))
+            records.append(_output(corrected, targets[number], suffix, options))
         except _Refused as reason:
             refused += reason.lines
     if bar is not None:
@@ -191,7 +192,7 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
 
 
 class _Refused(Exception):
-    """What is wrong with the input."""
+    """The input is wrong; ``lines`` has the reasons."""
 
     def __init__(self, lines: Sequence[object]) -> None:
         super().__init__()
@@ -226,7 +227,7 @@ def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:
 
 
 def _wrong_way(options: dict[str, Any]) -> str | None:
-    """Return what is wrong with the options that say how to correct; None where nothing is."""
+    """Return the contradiction of the options that choose the way of correction; None without one."""
     files = options["scanner"] is not None or options["scan"] is not None
     if not options["fit"]:
         if not files:
@@ -241,7 +242,7 @@ def _wrong_way(options: dict[str, Any]) -> str | None:
 
 
 def _require(images: Sequence[Path], suffix: str | None) -> None:
-    """The libraries of all files, or an end with advice."""
+    """Require the libraries of all files, or end with advice."""
     from tablegen.correction.output_files import MODULES as WRITERS
     from tablegen.images.files import MODULES as READERS
 
@@ -260,7 +261,7 @@ def _jobs(images: tuple[Path, ...], options: dict[str, Any]) -> list[tuple[Path,
 def _targets(
     jobs: Sequence[tuple[Path, Path | None]], options: dict[str, Any], suffix: str | None
 ) -> list[tuple[Path, str] | None]:
-    """Folder and name without the ending of each output; None where nothing is written."""
+    """Return folder and name without the ending of each output; None where nothing is written."""
     output: Path | None = options["output"]
     if output is None:
         return [None] * len(jobs)
@@ -294,16 +295,16 @@ def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "C
         raise _Refused([f"{error.filename or names}: {error.strerror or error}"]) from None
 
 
-def _put(
-    found: "Corrected", target: tuple[Path, str] | None, suffix: str | None, options: dict[str, Any]
+def _output(
+    corrected: "Corrected", target: tuple[Path, str] | None, suffix: str | None, options: dict[str, Any]
 ) -> dict[str, Any]:
-    """Print, draw and write one scan; its record."""
+    """Print, draw and write one scan; return its record."""
     from tablegen.correction.output_files import files_of
 
     files: dict[str, bytes] = {}
     if target is not None:
         assert suffix is not None
-        files = files_of(found.scan, target[1], suffix)
+        files = files_of(corrected.scan, target[1], suffix)
         sources = {(Path(options["scanner"] or ".")).resolve()}
         for name in files:
             path = target[0] / name
@@ -312,10 +313,10 @@ def _put(
             if path.resolve() in sources:
                 raise _Refused([f"{path}: is the scanner file"])
     if not options["as_json"]:
-        click.echo(found.summary())
-    put_plot(options["plot"], found.charts)
+        click.echo(corrected.summary())
+    show_plot(options["plot"], corrected.charts)
     if target is not None:
         written(target[0], files)
         for name in files:
             click.echo(f"{target[0] / name} written", err=options["as_json"])
-    return found.record
+    return corrected.record

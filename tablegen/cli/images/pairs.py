@@ -1,4 +1,4 @@
-"""Trace and retrace images on the command line: two files, or one that has both."""
+"""Options of trace and retrace images: two files, or one that has both."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,14 +19,14 @@ pair_option = click.option(
     metavar="VOLTS TRACE RETRACE",
     multiple=True,
     required=True,
-    help="Scan voltage at the piezo in volts, peak to peak, and its two images. RETRACE is left out if the first file "
-    "has both. Repeat the option for each amplitude.",
+    help="Scan voltage at the piezo in volts, peak to peak, and its two images. Omit RETRACE if the first file has "
+    "both. Repeat the option for each amplitude.",
 )
 channel_option = click.option(
     "--channel",
     metavar="NAME|N",
     help="Data channel, for image files with several channels. `tablegen channels FILE` lists them. A name without "
-    "the direction, such as Height, finds trace and retrace.",
+    "the direction, such as Height, selects trace and retrace.",
 )
 retrace_channel_option = click.option(
     "--retrace-channel",
@@ -39,10 +39,10 @@ frame_option = click.option(
 
 
 class CommandOfPairs(click.Command):
-    """A command with ``--pair``, whose RETRACE may be left out where TRACE has both."""
+    """A command with ``--pair``, whose RETRACE may be omitted if TRACE has both."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Name the file twice where it is named once."""
+        """Repeat the file of TRACE where RETRACE is omitted."""
         words: list[str] = []
         for at, word in enumerate(args):
             words.append(word)
@@ -52,7 +52,7 @@ class CommandOfPairs(click.Command):
 
 
 def require_readers(paths: "Iterable[Path]") -> None:
-    """End the command where a library that reads one of these images is missing."""
+    """End the command if a library that reads one of these images is missing."""
     from tablegen.images.files import MODULES
 
     needed = {MODULES.get(path.suffix.lower()) for path in paths} - {None}

@@ -1,4 +1,4 @@
-"""``tablegen refine``: a trace or images of the running scan to a layer over the model, by iterative learning."""
+"""``tablegen refine``: correct the model's remaining error by iterative learning from the running scan."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ from tablegen.cli.images.refine_images import ImageArguments, image_options
 from tablegen.cli.images.samples import CommandOfRunningImages
 from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import check_plot, plot_option, put_plot
+from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -85,10 +85,10 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 @click.option(
     "--force",
     is_flag=True,
-    help="Use the trace even if its error is larger than before, or if it was used already: learn on from it.",
+    help="Use the trace even if its error is larger than before, or if it was used already.",
 )
-@plot_option("measured and predicted errors, and what was learnt,", by_default=True)
-@click.option("--report", type=OutputFile(), metavar="FILE", help="Write the round to FILE as an HTML page.")
+@plot_option("measured and predicted errors, and the correction,", by_default=True)
+@click.option("--report", type=OutputFile(), metavar="FILE", help="Write the results to FILE as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def refine(
     scan: Path,
@@ -113,21 +113,21 @@ def refine(
 
     \b
     1. Record several periods of the running scan with a displacement sensor in TRACE.CSV.
-       Columns: time_s, displacement_nm, drive_v. A .npz of numpy has an array a column.
-       Or take trace and retrace of a grating or a lattice: --images.
+       Columns: time_s, displacement_nm, drive_v. A .npz file has one array for each column.
+       Or take trace and retrace images of a grating or a lattice: --images.
     2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
     3. Build, upload, and record again. Two or three rounds are usually enough.
     """
     of_traces = [
         name
-        for name, given in (
+        for name, value in (
             ("--triggered", triggered),
             ("--period-s", period_s),
             ("--delay-s", delay_s),
             ("--settle", settle is not None),
             ("--drift", drift is not None),
         )
-        if given
+        if value
     ]
     images.check(trace, of_traces)
     if period_s is not None and not triggered:
@@ -148,7 +148,7 @@ def refine(
         click.echo(refined.to_json())
     else:
         click.echo("\n".join(refined.table()))
-    put_plot(plot, refined.charts, by_default=not (as_json or no_plot))
+    show_plot(plot, refined.charts, by_default=not (as_json or no_plot))
     if not as_json:
         for finding in refined.findings():
             click.echo(finding.line)
@@ -165,7 +165,7 @@ def refine(
 
 
 def _learn(scan: Path, files: str, **how: Any) -> "RefinedScan":
-    """The round; what is wrong ends the command."""
+    """Refine the scan; wrong input ends the command."""
     from tablegen.api.refine import refine as learn
     from tablegen.base.input_errors import Rejected, Unphysical
 

@@ -1,4 +1,4 @@
-"""``tablegen refine --images``: its options."""
+"""Options of ``tablegen refine --images``."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @dataclass(frozen=True)
 class ImageArguments:
-    """What was given of ``--images`` and the options that go with it."""
+    """Values of ``--images`` and the options that belong to it."""
 
     pairs: tuple[tuple[Path, Path], ...]
     retrace_mirrored: bool
@@ -30,17 +30,23 @@ class ImageArguments:
 
     @property
     def names(self) -> str:
-        """The files, as messages call them."""
+        """Names of the files for messages."""
         files = dict.fromkeys(path for pair in self.pairs for path in pair if path != NO_RETRACE)
         return " and ".join(map(str, files))
 
     @property
     def knows_constant(self) -> bool:
-        """Whether the constant of the sample was given."""
+        """True if the constant of the sample was given."""
         return any(self.constant[name] is not None for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
 
     def check(self, trace: Path | None, of_traces: Sequence[str]) -> None:
-        """A trace or images, with their own options. Raises ``click.UsageError``."""
+        """Check that there is a trace or images, with their own options.
+
+        Raises
+        ------
+        click.UsageError
+            If options contradict each other.
+        """
         if (trace is None) == (not self.pairs):
             raise click.UsageError("give TRACE.CSV of a sensor, or --images TRACE RETRACE, one of them")
         if self.pairs and of_traces:
@@ -54,14 +60,14 @@ class ImageArguments:
             "--delay-pixels": self.delay_pixels or None,
             "--mismatch": self.mismatch or None,
         }
-        given = next((name for name, value in of_images.items() if value is not None), None)
-        if trace is not None and given is not None:
-            raise click.UsageError(f"{given} is for --images")
+        option = next((name for name, value in of_images.items() if value is not None), None)
+        if trace is not None and option is not None:
+            raise click.UsageError(f"{option} is for --images")
         if self.mismatch and self.knows_constant:
             raise click.UsageError("--mismatch is for a sample without a period; it has no constant")
 
     def keywords(self) -> dict[str, Any]:
-        """What ``tablegen.refine`` takes of images."""
+        """Return the keywords of ``tablegen.refine`` for the images."""
         if self.knows_constant:
             check_sample(self.constant)
         require_readers({path for pair in self.pairs for path in pair} - {NO_RETRACE})
@@ -84,8 +90,8 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
         type=(click.Path(path_type=Path), click.Path(path_type=Path)),
         metavar="TRACE [RETRACE]",
         multiple=True,
-        help="Images of the running scan, in place of TRACE.CSV: a grating or a lattice, of any constant. RETRACE is "
-        "left out if the first file has both. Repeat the option for frames that follow each other without a pause.",
+        help="Images of the running scan, in place of TRACE.CSV: a grating or a lattice, of any constant. Omit "
+        "RETRACE if the first file has both. Repeat the option for frames that follow each other without a pause.",
     ),
     constant_options,
     mirrored_option,
@@ -96,7 +102,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--mismatch",
         is_flag=True,
-        help="The sample has no period: correct only what trace and retrace differ by.",
+        help="The sample has no period: correct only the difference of trace and retrace.",
     ),
 )
 _CONSTANT = ("lattice_nm", "lattice", "cell", "pitch_nm", "angle_deg")
@@ -104,15 +110,16 @@ _NAMES = ("pairs", "retrace_mirrored", "delay_pixels", "channel", "retrace_chann
 
 
 def image_options(command: F) -> F:
-    """The options of images, given to the command as ``images``."""
+    """Add the options of images, which the command takes as ``images``."""
 
     @wraps(command)
-    def gathered(**given: Any) -> Any:
-        constant = {name: given.pop(name) for name in _CONSTANT}
-        return command(images=ImageArguments(**{name: given.pop(name) for name in _NAMES}, constant=constant), **given)
+    def gathered(**options: Any) -> Any:
+        constant = {name: options.pop(name) for name in _CONSTANT}
+        images = ImageArguments(**{name: options.pop(name) for name in _NAMES}, constant=constant)
+        return command(images=images, **options)
 
     decorated: Any = gathered
     for option in reversed(_OPTIONS):
         decorated = option(decorated)
-    found: F = decorated
-    return found
+    with_options: F = decorated
+    return with_options

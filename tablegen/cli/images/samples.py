@@ -1,4 +1,4 @@
-"""Images of a sample of known constant on the command line: what the sample is, and how images were taken."""
+"""Options of images of a sample of known constant: the sample, and the acquisition of the images."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,12 +13,12 @@ from tablegen.cli.shared.plot import PlottingCommand
 F = TypeVar("F", bound=Callable[..., Any])
 IMAGE_NAMES = ("--image", "--images")
 PAIR_NAME = "--pair"
-NO_RETRACE = Path()  # where RETRACE was left out
+NO_RETRACE = Path()  # an omitted RETRACE
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 
 def image_option(metavar: str, volts: int, text: str, names: tuple[str, ...] = IMAGE_NAMES) -> Callable[[F], F]:
-    """``--image`` with so many numbers before the files."""
+    """Return ``--image`` with a number of voltages before the files."""
     kinds: tuple[Any, ...] = (_POSITIVE, float, _POSITIVE)[:volts]
     files = click.Path(path_type=Path), click.Path(path_type=Path)
     return click.option(
@@ -27,12 +27,12 @@ def image_option(metavar: str, volts: int, text: str, names: tuple[str, ...] = I
 
 
 class CommandOfImages(PlottingCommand):
-    """A command with options of voltages and two files, the second of which may be left out: (name, voltages)."""
+    """A command with options of voltages and two files, the second of which may be omitted: (name, voltages)."""
 
     images = (*((name, 1) for name in IMAGE_NAMES),)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Say that there is no second file where none is named."""
+        """Insert ``NO_RETRACE`` where no second file is named."""
         words: list[str] = []
         for at, word in enumerate(args):
             words.append(word)
@@ -55,7 +55,7 @@ class CommandOfRunningImages(CommandOfImages):
 
 
 class CommandOfOffsetImages(CommandOfImages):
-    """The same with a scan voltage and an offset before the files."""
+    """``--image`` with a scan voltage and an offset before the files."""
 
     images = (*((name, 2) for name in IMAGE_NAMES),)
 
@@ -88,28 +88,28 @@ _CONSTANTS = [
         type=(float, click.FloatRange(min=0.0)),
         metavar="DEG ERROR",
         help="Angle between the fast axis and the normal of a grating's bars, and its standard error, in degrees.  "
-        "[default: that of the rows]",
+        "[default: from the rows]",
     ),
 ]
 
 
 def constant_options(command: F) -> F:
-    """Add what says of the sample alone; ``sample_of`` reads it."""
+    """Add the options of the sample; ``sample_of`` reads them."""
     for option in reversed(_CONSTANTS):
         command = option(command)
     return command
 
 
 def sample_options(command: F) -> F:
-    """Add what says of the sample and of the images; ``sample_of`` and ``acquisition_of`` read it."""
+    """Add the options of the sample and the images; ``sample_of`` and ``acquisition_of`` read them."""
     options = [
         *_CONSTANTS,
         click.option(
             "--aspect",
             type=click.FloatRange(0.02, 50.0),
             metavar="RATIO",
-            help="Height of the frame, of all rows, over the length of the line from turn to turn.  [default: that of "
-            "the file; square pixels if it says none]",
+            help="Height of the frame, of all rows, over the length of the line from turn to turn.  [default: from "
+            "the file, else square pixels]",
         ),
         mirrored_option,
         window_option,
@@ -124,9 +124,15 @@ def sample_options(command: F) -> F:
     return command
 
 
-def check_sample(given: dict[str, Any]) -> None:
-    """End the command where the options of the sample contradict each other, or none is given."""
-    constant, cell, pitch, angle = (given[name] for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
+def check_sample(options: dict[str, Any]) -> None:
+    """Check that the options describe one sample.
+
+    Raises
+    ------
+    click.UsageError
+        If they contradict each other, or none is given.
+    """
+    constant, cell, pitch, angle = (options[name] for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
     if constant is None and cell is None and pitch is None:
         raise click.UsageError("images need the constant of their sample: --lattice-nm NM, --cell, or --pitch-nm NM")
     if constant is not None and cell is not None:
@@ -135,14 +141,20 @@ def check_sample(given: dict[str, Any]) -> None:
         raise click.UsageError("--angle-deg is for a grating, of --pitch-nm; a lattice shows its angle")
 
 
-def refuse_sample(given: dict[str, Any]) -> None:
-    """End the command where options of images are given without images."""
+def refuse_sample(options: dict[str, Any]) -> None:
+    """Check that no option of images is given without images.
+
+    Raises
+    ------
+    click.UsageError
+        If one is given.
+    """
     for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg", "aspect"):
-        if given[name] is not None:
+        if options[name] is not None:
             raise click.UsageError(f"--{name.replace('_', '-')} is for images, of --image")
 
 
 def named_images(rows: Sequence[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
-    """The images of ``--image``, without a RETRACE that was left out; a library that is missing ends the command."""
+    """Return the images of ``--image``, without an omitted RETRACE; a missing library ends the command."""
     require_readers({path for *_, trace, retrace in rows for path in (trace, retrace)} - {NO_RETRACE})
     return [row[:-1] if row[-1] == NO_RETRACE else row for row in rows]

@@ -1,4 +1,4 @@
-"""What several commands share: the way from a path to a certified plan, and how its failures are told."""
+"""Code that several commands share: from a path to a certified plan, with exit statuses and messages."""
 
 import importlib.util
 import os
@@ -38,7 +38,7 @@ class OutputFile(click.Path):
         super().__init__(path_type=Path)
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
-        """The path; a usage error names what stands there."""
+        """Return the path; a usage error names what exists there."""
         path = Path(os.fsdecode(super().convert(value, parameter, context)))
         if other := other_than_file(path):
             self.fail(f"'{path}' is {other}, where a file has to go.", parameter, context)
@@ -52,7 +52,7 @@ class OutputFolder(click.Path):
         super().__init__(path_type=Path, file_okay=False)
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
-        """The path; a usage error names what stands there."""
+        """Return the path; a usage error names what exists there."""
         path = Path(os.fsdecode(super().convert(value, parameter, context)))
         if (other := other_than_file(path)) not in (None, "a directory"):
             self.fail(f"'{path}' is {other}, where a directory has to go.", parameter, context)
@@ -60,14 +60,20 @@ class OutputFolder(click.Path):
 
 
 def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:
-    """A callback of options: NaN is in every range of click's, and infinity in those that are open above."""
+    """Check that a number is finite: click's ranges contain NaN, and infinity if they are open above.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is not.
+    """
     if value is not None and not isfinite(value):
         raise click.BadParameter(f"{value} is not a finite number.")
     return value
 
 
 def require(*modules: str, extra: str, otherwise: str = "") -> None:
-    """End the command where modules of an extra are not installed; ``otherwise`` says what does without them."""
+    """End the command if modules of an extra are not installed; ``otherwise`` names an alternative."""
     missing = [module for module in modules if not _installed(module)]
     if missing:
         needs = " and ".join(missing)
@@ -77,7 +83,7 @@ def require(*modules: str, extra: str, otherwise: str = "") -> None:
 def _installed(module: str) -> bool:
     try:
         return importlib.util.find_spec(module) is not None
-    except ValueError:  # it was imported in an unusual way, or kept from being
+    except ValueError:  # a module that was imported in an unusual way, or is blocked
         return False
 
 
@@ -94,7 +100,13 @@ class Failure(click.ClickException):
 
 
 def fail(lines: "Sequence[object]", status: ExitStatus) -> NoReturn:
-    """End the command."""
+    """End the command with a message and a status.
+
+    Raises
+    ------
+    Failure
+        Always.
+    """
     raise Failure(lines, status)
 
 
@@ -106,10 +118,7 @@ strict_option = click.option(
 
 
 def quiet_blas() -> None:
-    """Before numpy is imported: no linear algebra library is used, and its threads would only spin.
-
-    They are a good part of what importing numpy costs.
-    """
+    """Limit BLAS to one thread, before numpy is imported: starting further threads is a good part of that import."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
@@ -140,7 +149,7 @@ def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = F
 
 
 def rendered(built: "Build") -> "dict[str, bytes]":
-    """The files of a build; a scan that one of its formats cannot hold ends the command."""
+    """Return the files of a build; a scan that one of its formats cannot hold ends the command."""
     from tablegen.base.input_errors import Rejected
 
     try:
@@ -156,7 +165,7 @@ def written(
 ) -> list[str]:
     """Write files and return the names of those that changed; a failure or an interruption ends the command.
 
-    Files that are ``outdated`` are removed; a function is asked for them when no other build writes.
+    Files that are ``outdated`` are removed; a function for them is called while no other build writes.
 
     An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
     """

@@ -1,4 +1,4 @@
-"""What ``build --check`` prints: how a directory differs from what would be written."""
+"""Compare a directory with the files that a build would write, for ``build --check``."""
 
 from collections.abc import Mapping
 from difflib import unified_diff
@@ -11,7 +11,7 @@ _WIDTH = 120
 
 
 def differences(folder: Path, files: Mapping[str, bytes]) -> list[str]:
-    """A unified diff of every file that is missing or stale; empty where the directory is up to date."""
+    """Return a unified diff of every file that is missing or stale; empty if the directory is up to date."""
     out: list[str] = []
     for name, content in files.items():
         path = folder / name

@@ -1,10 +1,10 @@
-"""Exit statuses, one for each thing that a script may want to tell apart."""
+"""Exit statuses of the commands, by which a script distinguishes outcomes."""
 
 from enum import IntEnum
 
 
 class ExitStatus(IntEnum):
-    """What the process ends with."""
+    """Exit status of the process."""
 
     OK = 0
     STALE = 1

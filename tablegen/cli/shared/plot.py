@@ -1,4 +1,4 @@
-"""The option ``--plot``: a picture into a file, or in characters into the terminal; the same of every command."""
+"""The option ``--plot`` of all commands: a picture in a file, or in characters in the terminal."""
 
 import os
 import sys
@@ -18,14 +18,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 TERMINAL = "-"  # in place of a file
 _ENDINGS = (".png", ".svg", ".pdf")
 _WITHOUT_LIBRARY = ".svg"
-_NARROW = 80  # characters, where nobody says how wide the terminal is
+_NARROW = 80  # characters, if the width of the terminal is unknown
 
 
 class _Picture(OutputFile):
-    """A file whose name ends as pictures do, or the terminal."""
+    """A file name with the ending of a picture, or the terminal."""
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
-        """The path; a usage error says what would do."""
+        """Return the path; a usage error names the endings."""
         if value == TERMINAL:
             return Path(TERMINAL)
         path = super().convert(value, parameter, context)
@@ -35,10 +35,10 @@ class _Picture(OutputFile):
 
 
 class PlottingCommand(click.Command):
-    """A command with ``--plot [FILE]``; a file after it that is there and is no picture is an argument."""
+    """A command with ``--plot [FILE]``; an existing file after it that is no picture is an argument."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Say that the terminal is meant where no file of a picture follows."""
+        """Insert the terminal as the target where no name of a picture follows."""
         words = []
         for at, word in enumerate(args):
             other = Path(args[at + 1] if at + 1 < len(args) else "")
@@ -48,7 +48,7 @@ class PlottingCommand(click.Command):
 
 
 def plot_option(what: str, by_default: bool = False) -> Callable[[F], F]:
-    """Add ``--plot [FILE]`` to a ``PlottingCommand``; where a terminal gets it without asking, ``--no-plot`` too."""
+    """Add ``--plot [FILE]`` to a ``PlottingCommand``; if the terminal has it by default, also ``--no-plot``."""
     default = "" if not by_default else "  [default: in the terminal]"
     option = click.option(
         "--plot",
@@ -65,7 +65,13 @@ def plot_option(what: str, by_default: bool = False) -> Callable[[F], F]:
 
 
 def check_plot(plot: Path | None, as_json: bool = False) -> None:
-    """End the command where it could not be drawn."""
+    """Check before the work that the plot can be drawn; a missing library ends the command.
+
+    Raises
+    ------
+    click.UsageError
+        If text and plot would both go to the terminal with --json.
+    """
     if plot is None:
         return
     if plot == Path(TERMINAL):
@@ -76,35 +82,35 @@ def check_plot(plot: Path | None, as_json: bool = False) -> None:
 
 
 def in_terminal(plot: Path | None) -> bool:
-    """Whether no file is written."""
+    """Return True if no file is written."""
     return plot is None or plot == Path(TERMINAL)
 
 
-def put_plot(plot: Path | None, charts: "Callable[[], PlottedCharts]", by_default: bool = False) -> None:
-    """Draw into the file, or into the terminal where that was asked for or is done ``by_default``."""
+def show_plot(plot: Path | None, charts: "Callable[[], PlottedCharts]", by_default: bool = False) -> None:
+    """Draw into the file, or into the terminal if the option has no file or ``by_default``."""
     if plot is None and not by_default:
         return
-    found = charts()
+    plotted = charts()
     if plot is not None and not in_terminal(plot):
         from tablegen.charts.picture_file import picture
 
-        written(plot.parent, {plot.name: picture(found.charts, plot.suffix[1:], found.heading, found.columns)})
+        written(plot.parent, {plot.name: picture(plotted.charts, plot.suffix[1:], plotted.heading, plotted.columns)})
         return
     from tablegen.charts.text import text_plot
 
     unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
     width = _width()
-    for chart in found.shown:
+    for chart in plotted.shown:
         for line in text_plot(chart, width, unicode):
             paint(line)
         click.echo()
 
 
 def _width() -> int:
-    """Characters of a line: what COLUMNS says, or the terminal; without either it is narrow."""
-    said = os.environ.get("COLUMNS", "")
-    if said.isdecimal() and int(said) > 0:
-        return int(said)
+    """Return the characters of a line: COLUMNS, or those of the terminal; without either the terminal is narrow."""
+    columns = os.environ.get("COLUMNS", "")
+    if columns.isdecimal() and int(columns) > 0:
+        return int(columns)
     try:
         return os.get_terminal_size(sys.stdout.fileno()).columns or _NARROW
     except (AttributeError, OSError, ValueError):  # no terminal

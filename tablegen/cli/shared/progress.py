@@ -1,4 +1,4 @@
-"""What is being done, on a terminal, while it takes longer than a moment."""
+"""A line on a terminal with the current step of a command that takes more than a second."""
 
 import sys
 import threading
@@ -13,18 +13,18 @@ _WIDTH = 60
 
 
 class Progress:
-    """A line on stderr that says what is being done and for how long; nothing where stderr is no terminal.
+    """A line on stderr with the current step and its time; nothing if stderr is no terminal.
 
-    Most builds end before it appears. It runs beside the work, which need not know of it.
+    Most builds end before it appears. It runs in a thread of its own.
     """
 
     def __init__(self) -> None:
         self._what: str | Callable[[], str] = ""
-        self._done = threading.Event()
+        self._stop = threading.Event()
         self._thread = threading.Thread(target=self._tell, daemon=True) if sys.stderr.isatty() else None
 
     def now(self, what: str | Callable[[], str]) -> None:
-        """Name what is being done from here on; a function is asked whenever the line is shown."""
+        """Set the text of the current step; a function is called for it whenever the line is drawn."""
         self._what = what
 
     def __enter__(self) -> "Progress":
@@ -35,17 +35,17 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._done.set()
+        self._stop.set()
         if self._thread is not None:
             self._thread.join()
 
     def _tell(self) -> None:
         start = time.monotonic()
-        shown = False
-        while not self._done.wait(_SHOW_AFTER_S):
+        visible = False
+        while not self._stop.wait(_SHOW_AFTER_S):
             what = self._what if isinstance(self._what, str) else self._what()
             text = f"{what} ({time.monotonic() - start:.0f} s)"
             redraw(f"{text:<{_WIDTH}}")
-            shown = True
-        if shown:
+            visible = True
+        if visible:
             erase(_WIDTH)

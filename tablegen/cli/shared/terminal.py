@@ -1,4 +1,4 @@
-"""What reaches the terminal: every character that could steer it is shown, and none is obeyed.
+"""Output to the terminal: control characters are shown as text, so that none takes effect.
 
 Titles of images, versions of manifests, names of files, texts of devices and messages of libraries come from others. So
 nothing of this package writes to stdout or stderr but through the streams of ``guard_streams``; only this module puts
@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from io import TextIOWrapper
 from typing import IO, Any
 
-# All controls but tab and line end; marks that reorder or hide text; separators that some take for ends of lines.
+# All control characters but tab and line end; marks that reorder or hide text; separators that some take for line ends.
 _STEERING = {
     code: f"\\u{code:04x}"
     for first, last in (
@@ -21,7 +21,7 @@ _STEERING = {
     for code in range(first, last + 1)
 }
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
-_STYLES = {  # colours of the table of 256 that are seen on black and on white, and by all eyes
+_STYLES = {  # colours of the table of 256 that are readable on black and on white, and for the colour-blind
     "title": _BOLD,
     "faint": "\x1b[38;5;245m",
     "before": "\x1b[38;5;245m",
@@ -33,64 +33,64 @@ _STYLES = {  # colours of the table of 256 that are seen on black and on white, 
 
 
 def visible(text: str) -> str:
-    r"""The text with ``\u001b`` in place of an escape, and so on; as JSON writes it, so that JSON stays JSON."""
+    r"""Return the text with ``\u001b`` in place of an escape, and so on; as JSON writes it, so that JSON stays JSON."""
     return text.translate(_STEERING)
 
 
 class GuardedStream:
-    """A stream of text through ``visible``; all else is that of the stream itself."""
+    """A text stream that writes through ``visible``; its other attributes are those of the stream."""
 
     def __init__(self, stream: IO[str]) -> None:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        """Write what can be shown."""
+        """Write the text with its control characters visible."""
         self.stream.write(visible(text))
         return len(text)
 
     def writelines(self, lines: list[str]) -> None:
-        """Write what can be shown of several texts."""
+        """Write several texts with their control characters visible."""
         for line in lines:
             self.write(line)
 
     @property
     def encoding(self) -> str:
-        """That of the stream. Beside one of ASCII click would write past this; the stream escapes what it has not."""
-        found = getattr(self.stream, "encoding", None) or "utf-8"
-        return "iso8859-1" if found.lower() in ("ascii", "us-ascii", "ansi_x3.4-1968", "646") else found
+        """Encoding of the stream; not ASCII, for which click would bypass this class."""
+        name = getattr(self.stream, "encoding", None) or "utf-8"
+        return "iso8859-1" if name.lower() in ("ascii", "us-ascii", "ansi_x3.4-1968", "646") else name
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
 
 
 def guard_streams() -> None:
-    """Put the guard before stdout and stderr, once."""
+    """Replace stdout and stderr by guarded streams, once."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None or isinstance(stream, GuardedStream):
             continue
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # what the terminal cannot show is no reason to fail
+            stream.reconfigure(errors="backslashreplace")  # a character that the terminal does not have must not fail
         setattr(sys, name, GuardedStream(stream))
 
 
 def tell(text: str, bold: bool = False) -> None:
-    """A line on stdout, in bold on a terminal if wanted."""
+    """Print a line on stdout, in bold on a terminal with ``bold``."""
     stream = _behind(sys.stdout)
     if stream is None:
         return
-    shown = visible(text)
-    stream.write(f"{_BOLD}{shown}{_PLAIN}\n" if bold and stream.isatty() else f"{shown}\n")
+    printable = visible(text)
+    stream.write(f"{_BOLD}{printable}{_PLAIN}\n" if bold and stream.isatty() else f"{printable}\n")
 
 
 def paint(spans: Iterable[tuple[str, str]]) -> None:
-    """A line on stdout of texts with their styles; in colours on a terminal, unless NO_COLOR is set."""
+    """Print a line on stdout of texts with their styles; in colours on a terminal, unless NO_COLOR is set."""
     stream = _behind(sys.stdout)
     if stream is None:
         return
     coloured = stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    shown = ((visible(text), _STYLES.get(style, "") if coloured else "") for text, style in spans)
-    stream.write("".join(f"{style}{text}{_PLAIN}" if style else text for text, style in shown) + "\n")
+    styled = ((visible(text), _STYLES.get(style, "") if coloured else "") for text, style in spans)
+    stream.write("".join(f"{style}{text}{_PLAIN}" if style else text for text, style in styled) + "\n")
 
 
 def redraw(text: str) -> None:

@@ -1,4 +1,4 @@
-"""What no command expects, at the top of the command line: a message, a status of its own, and how to see more."""
+"""Report an unexpected error: a message, its own exit status, and how to see the traceback."""
 
 import errno
 import os
@@ -22,11 +22,11 @@ _SHOW = f"set {VARIABLE}=1 and run the command again to see the traceback"
 
 def report(error: BaseException) -> ExitStatus:
     """Print what happened and what to do, and return the exit status; the traceback too if ``VARIABLE`` is set."""
-    wanted = os.environ.get(VARIABLE, "") not in ("", "0")
-    if wanted:
+    with_traceback = os.environ.get(VARIABLE, "") not in ("", "0")
+    if with_traceback:
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     lines, status = _explained(error)
-    if not wanted:
+    if not with_traceback:
         lines[-1] += f"; {_SHOW}"
     click.echo("\n".join(lines), err=True)
     return status

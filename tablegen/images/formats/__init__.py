@@ -1,1 +1,1 @@
-"""What reads the images of one format each: bytes to channels, without trust in what the bytes say."""
+"""Readers of image files, one format a module: bytes to channels, without trust in what the bytes say."""

@@ -1,4 +1,4 @@
-"""One image of a file, what the file says of it, and which of several is meant."""
+"""A channel of an image file: its title, shape and units, and the choice of one channel among several."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -18,17 +18,17 @@ FirstRow = Literal["top", "bottom"]
 MAX_PIXELS = 1 << 25  # 5792 x 5792; more than that in floating point would be most of a computer's memory
 _MAX_LISTED = 12  # channels in a message
 _MAX_TITLE = 60  # characters of a channel in a message
-_MAX_SPLIT = 1000  # characters of a title that is looked into
+_MAX_SPLIT = 1000  # characters of a title that is searched for a direction
 _DIRECTION = re.compile(r"(.+?)[\s_\-\[(]*(retrace|trace|forward|backward)\s*[\])]*", re.IGNORECASE | re.DOTALL)
 _MEANT: dict[str, Direction] = {"trace": "trace", "forward": "trace", "retrace": "retrace", "backward": "retrace"}
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One image of a file: what it is called, its shape by the file, and what reads it, once that is known to fit.
+    """One image of a file: its title, its shape by the file, and its reader, which is there once the bytes fit.
 
-    ``load`` gives rows x columns of a frame, counted from 0: row 0 is the first in time where the file says so, and
-    the left end of the line is at the left in both directions. It raises ``ValueError`` with what is wrong.
+    ``load`` returns rows x columns of a frame, counted from 0: row 0 is the first in time where the file states it, and
+    the left end of the line is at the left in both directions. It raises ``ValueError`` with the reason.
     """
 
     number: int
@@ -46,14 +46,24 @@ class Channel:
     angle_deg: float | None = None  # of the fast axis against the scanner's x; None where the file does not say
 
 
-def loaded(number: int, title: str, matrix: Matrix) -> Channel:
-    """Return a channel that is read already, of a file that states nothing else about it."""
+def channel_of_array(number: int, title: str, matrix: Matrix) -> Channel:
+    """Return a channel whose values are in memory, of a file that states nothing else about it.
+
+    Parameters
+    ----------
+    number
+        Number of the channel in the file.
+    title
+        Its title, which may contain the direction.
+    matrix
+        Values, of the shape that the file has.
+    """
     signal, direction = split_direction(title)
     return Channel(number, title, matrix.shape, lambda _: matrix, signal, direction)
 
 
 def split_direction(title: str) -> tuple[str, Direction | None]:
-    """``HeightRetrace``, ``Height (Retrace)`` or ``Height backward`` as ``Height`` and its direction."""
+    """Split ``HeightRetrace``, ``Height (Retrace)`` or ``Height backward`` into ``Height`` and its direction."""
     if len(title) > _MAX_SPLIT or title.strip().lower() in _MEANT:  # "Retrace" is no trace of "Re"
         return title, None
     match = _DIRECTION.fullmatch(title)
@@ -70,7 +80,7 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
     """
     if not channels:
         raise ValueError("contains no image")
-    there = listed(channels)
+    there = channel_list(channels)
     if name is None:
         matches = list(channels)
         if len({one.signal for one in channels}) == 1:
@@ -84,7 +94,7 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
         or [one for one in channels if str(one.number) == name]
     )
     if len(matches) != 1:
-        raise ValueError(f"has {'no' if not matches else 'more than one'} channel {quoted(name)}; there is {there}")
+        raise ValueError(f"has {'no' if not matches else 'more than one'} channel {quote(name)}; there is {there}")
     return matches[0]
 
 
@@ -95,13 +105,13 @@ def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
 
 
 def _of_direction(channels: Sequence[Channel], direction: Direction | None) -> list[Channel]:
-    """Those of the direction, where the file tells directions; all where it does not."""
+    """Return the channels of the direction where the file states directions; all where it does not."""
     matches = [one for one in channels if one.direction == direction]
     return matches if direction is not None and matches else list(channels)
 
 
-def listed(channels: Sequence[Channel]) -> str:
-    """Numbers and titles for a message."""
+def channel_list(channels: Sequence[Channel]) -> str:
+    """Return numbers and titles of channels for a message."""
     there = ", ".join(
         f"{one.number} ({shortened(one.title, _MAX_TITLE)})" if one.title else f"{one.number}"
         for one in channels[:_MAX_LISTED]
@@ -109,7 +119,7 @@ def listed(channels: Sequence[Channel]) -> str:
     return there + (", ..." if len(channels) > _MAX_LISTED else "")
 
 
-def quoted(title: str) -> str:
+def quote(title: str) -> str:
     """Quote a title for a message."""
     return f"'{shortened(title, _MAX_TITLE)}'"
 
@@ -129,17 +139,22 @@ def number(value: object, unit: float = 1.0) -> float | None:
     return finite if isfinite(finite) else None
 
 
-def lines_done(values: Matrix) -> int:
-    """Count the complete lines of a stopped scan, (channels, lines, columns), whose missing lines are NaN.
+def complete_lines(values: Matrix) -> int:
+    """Count the complete lines of a stopped scan, whose missing lines are NaN.
 
     All lines count unless the missing ones are the last: NaN elsewhere is a defect of the image.
+
+    Parameters
+    ----------
+    values
+        Values of all channels, shape (channels, lines, columns).
     """
     lines = values.shape[1]
     finite = np.isfinite(values)
     whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
     some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
-    done = whole.index(False) if False in whole else lines
-    return done if done and not any(some[done + 1 :]) else lines
+    complete = whole.index(False) if False in whole else lines
+    return complete if complete and not any(some[complete + 1 :]) else lines
 
 
 def first_line(error: BaseException) -> str:

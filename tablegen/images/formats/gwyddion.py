@@ -1,6 +1,6 @@
-"""Data fields of a Gwyddion file (.gwy): named components, each of a type, in objects that say how long they are.
+"""Data fields of a Gwyddion file (.gwy): named components, each of a type, in objects that state their length.
 
-Nothing is read beyond the end of the object that holds it, so that a damaged file is told by its damage.
+Nothing is read beyond the end of the object that holds it, so that the message names the damage.
 """
 
 import struct
@@ -10,7 +10,7 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, loaded, number, positive
+from tablegen.images.formats.channel import Channel, channel_of_array, number, positive
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
@@ -47,7 +47,7 @@ def gwy_channels(content: bytes, _: str) -> list[Channel]:
     channels = []
     for field in data_fields(content):
         width, height = (None if side is None else side * 1e9 for side in (field.width_m, field.height_m))
-        channel = loaded(field.number, field.title, field.values)
+        channel = channel_of_array(field.number, field.title, field.values)
         channels.append(replace(channel, unit=field.unit, width_nm=width, height_nm=height, angle_deg=field.angle_deg))
     return channels
 
@@ -123,7 +123,7 @@ def _unit(content: bytes, at: int, end: int) -> str:
 
 
 def _object(content: bytes, at: int, end: int) -> tuple[str, tuple[int, int], int]:
-    """Name of the object that begins there, where its components are, where it ends."""
+    """Return the name of the object that begins at ``at``, the bounds of its components, and its end."""
     name, at = _string(content, at, end)
     size = _count(content, at, end)
     if at + 4 + size > end:
@@ -132,7 +132,7 @@ def _object(content: bytes, at: int, end: int) -> tuple[str, tuple[int, int], in
 
 
 def _components(content: bytes, at: int, end: int) -> Iterator[tuple[str, bytes, int, int]]:
-    """Name, type, first and last place of each component."""
+    """Yield name, type, first and last place of each component."""
     for _ in range(_MAX_COMPONENTS):
         if at >= end:
             return

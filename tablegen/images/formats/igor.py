@@ -17,7 +17,7 @@ from tablegen.images.formats.channel import (
     Channel,
     FirstRow,
     Matrix,
-    lines_done,
+    complete_lines,
     number,
     positive,
     split_direction,
@@ -71,28 +71,30 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
     down = note.get("ScanDown")
     first: FirstRow = "top" if down == "1" else "bottom"
     shape = rows, columns
-    done = rows
+    complete = rows
     if kind in ("f4", "f8"):
         starts = range(_HEADERS, texts, size)
-        done = lines_done(np.stack([_load(content, f"{order}{kind}", at, shape, first, rows, 0) for at in starts]))
+        complete = complete_lines(
+            np.stack([_load(content, f"{order}{kind}", at, shape, first, rows, 0) for at in starts])
+        )
     width, height = positive(note.get("FastScanSize"), 1e9), positive(note.get("SlowScanSize"), 1e9)
     step_m = struct.unpack_from(f"{order}d", content, _STEP_AT + 8)[0]
     planned = _planned_lines(note, rows, height, step_m * 1e9)
     channels = []
     for at, label in enumerate(labels):
         signal, direction = split_direction(label)
-        load = partial(_load, content, f"{order}{kind}", _HEADERS + size * at, shape, first, done)
+        load = partial(_load, content, f"{order}{kind}", _HEADERS + size * at, shape, first, complete)
         channels.append(
             Channel(
                 at,
                 label,
-                (done, columns),
+                (complete, columns),
                 load,
                 signal,
                 direction,
                 next((by_name for names, by_name in _UNITS if re.fullmatch(names, signal)), unit),
                 width,
-                None if height is None else height * done / planned,
+                None if height is None else height * complete / planned,
                 positive(note.get("ScanRate"), 1.0),
                 first,
                 angle_deg=number(note.get("ScanAngle")),
@@ -101,13 +103,13 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
     return channels
 
 
-def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], first: FirstRow, done: int, _: int) -> Matrix:
+def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], first: FirstRow, lines: int, _: int) -> Matrix:
     values = np.frombuffer(content, kind, prod(shape), start).reshape(shape)
-    return (values[::-1] if first == "top" else values)[:done]
+    return (values[::-1] if first == "top" else values)[:lines]
 
 
 def _planned_lines(note: dict[str, str], rows: int, height_nm: float | None, step_nm: float) -> float:
-    """Lines of the whole scan: by the note, else by the wave's scaling, which has N - 1 steps; at least ``rows``."""
+    """Return the lines of the whole scan: by the note, else by the wave's scaling of N - 1 steps; at least ``rows``."""
     lines = positive(note.get("ScanLines"))
     if lines is None and height_nm is not None and 0.0 < step_nm < height_nm:
         lines = height_nm / step_nm + 1.0

@@ -34,8 +34,8 @@ def jpk_channels(content: bytes, _: str) -> list[Channel]:
     pages, tags = tiff_pages(content), tiff_tags(content)
     channels: list[Channel] = []
     for at, (page, own) in enumerate(zip(pages, tags, strict=False)):
-        named = own.get(_NAME) or own.get(_SHOWN_AS)
-        if len(page.shape) == 2 and named and not _is_preview(at, page, own, tags[0]):
+        title = own.get(_NAME) or own.get(_SHOWN_AS)
+        if len(page.shape) == 2 and title and not _is_preview(at, page, own, tags[0]):
             channels.append(_channel(len(channels), page, own, tags[0]))
     return channels
 
@@ -84,11 +84,11 @@ def _scale(own: TiffTags) -> tuple[float, float, str]:
         if default is None or own.get(_SLOT_NAME + at) != default:
             continue
         unit = own.get(_UNIT + at)
-        named = unit if isinstance(unit, str) else ""
+        unit_name = unit if isinstance(unit, str) else ""
         factor, offset = own.get(_FACTOR + at), own.get(_OFFSET + at)
         scaling = own.get(_SCALING + at)
         if scaling == "NullScaling":
-            return 1.0, 0.0, named
+            return 1.0, 0.0, unit_name
         if scaling == "LinearScaling" and isinstance(factor, float) and isinstance(offset, float):
-            return (factor or 1.0, offset, named) if isfinite(factor) and isfinite(offset) else (1.0, 0.0, "LSB")
+            return (factor or 1.0, offset, unit_name) if isfinite(factor) and isfinite(offset) else (1.0, 0.0, "LSB")
     return 1.0, 0.0, "LSB"

@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.base.data_files import file_text, lines_of
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.images.formats.channel import MAX_PIXELS, Channel, loaded
+from tablegen.images.formats.channel import MAX_PIXELS, Channel, channel_of_array
 from tablegen.images.npy import npy_array
 from tablegen.numerics.arrays import Floats
 
@@ -25,8 +25,8 @@ def npy_channels(content: bytes, _: str) -> list[Channel]:
         raise ValueError("is an .npz archive; save one array with numpy.save")
     array = npy_array(content)[0]
     if array.ndim == 3:
-        return [loaded(number, "", image) for number, image in enumerate(array)]
-    return [loaded(0, "", array)]
+        return [channel_of_array(number, "", image) for number, image in enumerate(array)]
+    return [channel_of_array(0, "", array)]
 
 
 def text_channels(content: bytes, name: str) -> list[Channel]:
@@ -67,7 +67,7 @@ def text_channels(content: bytes, name: str) -> list[Channel]:
             raise ValueError("has more than 2^25 numbers, which is the most that are read")
     if not values:
         raise ValueError("has no numbers")
-    return [loaded(0, "", np.array(values))]
+    return [channel_of_array(0, "", np.array(values))]
 
 
 def _separator(row: str) -> str | None:

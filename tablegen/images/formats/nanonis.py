@@ -14,10 +14,10 @@ from tablegen.images.formats.channel import (
     Direction,
     FirstRow,
     Matrix,
-    lines_done,
+    complete_lines,
     number,
     positive,
-    quoted,
+    quote,
 )
 
 _MAGIC = b":NANONIS_VERSION:"
@@ -52,7 +52,7 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
     tags = _tags(content[:end].decode("latin-1"))
     kind = {"FLOAT MSBFIRST": ">f4", "FLOAT LSBFIRST": "<f4"}.get(" ".join(_words(tags, "SCANIT_TYPE")))
     if kind is None:
-        raise ValueError(f"has numbers of the kind {quoted(' '.join(_words(tags, 'SCANIT_TYPE')))}; FLOAT is read")
+        raise ValueError(f"has numbers of the kind {quote(' '.join(_words(tags, 'SCANIT_TYPE')))}; FLOAT is read")
     columns, rows = _whole(tags)
     if _words(tags, "NANONIS_VERSION") == ["1"] and columns != rows:
         raise ValueError("is of version 1, which does not tell columns from rows; save it with a newer version")
@@ -63,7 +63,9 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
     if start + size * len(blocks) > len(content):
         least = f"{len(blocks)} images of {columns} x {rows} pixels"
         raise ValueError(f"ends in the middle of its images ({least} by its header); copy it again")
-    done = lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
+    complete = complete_lines(
+        np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns)
+    )
     width, height = _lengths(tags, "SCAN_RANGE", 1e9)
     times = _lengths(tags, "SCAN_TIME", 1.0)
     angle = number(next(iter(_words(tags, "SCAN_ANGLE")), None))
@@ -71,13 +73,13 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
         Channel(
             at,
             f"{signal} {_NAMES[direction]}",
-            (done, columns),
-            partial(_load, content, kind, start + size * at, (done, columns), direction),
+            (complete, columns),
+            partial(_load, content, kind, start + size * at, (complete, columns), direction),
             signal,
             direction,
             unit,
             width,
-            None if height is None else height * done / rows,
+            None if height is None else height * complete / rows,
             None if None in times else 1.0 / sum(filter(None, times)),
             _FIRST_ROW.get(" ".join(_words(tags, "SCAN_DIR"))),
             angle_deg=angle,
@@ -111,7 +113,7 @@ def _words(tags: dict[str, list[str]], name: str) -> list[str]:
 def _whole(tags: dict[str, list[str]]) -> tuple[int, int]:
     words = _words(tags, "SCAN_PIXELS")
     if len(words) != 2 or not all(word.isdecimal() and len(word) < 7 for word in words):
-        raise ValueError(f"has no two numbers as SCAN_PIXELS, but {quoted(' '.join(words))}")
+        raise ValueError(f"has no two numbers as SCAN_PIXELS, but {quote(' '.join(words))}")
     columns, rows = map(int, words)
     if not columns * rows:
         raise ValueError(f"has an image of {columns} x {rows} pixels; is it damaged?")
@@ -119,13 +121,13 @@ def _whole(tags: dict[str, list[str]]) -> tuple[int, int]:
 
 
 def _lengths(tags: dict[str, list[str]], name: str, unit: float) -> tuple[float | None, float | None]:
-    """Two positive numbers in units, each None where it is none."""
+    """Return two positive numbers in units, each None where it is none."""
     first, second = [*_words(tags, name), "", ""][:2]
     return positive(first, unit), positive(second, unit)
 
 
 def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:
-    """Signal, unit and direction of each block, in the order of the file."""
+    """Return signal, unit and direction of each block, in the order of the file."""
     head, *rows = [line.strip().split("\t") for line in tags.get("DATA_INFO", [])] or [[]]
     try:
         name, unit, direction = (head.index(key) for key in ("Name", "Unit", "Direction"))

@@ -51,7 +51,7 @@ def spm_channels(content: bytes, _: str) -> list[Channel]:
 
 
 def _lists(header: str) -> list[tuple[str, _List]]:
-    """Each list with its keys, in lower case, since versions differ in that."""
+    """Return each list with its keys, in lower case, since versions differ in that."""
     lists: list[tuple[str, _List]] = []
     for line in header.splitlines():
         text = line.strip().removeprefix("\\")
@@ -73,26 +73,26 @@ def _channel(content: bytes, at: int, image: _List, others: _List, scan: _List) 
         where = f"{columns} x {rows} pixels in {size} bytes from byte {start} of {len(content)}"
         raise ValueError(f"has an image {at} of {where}; copy it again")
     key = next((key for key in image if re.fullmatch(r"@\d+:image data", key)), "")
-    named = _NAMED.match(image.get(key, ""))
-    signal = (named["name"] or named["internal"] or "" if named else "").strip()
+    name_match = _NAMED.match(image.get(key, ""))
+    signal = (name_match["name"] or name_match["internal"] or "" if name_match else "").strip()
     direction = _DIRECTIONS.get(image.get("line direction", "").lower())
     factor, unit = _scale(image.get(f"{key.partition(':')[0]}:z scale", ""), others, stored)
     down = image.get("frame direction", "").lower()
     first: FirstRow = "top" if down == "down" else "bottom"
     valid = _valid_rows(image, rows)
-    done = len(range(*valid.indices(rows)))
+    complete = len(range(*valid.indices(rows)))
     planned = max(rows, round(positive(scan.get("lines")) or 0.0))
     width, height = _size(image, columns, planned)
     return Channel(
         at,
         f"{signal} {direction}" if direction else signal,
-        (done, columns),
+        (complete, columns),
         partial(_load, content, f"<i{stored}", start, (rows, columns), valid, first, factor),
         signal,
         direction,
         unit,
         width,
-        None if height is None else height * done / planned,
+        None if height is None else height * complete / planned,
         positive(scan.get("scan rate", "").partition(" ")[0]),
         first,
         angle_deg=number((image.get("rotate ang.") or scan.get("rotate ang.") or "").partition(" ")[0]),
@@ -123,7 +123,7 @@ def _whole(at: int, image: _List, key: str) -> int:
 
 
 def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | None]:
-    """Width and height in nm of a whole scan; no height unless the aspect ratio gives square pixels: readers differ."""
+    """Return width and height in nm of a whole scan; no height unless pixels are square, since readers differ then."""
     words = image.get("scan size", "").split()
     nm = _NM.get(words[-1]) if words else None
     width = positive(words[0]) if nm else None

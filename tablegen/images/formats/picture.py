@@ -1,4 +1,4 @@
-"""Pictures: .png in grey."""
+"""Pictures in grey (.png)."""
 
 import warnings
 from io import BytesIO
@@ -31,6 +31,18 @@ def png_channels(content: bytes, _: str) -> list[Channel]:
         raise ValueError(f"has pixels of the kind {picture.mode}; export it in grey, 16 bits, or as numbers")
 
     def load(_: int) -> Matrix:
+        """Read the pixels of the picture.
+
+        Returns
+        -------
+        Matrix
+            Grey levels, shape (rows, columns).
+
+        Raises
+        ------
+        ValueError
+            If the file is damaged, or in colour.
+        """
         try:
             picture.load()
             if picture.mode in ("1", "L") or picture.mode.startswith("I"):

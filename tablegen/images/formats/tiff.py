@@ -1,4 +1,4 @@
-"""Pages of a TIFF file, each read when it is wanted, and no file that would take more time or memory than its pages.
+"""Pages of a TIFF file, each read on demand; a file that would take more time or memory than its pages is refused.
 
 tifffile reads them, if the extra ``images`` is installed. What it believes of a file is checked before: a directory
 that points back at itself has no end, and a few packed bytes can unpack into any number.
@@ -30,7 +30,7 @@ _DEFLATE, _LZMA = (8, 32946), (34925,)  # values of the tag Compression
 
 @dataclass(frozen=True, eq=False)
 class TiffImage:
-    """The shape of a page, and what reads it; that raises ``ValueError``."""
+    """The shape of a page, and its reader, which raises ``ValueError``."""
 
     shape: tuple[int, ...]
     load: Callable[[], Matrix]
@@ -65,7 +65,7 @@ def tiff_pages(content: bytes) -> list[TiffImage]:
     """
     import tifffile
 
-    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it logs is said by what it raises
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # it logs what it also raises
     try:
         for _ in _directories(content):
             pass
@@ -78,6 +78,18 @@ def tiff_pages(content: bytes) -> list[TiffImage]:
 
 def _loader(page: Any, content: bytes) -> Callable[[], Matrix]:
     def load() -> Matrix:
+        """Read the pixels of the page.
+
+        Returns
+        -------
+        Matrix
+            Values of the page, of its shape.
+
+        Raises
+        ------
+        ValueError
+            If the page is damaged, or unpacks into more than it has.
+        """
         try:
             _require_bounded(page, content)
             return np.asarray(page.asarray())
@@ -121,7 +133,7 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
 
 
 def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:
-    """Byte order, whether the file is a big one, place and number of the tags of each page.
+    """Yield byte order, True for a BigTIFF, place and number of the tags of each page.
 
     Raises ``ValueError`` unless the chain ends, inside the file and after a sensible number.
     """
@@ -129,20 +141,20 @@ def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:
     version = struct.unpack_from(f"{order}H", content, 2)[0] if order and len(content) >= 4 else 0
     if order is None or version not in (42, 43):
         raise ValueError("does not begin as a TIFF file does")
-    # Where the first directory is named; how a count of tags, a tag, and a place are stored.
+    # Place of the pointer to the first directory; layouts of a count of tags, a tag, and a place.
     at, count, tag_bytes, place = (4, "H", 12, "I") if version == 42 else (8, "Q", 20, "Q")
     count, place = order + count, order + place
-    seen: set[int] = set()
+    visited: set[int] = set()
     total = 0
     while True:
         directory = _number(content, at, place)
         if directory == 0:
             return
-        if directory in seen:
+        if directory in visited:
             raise ValueError(f"its directory at byte {directory} comes again after itself")
-        if len(seen) == _MAX_PAGES:
+        if len(visited) == _MAX_PAGES:
             raise ValueError(f"more than {_MAX_PAGES} pages")
-        seen.add(directory)
+        visited.add(directory)
         first, tags = directory + struct.calcsize(count), _number(content, directory, count)
         total += tags
         if total > _MAX_TAGS:
