@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import msgspec
 from msgspec.structs import replace
 
 from tablegen.compensation import models
+from tablegen.compensation.identification import SettledAxis
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
@@ -50,13 +51,6 @@ class Run:
     asked: tuple[str, ...]
     x: AxisRun
     y: AxisRun
-
-
-class SettledAxis(Protocol):
-    """An axis on which a period is played."""
-
-    def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Displacement in nm in the middle of each tick of a period of volts, (ticks,), that are held tick by tick."""
 
 
 def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
