@@ -19,7 +19,7 @@ from tablegen.base.warnings import Finding, of_remarks, worst_first
 from tablegen.calibration.laws.image_sizes import SampleImage
 from tablegen.calibration.operator.advice import NextTrace, next_trace
 from tablegen.calibration.operator.delay import fit_delay
-from tablegen.calibration.operator.file_of_fit import operator_file
+from tablegen.calibration.operator.file_of_fit import MODEL, operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.loop_errors import LineErrors
@@ -30,7 +30,6 @@ from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces
 from tablegen.charts.picture_file import PlottedCharts
-from tablegen.compensation.models.operator import OperatorModel
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage
@@ -212,7 +211,7 @@ class CalibratedOperator(Result):
         ]
         error, further = self.delay.standard_error, self.next_trace
         return {
-            "kind": OperatorModel.model(),
+            "kind": MODEL,
             "axis": self.axis,
             "family": self.fit.family,
             "candidates_percent": dict(self.fit.candidates),
@@ -305,7 +304,7 @@ class CalibratedOperator(Result):
         text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, self.driver)
         own = with_own_hysteresis(text, name) if self.axis == "x" else text
         summary = f"operator of {len(self.fit.operator.lines)} traces, family {self.family}"
-        values = {"model": OperatorModel.model(), "file": beside.name}
+        values = {"model": MODEL, "file": beside.name}
         change = Change("hysteresis", values, provenance=[[summary, *origin]])
         return {
             beside.name: operator_file(self.fit, self.axis, self.driver, origin),

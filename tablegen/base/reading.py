@@ -13,9 +13,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
-from tablegen.base.user_cache import is_private
-
 _CHUNK_BYTES = 1 << 20
+_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _OPENING = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
 
 
@@ -113,6 +112,11 @@ def holds(path: Path, content: bytes) -> bool:
 def size_shown(count: int) -> str:
     """Return a limit as documents and messages show it."""
     return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
+
+
+def is_private(status: os.stat_result) -> bool:
+    """Return True if a file or directory is the user's own, and nobody else can write it."""
+    return not hasattr(os, "geteuid") or (status.st_uid == os.geteuid() and not status.st_mode & _BY_OTHERS)
 
 
 def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -> Iterator[bytes]:

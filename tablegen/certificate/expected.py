@@ -28,7 +28,7 @@ def expected_of(line: LinePlan) -> Expectation | None:
     if line.layer is not None:
         return None
     both = line.band_limit.directions == "both"
-    known = line.drive.shape.expectation
+    known = line.drive.shape.identification.expectation
     if known is not None:
         return known if both else known.forward_only
     rounding = _rounding(line) if both else None
@@ -67,7 +67,7 @@ def rounding_mismatch(line: LinePlan) -> float | None:
 
 def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
     drive = line.drive
-    if drive.shape.waveform is not None or not drive.hysteresis.compensates:
+    if drive.shape.whole is not None or not drive.hysteresis.compensates:
         return None
     w = on_grid(line.target, _GRID * line.target.harmonics)
     target = Expansion(line.target)

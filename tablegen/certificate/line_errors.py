@@ -257,7 +257,7 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
     times = shape.times(side, position)
 
     def at_times(series: FourierSeries) -> list[Floats]:
-        if shape.waveform is not None:  # its branches are a series too, and equal ones have to leave nothing
+        if shape.whole is not None:  # its branches are a series too, and equal ones have to leave nothing
             return list(values(times, (series, 0), (series, 1)))
         return played.expansion(series).at(times, 0, 1)
 

@@ -25,8 +25,10 @@ def with_optimum(line: LinePlan, certificate: Certificate) -> Certificate:
     The optimum is None where the waveform is the operator's own, which leaves no error to trade for acceleration. It
     needs scipy.
     """
-    straight = straightness(line.drive.shape.learnt_line, line.band_limit, line.layer)
-    percent = line.drive.shape.beside_learnt_percent or line.kept_percent or straight.error_percent(line.target)
+    shape, whole = line.drive.shape, line.drive.shape.whole
+    straight = straightness(shape if whole is None else whole.straight, line.band_limit, line.layer)
+    beside_percent = None if whole is None or whole.trade is None else whole.trade.beside_percent
+    percent = beside_percent or line.kept_percent or straight.error_percent(line.target)
     least = least_acceleration(straight, line.target.harmonics, percent) if percent > 1e-9 else None
     return replace(certificate, peak_acceleration=line.target.peak_acceleration(), optimum=least)
 

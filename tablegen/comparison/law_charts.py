@@ -9,6 +9,7 @@ from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.charts.chart import POSITION, Chart, Mark
 from tablegen.comparison.operators import SIDES
 from tablegen.comparison.overlay import overlay
+from tablegen.compensation import models
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import LineRequest, LineShape
@@ -101,13 +102,11 @@ def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
 
 
 def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape | None:
-    """Return the line of a model with branches; an operator's table has them too, for its laws."""
-    from tablegen.compensation.models.harmonic import HarmonicModel
-    from tablegen.compensation.models.operator import OperatorModel
-
+    """Return the line of a model that works with branches; an operator's table has them too, for its laws."""
     table = getattr(scanner, axis).hysteresis
-    if isinstance(table, OperatorModel):
-        table = HarmonicModel.like(table)
+    if table.identified:
+        laws = models.laws_beside(table)
+        table = None if laws is None else laws.like(table)
     problems = Problems()
     request = LineRequest(
         axis=axis,

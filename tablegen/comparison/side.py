@@ -12,7 +12,6 @@ from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import scan_quantities
-from tablegen.compensation.models.operator import OperatorModel
 from tablegen.config.load import load_scanner
 from tablegen.config.scanner import Scanner
 from tablegen.html_report.planned_scan import planned_scan
@@ -120,6 +119,6 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
     operators = {}
     for axis in ("x", "y"):
         table = getattr(scanner, axis).hysteresis
-        for name in table.files() if isinstance(table, OperatorModel) else ():
-            operators[axis] = ComparedOperator.read(path.parent / name)
+        if table is not None and table.operator_file is not None:
+            operators[axis] = ComparedOperator.read(path.parent / table.operator_file)
     return ComparedSide(path, kind, scanner_quantities(file, scanner), (), None, scanner, operators)

@@ -14,8 +14,7 @@ from msgspec import Struct
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import Response
-from tablegen.compensation.expectation import Expectation
-from tablegen.compensation.transient import Transient
+from tablegen.compensation.identification import NO_IDENTIFICATION, Identification
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.error_allowance import AllowedError
@@ -84,12 +83,14 @@ class LineShape(Struct, frozen=True):
     """The periodic normalised waveform of one line: forward for 0 < t <= turn, backward after, (14) and (17).
 
     ``applied`` is the residual in the manifest and in ``tablegen show``; without it, it is computed from the sweeps.
+    ``identification`` is what the model knows of the piezo besides.
     """
 
     turn: float
     forward: Sweep
     backward: Sweep
     applied: tuple[AppliedBranch, AppliedBranch] | None = None
+    identification: Identification = NO_IDENTIFICATION
 
     @property
     def peaks(self) -> tuple[AppliedBranch, AppliedBranch]:
@@ -97,33 +98,8 @@ class LineShape(Struct, frozen=True):
         return self.applied or (AppliedBranch.of(self.forward), AppliedBranch.of(self.backward))
 
     @property
-    def waveform(self) -> FourierSeries | None:
-        """The band-limited waveform, where the model itself makes it; None leaves it to ``band_limit`` of the scan."""
-        return None
-
-    @property
-    def kept_percent(self) -> float | None:
-        """The scaling error that ``waveform`` was made for, where that was ``LineRequest.allowed``."""
-        return None
-
-    @property
-    def learnt_line(self) -> "LineShape":
-        """The line that the piezo follows straight, where ``waveform`` has an allowed error against it."""
-        return self
-
-    @property
-    def beside_learnt_percent(self) -> float | None:
-        """The scaling error of ``waveform`` against ``learnt_line``."""
-        return None
-
-    @property
-    def transients(self) -> tuple[Transient, Transient] | None:
-        """The transients after a change of offset and after one of size, where the model knows them."""
-        return None
-
-    @property
-    def expectation(self) -> Expectation | None:
-        """The expected errors of the line on the scanner, where the model knows more than its branches."""
+    def whole(self) -> "WholeLine | None":
+        """The line, where the model itself makes the waveform; None leaves that to ``band_limit`` of the scan."""
         return None
 
     def value(self, t: FloatsLike) -> Floats:
@@ -204,10 +180,25 @@ class SweptSeries(Sweep):
         return self.turn * tau if self.forward else self.turn + (1.0 - self.turn) * tau
 
 
+class AccelerationTrade(Struct, frozen=True, eq=False):
+    """The scaling error of a ``WholeLine`` that was allowed for the sake of less acceleration, in percent.
+
+    ``learnt`` is the waveform that the piezo follows straight, and ``beside_percent`` the scaling error against it.
+    """
+
+    percent: float
+    learnt: FourierSeries | None = None
+    beside_percent: float | None = None
+
+
 class WholeLine(LineShape, frozen=True, kw_only=True):
-    """A line whose waveform the model itself makes, in the harmonics that are played."""
+    """A line whose waveform the model itself makes, in the harmonics that are played.
+
+    ``trade`` is there where the model kept ``LineRequest.allowed``.
+    """
 
     series: FourierSeries
+    trade: AccelerationTrade | None = None
 
     @classmethod
     def of(cls, series: FourierSeries, turn: float, **more: Any) -> "Self":
@@ -215,9 +206,15 @@ class WholeLine(LineShape, frozen=True, kw_only=True):
         return cls(turn, SweptSeries(series, turn, True), SweptSeries(series, turn, False), series=series, **more)
 
     @property
-    def waveform(self) -> FourierSeries | None:
-        """The waveform of the model."""
-        return self.series
+    def whole(self) -> "WholeLine":
+        """The line itself."""
+        return self
+
+    @property
+    def straight(self) -> "WholeLine":
+        """The line that the piezo follows straight, before acceleration was traded for error."""
+        learnt = None if self.trade is None else self.trade.learnt
+        return self if learnt is None else WholeLine.of(learnt, self.turn)
 
     def value(self, t: FloatsLike) -> Floats:
         """Return w(t) with t in periods, of the shape of ``t``."""

@@ -46,6 +46,8 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
     """True if the model corrects anything."""
     counts_turns: ClassVar[bool] = False
     """True if its line depends on the real turns of the waveform, not on those of a triangle."""
+    identified: ClassVar[bool] = False
+    """True if it was identified on traces: ``LineShape.identification`` of its lines has a piezo to simulate."""
 
     @classmethod
     def model(cls) -> str:
@@ -65,6 +67,11 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
     def files(self) -> tuple[str, ...]:
         """Return the files that the table names, relative to the scanner file: builds depend on them."""
         return ()
+
+    @property
+    def operator_file(self) -> str | None:
+        """The operator file among ``files``, for `tablegen compare`."""
+        return None
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
         """Return the line of one axis; None where it cannot be served, with the reason in ``problems``."""

@@ -10,7 +10,6 @@ import msgspec
 from tablegen.base.input_errors import Document, shortened
 from tablegen.base.reading import CONFIGURATION, read_text
 from tablegen.base.warnings import Tone
-from tablegen.compensation.models.operator import OperatorLine
 from tablegen.config.load import Setup
 from tablegen.html_report.blocks import Grid, Paragraph, Section, TableCell, row
 from tablegen.html_report.subject import PlannedScan
@@ -77,9 +76,9 @@ def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
 
 
 def _traces(line: LinePlan) -> list[Grid]:
-    if not isinstance(line.drive.shape, OperatorLine):
+    traces, driver = line.drive.shape.identification.traces, line.drive.driver
+    if not traces:
         return []
-    driver = line.drive.driver
     rows = tuple(
         row(
             Path(one.name).name,
@@ -89,7 +88,7 @@ def _traces(line: LinePlan) -> list[Grid]:
             *(f"{value:.2g}" for value in one.left_out[:3]),
             f"{one.left_out[3]:+.2g}",
         )
-        for one in line.drive.shape.operator.lines
+        for one in traces
     )
     head = ("trace", "stroke [V]", "centre [V]", "rate [Hz]", "rms [%]", "scaling [%]", "mismatch [%]", "size [%]")
     return [Grid(f"{line.axis}: error of the operator on each trace when that is left out", head, rows)]

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tablegen.calibration.operator.advice import NextTrace, expected_rms
+from tablegen.calibration.operator.advice import NextTrace, beyond_reach, expected_rms
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.loop_errors import WINDOW
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark, Raster, Role
 from tablegen.charts.picture_file import PlottedCharts
-from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
 from tablegen.numerics.driver import Driver
 
 _GRID = 121  # points of the map, each way
@@ -57,8 +56,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
     points = np.array([(stroke, centre) for stroke in strokes for centre in centres])
     rms = expected_rms(fit, points).reshape(_GRID, _GRID)
     trace_centres = np.array([line.centre for line in lines])
-    largest = max(line.stroke for line in lines) + STROKE_REACH
-    refused = (np.min(np.abs(centres[:, None] - trace_centres), axis=1) > CENTRE_REACH) | (strokes[:, None] > largest)
+    refused = beyond_reach(lines, strokes, centres)
     beyond = 0.5 * strokes[:, None] > np.minimum(centres, 1.0 - centres)
     visible = np.where(refused | beyond, np.nan, rms)
     high = float(np.nanmax(visible)) if np.isfinite(visible).any() else 1.0

@@ -14,14 +14,14 @@ from msgspec.structs import replace
 
 from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation import models
+from tablegen.compensation.identification import SettledAxis
 from tablegen.compensation.line import LineShape
-from tablegen.compensation.models.operator import OperatorLine
 from tablegen.config.load import Setup
 from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.virtual.own_scanner import OwnAxis
-from tablegen.virtual.simulation import AxisRun, SettledAxis, run_on_each, with_model
+from tablegen.virtual.own_run import own_piezo
+from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 MOST_TICKS = 1 << 13  # of a period that are played
 
@@ -131,12 +131,10 @@ def _models(planned: PlannedScan) -> list[str]:
     """Return the models to compare with: without correction, and beside an operator the laws."""
     names = [models.UNCOMPENSATED]
     for line in planned.plan.lines:
-        if isinstance(line.drive.shape, OperatorLine):
-            table = line.drive.hysteresis
-            served = [kind for kind in models.own() if kind.like(table) is not None and kind.order < table.order]
-            best = max(served, key=lambda kind: kind.order, default=None)
-            if best is not None and best.model() not in names and getattr(table, "branches", None):
-                names.append(best.model())
+        if own_piezo(line) is not None:
+            laws = models.laws_beside(line.drive.hysteresis)
+            if laws is not None and laws.model() not in names:
+                names.append(laws.model())
     return names
 
 
@@ -149,8 +147,9 @@ def _planned(setup: Setup, model: str) -> tuple[LinePlan, LinePlan] | str:
 
 
 def _played(line: LinePlan, plain: LinePlan, others: dict[str, tuple[LinePlan, LinePlan] | str]) -> PlayedAxis:
-    own = isinstance(plain.drive.shape, OperatorLine)
-    axis: SettledAxis = OwnAxis.of(plain) if own else LawAxis(plain)
+    piezo = own_piezo(plain)
+    own = piezo is not None
+    axis: SettledAxis = LawAxis(plain) if piezo is None else piezo
     corrections, rejected = [], []
     for model, lines in others.items():
         if isinstance(lines, str):

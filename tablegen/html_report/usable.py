@@ -5,7 +5,6 @@ from fractions import Fraction
 import numpy as np
 
 from tablegen.charts.chart import Chart, DrawnCurve, Mark
-from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.html_report.blocks import Charts, Paragraph, Section
@@ -35,8 +34,8 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
     drive = line.drive
     offsets, largest, cause = largest_sizes(planned, line)
     curves = [DrawnCurve("largest line", "other", offsets, largest, "area")]
-    if isinstance(drive.shape, OperatorLine):
-        traces = drive.shape.operator.lines
+    traces = drive.shape.identification.traces
+    if traces:
         v = np.array([trace.stroke for trace in traces])
         curves.append(
             DrawnCurve(

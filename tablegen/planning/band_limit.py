@@ -27,8 +27,9 @@ def band_limited(
     Unphysical
         If the fit cannot stay inside [0, 1].
     """
-    if shape.waveform is not None:
-        return shape.waveform if layer is None else shape.waveform.plus(layer)
+    if shape.whole is not None:
+        waveform = shape.whole.series
+        return waveform if layer is None else waveform.plus(layer)
     if limit.method == "window":
         target = shape if layer is None else RefinedShape(shape, layer)
         return fit_window(target, harmonics, limit.window, limit.directions == "both")
@@ -54,7 +55,7 @@ def minimum_acceleration_line(
     Unreachable
         If a firm error cannot be kept.
     """
-    if shape.waveform is None:
+    if shape.whole is None:
         from tablegen.planning.enough_harmonics import straightness  # here: most lines are fitted to their window
         from tablegen.waveform.minimum_acceleration import minimum_acceleration_series
 
@@ -65,4 +66,5 @@ def minimum_acceleration_line(
         except Unphysical:
             if allowed.firm:
                 raise
-    return band_limited(shape, limit, harmonics, layer), shape.kept_percent
+    trade = None if shape.whole is None else shape.whole.trade
+    return band_limited(shape, limit, harmonics, layer), None if trade is None else trade.percent

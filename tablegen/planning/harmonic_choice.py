@@ -47,7 +47,7 @@ class HarmonicChoice:
 
     def for_drive(self, drive: Drive, straight: int) -> int:
         """Return the highest harmonic for the shape of a drive, where ``straight`` is enough for a straight line."""
-        if drive.allowed is not None and drive.shape.waveform is None and chosen_by_build(self._limit):
+        if drive.allowed is not None and drive.shape.whole is None and chosen_by_build(self._limit):
             from tablegen.planning.enough_harmonics import straightness
 
             with self._problems.at(self._file, self.key):

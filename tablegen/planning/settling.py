@@ -36,7 +36,7 @@ class Settling(Struct, frozen=True):
 
 def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
     """Return the settling by the operator of an axis; None without one."""
-    transients = drive.shape.transients
+    transients = drive.shape.identification.transients
     if transients is None:
         return None
     line_s = 1.0 / float(schedule.line_rate)

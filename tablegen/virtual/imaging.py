@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.compensation.identification import SettledAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.played import played
-from tablegen.virtual.simulation import SettledAxis
 
 _TICKS = 16384  # ticks per line
 _STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip

@@ -2,20 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import msgspec
 import numpy as np
 
 from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation import models
+from tablegen.compensation.identification import MeasuredLine, SettledAxis
 from tablegen.compensation.model import Hysteresis
-from tablegen.compensation.models.operator import OperatorModel
-from tablegen.compensation.operator.operator import MeasuredLine
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.virtual.own_scanner import OwnAxis, operator_line
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 SEEDS = 20
@@ -64,7 +61,8 @@ class OwnRun:
 
 def own_axes(setup: Setup) -> tuple[str, ...]:
     """Return the axes of which the scanner file has an operator."""
-    return tuple(name for name in ("x", "y") if isinstance(_table(setup, name), OperatorModel))
+    tables = {name: _table(setup, name) for name in ("x", "y")}
+    return tuple(name for name, table in tables.items() if table is not None and table.identified)
 
 
 def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda _: None) -> list[OwnRun]:
@@ -92,12 +90,15 @@ def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda
 
 def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], object]) -> OwnRun:
     table = _table(setup, name)
-    assert isinstance(table, OperatorModel)
-    line_of_model = operator_line(line)
-    operator, centre = line_of_model.operator, line.drive.driver.share(line.drive.v_offset)
-    plants = [OwnAxis.departing(line, (seed, k)) for k in range(SEEDS)]
+    assert table is not None
+    traces, centre = line.drive.shape.identification.traces, line.drive.driver.share(line.drive.v_offset)
+    plants = [piezo for k in range(SEEDS) if (piezo := own_piezo(line, (seed, k))) is not None]
+    if not traces or not plants:
+        raise Unphysical(f"{name}: the {table.model()} model gives neither traces nor a piezo to play a scan on")
     rows = []
-    for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):
+    laws = models.laws_beside(table)
+    by_laws = "" if laws is None else laws.model()
+    for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", by_laws), (table.model(),) * 2):
         tell(f"playing {name}, {correction}, on its own operator")
         if not model:
             why = "the scanner file has no branches for this axis, which the laws need"
@@ -110,11 +111,17 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
             continue
         runs = _on_each(played, plants)
         rows.append(OwnRow(correction, model, tuple(map(image_errors, runs)), example=runs[0]))
-    nearest = min(abs(one.centre - centre) for one in operator.lines)
-    return OwnRun(name, line.drive.size_nm, operator.lines, nearest, False, tuple(rows))
+    nearest = min(abs(one.centre - centre) for one in traces)
+    return OwnRun(name, line.drive.size_nm, traces, nearest, False, tuple(rows))
 
 
-def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, ...], ...]:
+def own_piezo(line: LinePlan, seed: tuple[int, ...] | None = None) -> SettledAxis | None:
+    """Return the piezo by which a line was made, or none; with a ``seed``, one that departs from it."""
+    drive = line.drive
+    return drive.shape.identification.piezo(drive.driver, drive.response, line.series.harmonics, seed)
+
+
+def errors_on(line: LinePlan, plants: Sequence[SettledAxis]) -> tuple[tuple[float, ...], ...]:
     """Return the errors of a line that is played on several scanners: a row each, of ``MEASURES``.
 
     Raises
@@ -125,7 +132,7 @@ def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, .
     return tuple(map(image_errors, _on_each(line, plants)))
 
 
-def _on_each(line: LinePlan, plants: Sequence[OwnAxis]) -> list[AxisRun]:
+def _on_each(line: LinePlan, plants: Sequence[SettledAxis]) -> list[AxisRun]:
     try:
         return run_on_each(line, plants, _MOST_TICKS)
     except Unphysical as reason:
@@ -146,12 +153,3 @@ def image_errors(run: AxisRun) -> tuple[float, float, float, float]:
 def _table(setup: Setup, name: str) -> Hysteresis | None:
     axis: ScannerAxis = getattr(setup.scanner, name)
     return axis.hysteresis
-
-
-def _laws(table: OperatorModel) -> str:
-    """Return the most detailed other model for the branches of the table; empty without branches."""
-    served = [kind for kind in models.own() if kind.model() != models.UNCOMPENSATED and kind.order < table.order]
-    richest: Any = max(
-        (kind for kind in served if kind.like(table) is not None), key=lambda kind: kind.order, default=None
-    )
-    return "" if richest is None or not table.branches else str(richest.model())

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import msgspec
 from msgspec.structs import replace
 
 from tablegen.compensation import models
+from tablegen.compensation.identification import SettledAxis
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
@@ -50,25 +51,6 @@ class Run:
     configured: tuple[str, ...]
     x: AxisRun
     y: AxisRun
-
-
-class SettledAxis(Protocol):
-    """An axis on which a settled period can be played."""
-
-    def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Return the displacement in the middle of each tick of a settled period.
-
-        Parameters
-        ----------
-        volts
-            One period in V, held tick by tick, shape (ticks,).
-        tick_s
-            Length of a tick in s.
-
-        Returns
-        -------
-        Displacement in nm, shape (ticks,).
-        """
 
 
 def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:

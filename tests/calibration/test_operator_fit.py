@@ -9,10 +9,12 @@ from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, JilesAtherton, ManyP
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.loop_errors import compare
-from tablegen.calibration.operator.nonnegative import nonnegative
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
+from tablegen.calibration.operator.plays_fit import PlaysProblem
+from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.plays import envelopes
 from tablegen.numerics.arrays import Floats
 
@@ -54,13 +56,19 @@ def identified(kind: type, protocol: tuple[tuple[float, float], ...]) -> tuple[F
     return plant, fit_operator(lines, Response(plant), factor_of(plant))
 
 
-def test_weights_are_those_of_scipy() -> None:
-    from scipy.optimize import nnls
-
-    random = np.random.default_rng(5)
-    matrix, right = random.normal(size=(80, 30)), random.normal(size=80)
-    expected, _ = nnls(matrix, right)
-    assert nonnegative(matrix.T @ matrix, matrix.T @ right) == pytest.approx(expected, abs=1e-9)
+@pytest.mark.parametrize("problem_of", [PlaysProblem, BoucWenProblem])
+def test_weights_are_the_best_that_are_not_negative(problem_of: type[PlaysProblem] | type[BoucWenProblem]) -> None:
+    """By the conditions of Karush, Kuhn and Tucker: a better weight would have to be negative."""
+    plant = ForeignPlant(ManyPlays())
+    lines = [line(plant, 0.5, stroke, seed) for seed, stroke in enumerate((0.2, 0.5, 0.9))]
+    problem = problem_of(lines, 0.5, lambda loss: LogarithmicCreep(loss, 1e-4, 10.0, 100.0))
+    for start in problem.starts:
+        best = problem.best_weights(start)
+        columns = problem._moved(tuple(start[:-1].tolist()))
+        slopes = np.vstack([*columns, problem.penalty]).T @ best.residual
+        assert np.min(best.weights) == 0.0 < np.max(best.weights)
+        assert np.min(slopes) > -1e-10
+        assert np.max(np.abs(slopes[best.weights > 0.0])) < 1e-10
 
 
 def test_the_family_and_the_creep_are_found() -> None:

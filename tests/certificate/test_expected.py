@@ -22,7 +22,7 @@ from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import certificate_lines, summary
 from tablegen.compensation.expectation import Figure
-from tablegen.compensation.models.operator import OperatorLine
+from tablegen.compensation.models.operator import OperatorIdentification
 from tablegen.compensation.operator.file import operator_text
 from tablegen.config.load import Setup, load
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch
@@ -108,9 +108,10 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
     assert expected.size is not None
     assert expected.size.value == pytest.approx(100.0 * (slope / line.drive.size_nm - 1.0), abs=0.03)
     assert expected.mismatch.uncertainty == 0.2 + steps.mismatch
-    assert isinstance(line.drive.shape, OperatorLine)
-    assert expected.size.uncertainty == pytest.approx(np.hypot(0.1, 100.0 * line.drive.shape.between), rel=1e-12)
-    assert abs(line.drive.shape.between) < 5e-4
+    known = line.drive.shape.identification
+    assert isinstance(known, OperatorIdentification)
+    assert expected.size.uncertainty == pytest.approx(np.hypot(0.1, 100.0 * known.between), rel=1e-12)
+    assert abs(known.between) < 5e-4
     assert (max(scaling.values()) > 10.0) == (harmonics == 6)  # it is the waveform that makes the difference
 
 

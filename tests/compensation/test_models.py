@@ -108,7 +108,7 @@ def test_a_foreign_model_makes_a_line_that_is_straight_on_it(pair: Path) -> None
         assert np.max(np.abs(place - wanted)[inside]) < 2e-4
         assert np.max(np.abs(w - wanted)[inside]) > 0.9 * PLAY  # the drive itself is not straight there
     assert isinstance(plan.x.drive.shape, WholeLine)
-    assert plan.x.drive.shape.waveform == plan.x.target
+    assert plan.x.drive.shape.series == plan.x.target
 
 
 def test_it_is_built_shown_verified_and_simulated(pair: Path) -> None:

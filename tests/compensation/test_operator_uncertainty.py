@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from replacing import replace
 
 from tablegen.compensation.expectation import LEVEL_PERCENT
-from tablegen.compensation.operator.operator import MeasuredLine
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
 from tablegen.numerics.arrays import Floats
 

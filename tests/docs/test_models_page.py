@@ -7,6 +7,7 @@ from building import HELPERS, REPOSITORY
 
 from tablegen.cli.calibrate.group import calibrate
 from tablegen.compensation import models
+from tablegen.compensation.identification import Identification
 from tablegen.compensation.model import Hysteresis
 
 PAGE = (REPOSITORY / "docs" / "models.md").read_text("utf-8")
@@ -32,9 +33,12 @@ def test_what_measures_them_is_a_command() -> None:
 def test_the_parts_of_a_model_are_documented() -> None:
     for row in re.findall(r"^\| (`[a-z_]+`(?:, `[a-z_]+`)*) \| [^|]* \|$", PAGE, re.MULTILINE):
         for part in re.findall(r"`([a-z_]+)`", row):
-            assert hasattr(Hysteresis, part) or part in {"tag", *models.names()}, part
+            known = hasattr(Hysteresis, part) or hasattr(Identification, part)
+            assert known or part in {"tag", *models.names()}, part
     for part in ("contradictions", "faults", "files", "like", "line", "described", "order", "purpose", "calibration"):
         assert f"`{part}`" in PAGE
+    for part in (*Identification.__struct_fields__, "piezo", "identified", "operator_file"):
+        assert f"| `{part}` |" in PAGE
 
 
 def test_the_entry_point_in_the_page_is_the_group() -> None:

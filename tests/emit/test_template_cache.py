@@ -9,9 +9,11 @@ import pytest
 from editing import EXAMPLES
 
 import tablegen
+from tablegen.base import user_cache
 from tablegen.base.resources import resource_folder
+from tablegen.base.user_cache import private_folder
 from tablegen.emit import template_cache, templates
-from tablegen.emit.template_cache import TemplateCache
+from tablegen.emit.template_cache import TEMPLATES, TemplateCache
 
 EXAMPLE = EXAMPLES / "annexin_200nm.toml"
 SHOUT = compile("def root(context, *_):\n    yield 'not ours'\nblocks = {}\ndebug_info = ''\nname = 'c'", "x", "exec")
@@ -105,10 +107,9 @@ def test_what_others_can_write_is_not_run(
 ) -> None:
     """Even with a right digest: it has no secret in it."""
     first = built()
-    ours = TemplateCache(templates._SETTINGS)
     loaded = []
     monkeypatch.setattr(template_cache.Bucket, "bytecode_from_string", lambda *_: loaded.append(1))
-    assert ours.folder == cache
+    assert private_folder(TEMPLATES.folder) == cache
     given(cache)
     count = len(compiled)
     compiled.clear()
@@ -129,6 +130,8 @@ def test_it_would_be_run_where_nobody_else_can_write(cache: Path, compiled: list
         cached.get_source_checksum(source),
     )
     bucket.code = SHOUT
+    for path in cache.iterdir():
+        path.unlink()
     cached.dump_bytecode(bucket)
     second = built()
     assert {key for key in first if first[key] != second[key]} >= {"annexin_200nm.c"}
@@ -160,7 +163,7 @@ def test_a_cache_that_cannot_be_made_costs_nothing(cache: Path, compiled: list[s
 
 
 def test_it_does_not_grow_without_end(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(template_cache, "_MOST_FILES", 4)
+    monkeypatch.setattr(TEMPLATES, "most", 4)
     cache.mkdir(parents=True, mode=0o700)
     for age in range(10):
         path = cache / f"{age:040d}"
@@ -176,7 +179,7 @@ def test_a_full_disk_leaves_no_half_of_a_file(cache: Path, monkeypatch: pytest.M
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(template_cache.os, "replace", full)
+    monkeypatch.setattr(user_cache.os, "replace", full)
     first = tablegen.build(EXAMPLE)
     templates._environment.cache_clear()
     assert "annexin_200nm.c" in first.files

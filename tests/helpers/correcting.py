@@ -15,6 +15,7 @@ from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.compensation.dynamics import SecondOrder
+from tablegen.compensation.identification import SettledAxis
 from tablegen.correction.distortion import Distortion
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import sensor_trace
@@ -22,7 +23,6 @@ from tablegen.virtual.imaging import Conditions, FrameImages, Surface, hexagonal
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.sensor import Sensor
-from tablegen.virtual.simulation import SettledAxis
 
 _SAMPLES = 2000  # of a period, on which foreign piezos are integrated
 BUILT_IN = ("default", "duhem")

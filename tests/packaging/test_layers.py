@@ -123,6 +123,60 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == [["a", "b", "c", "a"]]
 
 
+# What may name a model's own classes: the models and their fits. Others ask ``Hysteresis`` and ``LineShape``.
+OPERATORS_HOMES = ("compensation.", "calibration.operator.")
+OPERATOR_MODEL = "compensation.models.operator"
+OPERATOR_CLASSES = {"OperatorIdentification", "OperatorModel", "OperatorPiezo"}
+
+
+def naming_the_operator(sources: dict[str, str], known: dict[str, Path]) -> list[str]:
+    """Modules outside of its homes that import the operator's model, or that have the name of one of its classes."""
+    outside = {name: source for name, source in sources.items() if not name.startswith(OPERATORS_HOMES)}
+    offences = []
+    for name, source in outside.items():
+        if any(other == OPERATOR_MODEL for other, _ in imported(source, known)):
+            offences.append(f"{name} imports {OPERATOR_MODEL}")
+        used = {node.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)}
+        offences += [f"{name} names {one}" for one in sorted(OPERATOR_CLASSES & used)]
+    return offences
+
+
+def test_only_its_homes_name_the_operators_model() -> None:
+    known = modules()
+    sources = {name: path.read_text("utf-8") for name, path in known.items()}
+    assert naming_the_operator(sources, known) == []
+    defined = {
+        node.name
+        for name, source in sources.items()
+        if name.startswith("compensation.")
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ClassDef)
+    }
+    assert defined >= OPERATOR_CLASSES
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "offence"),
+    [
+        (
+            "html_report.usable",
+            "def late(shape):\n    from tablegen.compensation.models.operator import MODEL\n",
+            f"html_report.usable imports {OPERATOR_MODEL}",
+        ),
+        (
+            "comparison.side",
+            "from tablegen.compensation.models import operator",
+            f"comparison.side imports {OPERATOR_MODEL}",
+        ),
+        ("calibration.summary", f"import tablegen.{OPERATOR_MODEL}", f"calibration.summary imports {OPERATOR_MODEL}"),
+        ("virtual.own_run", "isinstance(table, OperatorModel)", "virtual.own_run names OperatorModel"),
+    ],
+)
+def test_a_module_elsewhere_that_names_the_operators_model_is_found(name: str, source: str, offence: str) -> None:
+    assert naming_the_operator({name: source}, modules()) == [offence]
+    assert naming_the_operator({"calibration.operator.advice": source}, modules()) == []
+
+
 def loaded_by(code: str) -> set[str]:
     """The modules that are loaded once a new interpreter has run this."""
     script = f"import sys\n{code}\nprint(*sys.modules)"

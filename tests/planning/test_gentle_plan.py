@@ -166,7 +166,7 @@ def test_an_operator_s_line_keeps_its_error_with_less_acceleration(tmp_path: Pat
 
     learnt, plan = planned().x, planned(f"{E} = {percent}")
     gentle = plan.x
-    expected = gentle.drive.shape.expectation
+    expected = gentle.drive.shape.identification.expectation
     assert expected is not None
     assert expected.mismatch is not None
     assert gentle.kept_percent == percent

@@ -1,12 +1,12 @@
 """Files that were compiled and kept in the user's cache: what is taken again, what is not, and what is not kept."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
-from tablegen.base import file_cache as kept_files
-from tablegen.base.file_cache import CachedFiles
+from tablegen.base.user_cache import CachedFiles
 
 MODELS = CachedFiles("models", 20)
 KEY, OTHER = "1" * 64, "2" * 64
@@ -110,6 +110,6 @@ def test_a_full_disk_leaves_no_half_of_a_model(model: Path, cache: Path, monkeyp
         target.write_bytes(source.read_bytes()[:3])
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(kept_files.shutil, "copy", full)
+    monkeypatch.setattr(shutil, "copy", full)
     MODELS.keep(KEY, model)
     assert list(cache.iterdir()) == []

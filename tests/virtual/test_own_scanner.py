@@ -11,12 +11,12 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.virtual.modes import second_order
-from tablegen.virtual.own_run import errors_on, image_errors, simulate_own
-from tablegen.virtual.own_scanner import OwnAxis, departing
+from tablegen.virtual.own_run import errors_on, image_errors, own_piezo, simulate_own
 from tablegen.virtual.simulation import run_line
 
 
@@ -41,7 +41,7 @@ def stepped(u: Floats) -> Floats:
 
 def test_it_moves_as_plays_that_are_stepped(line: LinePlan) -> None:
     volts = 50.0 + 20.0 * np.sin(2.0 * np.pi * np.arange(1000) / 1000)
-    axis = replace(OwnAxis.of(line, read(line)), response=None, factor=1.0)
+    axis = replace(piezo(line), response=None, factor=1.0)
     axis = replace(axis, operator=replace(axis.operator, creep=replace(axis.operator.creep, loss_per_decade=0.0)))
     moved, expected = axis.settled(volts, 1e-5), stepped(volts / 100.0)
     assert np.max(np.abs(np.ptp(moved) / np.ptp(expected) - 1.0)) < 1e-6
@@ -55,18 +55,25 @@ def test_it_moves_as_plays_that_are_stepped(line: LinePlan) -> None:
     assert np.max(np.abs(late - moved)) > 2e-2 * np.ptp(moved)
 
 
+def piezo(line: LinePlan) -> OperatorPiezo:
+    """The operator of the line as a piezo."""
+    own = own_piezo(line)
+    assert isinstance(own, OperatorPiezo)
+    return own
+
+
 def read(line: LinePlan) -> Operator:
     """The operator of the line."""
-    return OwnAxis.of(line).operator
+    return piezo(line).operator
 
 
-def plants(line: LinePlan, operator: Operator) -> list[OwnAxis]:
+def plants(line: LinePlan, operator: Operator) -> list[OperatorPiezo]:
     """Scanners that depart from an operator."""
-    return [OwnAxis.of(line, departing(operator, (0, k))) for k in range(4)]
+    return [replace(piezo(line), operator=departing(operator, (0, k))) for k in range(4)]
 
 
 def test_without_a_departure_it_does_what_the_build_expects(line: LinePlan) -> None:
-    rms, scaling, mismatch, size = image_errors(run_line(line, OwnAxis.of(line)))
+    rms, scaling, mismatch, size = image_errors(run_line(line, piezo(line)))
     assert rms < 0.02
     assert scaling < 0.8
     assert mismatch < 0.05

@@ -7,8 +7,9 @@ import numpy as np
 
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
 from tablegen.compensation.operator.field import covariance
-from tablegen.numerics.arrays import Floats
+from tablegen.numerics.arrays import Bools, Floats
 from tablegen.numerics.driver import Driver
 
 _STROKES = np.arange(0.1, 1.0, 0.05)
@@ -42,6 +43,14 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver |
     stroke, centre = reach[best]
     driver = Driver.of(driver)
     return NextTrace(stroke * driver.span, driver.volts(centre), float(max(unknown[best], 0.0)), other)
+
+
+def beyond_reach(lines: Sequence[PeriodicLine], strokes: Floats, centres: Floats) -> Bools:
+    """Return where a build refuses a scan, since nothing was measured near: shape (strokes, centres)."""
+    known = np.array([line.centre for line in lines])
+    largest = max(line.stroke for line in lines) + STROKE_REACH
+    out: Bools = (np.min(np.abs(centres[:, None] - known), axis=1) > CENTRE_REACH) | (strokes[:, None] > largest)
+    return out
 
 
 def expected_rms(fit: OperatorFit, points: Floats) -> Floats:

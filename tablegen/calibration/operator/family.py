@@ -11,8 +11,8 @@ from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
+from scipy.optimize import nnls
 
-from tablegen.calibration.operator.nonnegative import nonnegative
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
@@ -28,6 +28,7 @@ _GAIN_STEP = 1e-3
 _TRIALS = 4  # of a step, each with more damping
 _CONVERGED = 1e-3  # of the cost
 _FIRST_ROUNDS = 4
+_ITERATIONS = 30  # of the weights, for each of them: ten times what scipy allows
 
 CreepOf = Callable[[float], LogarithmicCreep]
 
@@ -149,9 +150,10 @@ class FamilyProblem(ABC):
         )
         gains = [1.0 if at is None else float(numbers[at]) for at in self._gain_of]
         matrix = np.vstack([gain * part for gain, part in zip(gains, parts, strict=True)])
-        normal = matrix.T @ matrix + self.penalty.T @ self.penalty
-        weights = nonnegative(normal, matrix.T @ measured)
-        residual = np.concatenate([matrix @ weights - measured, self.penalty @ weights])
+        rows = np.vstack([matrix, self.penalty])
+        right = np.concatenate([measured, np.zeros(len(self.penalty))])
+        weights, _ = nnls(rows, right, maxiter=_ITERATIONS * len(rows.T))
+        residual = rows @ weights - right
         return _WeightsFit(numbers, weights, residual, float(residual @ residual))
 
     def improve(self, best: _WeightsFit, rounds: int) -> _WeightsFit:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from tablegen.calibration.operator.fit import OperatorFit
+from tablegen.compensation.models.operator import OperatorModel
 from tablegen.compensation.operator.bouc_wen import NO_BOUC_WEN
 from tablegen.compensation.operator.file import (
     VERSION,
@@ -16,6 +17,7 @@ from tablegen.compensation.operator.file import (
 )
 from tablegen.numerics.driver import Driver
 
+MODEL = OperatorModel.model()
 _HEAD = (
     "An operator of the piezo, written by tablegen calibrate operator; docs/operator.md says what the numbers are.",
     "Strokes, centres and thresholds are shares of v_max, weights nm.",

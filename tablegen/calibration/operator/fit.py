@@ -18,10 +18,11 @@ from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrink
 from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Response
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths, through
-from tablegen.compensation.operator.operator import MeasuredLine, Operator
+from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import NO_PLAYS
 from tablegen.numerics.arrays import Floats
 

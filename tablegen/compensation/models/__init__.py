@@ -52,6 +52,12 @@ def get(name: str) -> type[Hysteresis]:
     return model
 
 
+def laws_beside(table: Hysteresis) -> type[Hysteresis] | None:
+    """Return the most detailed model of the laws that the table of an identified model has branches for."""
+    simpler = [kind for kind in own() if kind.compensates and kind.order < table.order]
+    return max((kind for kind in simpler if kind.like(table) is not None), key=lambda kind: kind.order, default=None)
+
+
 def line_of(table: Hysteresis, request: LineRequest, problems: ModelProblems) -> LineShape | None:
     """Return the line that a model makes; None where ``problems`` grew.
 

@@ -12,23 +12,21 @@ from tablegen.base.figures import shown_path
 from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.base.quantities import FileName
 from tablegen.compensation.branches import WithBranches
-from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.dynamics import Response, capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hysteresis import BranchShape
-from tablegen.compensation.line import LineRequest, LineShape, WholeLine
+from tablegen.compensation.identification import Identification
+from tablegen.compensation.line import AccelerationTrade, LineRequest, LineShape, WholeLine
 from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.loop import Loop
-from tablegen.compensation.operator.minimum_acceleration_line import (
-    MinimumAccelerationLine,
-    minimum_acceleration_waveform,
-)
+from tablegen.compensation.operator.minimum_acceleration_line import minimum_acceleration_waveform
 from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
+from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
-from tablegen.compensation.transient import Transient
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
@@ -42,60 +40,26 @@ _SLOWEST_HZ = 0.01  # of frames over which drift is followed
 SIDES = ("forward", "backward")
 
 
-class OperatorLine(WholeLine, frozen=True, kw_only=True):
-    """The line, the errors that the operator expects of it, and its distance from what was measured.
+class OperatorIdentification(Identification, frozen=True, kw_only=True, eq=False):
+    """The piezo as the operator knows it, at the rate and offset of a line.
 
-    ``uncertainty`` is what the operator may be wrong by at this stroke, centre and rate, at ``LEVEL_PERCENT``;
-    ``distance`` is that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate,
-    ``factor`` that of its loops at the mean of this drive, and ``between`` which share of the size is uncertain since
-    its turns are not even about that mean; ``after`` are the transients of a change of offset and of one of size.
-    ``kept`` is the scaling error, percent, for which it has minimum acceleration, ``beside`` that against the line that
-    was ``learnt``; they are None where that is the waveform.
+    ``operator`` is that of this rate, ``factor`` that of its loops at the mean of the line's drive, and ``between``
+    which share of the size is uncertain since the turns of the drive are not even about that mean.
     """
 
-    expected: ExpectedErrors
-    uncertainty: ExpectedErrors
-    distance: float
     operator: Operator
     factor: float
     between: float
-    after: tuple[Transient, Transient]
-    kept: float | None = None
-    learnt: FourierSeries | None = None
-    beside: float | None = None
 
-    @property
-    def beside_learnt_percent(self) -> float | None:
-        """The part of ``kept`` by which the waveform departs from the learnt one."""
-        return self.beside
-
-    @property
-    def learnt_line(self) -> LineShape:
-        """The line as it was learnt, before acceleration was traded for error."""
-        return self if self.learnt is None else WholeLine.of(self.learnt, self.turn)
-
-    @property
-    def kept_percent(self) -> float | None:
-        """The scaling error that was allowed, and kept."""
-        return self.kept
-
-    @property
-    def transients(self) -> tuple[Transient, Transient]:
-        """The transients after a change of offset and after one of size."""
-        return self.after
-
-    @property
-    def expectation(self) -> Expectation:
-        """The expected errors and their uncertainties, in percent."""
-        errors, by = self.expected, self.uncertainty
-        return Expectation(
-            "traces",
-            {side: Figure(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
-            {side: Figure(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
-            Figure(errors.mismatch, by.mismatch),
-            Figure(errors.size, by.size),
-            100.0 * self.distance,
-        )
+    def piezo(
+        self, driver: Driver, response: Response | None, harmonics: int, seed: tuple[int, ...] | None = None
+    ) -> OperatorPiezo:
+        """Return the piezo that does what the operator says, or that departs from it at random."""
+        operator, factor = self.operator, self.factor
+        if seed is not None:
+            operator = departing(operator, seed)
+            factor *= 1.0 + self.between * float(np.random.default_rng((*seed, 1)).standard_normal())
+        return OperatorPiezo(operator, factor, driver, response, harmonics)
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -105,6 +69,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
     calibration: ClassVar[str] = "`calibrate operator`"
     order: ClassVar[int] = 3
     counts_turns: ClassVar[bool] = True
+    identified: ClassVar[bool] = True
 
     file: Annotated[FileName, Meta(description="the operator's file, relative to the scanner file")]
 
@@ -121,6 +86,11 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
     def files(self) -> tuple[str, ...]:
         """Return the operator's file."""
         return (self.file,)
+
+    @property
+    def operator_file(self) -> str:
+        """The operator's file."""
+        return self.file
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
         """Learn the waveform on the operator, starting from a straight line."""
@@ -179,7 +149,7 @@ def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
     return operator, factor
 
 
-def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> OperatorLine | None:
+def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> WholeLine | None:
     centre = request.v_share
     operator, factor = _at(operator, request)
     at_offset = request.factor_at(centre)
@@ -211,13 +181,14 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     straight = LineShape(request.turn, BranchShape(), BranchShape())
     start = fit_window(straight, request.harmonics, request.window, request.both)
     learnt = learn_waveform(operator, line, start, through, None if response is None else dynamics)
-    traded: MinimumAccelerationLine | None = None
+    trade: AccelerationTrade | None = None
     if request.allowed is not None:
         try:
             traded = minimum_acceleration_waveform(
                 operator, line, learnt, request.allowed.percent, through, None if response is None else dynamics
             )
             learnt = traded.waveform
+            trade = AccelerationTrade(request.allowed.percent, traded.learnt, traded.beside_percent)
         except Unphysical as reason:
             if request.allowed.firm:
                 problems.add_to_scan("band_limit.max_scaling_error_percent", str(reason))
@@ -239,22 +210,32 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
         return FourierSeries(0.5 + scale * (series.a0 - 0.5), scale * series.a, scale * series.b)
 
     series = scaled(learnt.series)
-    return OperatorLine.of(
-        series,
-        request.turn,
-        expected=learnt.expected,
-        uncertainty=_uncertainty(operator, request, learnt),
-        distance=operator.distance(learnt.stroke, learnt.centre),
-        operator=operator,
-        factor=factor,
-        between=between,
-        kept=None if traded is None or request.allowed is None else request.allowed.percent,
-        learnt=None if traded is None else scaled(traded.learnt),
-        beside=None if traded is None else traded.beside_percent,
-        after=(
+    if trade is not None and trade.learnt is not None:
+        trade = structs.replace(trade, learnt=scaled(trade.learnt))
+    identification = OperatorIdentification(
+        traces=operator.lines,
+        expectation=_expectation(operator, learnt, _uncertainty(operator, request, learnt)),
+        transients=(
             after_offset(late, learnt.stroke, learnt.centre, factor, request.turn, 1.0 / request.rate_hz),
             after_size(late, learnt.stroke, learnt.centre, factor, request.turn, 1.0 / request.rate_hz),
         ),
+        operator=operator,
+        factor=factor,
+        between=between,
+    )
+    return WholeLine.of(series, request.turn, trade=trade, identification=identification)
+
+
+def _expectation(operator: Operator, learnt: LearntWaveform, by: ExpectedErrors) -> Expectation:
+    """Return the expected errors of a learnt waveform, uncertain by others, in percent."""
+    errors = learnt.expected
+    return Expectation(
+        "traces",
+        {side: Figure(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
+        {side: Figure(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
+        Figure(errors.mismatch, by.mismatch),
+        Figure(errors.size, by.size),
+        100.0 * operator.distance(learnt.stroke, learnt.centre),
     )
 
 

@@ -11,11 +11,12 @@ from msgspec import Meta, Struct, ValidationError, convert
 
 from tablegen.base.input_errors import Problem, Problems, Rejected
 from tablegen.base.toml import read_toml
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.bouc_wen import BoucWen
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, through
-from tablegen.compensation.operator.operator import MeasuredLine, Operator
+from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import BENDS, Plays
 
 VERSION = 1

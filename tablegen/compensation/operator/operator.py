@@ -7,6 +7,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
@@ -16,23 +17,6 @@ from tablegen.numerics.arrays import Floats
 SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
 _END_POINTS = 48  # of a branch at either end
 _LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands still, and cannot be inverted
-
-
-@dataclass(frozen=True, slots=True)
-class MeasuredLine:
-    """One trace of the operator's calibration: its place, and its errors when it is left out of the fit.
-
-    Strokes and centres are shares of v_max. ``left_out`` is the rms residual, the scaling error and the mismatch of
-    trace and retrace inside the window, in percent, and the error of the size in percent; ``in_fit`` is what remains of
-    these where the trace is not left out, that is noise.
-    """
-
-    name: str
-    stroke: float
-    centre: float
-    rate_hz: float
-    left_out: tuple[float, float, float, float]
-    in_fit: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)

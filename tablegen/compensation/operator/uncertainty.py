@@ -10,8 +10,9 @@ from math import sqrt
 
 import numpy as np
 
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.field import Lengths, covariance
-from tablegen.compensation.operator.operator import MeasuredLine, chebyshev
+from tablegen.compensation.operator.operator import chebyshev
 from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 

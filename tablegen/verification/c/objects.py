@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import file_sha256
+from tablegen.base.user_cache import CachedFiles
 
 _CACHE = CachedFiles("objects", 300)
 # Settings by which compilers find or make something else.

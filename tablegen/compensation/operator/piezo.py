@@ -1,4 +1,4 @@
-"""The operator of the scanner file as the virtual scanner, with errors as large as its uncertainty.
+"""The operator as a piezo for simulations, wrong by as much as it is uncertain.
 
 A build knows the operator; the piezo departs from it. The size of the departure comes from the traces, each of which
 was left out when the operator was identified: near it, loops are bent by smooth random curves of that rms, and sizes
@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tablegen.compensation.dynamics import Response
-from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.settled import settled
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
-from tablegen.planning.line_plan import LinePlan
 
 # Departures at two places are alike within this much of stroke and of centre, shares of v_max.
 _ALIKE = Lengths(0.2, 0.2, 1e-9)
@@ -53,29 +51,14 @@ class DepartingField(Field):
 
 
 @dataclass(frozen=True, eq=False)
-class OwnAxis:
-    """An axis that follows an operator; creep and dynamics act up to ``harmonics``; nm from the lower turn on."""
+class OperatorPiezo:
+    """An axis that does what an operator says; creep and dynamics up to ``harmonics``; nm from the lower turn on."""
 
     operator: Operator
     factor: float
     driver: Driver
     response: Response | None
     harmonics: int
-
-    @classmethod
-    def of(cls, line: LinePlan, operator: Operator | None = None) -> "OwnAxis":
-        """Return an axis at the offset and the rate of a line that was solved on an operator, or on ``operator``."""
-        shape = operator_line(line)
-        drive = line.drive
-        return cls(operator or shape.operator, shape.factor, drive.driver, drive.response, line.series.harmonics)
-
-    @classmethod
-    def departing(cls, line: LinePlan, seed: tuple[int, ...]) -> "OwnAxis":
-        """Return an axis that departs from the operator of a line, with another law of offsets."""
-        shape = operator_line(line)
-        axis = cls.of(line, departing(shape.operator, seed))
-        share = shape.between * float(np.random.default_rng((*seed, 1)).standard_normal())
-        return replace(axis, factor=axis.factor * (1.0 + share))
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Return the settled position in the middle of each tick of a period.
@@ -100,12 +83,6 @@ class OwnAxis:
         loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
         rate_hz = 1.0 / (len(u) * tick_s)
         return settled(loop, u, rate_hz, self.operator.creep, self.response, self.harmonics)
-
-
-def operator_line(line: LinePlan) -> OperatorLine:
-    """Return the model's solution of a line that was computed on an operator."""
-    assert isinstance(line.drive.shape, OperatorLine)
-    return line.drive.shape
 
 
 def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
