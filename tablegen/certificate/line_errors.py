@@ -64,11 +64,28 @@ class TickErrors:
         self._errors = errors
 
     def errors(self, k: Ints) -> Floats:
-        """Those at ticks k."""
+        """Return the errors at ticks.
+
+        Parameters
+        ----------
+        k
+            Ticks of the period, any shape.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape of ``k``.
+        """
         return self._errors[k]
 
     def corners(self, first: int, stop: int) -> Ints:
-        """All ticks in [first, stop)."""
+        """Return all ticks in [first, stop).
+
+        Returns
+        -------
+        Ints
+            Ticks, shape (stop - first,).
+        """
         return np.arange(first, stop)
 
     def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
@@ -120,7 +137,18 @@ class EmittedPeriod:
         return codes
 
     def errors(self, k: Ints) -> Floats:
-        """Compute the emitted code less the unrounded target code at ticks k."""
+        """Return the emitted code less the unrounded target code.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks), shape (n,).
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (n,).
+        """
         return self._by_tick[k] if self.runs.by_tick else self.runs.at(k) - self._asked(k)
 
     @property
@@ -202,7 +230,13 @@ class EmittedPeriod:
         return float(np.sum(n * (mean + arch * bend))), float(np.sum(n * square))
 
     def corners(self, first: int, stop: int) -> Ints:
-        """Ticks in [first, stop) at which a run begins or ends."""
+        """Return the ticks in [first, stop) at which a run begins or ends.
+
+        Returns
+        -------
+        Ints
+            Ticks, ascending, shape (n,), n <= stop - first.
+        """
         if self.runs.by_tick:
             return np.arange(first, stop)
         starts = self.runs.starts
@@ -257,11 +291,25 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
     times = shape.times(side, position)
 
     def at_times(series: FourierSeries) -> list[Floats]:
+        """Return value and slope of a series at the times of the line.
+
+        Returns
+        -------
+        list of Floats
+            Value, and slope per period, each of the shape of ``times``.
+        """
         if shape.waveform is not None:  # its branches are a series too, and equal ones have to leave nothing
             return list(values(times, (series, 0), (series, 1)))
         return played.expansion(series).at(times, 0, 1)
 
     def follow(series: FourierSeries) -> tuple[Floats, Floats]:
+        """Return what the piezo makes of a drive, without the layer.
+
+        Returns
+        -------
+        place, slope
+            Each of the shape of ``times``.
+        """
         value, slope = at_times(series)
         if line.layer is not None:
             layer_value, layer_slope = at_times(line.layer)
@@ -331,6 +379,18 @@ def _chords(
         return np.zeros(1), np.zeros(1)
 
     def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
+        """Return the errors in the middle of ticks.
+
+        Parameters
+        ----------
+        k
+            Ticks of the sweep, shape (n,).
+
+        Returns
+        -------
+        where, noise, total
+            Place on the line, its error by quantisation, and with that of the waveform; shares of the line, each (n,).
+        """
         t = (k + 0.5) / ticks
         where = t / turn if side == "forward" else (1.0 - t) / share
         noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)

@@ -40,6 +40,20 @@ def least_acceleration(straight: Straightness, harmonics: int, percent: float) -
     scale = np.concatenate([[1.0], (tau * n) ** -2.0, (tau * n) ** -2.0])
 
     def rows(t: Floats, derivative: int) -> Floats:
+        """Return the rows of a derivative of the waveform, by its scaled coefficients.
+
+        Parameters
+        ----------
+        t
+            Times in periods, shape (m,).
+        derivative
+            Order, 0 to 2.
+
+        Returns
+        -------
+        Floats
+            Shape (m, 2 H + 1).
+        """
         angle, rate = tau * np.outer(t, n), (tau * n) ** derivative
         c, s = np.cos(angle), np.sin(angle)
         columns = {0: (c, s), 1: (-s, c), 2: (-c, -s)}[derivative]

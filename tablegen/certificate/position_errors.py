@@ -60,7 +60,13 @@ def position_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[s
 
 
 def arriving(line: LinePlan, played: EmittedPeriod) -> Floats:
-    """Position in the middle of each tick less the one that the float waveform should make, in LSB, shape (ticks,)."""
+    """Return the position in the middle of each tick less the one that the float waveform should make.
+
+    Returns
+    -------
+    Floats
+        LSB of the converter, shape (ticks,).
+    """
     ticks, response, series = line.program.ticks, line.drive.response, line.series
     assert response is not None
     rate = float(line.rate)

@@ -34,7 +34,13 @@ class Passage(Struct, frozen=True):
 
     @classmethod
     def of(cls, line: LinePlan) -> "Passage":
-        """Return the passage of an axis."""
+        """Return the passage of an axis.
+
+        Raises
+        ------
+        TypeError
+            If the axis has a response of an unknown kind.
+        """
         match line.drive.response:
             case None:
                 return cls(band_hz=line.series.harmonics * float(line.rate))
@@ -53,7 +59,18 @@ class Changes(Struct, frozen=True):
 
     @classmethod
     def of(cls, codes: Ints) -> "Changes":
-        """Of consecutive codes, shape (n,)."""
+        """Return the changes of consecutive codes.
+
+        Parameters
+        ----------
+        codes
+            One a tick, shape (n,), n >= 1.
+
+        Returns
+        -------
+        Changes
+            Share of the n - 1 steps, and mean size of those that are not 0.
+        """
         steps = np.abs(np.diff(codes))
         count = int(np.count_nonzero(steps))
         share = count / max(len(steps), 1)
@@ -88,22 +105,46 @@ class ShapedPeriods:
 
     @property
     def code_errors(self) -> Floats:
-        """Emitted less asked for, of the periods that are judged, shape (periods, ticks)."""
+        """The emitted less the unrounded codes of the judged periods.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods, ticks).
+        """
         return np.asarray(self.codes[self._judged] - self._asked)
 
     @cached_property
     def position_errors(self) -> Floats:
-        """The same in the position, in LSB."""
+        """The errors of the position in the judged periods.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods, ticks).
+        """
         return self._arrived(self.codes)
 
     @cached_property
     def rounded_errors(self) -> Floats:
-        """Those of the position without shaping."""
+        """The errors of the position in the judged periods if codes were rounded instead of shaped.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods, ticks).
+        """
         return self._arrived(np.tile(self._rounded, (len(self.codes), 1)))
 
     @property
     def judged_codes(self) -> Ints:
-        """The codes of the periods that are judged, shape (ticks,)."""
+        """The codes of the judged periods.
+
+        Returns
+        -------
+        Ints
+            One period after another, shape (periods * ticks,).
+        """
         return self.codes[self._judged].reshape(-1)
 
     @property
@@ -122,7 +163,18 @@ class ShapedPeriods:
 
 
 def passed(line: LinePlan, errors: Floats) -> Floats:
-    """Compute the position errors of code errors that begin from rest, one a tick, shape (n,)."""
+    """Return the position errors of code errors that begin from rest.
+
+    Parameters
+    ----------
+    errors
+        LSB of the converter, one a tick, shape (n,).
+
+    Returns
+    -------
+    Floats
+        LSB of the converter, shape (n,).
+    """
     size = 1 << (2 * len(errors) - 1).bit_length()
     f: Floats = np.arange(size // 2 + 1, dtype=np.float64) * (float(line.rate) * line.program.ticks / size)
     spectrum = np.fft.rfft(errors, size)
@@ -139,5 +191,16 @@ def passed(line: LinePlan, errors: Floats) -> Floats:
 
 
 def largest_and_rms(errors: Floats) -> tuple[float, float]:
-    """Return the largest magnitude, and the root of the mean square."""
+    """Return the largest magnitude, and the root of the mean square.
+
+    Parameters
+    ----------
+    errors
+        Any shape, not empty.
+
+    Returns
+    -------
+    largest, rms
+        In the unit of ``errors``.
+    """
     return float(np.max(np.abs(errors))), sqrt(float(np.mean(errors * errors)))

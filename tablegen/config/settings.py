@@ -55,7 +55,13 @@ def parse_setting(text: str) -> Setting:
 
 
 def check_repeated_keys(settings: "Sequence[Setting]") -> None:
-    """Refuse a key that is given twice, or beside a table that holds it."""
+    """Check that no key is set twice, or beside a table that holds it.
+
+    Raises
+    ------
+    Rejected
+        If a key is.
+    """
     for at, setting in enumerate(settings):
         for other in settings[:at]:
             if setting.key == other.key:

@@ -51,7 +51,20 @@ def memories(content: Content) -> list[Memory]:
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
-    """Write the words, each in as many hexadecimal digits as ``bits`` take."""
+    """Write words, each in as many hexadecimal digits as ``bits`` take.
+
+    Parameters
+    ----------
+    words
+        Integers of up to ``bits`` bits, negative ones in two's complement, shape (n,).
+    bits
+        Word length.
+
+    Returns
+    -------
+    bytes
+        A line a word.
+    """
     digits, mask = -(-bits // 4), (1 << bits) - 1
     values = np.asarray(words if isinstance(words, np.ndarray | list) else list(words), dtype=np.int64)
     if len(values) and digits % 2 == 0:  # whole bytes, which are spelled all at once
@@ -63,11 +76,21 @@ def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
 def memory_files(
     name: str, schedule: Schedule, x: Program, y: Program, fourier: Mapping[Literal["x", "y"], Ints]
 ) -> dict[str, bytes]:
-    """All memory files of a build by their names; ``fourier`` has the Fourier words of "x" and "y" in order.
+    """Write all memory files of a build.
 
     The registers are those for uploaded tables: a host that uploads Fourier words instead writes HARMONICS over the
     last register of their axis, which is 0 here. The quarter sine is that of the longest interpolated table, and serves
     shorter ones too; where no table is interpolated there is none.
+
+    Parameters
+    ----------
+    fourier
+        Fourier words of "x" and "y" in order, Q2.30, each of shape (2 H + 1,).
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by file name.
     """
     memories = _memories(schedule, x, y, fourier)
     return {f"{name}_{memory.name}.mem": memory_file(memory.words, memory.bits) for memory in memories}

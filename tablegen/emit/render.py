@@ -25,10 +25,26 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of pl
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:
-    """Every file of a build by name: those of its formats, what goes with them, and the manifest last.
+    """Render every file of a build by name: those of its formats, what goes with them, and the manifest last.
 
-    ``formats`` are those of the plan unless given. Raises ``UnknownFormat``, and ``Unphysical`` for a scan that a
-    format cannot hold.
+    Parameters
+    ----------
+    formats
+        Names of formats; by default those of the plan.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by file name.
+
+    Raises
+    ------
+    UnknownFormat
+        If a format is unknown, or writes a file that another one or the runtime has.
+    Unphysical
+        If a format cannot hold the scan.
+    FormatFailed
+        If a format of another distribution fails.
     """
     chosen_formats = chosen(plan.formats if formats is None else formats)
     record = plan_record(plan)

@@ -41,7 +41,7 @@ class TemplateCache(BytecodeCache):
                 bucket.bytecode_from_string(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep the code of a template; where that fails it is compiled again the next time."""
+        """Keep the code of a template; where that fails it is compiled again the next time, and nothing is raised."""
         if self.folder is None:
             return
         code = bucket.bytecode_to_string()

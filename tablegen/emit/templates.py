@@ -55,6 +55,17 @@ def comment_safe(text: str) -> str:
 
 
 def rows(words: Ints | list[str]) -> list[str]:
-    """Words as lines of text, ten a line, with commas between; those that are text already as they are."""
+    """Format words as lines of text, ten a line, with commas between.
+
+    Parameters
+    ----------
+    words
+        Integers, shape (n,), or their texts.
+
+    Returns
+    -------
+    list of str
+        The lines, without a comma at their ends.
+    """
     values = words if isinstance(words, list) else [str(word) for word in words.tolist()]
     return [", ".join(values[i : i + _WORDS_PER_ROW]) for i in range(0, len(values), _WORDS_PER_ROW)]

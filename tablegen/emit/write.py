@@ -30,12 +30,24 @@ class NoPlace(CannotWrite):
 def write_files(
     folder: Path, files: Mapping[str, bytes], outdated: Sequence[str] | Callable[[], Sequence[str]] = ()
 ) -> list[str]:
-    """Write what changed, remove what is ``outdated``, and return the names of what was written, in order.
+    """Write what changed, remove what is outdated, and return the names of what was written, in order.
 
     Everything is first written beside its place and only then renamed into it, the manifest last: a full disk or
     an interruption leaves the directory as it was, or with a manifest that ``build --check`` finds stale. So does a cut
     of power: what was renamed has reached the disk before the manifest is. Two writers of one directory take turns, and
-    what one that was killed has left behind is removed. ``outdated`` may be a function, which is asked in one's turn.
+    what one that was killed has left behind is removed.
+
+    Parameters
+    ----------
+    outdated
+        Names of files to remove, or a function that returns them while the directory is locked.
+
+    Raises
+    ------
+    NoPlace
+        If something else than a directory is at ``folder``.
+    CannotWrite
+        If the system refuses to write.
     """
     if (other := other_than_file(folder)) not in (None, "a directory"):
         raise NoPlace(f"{folder}: is {other}, where a directory has to go")
@@ -110,7 +122,13 @@ def _settle_files(paths: Sequence[Path]) -> None:
 
 
 def settle(folder: Path) -> None:
-    """Let what was renamed and removed in a directory reach the disk, where the system can."""
+    """Let what was renamed and removed in a directory reach the disk, where the system can.
+
+    Raises
+    ------
+    OSError
+        If the disk reports an error.
+    """
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:  # Windows opens no directories

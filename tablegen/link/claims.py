@@ -31,7 +31,13 @@ def most_bytes(info: DeviceInfo) -> int:
 
 
 def check_device(info: DeviceInfo) -> None:
-    """Raise ``NotUnderstood`` for the first field of HELLO that no device of this version can have."""
+    """Check every field of HELLO.
+
+    Raises
+    ------
+    NotUnderstood
+        For the first field that no device of this version can have.
+    """
     _check("HELLO", "version", info.version, VERSION, VERSION)
     _check("HELLO", "window", info.window, 1, 255)
     _check("HELLO", "data_bytes", info.data_bytes, 1, DATA_BYTES)
@@ -58,7 +64,13 @@ def _check_shape(name: str, shape: AxisShape) -> None:
 
 
 def check_unchanged(before: DeviceInfo, now: DeviceInfo) -> None:
-    """Raise ``NotUnderstood`` where HELLO announces another device than the one that was there before."""
+    """Check that HELLO announces the device that was there before.
+
+    Raises
+    ------
+    NotUnderstood
+        If a field differs.
+    """
     for field in (field.name for field in fields(DeviceInfo)):
         was, is_now = getattr(before, field), getattr(now, field)
         if was != is_now:
@@ -74,7 +86,13 @@ def check_status(status: DeviceStatus, info: DeviceInfo, source: str) -> None:
 
 
 def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> None:
-    """Raise ``NotUnderstood`` where active limits are wider than those of the device's build."""
+    """Check that active limits are no wider than those of the device's build.
+
+    Raises
+    ------
+    NotUnderstood
+        If one is wider.
+    """
     for name, active, build in (("x", limits[0], info.x_limits), ("y", limits[1], info.y_limits)):
         inner = active.within(build)
         for field in (field.name for field in fields(AxisLimits)):
@@ -86,7 +104,13 @@ def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> Non
 
 
 def check_length(source: str, payload: bytes, size: int) -> None:
-    """Raise ``NotUnderstood`` for an answer that is too short; a longer one is of a later version."""
+    """Check that an answer is long enough; a longer one is of a later version.
+
+    Raises
+    ------
+    NotUnderstood
+        If it is shorter than ``size`` bytes.
+    """
     if len(payload) < size:
         raise NotUnderstood(f"{source}: its answer has {len(payload)} bytes; at least {size} are needed")
 

@@ -143,12 +143,28 @@ class Device:
     ) -> UploadResult:
         """Put a new scan into the instrument, which goes on with the old one until a line of the new one starts.
 
-        ``progress`` is called with the bytes that the device has, and with all. A scan that is already active is not
-        sent, unless ``force``. ``timeout_s`` bounds everything (default: ``upload_time_s``). ``limits`` make refusals
-        say more. What a device would refuse, ``tablegen.link.prepare.check`` says before.
+        What a device would refuse, ``tablegen.link.prepare.check`` says before.
 
-        Raises ``Refused``, ``LinkLost``, ``OutOfTime``, ``NotPlaying``. The old scan plays on then, and the device
-        keeps what it has received: the same upload again goes on from there.
+        Parameters
+        ----------
+        progress
+            Function that is called with the bytes that the device has, and with all.
+        force
+            True to send a scan that is already active too.
+        timeout_s
+            Bound of the whole upload in s; by default ``upload_time_s``.
+        limits
+            Limits of the device, to explain refusals in more detail.
+
+        Raises
+        ------
+        Refused, LinkLost, OutOfTime
+            If the device refuses, is gone, or takes too long: the old scan plays on, and the device keeps what it has
+            received, so that the same upload again goes on from there.
+        NotPlaying
+            If the device took the upload and plays something else.
+        NotUnderstood
+            If its answers contradict each other.
         """
         session = self._session
         deadline = Deadline(session.now(), lambda: self.upload_time_s(image) if timeout_s is None else timeout_s)
@@ -194,7 +210,17 @@ class Device:
     def readback(self, *, timeout_s: float | None = None) -> bytes:
         """Read back the image of the scan that plays, as bytes.
 
-        Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
+        Parameters
+        ----------
+        timeout_s
+            Bound in s; by default what the longest image takes.
+
+        Raises
+        ------
+        Refused
+            If the device does not hold it: a scan that came with the firmware, or memory in use.
+        OutOfTime
+            If the scan changed each time it was read, or the device takes too long.
         """
         size = most_bytes(self.info)
         deadline = Deadline(
@@ -213,7 +239,15 @@ class Device:
         self._act(Request.PARK)
 
     def arm(self, frames: int = 0) -> None:
-        """Let the next trigger play so many frames; 0 is without end."""
+        """Let the next trigger play so many frames; 0 is without end.
+
+        Raises
+        ------
+        ValueError
+            If ``frames`` does not fit 32 bits.
+        Refused
+            If the device refuses.
+        """
         if not 0 <= frames < 1 << 32:
             raise ValueError(f"{frames} frames; 0 (endless) to 2^32 - 1")
         self._act(Request.ARM, frames.to_bytes(4, "little"))
@@ -233,7 +267,13 @@ class Device:
         return int.from_bytes(payload[:_GENERATION_BYTES], "little")
 
     def limits(self) -> Limits:
-        """Ask for the active limits of x and y."""
+        """Ask for the active limits of x and y.
+
+        Raises
+        ------
+        Refused
+            If the device refuses for another reason than that it has no such request.
+        """
         size = 2 * AxisLimits.LAYOUT.size
         try:
             return self._limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
@@ -252,7 +292,13 @@ class Device:
         return self._limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
 
     def wait_for(self, state: DeviceState, timeout_s: float) -> DeviceStatus:
-        """Wait until the sequencer is in a state. Raises ``OutOfTime``."""
+        """Wait until the sequencer is in a state.
+
+        Raises
+        ------
+        OutOfTime
+            If it is not within ``timeout_s`` seconds.
+        """
         deadline = self._until(timeout_s)
         while True:
             status = self.status()

@@ -22,9 +22,12 @@ class Frame:
     payload: bytes = b""
 
     def encode(self) -> bytes:
-        """As it goes onto the wire, with the 0x00 that ends it.
+        """Return the frame as it goes onto the wire, with the 0x00 that ends it.
 
-        Raises ``ValueError`` if the payload is too long.
+        Raises
+        ------
+        ValueError
+            If the payload is too long.
         """
         if len(self.payload) > MAXIMUM_PAYLOAD:
             raise ValueError(f"a payload of {len(self.payload)} bytes; at most {MAXIMUM_PAYLOAD} fit into a frame")
@@ -35,7 +38,10 @@ class Frame:
 def decode(wire: bytes) -> Frame:
     """Decode a frame from the bytes between two 0x00 on the wire.
 
-    Raises ``ValueError`` where it is none: damaged, too short or too long.
+    Raises
+    ------
+    ValueError
+        If it is damaged, too short or too long.
     """
     data = cobs_decode(wire)
     if not MINIMUM_FRAME <= len(data) <= MAXIMUM_FRAME:
@@ -57,7 +63,7 @@ class FrameReader:
         self._overflown = False
 
     def feed(self, received: bytes) -> list[Frame]:
-        """Frames that are complete with these bytes, in order."""
+        """Return the frames that are complete with these bytes, in order; damaged ones are counted and dropped."""
         frames = []
         *ended, rest = received.split(b"\0")
         for piece in ended:
@@ -92,7 +98,10 @@ def cobs_encode(data: bytes) -> bytes:
 def cobs_decode(stuffed: bytes) -> bytes:
     """Decode bytes of ``cobs_encode``, without the 0x00 that ended them.
 
-    Raises ``ValueError`` where a distance leads past the end.
+    Raises
+    ------
+    ValueError
+        If a distance leads past the end.
     """
     blocks = []
     at = 0

@@ -101,10 +101,7 @@ PERMITS = 1  # bit of Status.flags
 
 
 class _Struct:
-    """A payload of fixed layout; ``unpack`` ignores what later versions may append.
-
-    Raises ``ValueError`` for fewer bytes than the layout has.
-    """
+    """A payload of fixed layout; ``unpack`` ignores what later versions may append."""
 
     LAYOUT: ClassVar[struct.Struct]
 
@@ -114,7 +111,13 @@ class _Struct:
 
     @classmethod
     def unpack(cls, payload: bytes) -> Self:
-        """Read the fields of a payload."""
+        """Read the fields of a payload.
+
+        Raises
+        ------
+        ValueError
+            If it has fewer bytes than the layout.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for {cls.__name__}, which has {cls.LAYOUT.size}")
         return cls(*cls.LAYOUT.unpack_from(payload))
@@ -200,7 +203,13 @@ class DeviceInfo:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
-        """Read the beginning of the answer to HELLO. Raises ``ValueError`` if it is too short."""
+        """Read the beginning of the answer to HELLO.
+
+        Raises
+        ------
+        ValueError
+            If it is too short.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a device")
         version, features, window, data, harmonics, shaping, degree, image, *parts, rate = cls.LAYOUT.unpack_from(
@@ -267,7 +276,13 @@ class DeviceStatus:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceStatus":
-        """Read an answer. Raises ``ValueError`` if it is too short, or of an unknown state."""
+        """Read the answer to STATUS.
+
+        Raises
+        ------
+        ValueError
+            If it is too short, or of an unknown state.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a status")
         state, upload, *numbers, counts, bad, digest = cls.LAYOUT.unpack_from(payload)
@@ -309,7 +324,13 @@ class ImageInfo:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "ImageInfo":
-        """Read the payload of BEGIN. Raises ``ValueError`` if it is too short."""
+        """Read the payload of BEGIN.
+
+        Raises
+        ------
+        ValueError
+            If it is too short.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for an image")
         digest, size, crc, x, y = cls.LAYOUT.unpack_from(payload)

@@ -19,7 +19,7 @@ _MIN_INDEX_BITS = 3  # least index bits of an interpolated table
 
 
 class RequestRefused(Exception):
-    """A request is."""
+    """A request that the device refuses, with the reason and its detail of docs/protocol.md."""
 
     def __init__(self, reason: Reason, detail: int = 0) -> None:
         super().__init__(reason, detail)
@@ -47,7 +47,13 @@ class Taken:
 
 
 def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
-    """Return the program of an image. Raises ``ValueError`` where it cannot be played at all."""
+    """Return the program of an image.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be played at all.
+    """
     scan = contents.scan
     schedule = Schedule(
         ticks=scan("line_ticks"),
@@ -84,7 +90,13 @@ class Bank:
         self._stage_is_whole = True
 
     def begin(self, payload: bytes) -> bytes:
-        """Return the answer to BEGIN."""
+        """Return the answer to BEGIN.
+
+        Raises
+        ------
+        RequestRefused
+            If an upload is being checked, or the image does not fit the device.
+        """
         info = ImageInfo.unpack(payload)
         held = self.held
         if (held is not None and held.state is not Upload.RECEIVING) or not self._player.writable:
@@ -104,7 +116,13 @@ class Bank:
         return struct.pack("<I", len(held.data))
 
     def data(self, payload: bytes) -> bytes:
-        """Return the answer to DATA."""
+        """Return the answer to DATA.
+
+        Raises
+        ------
+        RequestRefused
+            If no upload was announced, or its program words cannot be played.
+        """
         held = self.held
         if held is None:
             raise RequestRefused(Reason.UPLOAD)
@@ -138,7 +156,13 @@ class Bank:
             raise RequestRefused(Reason.LENGTH, size)
 
     def find(self, image_crc: int) -> Taken | Held:
-        """Find what a COMMIT means: the program that plays already, or a complete upload."""
+        """Find what a COMMIT means: the program that plays already, or a complete upload.
+
+        Raises
+        ------
+        RequestRefused
+            If no complete upload has this CRC, or one is being checked.
+        """
         held, taken = self.held, self.taken
         if held is None:
             if taken is None or taken.info.image_crc != image_crc:
@@ -153,7 +177,18 @@ class Bank:
         return held
 
     def accept(self, held: Held, authentic: Callable[[bytes], None]) -> DualProgram:
-        """Check an upload, and return its program. ``authentic`` raises if the tag is not the image's."""
+        """Check an upload, and return its program.
+
+        Parameters
+        ----------
+        authentic
+            Function that raises if the tag is not the image's.
+
+        Raises
+        ------
+        RequestRefused
+            If the image is damaged or cannot be played within the limits.
+        """
         image = bytes(held.data)
         if zlib.crc32(image) != held.info.image_crc:
             raise RequestRefused(Reason.IMAGE)
@@ -172,7 +207,13 @@ class Bank:
         self._stage_is_whole = True
 
     def readback(self, offset: int, count: int) -> bytes:
-        """Bytes of the image that plays."""
+        """Return bytes of the image that plays.
+
+        Raises
+        ------
+        RequestRefused
+            If the image is not held.
+        """
         taken = self.taken
         if taken is None or (self._staged and not self._stage_is_whole):
             raise RequestRefused(Reason.READBACK)

@@ -47,7 +47,13 @@ class PreparedScan:
 
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
-        """Prepare the scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
+        """Prepare the scan that ``tablegen build`` wrote into a folder.
+
+        Raises
+        ------
+        NotABuild
+            If the folder holds none, or its manifest was changed.
+        """
         stored = read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
@@ -57,13 +63,22 @@ class PreparedScan:
 
     @property
     def axes(self) -> tuple[tuple[str, Program, Ints], tuple[str, Program, Ints]]:
-        """Name, program and Fourier words of both."""
+        """The name, the program and the Fourier words of each axis, x first.
+
+        Returns
+        -------
+        tuple of tuple
+            The words are Q2.30 of shape (2 H + 1,).
+        """
         return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
 
     def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> ProgramImage:
         """Make the image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
 
-        Raises ``Unsuitable`` where an axis has no Fourier words that would render its table.
+        Raises
+        ------
+        Unsuitable
+            If an axis has no Fourier words that would render its table.
         """
         if form == "fourier" and (direct := [name for name, axis, _ in self.axes if axis.mode == "direct"]):
             raise Unsuitable(
@@ -101,9 +116,17 @@ def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
 
 
 def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
-    """Whether a device with these active limits would accept the image, as far as can be known without it.
+    """Check that a device with these active limits would accept the image, as far as can be known without it.
 
-    Raises ``Unsuitable`` with everything that is found.
+    Parameters
+    ----------
+    any_rate
+        True to accept another update rate than the device has.
+
+    Raises
+    ------
+    Unsuitable
+        If it would not, with every objection.
     """
     found = [*_device(image, info, scan), *([] if any_rate else _rate(scan, info))]
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):

@@ -33,9 +33,19 @@ class ProgramImage:
 def make_image(
     program: DualProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
 ) -> ProgramImage:
-    """Make the image of a program of the plan with this SHA-256 (64 hexadecimal digits).
+    """Make the image of a program.
 
-    Where Fourier words are given, int64 of shape (2 H + 1,) in the order of devices, they go in place of the table.
+    Parameters
+    ----------
+    digest
+        SHA-256 of the plan, 64 hexadecimal digits.
+    x_fourier, y_fourier
+        Fourier words that replace the table, Q2.30 of shape (2 H + 1,) in the order of devices.
+
+    Returns
+    -------
+    ProgramImage
+        What an upload sends.
     """
     harmonics = [0 if words is None else len(words) // 2 for words in (x_fourier, y_fourier)]
     words = program_words(program.schedule, program.x, program.y, (harmonics[0], harmonics[1]))
@@ -148,7 +158,10 @@ def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int
 def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
     """Take apart an image of tables of these shapes.
 
-    Raises ``ValueError`` where its length is not what its program words say.
+    Raises
+    ------
+    ValueError
+        If its length is not what its program words say.
     """
     if len(data) < PROGRAM_BYTES:
         raise ValueError(f"an image of {len(data)} bytes; the program words alone have {PROGRAM_BYTES}")

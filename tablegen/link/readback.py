@@ -37,7 +37,13 @@ class Reading:
         return [at for at in range(0, end, DATA_BYTES) if at not in self.pieces]
 
     def image(self) -> bytes:
-        """Join the pieces. Raises ``NotUnderstood`` where they make no image."""
+        """Join the pieces.
+
+        Raises
+        ------
+        NotUnderstood
+            If they make no image.
+        """
         last = max(self.pieces)
         end = last + len(self.pieces[last]) if self.end is None else self.end
         if end > self.most:
@@ -73,7 +79,13 @@ class _ImageReader:
         self._in_vain = 0
 
     def read(self) -> Reading:
-        """All pieces, up to the first that is short."""
+        """Read all pieces, up to the first that is short.
+
+        Raises
+        ------
+        LinkLost, OutOfTime
+            If the device is gone, or takes too long.
+        """
         restarts = 0
         while missing := self._reading.missing():
             if self._session.now() >= self._deadline:

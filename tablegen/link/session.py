@@ -77,7 +77,13 @@ class LinkSession:
         self._heard = True
 
     def status_of(self, payload: bytes, source: str = "STATUS") -> DeviceStatus:
-        """Unpack a status that answered the request ``source``. Raises ``NotUnderstood`` for an impossible one."""
+        """Unpack a status that answered the request ``source``.
+
+        Raises
+        ------
+        NotUnderstood
+            If the status is impossible.
+        """
         check_length(source, payload, DeviceStatus.LAYOUT.size)
         try:
             status = DeviceStatus.unpack(payload)
@@ -87,7 +93,13 @@ class LinkSession:
         return status
 
     def greet(self, deadline: float, anew: bool = False) -> None:
-        """HELLO again, on a port that may have gone meanwhile."""
+        """HELLO again, on a port that may have gone meanwhile.
+
+        Raises
+        ------
+        LinkLost
+            If the port does not come back before the deadline.
+        """
         try:
             self.hello(deadline, anew)
         except Silent:
@@ -96,7 +108,13 @@ class LinkSession:
             self.reopen(deadline, lost)
 
     def reopen(self, deadline: float, why: LinkLost) -> None:
-        """Open a port that has gone again, and HELLO; tries until the deadline. Without an opener raises ``why``."""
+        """Open a lost port again, and HELLO; repeat it until the deadline.
+
+        Raises
+        ------
+        LinkLost
+            ``why``, or what failed last.
+        """
         if self._opener is None:
             raise why
         while True:
@@ -121,7 +139,15 @@ class LinkSession:
                     raise
 
     def ask(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
-        """Send a request that does not act, and return the payload of its answer."""
+        """Send a request that does not act, and return the payload of its answer.
+
+        Raises
+        ------
+        Refused
+            If the device refuses the request.
+        LinkLost
+            If the device is gone, or does not answer before the deadline.
+        """
         for _ in range(_MAX_RESTARTS):
             try:
                 return self._repeat(kind, None, payload, answer_bytes, deadline)
@@ -136,7 +162,15 @@ class LinkSession:
         raise self.contested()
 
     def act(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float, tagged: bool = True) -> bytes:
-        """Send a request that acts, with a tag where the device needs one; it is carried out once."""
+        """Send a request that acts, with a tag where the device needs one; it is carried out once.
+
+        Raises
+        ------
+        Refused
+            If the device refuses the request.
+        LinkLost
+            If the device is gone, or does not answer before the deadline.
+        """
         number, body = self.exchange.number(), None
         last: LinkError = self.contested()
         for _ in range(_MAX_RESTARTS):
@@ -167,7 +201,13 @@ class LinkSession:
         return self.tag_of(nonce, kind, number, payload, b"")
 
     def needs_key(self, kind: Request) -> bool:
-        """Whether a request that acts needs a tag; raises ``Refused`` where no key was given."""
+        """Return True if a request that acts needs a tag.
+
+        Raises
+        ------
+        Refused
+            If it does and there is no key.
+        """
         if not self.info.features & Feature.KEY:
             return False
         if self.key is None:

@@ -43,7 +43,12 @@ def byte_s(baud: int | None) -> float:
 def open_port(url: str, baud: int = 115200) -> Transport:
     """Open a port of pyserial: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, or any other URL of it.
 
-    Raises ``NoPort`` where it cannot be opened, ``SerialMissing`` without pyserial.
+    Raises
+    ------
+    NoPort
+        If it cannot be opened.
+    SerialMissing
+        If pyserial is not installed.
     """
     try:
         import serial
@@ -89,14 +94,26 @@ class SerialTransport:
         self._name = name
 
     def write(self, data: bytes) -> None:
-        """Pass on bytes. Raises ``LinkLost`` where the port is gone or takes none."""
+        """Write bytes to the port.
+
+        Raises
+        ------
+        LinkLost
+            If the port is gone or takes none.
+        """
         try:
             self._port.write(data)
         except Exception as error:  # a port that vanishes raises OSError, TypeError and others
             raise self._lost(error) from None
 
     def read(self, timeout_s: float) -> bytes:
-        """Read what has come within ``timeout_s`` seconds. Raises ``LinkLost`` where the port is gone."""
+        """Read what has come within ``timeout_s`` seconds.
+
+        Raises
+        ------
+        LinkLost
+            If the port is gone.
+        """
         end = self.now() + timeout_s
         received = bytearray()
         try:

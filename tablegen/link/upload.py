@@ -57,7 +57,13 @@ class Uploader:
         self._restart(session.status)
 
     def run(self) -> UploadResult:
-        """Upload; the result, or a ``LinkError``."""
+        """Upload the image, and return the result.
+
+        Raises
+        ------
+        LinkError
+            If the device refuses it, is gone, or takes too long.
+        """
         sent = self._exchange.bytes_sent
         while True:
             try:

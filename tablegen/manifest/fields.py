@@ -288,7 +288,13 @@ class ManifestAxis(Struct):
 
     @property
     def fourier_words(self) -> Ints:
-        """In the order in which devices hold them."""
+        """The Fourier words in the order in which devices hold them: a0, a1..aH, b1..bH.
+
+        Returns
+        -------
+        Ints
+            Q2.30, shape (2 H + 1,).
+        """
         fourier = self.fourier
         return np.array([fourier.a0_word, *fourier.a_words, *fourier.b_words], dtype=np.int64)
 
@@ -320,10 +326,20 @@ class ManifestAxis(Struct):
         )
 
     def asked(self, k: Ints) -> Floats:
-        """Compute the unrounded codes of the float waveform at ticks k in [0, ticks) of the period.
+        """Compute the unrounded codes of the float waveform.
 
         V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
         phases, in none of the ways in which the build does it.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks) of the period, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Codes in LSB of the converter, shape (n,).
         """
         advance, period = k // self.line.hold_ticks, self.line.ticks // self.line.hold_ticks
         if period <= 4 * len(k):

@@ -10,7 +10,13 @@ CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of 
 
 
 def read_json(content: bytes) -> Any:
-    """Read a manifest. Raises ``ValueError`` for all that is no JSON, or nested as no manifest is."""
+    """Read a manifest.
+
+    Raises
+    ------
+    ValueError
+        If it is no JSON, or nested as no manifest is.
+    """
     try:
         return json.loads(content, parse_constant=_no_number)
     except RecursionError:

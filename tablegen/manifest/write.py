@@ -51,7 +51,15 @@ def manifest_file(
 
 
 def require_readable(content: bytes) -> None:
-    """Raise ``UnreadableManifest`` for a manifest that a build may have and that its own reader refuses."""
+    """Check that the reader of manifests accepts one before it is written.
+
+    Raises
+    ------
+    TooLongManifest
+        If it has more bytes than are read.
+    UnreadableManifest
+        If its reader refuses it.
+    """
     if len(content) > MANIFEST_KIND.most_bytes:
         raise TooLongManifest(f"it has {len(content)} bytes, above the {MANIFEST_KIND.most_bytes} that are read")
     try:

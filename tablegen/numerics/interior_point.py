@@ -26,13 +26,46 @@ class Rows(Protocol):
     """A linear map of unknowns (n,) to (m,)."""
 
     def times(self, y: Floats) -> Floats:
-        """Return R y, (m,)."""
+        """Return R y.
+
+        Parameters
+        ----------
+        y
+            Unknowns, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Shape (m,).
+        """
 
     def transposed(self, z: Floats) -> Floats:
-        """Return R^T z, (n,)."""
+        """Return R^T z.
+
+        Parameters
+        ----------
+        z
+            One value a row, shape (m,).
+
+        Returns
+        -------
+        Floats
+            Shape (n,).
+        """
 
     def gram(self, diagonal: Floats) -> Floats:
-        """Return R^T diag R, (n, n)."""
+        """Return R^T diag(diagonal) R.
+
+        Parameters
+        ----------
+        diagonal
+            One weight a row, shape (m,).
+
+        Returns
+        -------
+        Floats
+            Shape (n, n), symmetric.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +92,24 @@ class Minimum:
 def least_bound(
     parts: Sequence[Bounded], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
 ) -> Minimum:
-    """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``."""
+    """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``.
+
+    Parameters
+    ----------
+    parts
+        Constraints on the same n unknowns, of any number of rows each.
+    start
+        First unknowns, shape (n,); they need not satisfy the constraints.
+    gap
+        Relative distance of v from its lower bound at which the iteration ends.
+    reached
+        Function that ends the iteration at the first v for which it is true.
+
+    Returns
+    -------
+    Minimum
+        The last iterate; ``settled`` is False if neither condition was met.
+    """
     state = _State(parts, start)
     with np.errstate(
         over="ignore", divide="ignore", invalid="ignore"
@@ -89,15 +139,36 @@ class _Stack:
         )
 
     def times(self, y: Floats) -> Floats:
+        """Return R y, (n,) to (m,).
+
+        Returns
+        -------
+        Floats
+            Rows of all parts, shape (m,).
+        """
         return np.concatenate([rows.times(y) for rows in self._rows])
 
     def transposed(self, z: Floats) -> Floats:
+        """Return R^T z, (m,) to (n,).
+
+        Returns
+        -------
+        Floats
+            Sum over all parts, shape (n,).
+        """
         first, *others = [rows.transposed(of) for rows, of in self._split(z)]
         for other in others:
             first = first + other
         return first
 
     def gram(self, diagonal: Floats) -> Floats:
+        """Return R^T diag(diagonal) R, (m,) to (n, n).
+
+        Returns
+        -------
+        Floats
+            Sum over all parts, shape (n, n).
+        """
         first, *others = [rows.gram(of) for rows, of in self._split(diagonal)]
         for other in others:
             first += other
@@ -166,7 +237,18 @@ class _State:
         lack, residual = self._room() - slack, self._residual()
 
         def step(complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-            """Return the steps of (y, v), rows, slacks and multipliers that change their products by ``complement``."""
+            """Return the steps that change the products of slacks and multipliers by ``complement``.
+
+            Parameters
+            ----------
+            complement
+                Shape (2, m).
+
+            Returns
+            -------
+            solution, moves, slacks, multipliers
+                Steps of (y, v), (n + 1,); of the rows, (m,); of slacks and multipliers, (2, m).
+            """
             pull = (complement - one * lack) / slack
             right = np.append(residual[0] - rows.transposed(pull[0] - pull[1]), residual[1] + _sum(rows.share * pull))
             solution = factor.solve(right)

@@ -45,7 +45,18 @@ class Cholesky:
         self._columns = columns
 
     def solve(self, right: Floats) -> Floats:
-        """Return x with A x = right; both have shape (n,)."""
+        """Return the solution x of A x = right.
+
+        Parameters
+        ----------
+        right
+            Shape (n,); not changed.
+
+        Returns
+        -------
+        Floats
+            Shape (n,).
+        """
         x = np.array(right, dtype=np.float64)
         begins = range(0, len(x), _TOGETHER)
         for begin in begins:

@@ -33,6 +33,13 @@ class IdealCodes:
         grid = slow_grid(series, extreme_points(series))
 
         def slope_and_bend(t: Floats) -> tuple[Floats, ...]:
+            """Return the first and the second derivative of the waveform.
+
+            Returns
+            -------
+            tuple of Floats
+                Per period and per period^2, each of the shape of ``t``.
+            """
             return values(t, (series, 1), (series, 2))
 
         self._extremes = extreme_ticks(grid, slope_and_bend, ticks)

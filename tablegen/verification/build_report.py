@@ -101,11 +101,27 @@ def verify_build(
     *,
     other_version: bool = False,
 ) -> Report:
-    """Verify the build in ``folder`` for a target; it is played in ``work``, an empty directory.
+    """Verify the build in ``folder`` for a target.
 
-    A build of another version fails unless ``other_version``, since its runtime cannot be compared with the installed
-    one. Raises ``NotABuild`` and ``ToolMissing``. Everything else that is wrong is a failed check, and none hides
-    another.
+    Everything that is wrong with the build itself is a failed check, and none hides another.
+
+    Parameters
+    ----------
+    work
+        Empty directory in which the build is played.
+    most_ticks
+        Bound of the ticks that are played.
+    seed
+        Seed of the random parts of the session.
+    other_version
+        True to accept a build of another version, whose runtime cannot be compared with the installed one.
+
+    Raises
+    ------
+    NotABuild
+        If the folder holds no build, or none that this target can play.
+    ToolMissing
+        If a compiler or simulator is not installed.
     """
     stored = read_build(folder)
     if target.format_name is not None and target.format_name not in stored.formats:

@@ -58,7 +58,13 @@ def wrong_position(
 
 
 def position_errors(axis: ManifestAxis, period: PlayedPeriod, passage: ManifestPassage, rate_hz: float) -> Floats:
-    """Position less the one that is to arrive, in the middle of each tick, in LSB of the drive, shape (ticks,)."""
+    """Return the position less the one that is to arrive, in the middle of each tick.
+
+    Returns
+    -------
+    Floats
+        LSB of the converter, shape (ticks,).
+    """
     ticks, per_unit = axis.line.ticks, period.codes_per_unit
     output, drive = axis.output, axis.drive
     middle = (drive.v_offset - output.v_zero) / output.v_per_code

@@ -54,7 +54,18 @@ class Straightness:
         return self.window[0] <= 0.0 or self.window[1] >= 1.0
 
     def times(self, x: Floats) -> list[Floats]:
-        """Return when each direction that images passes places x of the window, 0..1; each of the shape of x."""
+        """Return when each direction that images passes places of the window.
+
+        Parameters
+        ----------
+        x
+            Places in the window, 0 at its lower end and 1 at its upper, any shape.
+
+        Returns
+        -------
+        list of Floats
+            Times in periods: forward, then backward if ``both``; each of the shape of ``x``.
+        """
         low, high = self.window
         place, turn = low + (high - low) * x, self.shape.turn
         forward = turn * place

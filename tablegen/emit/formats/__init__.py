@@ -42,7 +42,13 @@ def own_names() -> list[str]:
 
 @cache
 def get(name: str) -> Format:
-    """Return the format of a name. Raises ``UnknownFormat``."""
+    """Return the format of a name.
+
+    Raises
+    ------
+    UnknownFormat
+        If no format has that name, or an installed package has no ``Format`` under it.
+    """
     if name in _own():
         format_found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
     elif name in _others():
@@ -62,8 +68,12 @@ def get(name: str) -> Format:
 def files_of(one: Format, content: Content) -> dict[str, bytes]:
     """Render the files of a format by name, without its runtime.
 
-    Raises ``Unphysical`` for a build that it cannot hold, ``FormatFailed`` where a format of another distribution fails
-    or returns anything but names with bytes.
+    Raises
+    ------
+    Unphysical
+        If the format cannot hold the build.
+    FormatFailed
+        If a format of another distribution fails, or returns anything but names with bytes.
     """
     if one.name in _own():
         return one.files(content)
@@ -80,7 +90,13 @@ def files_of(one: Format, content: Content) -> dict[str, bytes]:
 
 @contextmanager
 def failing_as_format(one: Format) -> Iterator[None]:
-    """Turn what a format of another distribution raises inside into ``FormatFailed``; that of an own one is a fault."""
+    """Report an exception inside a format of another distribution; one of an own format is a fault of the program.
+
+    Raises
+    ------
+    FormatFailed
+        If the format raises anything but ``Unphysical`` and ``UnknownFormat``.
+    """
     if one.name in _own():
         yield
         return

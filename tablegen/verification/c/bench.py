@@ -41,7 +41,22 @@ class CPlayed:
 
     @classmethod
     def of(cls, capture: Words, script: str, constants: int = 0) -> "CPlayed":
-        """Split what the bench wrote while it played a script: ticks, then counts, states, constants."""
+        """Split what the bench wrote while it played a script: ticks, then counts, states, constants.
+
+        Parameters
+        ----------
+        capture
+            Words of 64 bits, shape (n,).
+        script
+            Text of the script.
+        constants
+            Number of the words of constants.
+
+        Returns
+        -------
+        CPlayed
+            Its ``capture`` has the shape (ticks,).
+        """
         states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
         ticks = len(capture) - len(FAULTS) - states - constants
         tail = capture[ticks:].astype(np.int64).tolist()
@@ -73,7 +88,18 @@ def constants_written(chosen: Mapping[str, int] | None) -> int:
 
 
 def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None) -> str:
-    """Format a script for the C bench: shape, codes at power-up, the sine table if it is needed, commands."""
+    """Format a script for the C bench: shape, codes at power-up, the sine table if it is needed, commands.
+
+    Parameters
+    ----------
+    sine
+        Words with 30 fraction bits, shape (n,): see ``sine_periods``.
+
+    Returns
+    -------
+    str
+        A word of 16 hexadecimal digits a line.
+    """
     x_index, y_index = (
         getattr(shape, f"{axis}_index_bits") if getattr(shape, f"{axis}_interpolated") else 0 for axis in "xy"
     )

@@ -90,7 +90,19 @@ def compile_bare(
 ) -> Executable:
     """Compile and link for a bare processor; headers are found beside the sources, which may list them.
 
-    A ``compiler`` that is not gcc is told the processor in its own command.
+    Parameters
+    ----------
+    compiler
+        Command, by default gcc for the core; one that is not gcc has the processor in its own command.
+    chosen
+        Macros by name, for ``-D``.
+
+    Raises
+    ------
+    SimulationFailed
+        If the compiler fails or warns.
+    ToolMissing
+        If the compiler or the emulator is not installed.
     """
     architecture = CORES[core].architecture
     command = require_emulator(compiler or COMPILERS[architecture])
@@ -157,7 +169,13 @@ class Processor:
         return uc
 
     def symbol(self, name: str) -> int:
-        """Return the address of a symbol, without the Thumb bit."""
+        """Return the address of a symbol, without the Thumb bit.
+
+        Raises
+        ------
+        SimulationFailed
+            If the executable has no such symbol.
+        """
         try:
             address = self.executable.symbols[name]
         except KeyError:
@@ -182,7 +200,13 @@ class Processor:
         return int.from_bytes(self.read(name, 4), "little")
 
     def run(self, start: int, stop: int) -> None:
-        """Until the processor is about to execute what is at ``stop``."""
+        """Run until the processor is about to execute the instruction at ``stop``.
+
+        Raises
+        ------
+        SimulationFailed
+            If the processor stops before.
+        """
         from unicorn import UcError
 
         while True:

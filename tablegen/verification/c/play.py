@@ -14,14 +14,26 @@ OBJECTS = "objects"
 
 
 def compile_line(line: Sequence[str], place: Path | None = None) -> None:
-    """Run a compiler, in a directory if one is given; raises ``SimulationFailed`` with all that it says."""
+    """Run a compiler, in a directory if one is given.
+
+    Raises
+    ------
+    SimulationFailed
+        If it fails or warns, with all its output.
+    """
     done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
     if done.returncode or done.stderr:
         raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
 
 
 def require_headers(compiler: Sequence[str]) -> None:
-    """Raise ``ToolMissing`` if a compiler has no C library; Debian's gcc only recommends that package."""
+    """Check that a compiler has a C library; Debian's gcc only recommends that package.
+
+    Raises
+    ------
+    ToolMissing
+        If it has none.
+    """
     line = [*compiler, "-fsyntax-only", "-x", "c", "-"]
     done = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
     if done.returncode and "stdint.h" in done.stderr:
@@ -59,7 +71,18 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Compile the ``objects`` of a job and its program, and play the script of ``folder`` in each of its ways.
 
     Places and files are named within ``folder``; a way of playing is a record, of ``most_bytes``, and arguments.
-    Returns what went wrong, by the record; nothing is played after that.
+
+    Returns
+    -------
+    dict of str to str
+        The message of the first playback that failed, by its record; nothing is played after that.
+
+    Raises
+    ------
+    SimulationFailed
+        If the compiler fails.
+    ToolMissing
+        If the compiler has no C library.
     """
     program = folder / job["program"]
     program.parent.mkdir(parents=True, exist_ok=True)

@@ -59,7 +59,13 @@ class CTarget:
             require_compiler(host_compiler())
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
-        """``direct`` tables may be longer than the runtime takes, and are not rendered."""
+        """Check that the runtime can play the tables; direct ones may be longer than it takes, and are not rendered.
+
+        Raises
+        ------
+        NotABuild
+            If a table is too long, or Fourier words are to be rendered and both tables are direct.
+        """
         for name, axis in stored.axes:
             if axis.table.mode == "direct" and len(axis.table.words) > _MAX_TABLE_WORDS:
                 raise NotABuild(

@@ -22,7 +22,13 @@ _SIX_DIGITS, _LONG_PERIOD = 1.1e-5, 1e-3  # relative: what six digits round away
 
 
 def on_grid(series: ManifestSeries, count: int, derivative: int = 0) -> Floats:
-    """w, or its derivative with respect to t in periods, at k / count for k in [0, count)."""
+    """Return w, or its derivative with respect to t in periods, at k / count for k in [0, count).
+
+    Returns
+    -------
+    Floats
+        Shape (count,).
+    """
     n = np.arange(1, len(series.a) + 1)
     factor = (tau * n) ** derivative
     a, b = np.array(series.a), np.array(series.b)
@@ -89,11 +95,28 @@ class PlayedPeriod:
 
     @property
     def edges(self) -> Ints:
-        """Ticks at which a run of one code begins or ends."""
+        """The ticks at which a run of one code begins or ends.
+
+        Returns
+        -------
+        Ints
+            Ticks, ascending, shape (n,).
+        """
         return merged(self.runs.starts, self.runs.lasts)
 
     def errors(self, k: Ints) -> Floats:
-        """Code less the unrounded code of the waveform, at ticks k, of any period."""
+        """Return the code less the unrounded code of the waveform.
+
+        Parameters
+        ----------
+        k
+            Ticks of any period, shape (n,).
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (n,).
+        """
         advance = k % self.program.ticks // self.program.hold
         intended = self._intended[advance] if self.is_whole else self._between(advance)
         errors: Floats = self.runs.at(k % self.program.ticks) - intended

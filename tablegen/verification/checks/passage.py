@@ -10,7 +10,18 @@ Complex = npt.NDArray[np.complex128]
 
 
 def passes(passage: ManifestPassage, f_hz: Floats) -> Complex:
-    """Return the complex gain of a passage for errors at frequencies in Hz, of the shape of ``f_hz``."""
+    """Return the complex gain of a passage for errors.
+
+    Parameters
+    ----------
+    f_hz
+        Frequencies in Hz, any shape.
+
+    Returns
+    -------
+    Complex
+        Dimensionless, shape of ``f_hz``.
+    """
     if passage.response is not None:
         return np.asarray(np.where(f_hz <= passage.response.hz[-1], _measured(passage.response, f_hz), 0.0))
     if passage.frequency_hz is None or passage.quality is None:

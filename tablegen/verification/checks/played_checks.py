@@ -49,7 +49,18 @@ def first_difference(capture: Capture) -> str | None:
 
 
 def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints]) -> list[Check]:
-    """Codes against model and limits, converter words that were ``sent``, and markers against the model."""
+    """Compare codes with model and limits, converter words with the codes, and markers with the model.
+
+    Parameters
+    ----------
+    sent
+        Converter words of each axis, coded and aligned, each of shape (ticks,).
+
+    Returns
+    -------
+    list of Check
+        Those of x, of y, and of the markers.
+    """
     checks = []
     for axis, content in stored.axes:
         checks += [_model(capture, axis), _slew(capture, axis, content), _clamp(capture, axis)]
@@ -248,7 +259,8 @@ def coded(codes: Ints, content: ManifestAxis) -> Ints:
 
     Returns
     -------
-    Words of the same shape.
+    Ints
+        Converter words, shape of ``codes``.
     """
     output = content.program.output
     return output.word(codes)

@@ -47,15 +47,48 @@ class ModelBranch:
         return cls(branch.beta * bend[1] / determinant, -branch.beta * bend[0] / determinant)
 
     def value(self, s: Floats) -> Floats:
-        """u(s)."""
+        """Return u(s), equation (17).
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``s``.
+        """
         return (1.0 + 2.0 * self.xi_gamma) * s + self.xi * np.sin(pi * s) + self.xi_gamma * (np.cos(pi * s) - 1.0)
 
     def slope(self, s: Floats) -> Floats:
-        """du/ds."""
+        """Return du/ds.
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``s``.
+        """
         return 1.0 + 2.0 * self.xi_gamma + pi * (self.xi * np.cos(pi * s) - self.xi_gamma * np.sin(pi * s))
 
     def inverse(self, u: Floats) -> Floats:
-        """s(u)."""
+        """Return s(u), the inverse of ``value``.
+
+        Parameters
+        ----------
+        u
+            Normalised drive, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Places in the sweep, shape (n,).
+        """
         return _inverse(self, u)
 
 
@@ -77,17 +110,50 @@ class WaveformBranch:
         return cls(waveform, axis.drive.turn, side == "forward")
 
     def value(self, s: Floats) -> Floats:
-        """u(s)."""
+        """Return u(s).
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``s``.
+        """
         w = at(self.waveform, self._times(s))
         return w if self.forward else 1.0 - w
 
     def slope(self, s: Floats) -> Floats:
-        """du/ds."""
+        """Return du/ds.
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``s``.
+        """
         rise = at(self.waveform, self._times(s), 1)
         return self.turn * rise if self.forward else (self.turn - 1.0) * rise
 
     def inverse(self, u: Floats) -> Floats:
-        """s(u)."""
+        """Return s(u), the inverse of ``value``.
+
+        Parameters
+        ----------
+        u
+            Normalised drive, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Places in the sweep, shape (n,).
+        """
         return _inverse(self, u)
 
     def _times(self, s: Floats) -> Floats:
@@ -111,9 +177,12 @@ _EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
 
 
 def knows(model: str) -> bool:
-    """Test whether the scaling errors of this model can be computed here; those of installed packages cannot.
+    """Return True if the scaling errors of this model can be computed here; those of installed packages cannot.
 
-    Raises ``ValueError`` for a model that nobody has: no build states it.
+    Raises
+    ------
+    ValueError
+        If neither tablegen nor an installed package has the model: no build states it.
     """
     if model in _EQUATIONS or model == OPERATOR:
         return True
@@ -136,9 +205,21 @@ def _branch(axis: ManifestAxis, side: str) -> ModelBranch | WaveformBranch:
 
 
 def hold_response(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Floats]:
-    """Real and imaginary part of what a converter makes of harmonics that it holds for an advance of ``advances``.
+    """Return the response of a zero-order hold to harmonics of a period of ``advances`` held values.
 
     Where an axis steps once a line, the phase alone counts: it is imaged at its codes.
+
+    Parameters
+    ----------
+    harmonics
+        H, the highest harmonic.
+    steps
+        True for an axis that steps once a line.
+
+    Returns
+    -------
+    real, imaginary
+        Dimensionless, for harmonics 1..H, shape (H,).
     """
     share = np.arange(1, harmonics + 1) / advances
     size = np.ones(harmonics) if steps else np.sinc(share)
@@ -226,7 +307,18 @@ class PositionErrors:
         self.edges = np.arange(len(errors), dtype=np.int64)
 
     def errors(self, k: Ints) -> Floats:
-        """At ticks k, in LSB."""
+        """Return the errors of the position.
+
+        Parameters
+        ----------
+        k
+            Ticks of the period, any shape.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape of ``k``.
+        """
         return self._errors[k]
 
 

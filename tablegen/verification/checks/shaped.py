@@ -35,7 +35,18 @@ def code_excess(axis: ManifestAxis) -> float:
 
 
 def shaped_codes(program: Program, count: int) -> Ints:
-    """Return the first codes of a shaped program since it began, within its limits: shape (count,)."""
+    """Return the first codes of a shaped program since it began, within its limits.
+
+    Parameters
+    ----------
+    count
+        Number of ticks, which may be several periods.
+
+    Returns
+    -------
+    Ints
+        Codes, shape (count,).
+    """
     output = program.output
     bits = _CODE_AND_REMAINDER_BITS - output.dac_bits
     half = 1 << (bits - 1)
@@ -82,22 +93,46 @@ class ShapedPlay:
 
     @property
     def codes(self) -> Ints:
-        """Those that are judged, (ticks,)."""
+        """The codes of the judged periods.
+
+        Returns
+        -------
+        Ints
+            One period after another, shape (periods * ticks,).
+        """
         return self._shaped[self._first :].reshape(-1)
 
     @property
     def code_errors(self) -> Floats:
-        """Those of these codes, (ticks,)."""
+        """The codes less the unrounded codes of the judged periods.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods * ticks,).
+        """
         return np.asarray((self._shaped - self._intended)[self._first :].reshape(-1))
 
     @cached_property
     def position_errors(self) -> Floats | None:
-        """Behind the passage, (periods, ticks); None where the manifest does not have it."""
+        """The errors of the position in the judged periods.
+
+        Returns
+        -------
+        Floats or None
+            LSB of the converter, shape (periods, ticks); None where the manifest states no passage.
+        """
         return self._behind(self._shaped)
 
     @cached_property
     def rounded_errors(self) -> Floats | None:
-        """The same without shaping."""
+        """The errors of the position in the judged periods if codes were rounded instead of shaped.
+
+        Returns
+        -------
+        Floats or None
+            LSB of the converter, shape (periods, ticks); None where the manifest states no passage.
+        """
         return self._behind(self._rounded)
 
     def _behind(self, codes: Ints) -> Floats | None:

@@ -36,7 +36,13 @@ class Capture:
 
     @property
     def known(self) -> Bools:
-        """Ticks of which the simulator knew every bit."""
+        """The ticks of which the simulator knew every bit.
+
+        Returns
+        -------
+        Bools
+            Shape (ticks,).
+        """
         known: Bools = self.got != UNDEFINED
         return known
 
@@ -52,30 +58,87 @@ class Capture:
 
 
 def part(subject: str, words: Words) -> Ints:
-    """Return a field of captured words: x, y, markers, or faults, shape (ticks,)."""
+    """Return a field of captured words.
+
+    Parameters
+    ----------
+    subject
+        "x", "y", "markers" or "faults".
+    words
+        Captured words, shape (ticks,).
+
+    Returns
+    -------
+    Ints
+        Shape (ticks,).
+    """
     shift, mask = _MASK[subject]
     return (words >> np.uint64(shift) & np.uint64(mask)).view(np.int64)
 
 
 def differing(subject: str, capture: Capture) -> Ints:
-    """Return the ticks at which a field of the captured words differs from the model, shape (errors,)."""
+    """Return the ticks at which a field of the captured words differs from the model.
+
+    Parameters
+    ----------
+    subject
+        "x", "y", "markers" or "faults".
+
+    Returns
+    -------
+    Ints
+        Ticks, ascending, shape (errors,).
+    """
     shift, mask = _MASK[subject]
     return np.flatnonzero((capture.got ^ capture.expected) & np.uint64(mask << shift))
 
 
 def without_faults(words: Words) -> Words:
-    """Return captured words with their faults cleared, shape (ticks,)."""
+    """Return captured words with their faults cleared.
+
+    Parameters
+    ----------
+    words
+        Captured words, shape (ticks,).
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     cleared: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
     return cleared
 
 
 def recaptured(capture: Capture, got: Words) -> Capture | None:
-    """Return a second capture of the same session, if it has as many ticks as the first; else None."""
+    """Return a second capture of the same session, if it has as many ticks as the first; else None.
+
+    Parameters
+    ----------
+    got
+        Words of the second capture, shape (ticks,).
+
+    Returns
+    -------
+    Capture or None
+        With the model of the first.
+    """
     return None if capture.lost or len(got) != len(capture.got) else replace(capture, got=got)
 
 
 def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
-    """Line capture and model up."""
+    """Align the captured words of a session with the model, up to the shorter of both.
+
+    Parameters
+    ----------
+    got
+        Captured words, shape (ticks,).
+
+    Returns
+    -------
+    Capture
+        Its arrays have one shape; ``lost`` is the difference of both lengths.
+    """
     model = np.array(script.expected, dtype=np.uint64)
     playing, frame = (model & np.uint64(1 << 48 + FLAGS.index(name)) != 0 for name in ("playing", "frame"))
     index = np.arange(len(model))

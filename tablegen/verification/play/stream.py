@@ -48,7 +48,18 @@ def pack(tick: Tick) -> int:
 
 
 def pack_line(ticks: LineTicks, faults: Ints) -> Words:
-    """Pack the ticks of a line, all of which play, with the faults so far: shape (ticks,)."""
+    """Pack the ticks of a line, all of which play, with the faults so far.
+
+    Parameters
+    ----------
+    faults
+        Bits of the faults at each tick, shape (ticks,).
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     markers = {"line": ticks.line, "frame": ticks.frame, "pixel": ticks.pixel, "backward": ticks.backward}
     words = faults << _FAULTS_AT | 1 << 48 + FLAGS.index("playing") | ticks.y << 24 | ticks.x
     for name, marker in {**markers, "valid": ticks.valid}.items():
@@ -154,7 +165,17 @@ class Script:
             self.wait(self._until + (ticks - 1) * self._period + 1)
 
     def write(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
-        """Write words to a region of the idle bank, from address ``first`` on, one a clock."""
+        """Write words to a region of the idle bank, from address ``first`` on, one a clock.
+
+        Parameters
+        ----------
+        region
+            Number of the region.
+        words
+            Integers of up to 32 bits, shape (n,).
+        first
+            Address of the first word.
+        """
         base = _WRITE | region << 48
         values = np.asarray(words, dtype=np.int64) & 0xFFFFFFFF
         at = np.arange(first, first + len(values), dtype=np.int64) << 32
@@ -162,7 +183,17 @@ class Script:
         self._pass(len(words))
 
     def write_refused(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
-        """Write words that must have no effect: a program is pending, or the last one is still leaving."""
+        """Write words that must have no effect: a program is pending, or the last one is still leaving.
+
+        Parameters
+        ----------
+        region
+            Number of the region.
+        words
+            Integers of up to 32 bits, shape (n,).
+        first
+            Address of the first word.
+        """
         assert not self.writable
         self.write(region, words, first)
         self.refused = True
@@ -183,7 +214,13 @@ class Script:
         self.refused = True
 
     def load(self, program: DualProgram, x: FourierWords | None = None, y: FourierWords | None = None) -> None:
-        """Write a whole program, once the idle bank can be written: tables, or Fourier words to render them from."""
+        """Write a whole program, once the idle bank can be written.
+
+        Parameters
+        ----------
+        x, y
+            Fourier words to render an axis from; without them its table is written.
+        """
         self.wait_writable()
         assert self.writable, "a program waits to be taken; withdraw it first"
         harmonics = (x.harmonics if x else 0, y.harmonics if y else 0)
@@ -366,7 +403,13 @@ def read_states(words: list[int]) -> list[StoredState]:
 
 
 def read_capture(path: Path) -> Words:
-    """Read the words of a capture, shape (ticks,); a word with unknown bits becomes all ones, which no tick is."""
+    """Read the words of a capture; a word with unknown bits becomes all ones, which no tick is.
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     text = path.read_text("ascii").lower()
     if "x" in text or "z" in text:
         text = re.sub(r"^.*[xz].*$", "f" * 16, text, flags=re.MULTILINE)
@@ -383,7 +426,20 @@ class Mismatch:
 
 
 def compare(expected: Sequence[int], capture: Words) -> Mismatch | None:
-    """Every tick of a capture against the model, codes, markers and faults; None where all are equal."""
+    """Compare every tick of a capture with the model: codes, markers and faults.
+
+    Parameters
+    ----------
+    expected
+        Words of the model, of length n.
+    capture
+        Captured words, shape (m,).
+
+    Returns
+    -------
+    Mismatch or None
+        The first tick that differs or that only one of both has; None where all are equal.
+    """
     model = np.array(expected, dtype=np.uint64)
     length = min(len(model), len(capture))
     differs = np.flatnonzero(model[:length] != capture[:length])

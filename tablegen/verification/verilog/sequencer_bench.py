@@ -94,7 +94,13 @@ class SequencerBench:
 
 
 def run_bench(design: Compiled, folder: Path, clocks: int) -> dict[str, Any]:
-    """Play the script of so many clocks that a compiled bench reads; the counters of the bench by name."""
+    """Play the script of so many clocks that a compiled bench reads, and return the counters of the bench by name.
+
+    Raises
+    ------
+    SimulationFailed
+        If the bench does not play its script to the end.
+    """
     status_file = folder / "status.json"
     status_file.unlink(missing_ok=True)
     timeout = (clocks + 1000) * 10 // 1000 + 10

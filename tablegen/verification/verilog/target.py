@@ -75,7 +75,13 @@ class VerilogTarget:
         require(self.simulator)
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
-        """``direct`` tables may be longer than the sequencer's addresses."""
+        """Check that the sequencer can play the tables; direct ones may be longer than its addresses.
+
+        Raises
+        ------
+        NotABuild
+            If a table is too long, or Fourier words are to be rendered and both tables are direct.
+        """
         for name, axis in stored.axes:
             if len(axis.table.words) > _MAX_TABLE_WORDS:
                 raise NotABuild(
