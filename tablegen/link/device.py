@@ -1,4 +1,4 @@
-"""``Device``: an instrument at the end of a serial line, for control software. It prints nothing."""
+"""The class ``Device``: an instrument at the end of a serial line, for control software; nothing is printed."""
 
 import math
 import random as random_module
@@ -64,14 +64,29 @@ class Device:
         random: Random | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Open a port and say HELLO.
+        """Open a port and send HELLO.
 
-        ``port`` is a port or URL of pyserial, a function that opens a ``Transport`` (again and again), or an open one.
-        ``key`` has 16 to 32 bytes. ``latency_s`` is that of bridges on the way, ``timeout_s`` that of a request (plus
-        8 times what answers come late, by 5 s at most).
-        ``random`` and ``sleep`` are for tests.
+        Parameters
+        ----------
+        port
+            A port or URL of pyserial, a function that opens a ``Transport`` (again and again), or an open one.
+        key
+            16 to 32 bytes.
+        latency_s
+            Latency of bridges between host and device.
+        timeout_s
+            Bound of a request, to which 8 times the lateness of answers is added, up to 5 s.
+        random, sleep
+            Replacements for tests.
 
-        Raises ``NoPort``, ``NoAnswer``, ``Refused`` (the device speaks another version), ``SerialMissing``.
+        Raises
+        ------
+        NoPort, SerialMissing
+            If the port cannot be opened.
+        NoAnswer, Refused
+            If no device answers, or one of another version.
+        ValueError
+            If the key has another length.
         """
         if key is not None and len(key) not in _KEY_BYTES:
             raise ValueError(f"a key of {len(key)} bytes; devices have 16 to 32")
@@ -105,22 +120,22 @@ class Device:
 
     @property
     def info(self) -> DeviceInfo:
-        """What the device is."""
+        """The properties of the device, fixed at its build."""
         return self._session.info
 
     @property
     def hello(self) -> DeviceStatus:
-        """What it did at first, or at the end of the last upload; ``status`` asks again."""
+        """The status at the last HELLO, or at the end of the last upload; ``status`` asks again."""
         return self._session.status
 
     @property
     def acts(self) -> tuple[Request, ...]:
-        """Requests that were sent and change what the device does: it may have carried them out."""
+        """The requests that were sent and change what the device does: it may have carried them out."""
         return tuple(self._session.acts)
 
     @property
     def upload_state(self) -> UploadState | None:
-        """What is known of the last upload, for the time when it is interrupted; None if there was none."""
+        """The progress of the last upload, for the time when it is interrupted; None if there was none."""
         return None if self._uploader is None else self._uploader.state
 
     def status(self) -> DeviceStatus:
@@ -129,7 +144,13 @@ class Device:
         return self._session.status_of(payload)
 
     def needs_key(self) -> bool:
-        """Return whether uploads carry a tag; raises ``Refused`` if they do and no key was given. Sends nothing."""
+        """Return True if uploads carry a tag; nothing is sent.
+
+        Raises
+        ------
+        Refused
+            If they do and there is no key.
+        """
         return self._session.needs_key(Request.COMMIT)
 
     def upload(
@@ -235,7 +256,7 @@ class Device:
         raise OutOfTime("the scan changed while it was read; is another program uploading?")
 
     def park(self) -> None:
-        """End the scan: ramp to the park codes, and hold them. ``wait_for(State.PARKED)`` waits for that."""
+        """Park: end the scan, ramp to the park codes and hold them; ``wait_for(State.PARKED)`` waits for the end."""
         self._act(Request.PARK)
 
     def arm(self, frames: int = 0) -> None:
@@ -257,11 +278,11 @@ class Device:
         self._act(Request.TRIGGER)
 
     def clear(self) -> None:
-        """Forget faults and their counts."""
+        """Clear faults and their counts."""
         self._act(Request.CLEAR)
 
     def abort(self) -> int:
-        """Forget an upload, and withdraw a program that waits; the generation that plays."""
+        """Discard an upload and withdraw a waiting program; return the generation that plays."""
         payload = self._act(Request.ABORT, plain=True)
         check_length("ABORT", payload, _GENERATION_BYTES)
         return int.from_bytes(payload[:_GENERATION_BYTES], "little")
@@ -312,7 +333,7 @@ class Device:
             self._sleep(min(_POLL_S, deadline - self._session.now()))
 
     def _sleep(self, seconds: float) -> None:
-        """On the clock of the port, and emptying it."""
+        """Sleep by the clock of the port, and empty it meanwhile."""
         self._session.exchange.receive(self._session.now() + seconds)
 
     def _act(self, kind: Request, payload: bytes = b"", answer_bytes: int = 16, plain: bool = False) -> bytes:
@@ -325,7 +346,7 @@ class Device:
         return self._session.now() + timeout_s
 
     def _late_s(self) -> float:
-        """By which answers are late."""
+        """Return the time in s by which answers are late."""
         return min(self._session.exchange.pace.late_s, _MAX_LATE_S)
 
     def _limits(self, payload: bytes) -> Limits:

@@ -14,7 +14,7 @@ OVERHEAD = MINIMUM_FRAME + 2  # bytes of a frame on the wire beside its payload
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A request or an answer. ``type`` and ``seq`` are 8 bits, ``session`` 32, ``payload`` at most 244 bytes."""
+    """A request or an answer: ``type`` and ``seq`` have 8 bits, ``session`` 32, ``payload`` at most 244 bytes."""
 
     type: int
     seq: int
@@ -55,7 +55,7 @@ def decode(wire: bytes) -> Frame:
 
 
 class FrameReader:
-    """Frames out of whatever pieces a line delivers; ``bad_frames`` counts what was dropped."""
+    """The frames in whatever pieces a line delivers; ``bad_frames`` counts the damaged ones."""
 
     def __init__(self) -> None:
         self.bad_frames = 0
@@ -81,7 +81,7 @@ class FrameReader:
         return frames
 
     def _add(self, piece: bytes) -> None:
-        """Noise without an end takes no memory without end."""
+        """Append bytes of a frame up to its greatest length, so that endless noise takes no endless memory."""
         if len(self._begun) + len(piece) > MAXIMUM_FRAME + 1:
             self._begun.clear()
             self._overflown = True
@@ -90,7 +90,7 @@ class FrameReader:
 
 
 def cobs_encode(data: bytes) -> bytes:
-    """Consistent overhead byte stuffing of at most 254 bytes: one byte more, and no zero among them."""
+    """Encode at most 254 bytes by consistent overhead byte stuffing: one byte more, and no zero among them."""
     assert len(data) <= MAXIMUM_FRAME
     return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0"))
 

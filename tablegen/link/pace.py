@@ -1,4 +1,4 @@
-"""How long answers take: what line and latency explain, and what every answer teaches beyond that."""
+"""The time that answers take: by line and latency, and by the lateness of the answers so far."""
 
 from collections import deque
 from collections.abc import Callable
@@ -21,7 +21,7 @@ _MAX_BACK_OFF = 4  # or up to so many times the first wait
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """A request as it was sent: when, how far it ended in all bytes, and when its answer should come."""
+    """A request that was sent: its time, its end in the count of all bytes, and the expected time of its answer."""
 
     at: float
     end: int
@@ -29,7 +29,7 @@ class _Mark:
 
 
 class Pace:
-    """Learns the way to a device from the answers that come.
+    """The pace of a link, estimated from the answers that come.
 
     What an answer takes longer than line and latency explain is its lateness. Waits allow for the largest, without a
     cap; it fades as other answers come. Only a request that was sent once teaches (Karn).
@@ -45,12 +45,12 @@ class Pace:
         self.late_s = 0.0  # the largest lateness, fading
 
     def forget(self) -> None:
-        """Forget all requests on their way: the port is another one, and they will not be answered."""
+        """Drop all requests on their way: the port is another one, and they will not be answered."""
         self._marks.clear()
         self._line_free = 0.0
 
     def sent(self, key: tuple[int, int], now: float, baud: int | None, sizes: tuple[int, int], learn: bool) -> float:
-        """Note that a request leaves, and return how long to wait for its answer.
+        """Record that a request leaves, and return how long to wait for its answer.
 
         ``key`` is its type and seq, ``sizes`` the bytes of the request on the wire and of the answer's payload.
         ``learn`` is false where the answer's time says nothing about the way.
@@ -65,7 +65,7 @@ class Pace:
         return _MARGIN * (way + self.late_s) + _DEVICE_DELAY_S
 
     def answered(self, key: tuple[int, int], now: float, answer_bytes: int) -> None:
-        """Note that an answer of so many bytes of payload has come."""
+        """Record that an answer of so many bytes of payload has come."""
         mark = self._marks.pop(key, None)
         if mark is None:
             return
@@ -73,13 +73,13 @@ class Pace:
         between = mark.end - self._answered
         if between <= 0:
             return
-        moved = max(between, answer_bytes + OVERHEAD)
-        if mark.at < self._answered_at and moved >= _SPACED_BYTES:  # it was on its way behind the one before
-            self._spacings.append((now - self._answered_at) / moved)
+        transfer = max(between, answer_bytes + OVERHEAD)
+        if mark.at < self._answered_at and transfer >= _SPACED_BYTES:  # it was on its way behind the one before
+            self._spacings.append((now - self._answered_at) / transfer)
         self._answered, self._answered_at = mark.end, now
 
     def slow_baud(self, baud: int | None) -> int | None:
-        """About the rate at which answers come, in bit/s, where it is far below ``baud``; None where it is not.
+        """Return about the rate of the answers in bit/s where it is far below ``baud``, else None.
 
         Most answers through a long way follow each other closely. So the quarter of the answers with the shortest
         spacing decides.
@@ -94,9 +94,9 @@ class Pace:
 
 
 class Deadline:
-    """When something has to have ended: what is allowed may grow while a host learns how long it takes.
+    """The end of the time for a transfer; the time may grow while the host learns how slow the link is.
 
-    The most that ``allowed_s`` has told so far counts. Times are those of the port's clock, in seconds.
+    The largest result of ``allowed_s`` so far counts. Times are those of the port's clock, in seconds.
     """
 
     def __init__(self, start: float, allowed_s: Callable[[], float]) -> None:
@@ -104,7 +104,7 @@ class Deadline:
 
     @property
     def at(self) -> float:
-        """The time."""
+        """The time of the deadline in s."""
         self._most_s = max(self._most_s, self._allowed_s())
         return self._start + self._most_s
 

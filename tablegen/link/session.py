@@ -28,11 +28,11 @@ _REOPEN_INTERVAL_S = 0.25
 
 
 class SessionEnded(Exception):
-    """The device knows another session, or none: the next request has to be HELLO. For use within the client."""
+    """The end of a session: the device knows another one, or none, and the next request has to be HELLO. Internal."""
 
 
 class LinkSession:
-    """One host at one device. Requests end in an answer or an error before their deadline, a time of ``now``."""
+    """A session of a host with a device; requests end in an answer or an error before a deadline, a time of ``now``."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class LinkSession:
         self.acts: dict[Request, None] = {}  # requests that act which were sent, in order, each once
         self._opener = opener
         self._sleep = sleep
-        self._heard = False
+        self._has_answered = False
 
     def now(self) -> float:
         """Return the time by the clock of the port."""
@@ -61,20 +61,20 @@ class LinkSession:
         """Give the port back."""
         self.exchange.transport.close()
 
-    def hello(self, deadline: float, anew: bool = False) -> None:
-        """Begin, or go on, and learn ``info`` and ``status``; ``anew`` is with another session."""
-        if anew:
+    def hello(self, deadline: float, new_session: bool = False) -> None:
+        """Send HELLO, and store ``info`` and ``status``; ``new_session`` begins another session."""
+        if new_session:
             self.exchange.new_session()
         payload = self._repeat(Request.HELLO, None, bytes([VERSION]), HELLO_BYTES, deadline)
         size = DeviceInfo.LAYOUT.size
         check_length("HELLO", payload, HELLO_BYTES)
         info = DeviceInfo.unpack(payload)
         check_device(info)
-        if self._heard:
+        if self._has_answered:
             check_unchanged(self.info, info)
         self.info = info
         self.status, self.status_at = self.status_of(payload[size:], "HELLO"), self.now()
-        self._heard = True
+        self._has_answered = True
 
     def status_of(self, payload: bytes, source: str = "STATUS") -> DeviceStatus:
         """Unpack a status that answered the request ``source``.
@@ -92,8 +92,8 @@ class LinkSession:
         check_status(status, self.info, source)
         return status
 
-    def greet(self, deadline: float, anew: bool = False) -> None:
-        """HELLO again, on a port that may have gone meanwhile.
+    def greet(self, deadline: float, new_session: bool = False) -> None:
+        """Send HELLO again, on a port that may have gone meanwhile.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class LinkSession:
             If the port does not come back before the deadline.
         """
         try:
-            self.hello(deadline, anew)
+            self.hello(deadline, new_session)
         except Silent:
             raise
         except LinkLost as lost:
@@ -158,7 +158,7 @@ class LinkSession:
             except Refused as refusal:
                 if refusal.reason != Reason.SESSION:
                     raise
-                self.greet(deadline, anew=True)
+                self.greet(deadline, new_session=True)
         raise self.contested()
 
     def act(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float, tagged: bool = True) -> bytes:
@@ -187,7 +187,7 @@ class LinkSession:
                 if refusal.reason == Reason.KEY and self.key is not None:
                     last, body = refusal, None  # the line may have spent the challenge
                 elif refusal.reason in (Reason.SESSION, Reason.OLD):
-                    self.greet(deadline, anew=True)
+                    self.greet(deadline, new_session=True)
                     last, body = self.contested(), None
                 else:
                     raise
@@ -215,7 +215,7 @@ class LinkSession:
         return True
 
     def tag_of(self, nonce: bytes, kind: int, number: int, payload: bytes, digest: bytes) -> bytes:
-        """BLAKE2s of a request under the key; ``digest`` is that of the image, with COMMIT."""
+        """Return the BLAKE2s tag of a request under the key; ``digest`` is that of the image, with COMMIT."""
         assert self.key is not None
         check_length("CHALLENGE", nonce, NONCE_BYTES)
         head = bytes([kind, number]) + self.exchange.session.to_bytes(4, "little")
@@ -228,12 +228,12 @@ class LinkSession:
 
     def silent(self) -> LinkError:
         """Return the error where nobody answers."""
-        if self._heard and self.exchange.noise:
+        if self._has_answered and self.exchange.noise:
             return Silent(
                 "the device no longer answers, and bytes come that are not its frames: does its console write to the "
                 "same line, or did it restart with another baud rate?"
             )
-        if self._heard:
+        if self._has_answered:
             return Silent("the device no longer answers; is it still on?")
         if self.exchange.noise:
             why = "the received bytes are not frames of the device: is --baud the rate of the device?"
@@ -242,9 +242,16 @@ class LinkSession:
         return NoAnswer(f"the port is open, but no device answers: {why}")
 
     def _repeat(self, kind: Request, number: int | None, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
-        """Send a request until it is answered. Raises ``Refused``, ``LinkLost``, ``NoAnswer``.
+        """Send a request until it is answered.
 
-        What acts has its ``number``; the rest has another one each time, so that answers tell how long the way is.
+        A request that acts has its ``number``; any other has a new one each time, so that answers show the delay.
+
+        Raises
+        ------
+        Refused
+            If the device refuses the request.
+        LinkLost, NoAnswer
+            If no answer comes before the deadline.
         """
         sent = set()
         for count in range(_MAX_TRIES):
@@ -264,6 +271,6 @@ class LinkSession:
 
     def _payload(self, answer: Answer) -> bytes:
         if answer.reason:
-            info = self.info if self._heard else None
+            info = self.info if self._has_answered else None
             raise refused(answer.kind, answer.reason, answer.detail, info)
         return answer.payload

@@ -1,4 +1,4 @@
-"""The way to a device: bytes to it, bytes from it, and a clock. pyserial opens real ones."""
+"""Transports: bytes to a device, bytes from it, and a clock. pyserial opens real ones."""
 
 import errno
 import time
@@ -15,7 +15,7 @@ _BITS_PER_BYTE = 10  # bits of a byte on the wire: start, 8, stop
 
 
 class Transport(Protocol):
-    """What the client needs of a port. ``write`` and ``read`` raise ``LinkLost`` when it has gone."""
+    """The interface of a port for the client; ``write`` and ``read`` raise ``LinkLost`` when it has gone."""
 
     baud: int | None  # bits a second, for time-outs; None where bytes take no time
 
@@ -29,14 +29,14 @@ class Transport(Protocol):
         """Give the port back. It can be called twice."""
 
     def now(self) -> float:
-        """Seconds of a clock that never goes back."""
+        """Return the seconds of a clock that never goes back."""
 
 
 Opener = Callable[[], Transport]
 
 
 def byte_s(baud: int | None) -> float:
-    """Seconds that a byte takes on the wire."""
+    """Return the seconds that a byte takes on the wire."""
     return _BITS_PER_BYTE / baud if baud else 0.0
 
 
@@ -86,7 +86,7 @@ def _why_not(url: str, error: Exception) -> str:
 
 
 class SerialTransport:
-    """A port that pyserial has opened."""
+    """A port of pyserial."""
 
     def __init__(self, port: Any, name: str, baud: int | None) -> None:
         self.baud = baud

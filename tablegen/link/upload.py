@@ -1,4 +1,4 @@
-"""An upload: BEGIN, DATA within the device's window, and COMMIT, on their way at once; gone back where one is lost."""
+"""An upload: BEGIN, DATA within the device's window, and COMMIT, on their way at once, and repeated after a loss."""
 
 import hashlib
 import struct
@@ -29,7 +29,7 @@ _COMMITTED = struct.Struct("<2I")
 
 
 class Uploader:
-    """One upload in a session, until it is active or has failed."""
+    """An upload in a session, until it is active or has failed."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Uploader:
         self._sent_to = 0  # bytes that were sent at least once
         self._resumed: int | None = None
         self._retransmissions = 0
-        self._anew: dict[int, int] = {}
+        self._restarts: dict[int, int] = {}
         self._flight = Flight(session.info.window, self._start)
         self._before = session.status
         self._had = self._received(session.status)  # bytes that the device had before
@@ -74,7 +74,7 @@ class Uploader:
                 self._session.reopen(self._deadline, lost)
             except SessionEnded:
                 self._count(Reason.SESSION, self._session.contested())
-                self._session.greet(self._deadline, anew=True)
+                self._session.greet(self._deadline, new_session=True)
             else:
                 break
             self._restart(self._session.status)
@@ -95,7 +95,7 @@ class Uploader:
 
     @property
     def state(self) -> UploadState:
-        """What is known of it."""
+        """The progress of the upload."""
         return UploadState(self._confirmed, len(self._image.data), self._committed)
 
     @property
@@ -108,12 +108,12 @@ class Uploader:
     # What is known of the device
 
     def _received(self, status: DeviceStatus) -> int:
-        """Bytes of this upload that the device has."""
+        """Return the bytes of this upload that the device has."""
         same = status.image_crc == self._image.info.image_crc and status.upload == Upload.RECEIVING
         return min(status.received, len(self._image.data)) if same else 0
 
     def _restart(self, status: DeviceStatus) -> None:
-        """After HELLO: nothing is on its way, and the device says what it has."""
+        """Start again after HELLO: nothing is on its way, and ``status`` has the bytes of the device."""
         self._flight.clear(self._session.now())
         self._begun = False  # BEGIN was answered
         self._pipelined = True  # DATA need not wait for that
@@ -128,14 +128,14 @@ class Uploader:
         self._busy = False  # BEGIN was refused so: STATUS before the next one
 
     def _in_force(self, status: DeviceStatus) -> bool:
-        """Whether this upload is, and not an earlier one of the same scan."""
+        """Return True if this upload is active, and not an earlier one of the same scan."""
         same, before = status.hash == self._image.info.hash, self._before
         return self._committed and same and (before.hash, before.generation) != (status.hash, status.generation)
 
     def _count(self, reason: int, error: LinkError) -> None:
         """Count an error that may happen by chance, but not without end."""
-        self._anew[reason] = self._anew.get(reason, 0) + 1
-        if self._anew[reason] > (_MAX_KEY_RESTARTS if reason == Reason.KEY else _MAX_RESTARTS):
+        self._restarts[reason] = self._restarts.get(reason, 0) + 1
+        if self._restarts[reason] > (_MAX_KEY_RESTARTS if reason == Reason.KEY else _MAX_RESTARTS):
             raise error
 
     # The loop
@@ -148,8 +148,8 @@ class Uploader:
             self._overdue(now)
             self._fill(now)
             for answer in self._exchange.receive(self._wake()):
-                if done := self._take(answer):
-                    return done
+                if result := self._take(answer):
+                    return result
 
     def _fill(self, now: float) -> None:
         """Send whatever may be on its way now."""
@@ -213,7 +213,7 @@ class Uploader:
         self._flight.add(self._commit)
 
     def _wake(self) -> float:
-        """When something is to be done without an answer."""
+        """Return the time of the next action without an answer."""
         due = self._flight.next_due()
         times = [self._deadline] if due is None else [self._deadline, due]
         times += [at for at in (self._poll_at, self._pause_until) if at > self._session.now()]
@@ -233,7 +233,7 @@ class Uploader:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Where nothing is on its way that could confirm what was sent, it has to be sent again."""
+        """Send again what no request on its way could confirm."""
         if (
             self._begun
             and self._commit is None
@@ -335,7 +335,7 @@ class Uploader:
             self._wait_for_others()
         elif answer.reason in (Reason.KEY, Reason.UPLOAD, Reason.IMAGE):
             self._count(answer.reason, error)
-            self._begin_anew()
+            self._begin_again()
         else:
             raise error
         return None
@@ -349,20 +349,20 @@ class Uploader:
                 self._next, self._poll_at = len(self._image.data), self._session.now()
             elif sent.round == self._round:
                 self._count(answer.reason, error)
-                self._begin_anew()
+                self._begin_again()
         elif sent.kind == Request.DATA and answer.reason in _LAYOUT_REASONS and not self._begun:
             pass  # it belongs to the upload before
         else:
             raise error
 
-    def _begin_anew(self) -> None:
+    def _begin_again(self) -> None:
         """Send BEGIN, and wait for what it says before anything else is sent."""
         self._flight.forget(Request.BEGIN, Request.DATA)  # what they answer is of the upload before
         self._begun = self._pipelined = False
         self._go_back(0)
 
     def _wait_for_others(self) -> None:
-        self._begin_anew()
+        self._begin_again()
         self._busy = True
         self._pause_until = self._session.now() + _BUSY_S
 
@@ -395,7 +395,7 @@ class Uploader:
         return refused(answer.kind, answer.reason, answer.detail, self._session.info, contents, self._limits)
 
     def _out_of_time(self, now: float) -> OutOfTime:
-        silence_s = now - self._flight.heard_at
+        silence_s = now - self._flight.last_answer_at
         received = 0 if self._status is None else self._received(self._status)
         ours = self._status is not None and self._status.image_crc == self._image.info.image_crc
         return out_of_time(

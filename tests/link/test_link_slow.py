@@ -210,7 +210,7 @@ def test_a_buffer_that_is_too_small_for_the_window() -> None:
 
 
 def _deaf_to_late(self: Flight, key: tuple[int, int], now: float) -> Sent | None:
-    self.heard_at, self.in_vain = now, 0
+    self.last_answer_at, self.in_vain = now, 0
     return self._on_way.pop(key, None)
 
 
