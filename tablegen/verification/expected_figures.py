@@ -1,4 +1,4 @@
-"""What is expected on the scanner, as far as a directory tells: the mismatch by the laws, and what its headers say.
+"""The expectations on the scanner that a directory can confirm: the mismatch by the laws, and the text of headers.
 
 Traces are in no build, so that of an operator's figures the text of the emitted headers is the only other witness: a
 manifest that was edited alone is found to the digits that stand there.
@@ -50,8 +50,8 @@ def wrong_mismatch(axis: ManifestAxis) -> list[str]:
             wrong.append(f"certificate.expected.stroke.{side}.beta is {here:g}, and that of the line {of_line:g}")
     turn, x = axis.drive.turn, np.linspace(*axis.fourier.window, _POINTS)
     there, back = ((at(target, t) - low) / (high - low) for t in (turn * x, turn + (1.0 - turn) * (1.0 - x)))
-    apart = forward.inverse(there) - (1.0 - backward.inverse(1.0 - back))
-    figures: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(apart)))}
+    mismatch = forward.inverse(there) - (1.0 - backward.inverse(1.0 - back))
+    figures: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(mismatch)))}
     stated: dict[str, float | int | None] = {"value": expected.mismatch_percent.value}
     return wrong + different_figures(stated, figures, True, "expected.mismatch_percent.")
 

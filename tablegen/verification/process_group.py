@@ -1,4 +1,4 @@
-"""Playing in a process group of its own, so that an interruption ends simulator, compiler and program with it.
+"""A process group for a playback, so that an interruption ends simulator, compiler and program with it.
 
 ``run_all`` starts this module as processes and waits for them; what it does and finds is passed in files of its folder.
 """

@@ -154,11 +154,11 @@ def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     folder, stored = tmp_path_factory.mktemp("benches"), read_build(short.folder)
     program, absent = c_program(short.folder, folder, stored, fourier=False)
     assert not absent
-    sources, chosen = program.sources, program.defines
+    sources, macro_values = program.sources, program.defines
     shape = SequencerShape.of((stored.program.x, stored.program.y))
-    step = CBench(shape, folder / "step", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
-    chosen["BENCH_FILL"] = 600
-    fill = CBench(shape, folder / "fill", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
+    step = CBench(shape, folder / "step", options=["-std=c99", "-O2"], sources=sources, macro_values=macro_values)
+    macro_values["BENCH_FILL"] = 600
+    fill = CBench(shape, folder / "fill", options=["-std=c99", "-O2"], sources=sources, macro_values=macro_values)
     return Benches(stored, step, fill)
 
 

@@ -1,4 +1,4 @@
-"""The C sequencer under the scripts of the Verilog one: compiled with a compiler of this machine, run as a process."""
+"""The C sequencer under the scripts of the Verilog one: compiled for this machine, run as a process."""
 
 import re
 import shlex
@@ -29,7 +29,7 @@ OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", 
 
 @dataclass(frozen=True)
 class CPlayed:
-    """What a script made: the ticks, how often each fault was seen, and the words of the states it asked for.
+    """The record of a script: the ticks, the count of each fault, and the words of the states.
 
     ``constants`` are those of an emitted header that was compiled into the bench.
     """
@@ -65,25 +65,25 @@ class CPlayed:
 
 
 def storage_bits(bits: int) -> int:
-    """Bits in which the C runtime holds table or converter words of so many bits."""
+    """Return the bits in which the C runtime stores table or converter words of so many bits."""
     return 16 if bits <= 16 else 32
 
 
 def defines(shape: SequencerShape, fill: int = 0) -> dict[str, int]:
     """Return the macros of a firmware for programs of a shape; with ``fill``, at most that many ticks a call."""
-    chosen = {
+    macro_values = {
         "DAC_REQUESTS": 128,
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(shape.x_word_bits, shape.y_word_bits)),
         "DAC_OUTPUT_STORAGE_BITS": storage_bits(shape.dac_bits),
     }
     if CUBIC in (shape.x_interpolated, shape.y_interpolated):
-        chosen["DAC_SPLINE"] = 1
-    return chosen | ({"BENCH_FILL": fill} if fill else {})
+        macro_values["DAC_SPLINE"] = 1
+    return macro_values | ({"BENCH_FILL": fill} if fill else {})
 
 
-def constants_written(chosen: Mapping[str, int] | None) -> int:
-    """How many numbers a bench writes of the header that was compiled into it: its constants, and its hash."""
-    constants = (chosen or {}).get("BENCH_CONSTANTS")
+def constants_written(macro_values: Mapping[str, int] | None) -> int:
+    """Return how many numbers of its header a bench writes: its constants, and its hash."""
+    constants = (macro_values or {}).get("BENCH_CONSTANTS")
     return 0 if constants is None else constants + HASH_DIGITS
 
 
@@ -138,9 +138,9 @@ def require_compiler(compiler: str) -> list[str]:
     return command
 
 
-def macros(chosen: Mapping[str, int]) -> list[str]:
+def macros(macro_values: Mapping[str, int]) -> list[str]:
     """Return macros as words of a compiler's command."""
-    return [f"-D{name}={value}" for name, value in chosen.items()]
+    return [f"-D{name}={value}" for name, value in macro_values.items()]
 
 
 class CBench:
@@ -154,14 +154,14 @@ class CBench:
         options: Sequence[str] = OPTIONS,
         sources: Sequence[Path] | None = None,
         fill: int = 0,
-        chosen: Mapping[str, int] | None = None,
+        macro_values: Mapping[str, int] | None = None,
     ) -> None:
-        """Compile the bench; ``sources`` replace the shipped runtime, ``chosen`` the macros that suit the shape."""
+        """Compile the bench; ``sources`` replace the shipped runtime, ``macro_values`` those that suit the shape."""
         runtime = list(c_runtime() if sources is None else sources)
         folder.mkdir(parents=True, exist_ok=True)
         self.shape, self.program = shape, folder / "stream_bench"
-        self._constants = constants_written(chosen)
-        choices = macros(defines(shape, fill) if chosen is None else chosen)
+        self._constants = constants_written(macro_values)
+        choices = macros(defines(shape, fill) if macro_values is None else macro_values)
         places = [f"-I{place}" for place in sorted({str(path.parent.absolute()) for path in (*runtime, *BENCH)})]
         parts = [str(path.absolute()) for path in runtime if path.suffix == ".c"]
         line = [*require_compiler(compiler), *options, *choices, *places, *parts, *map(str, OWN_SOURCES)]

@@ -35,7 +35,7 @@ _SLICE_US = 500_000  # so that an interruption is seen
 
 @dataclass(frozen=True)
 class Core:
-    """A processor, by the names that gcc and unicorn have for it: ``model`` is a model of Arm, a mode of RISC-V."""
+    """A processor by its names in gcc and unicorn; ``model`` is a model of Arm, a mode of RISC-V."""
 
     architecture: Literal["arm", "riscv"]
     options: tuple[str, ...]
@@ -85,7 +85,7 @@ def compile_bare(
     core: str = "cortex-m4",
     compiler: str | None = None,
     options: Sequence[str] = OPTIONS,
-    chosen: Mapping[str, int] | None = None,
+    macro_values: Mapping[str, int] | None = None,
     layout: Path = LAYOUT,
 ) -> Executable:
     """Compile and link for a bare processor; headers are found beside the sources, which may list them.
@@ -94,7 +94,7 @@ def compile_bare(
     ----------
     compiler
         Command, by default gcc for the core; one that is not gcc has the processor in its own command.
-    chosen
+    macro_values
         Macros by name, for ``-D``.
 
     Raises
@@ -113,7 +113,7 @@ def compile_bare(
         *(CORES[core].options if own else ()),
         *options,
         *FREESTANDING,
-        *(f"-D{name}={value}" for name, value in (chosen or {}).items()),
+        *(f"-D{name}={value}" for name, value in (macro_values or {}).items()),
         *(f"-I{place}" for place in sorted({str(path.parent) for path in sources})),
         *(str(path) for path in sources if path.suffix == ".c"),
         "-T",
@@ -123,15 +123,15 @@ def compile_bare(
         "-o",
         str(program),
     ]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode or done.stderr:
-        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+    process = subprocess.run(line, capture_output=True, text=True, check=False)
+    if process.returncode or process.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{process.stdout}{process.stderr}".strip())
     return read_executable(program)
 
 
 @dataclass(frozen=True)
 class Called:
-    """What a call of a function took; ``result`` is its first word."""
+    """The cost of a call of a function; ``result`` is its first word."""
 
     result: int
     instructions: int
@@ -192,7 +192,7 @@ class Processor:
         return bytes(self.uc.mem_read(address, 32)).split(b"\0")[0].decode("ascii", "replace")
 
     def write(self, name: str, data: bytes) -> None:
-        """Into a variable."""
+        """Write bytes into a variable."""
         self.uc.mem_write(self.symbol(name), data)
 
     def word(self, name: str) -> int:
@@ -254,7 +254,7 @@ class Processor:
         return Called(int(self.uc.reg_read(self._arguments[0])), executed, _STACK - untouched)
 
     def _instructions(self, address: int, size: int) -> int:
-        """How many a block has: the first half-word of each tells how long it is."""
+        """Count the instructions of a block, whose lengths their first half-words tell."""
         code = np.frombuffer(bytes(self.uc.mem_read(address, size)), dtype="<u2")
         count = at = 0
         while at < len(code):
@@ -267,7 +267,7 @@ class Processor:
 class CortexMBench:
     """The bench, compiled once for programs of one shape and a Cortex-M; ``core`` is one of ``CORES``.
 
-    ``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape.
+    ``sources`` in place of the shipped runtime; ``macro_values`` in place of those that suit the shape.
     """
 
     def __init__(
@@ -278,19 +278,19 @@ class CortexMBench:
         options: Sequence[str] = OPTIONS,
         sources: Sequence[Path] | None = None,
         fill: int = 0,
-        chosen: Mapping[str, int] | None = None,
+        macro_values: Mapping[str, int] | None = None,
         core: str = "cortex-m4",
     ) -> None:
         runtime = list(c_runtime() if sources is None else sources)
         self.shape, self.core = shape, core
-        self._constants = constants_written(chosen)
+        self._constants = constants_written(macro_values)
         self.executable = compile_bare(
             folder / "stream_bench.elf",
             [*runtime, *BENCH, MEMORY],
             core,
             compiler,
             options,
-            defines(shape, fill) if chosen is None else chosen,
+            defines(shape, fill) if macro_values is None else macro_values,
         )
 
     def play(self, script: Script, fourier: bool = False) -> CPlayed:

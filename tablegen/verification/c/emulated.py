@@ -16,7 +16,7 @@ EMULATED = "arm-none-eabi-gcc, Cortex-M4"
 
 
 class EmulatedPlayer:
-    """Compiles a program and plays the script that stands in ``work``; each way of playing is a program of its own."""
+    """A player on an emulator: it compiles a program for each way of playing, and plays the script in ``work``."""
 
     def __init__(self, work: Path, program: CProgram, shape: SequencerShape) -> None:
         self._work, self._program, self._shape = work, program, shape

@@ -33,7 +33,7 @@ def host_compiler() -> str:
 
 
 class HostPlayer:
-    """Compiles a program, and plays the ``script`` of so many ticks, which stands in ``work``, in both ways."""
+    """A player on this machine: it compiles a program, and plays the script in ``work`` in both ways."""
 
     def __init__(self, work: Path, program: CProgram, script: str, ticks: int) -> None:
         self._compiler = host_compiler()
@@ -55,7 +55,7 @@ class HostPlayer:
 
     @cached_property
     def _failures(self) -> dict[str, str]:
-        """Why records are missing; both are played by one process."""
+        """The reasons for missing records; both are played by one process."""
         objects = self._objects()
         job = {
             "compiler": require_compiler(self._compiler),
@@ -100,7 +100,7 @@ class HostPlayer:
 
 
 def _options() -> list[str]:
-    """Warnings are for whoever compiles the firmware: what counts here is what it does."""
+    """Return the options of the compiler, without warnings, which are for whoever compiles the firmware."""
     try:
         return [*OPTIONS, *shlex.split(os.environ.get("CFLAGS", "")), "-w"]
     except ValueError as error:

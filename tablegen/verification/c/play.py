@@ -1,4 +1,4 @@
-"""Compile the C bench and run it: no more than a process of its own needs, which begins in little time."""
+"""Compile the C bench and run it; this module imports little, so that its process starts fast."""
 
 import resource
 import shutil
@@ -21,9 +21,9 @@ def compile_line(line: Sequence[str], place: Path | None = None) -> None:
     SimulationFailed
         If it fails or warns, with all its output.
     """
-    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
-    if done.returncode or done.stderr:
-        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+    process = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
+    if process.returncode or process.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{process.stdout}{process.stderr}".strip())
 
 
 def require_headers(compiler: Sequence[str]) -> None:
@@ -35,8 +35,8 @@ def require_headers(compiler: Sequence[str]) -> None:
         If it has none.
     """
     line = [*compiler, "-fsyntax-only", "-x", "c", "-"]
-    done = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
-    if done.returncode and "stdint.h" in done.stderr:
+    process = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
+    if process.returncode and "stdint.h" in process.stderr:
         raise ToolMissing(f"{compiler[0]} finds no headers of the C library: apt-get install libc6-dev")
 
 
@@ -57,14 +57,14 @@ def record(command: Sequence[str], script: bytes, place: Path, most: int, timeou
 
 def _ended(script: bytes, timeout: float | None, command: Sequence[str], **options: Any) -> bytes:
     try:
-        done = subprocess.run(command, input=script, stderr=subprocess.PIPE, check=False, timeout=timeout, **options)
+        process = subprocess.run(command, input=script, stderr=subprocess.PIPE, check=False, timeout=timeout, **options)
     except subprocess.TimeoutExpired:
         raise SimulationFailed(f"the bench did not end in {timeout:.0f} s") from None
-    if done.returncode:
+    if process.returncode:
         raise SimulationFailed(
-            done.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {done.returncode}"
+            process.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {process.returncode}"
         )
-    return done.stdout or b""
+    return process.stdout or b""
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The C sequencer of a build: what a user would compile plays, on this machine or on an emulated Cortex-M.
+"""The C sequencer of a build on this machine or on an emulated Cortex-M: what a user would compile.
 
 The bench is compiled with the emitted header and arrays and with the ``dac_*.c`` of the directory. A session is played
 twice, a tick a call (``dac_sequencer_step``) and many ticks a call (``dac_sequencer_fill``).
@@ -43,14 +43,14 @@ _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() 
 
 @dataclass(frozen=True)
 class CTarget:
-    """Where the C sequencer plays, and whether it renders its tables from Fourier words."""
+    """The machine on which the C sequencer plays; with ``fourier`` it renders its tables from Fourier words."""
 
     machine: Literal["c", "cortex-m"]
     fourier: bool = False
     format_name: str = "c"
 
     def require(self) -> None:
-        """Require a compiler, and what runs its output."""
+        """Check that a compiler is installed, and the machine that runs its output."""
         if self.machine == "cortex-m":
             from tablegen.verification.c.emulate import require_emulator
 
@@ -78,7 +78,7 @@ class CTarget:
             )
 
     def play(self, job: PlayJob) -> Outcome:
-        """One session by steps, and the same by fills."""
+        """Play a session a tick a call, and the same session many ticks a call."""
         stored, work, progress = job.stored, job.work, job.progress
         program, absent = c_program(job.folder, work, stored, self.fourier)
         if absent:
@@ -124,7 +124,7 @@ class CTarget:
 
     @property
     def _name(self) -> str:
-        """What plays, as the table has it."""
+        """The name of the machine in the table of checks."""
         return host_compiler() if self.machine == "c" else EMULATED
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""What a manifest expects on the scanner: whether it hangs together; what it rests on is not in the directory.
+"""The consistency of what a manifest expects on the scanner; the operator behind it is not in the directory.
 
 The traces of an operator, and the laws of a scanner file, are in no build. So the figures themselves are statements.
 """

@@ -1,4 +1,4 @@
-"""What of errors of codes arrives in the position, behind the passage that a certificate states."""
+"""The part of the errors of codes that arrives in the position, behind the passage that a certificate states."""
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +32,10 @@ def passes(passage: ManifestPassage, f_hz: Floats) -> Complex:
 
 
 def _measured(response: ManifestResponse, f_hz: Floats) -> Complex:
-    """Gain and phase are linear between the points; below the first the phase goes to the half turn that is nearest."""
+    """Return a measured response.
+
+    Gain and phase are linear between the points; below the first the phase goes to the half turn that is nearest.
+    """
     first = response.phase_turns[0]
     hz, turns = [0.0, *response.hz], [np.rint(2.0 * first) / 2.0, *response.phase_turns]
     gain = np.interp(f_hz, response.hz, response.gain)

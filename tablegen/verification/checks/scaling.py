@@ -1,4 +1,4 @@
-"""The scaling errors of a certificate once more, through the shape that the manifest states, by chords of its words.
+"""The scaling errors of a certificate, computed again through the shape in the manifest, by chords of its words.
 
 The shape of a branch is u = lambda s + xi sin(pi s) + xi_gamma (cos(pi s) - 1), equations (15) and (17) to (21), from
 its beta and u_peak. An operator's waveform is its own shape: such a line has no other. docs/manifest.md says what each
@@ -33,12 +33,12 @@ class ModelBranch:
 
     @classmethod
     def of(cls, branch: ManifestBranch, model: str) -> "ModelBranch":
-        """From the peak of its residual, and where that is."""
+        """Return the branch of a residual with this peak at this place."""
         return _EQUATIONS[model](branch)
 
     @classmethod
     def harmonic(cls, branch: ManifestBranch) -> "ModelBranch":
-        """Equations (17) to (21)."""
+        """Return the branch of the harmonic model, equations (17) to (21)."""
         at_peak = branch.u_peak - branch.beta
         c, s = cos(0.5 * pi * 2.0 * at_peak), sin(pi * at_peak)
         # The residual is xi s + xi_gamma (c - 1 + 2 at_peak); it is beta at its peak, and flat there.
@@ -299,7 +299,7 @@ def position_scaling(axis: ManifestAxis, period: PlayedPeriod, errors: Floats) -
 
 
 class PositionErrors:
-    """Errors of the position at every tick of a period."""
+    """The errors of the position at every tick of a period."""
 
     def __init__(self, period: PlayedPeriod, errors: Floats) -> None:
         self._errors = errors
@@ -331,10 +331,10 @@ def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None
     figures = {}
     for side in sides:
         branch, position, sweep, times = _sweep(axis, side)
-        moved = at(layer, times) / branch.slope(sweep)
+        shift = at(layer, times) / branch.slope(sweep)
         figures[side] = {
-            "position": 100.0 * float(np.max(np.abs(moved))),
-            "scaling": _peak_to_peak(np.gradient(moved, position)),
+            "position": 100.0 * float(np.max(np.abs(shift))),
+            "scaling": _peak_to_peak(np.gradient(shift, position)),
         }
     return figures
 
@@ -387,7 +387,7 @@ def _chords(
     deviation: Floats,
     steepness: Floats,
 ) -> tuple[Floats, Floats]:
-    """Slope errors of chords of 1/20 of the line: of the codes, and of their rounding alone.
+    """Return the slope errors of chords of 1/20 of the line: of the codes, and of their rounding alone.
 
     A code stands for the middle of its tick. Chords that begin or end where a run of one code does are enough.
     """

@@ -1,4 +1,4 @@
-"""Shaped codes once more, and what of their errors arrives: from the integers of a manifest, in ways of its own.
+"""Shaped codes, computed again from the integers of a manifest in another way, and the errors that arrive.
 
 Remainders of order 1 and 2 are sums of all values so far, modulo a code; those of order 3 are carried on one by one.
 docs/manifest.md says of which ticks the figures are, and behind what.
@@ -19,7 +19,7 @@ _CODE_AND_REMAINDER_BITS = 28
 
 
 def step_excess(axis: ManifestAxis) -> int:
-    """By how much shaping makes a step larger at most."""
+    """Return the bound of what shaping adds to a step, in codes."""
     shaping = axis.output.shaping
     if shaping is None:
         return 0
@@ -27,7 +27,7 @@ def step_excess(axis: ManifestAxis) -> int:
 
 
 def code_excess(axis: ManifestAxis) -> float:
-    """By how much a code is beyond its unrounded value at most."""
+    """Return the bound of the distance of a shaped code from its unrounded value, in codes."""
     shaping = axis.output.shaping
     if shaping is None:
         return 0.5
@@ -172,8 +172,8 @@ class ShapedPlay:
 
 def _changes(codes: Ints) -> tuple[float, float]:
     steps = np.abs(codes[1:] - codes[:-1])
-    moved = steps[steps > 0]
-    return 100.0 * len(moved) / max(len(steps), 1), float(np.mean(moved)) if len(moved) else 0.0
+    changes = steps[steps > 0]
+    return 100.0 * len(changes) / max(len(steps), 1), float(np.mean(changes)) if len(changes) else 0.0
 
 
 def stated_shaping(stated: ManifestShaped | None) -> dict[str, float | int | None]:

@@ -1,4 +1,4 @@
-"""What was stored of a session beside what the model has, and where in which program each tick was."""
+"""The captured words of a session beside those of the model, and the place of each tick in its program."""
 
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,7 @@ _MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults
 
 @dataclass(frozen=True, eq=False)
 class Capture:
-    """The words that left the device, those of the model, and where in its program the model was.
+    """The captured words of a session, those of the model, and the place of each tick in its program.
 
     ``place`` is the tick of the frame, -1 where nothing plays, and ``since`` the tick since the program began.
     ``which`` is the program in the bank, by its number in ``programs``; the first is none. ``steady`` says where the
@@ -32,7 +32,7 @@ class Capture:
     steady: Bools
     own: Bools
     programs: tuple[DualProgram | None, ...]
-    lost: int  # ticks that the model has and the capture has not, or the other way round
+    length_error: int  # ticks that the model has and the capture has not, or the other way round
 
     @property
     def known(self) -> Bools:
@@ -51,7 +51,8 @@ class Capture:
 
         Returns
         -------
-        Shape (ticks,).
+        Ints
+            Shape (ticks,).
         """
         figures = [0 if one is None else int(getattr(getattr(one, axis).output, name)) for one in self.programs]
         return np.array(figures, dtype=np.int64)[self.which]
@@ -123,7 +124,7 @@ def recaptured(capture: Capture, got: Words) -> Capture | None:
     Capture or None
         With the model of the first.
     """
-    return None if capture.lost or len(got) != len(capture.got) else replace(capture, got=got)
+    return None if capture.length_error or len(got) != len(capture.got) else replace(capture, got=got)
 
 
 def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
@@ -171,7 +172,7 @@ def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
 
 
 def _since_begin(program: DualProgram, place: Ints) -> Ints:
-    """Ticks since one program began, which nothing interrupts but rests and starts."""
+    """Return the ticks since one program began, which nothing interrupts but rests and starts."""
     # A scan begins where a frame does and the tick before was not the last of one.
     begins = (place == 0) & (np.concatenate([[-1], place[:-1]]) != program.schedule.frame_ticks - 1)
     index = np.arange(len(place))
@@ -179,7 +180,7 @@ def _since_begin(program: DualProgram, place: Ints) -> Ints:
 
 
 def _caught_up(program: DualProgram, place: Ints, since: Ints, model: Words) -> Bools:
-    """Where the codes of the model had caught up with one program."""
+    """Return True at ticks where the codes of the model have caught up with one program."""
     reached = place >= 0
     for axis, one in (("x", program.x), ("y", program.y)):
         reached[reached] = _codes(one, place[reached], since[reached]) == part(axis, model)[reached]

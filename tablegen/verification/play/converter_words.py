@@ -1,4 +1,4 @@
-"""Words as converters get them, turned back into codes."""
+"""Converter words, turned back into codes."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is played to verify a build: requests and faults on short programs, then frames of the build's own.
+"""The session that verifies a build: requests and faults on short programs, then frames of the build's own.
 
 The own program follows a variation of it in mid-line, plays a frame and more, gives way to a variation in mid-frame,
 takes over again, and parks.
@@ -26,7 +26,7 @@ _TAKING_OVER_TICKS = 1500  # more than pass while its words are written
 
 @dataclass(frozen=True)
 class BuildSession:
-    """A script, and how far it came with the ticks that it was given."""
+    """A script, and its extent within the ticks that it may take."""
 
     script: Script
     whole_frame: bool
@@ -35,7 +35,7 @@ class BuildSession:
 
 
 def needed_ticks(program: DualProgram) -> int:
-    """Ticks in which a session plays a whole frame of the build's program, and all that follows."""
+    """Return the ticks in which a session plays a whole frame of the build's program, and all that follows."""
     schedule = program.schedule
     ramp = max(
         -(-(axis.output.code_max - axis.output.code_min) // axis.output.max_step) for axis in (program.x, program.y)
@@ -50,7 +50,7 @@ def needed_ticks(program: DualProgram) -> int:
 
 
 def power_up_codes(program: DualProgram) -> tuple[int, int]:
-    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room.
+    """Return codes at power-up from which the first ramp leads up in x and down in y, where there is room.
 
     That of y takes longer, and ends with a step of one code.
     """
@@ -93,7 +93,7 @@ class _Own:
         script.wait_ticks(variation.schedule.ticks)  # a line start is among them
 
     def catch_up(self, until: int) -> None:
-        """Until the output is at the waveform, or so many ticks of the session are over."""
+        """Play until the output is at the waveform, or so many ticks of the session are over."""
         while self.script.model.catching_up and self.played < until:
             self.script.wait_ticks(min(_CATCH_UP_STRIDE, until - self.played))
 

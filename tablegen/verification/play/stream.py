@@ -1,4 +1,4 @@
-"""A script for the bench of the sequencer, and what the integer model makes of it, tick for tick.
+"""A script for the bench of the sequencer, and the ticks that the integer model makes of it.
 
 Every call adds commands to the script and lets the model live through the same clocks, so that a script needs no second
 description of what it does. ``stream_bench.v`` plays it and captures; ``compare`` holds capture against model.
@@ -69,7 +69,7 @@ def pack_line(ticks: LineTicks, faults: Ints) -> Words:
 
 @dataclass(frozen=True)
 class Sample:
-    """A stored tick, taken apart again."""
+    """The fields of a stored tick."""
 
     x: int
     y: int
@@ -85,7 +85,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class StoredState:
-    """What a device says of itself while nothing is on its way: its flags, its faults, their counts, its outputs."""
+    """The state of a device while nothing is on its way: its flags, its faults, their counts, its outputs."""
 
     flags: tuple[bool, ...]  # in the order of STATES
     faults: int
@@ -100,7 +100,7 @@ class StoredState:
         return cls(flags, words[0] >> 8 & 0xF, counts, words[3] & ~(0xFF << _FAULTS_AT))
 
     def limited(self, most_counted: int, ignored: tuple[str, ...] = ()) -> "StoredState":
-        """As a device has it whose counters end at ``most_counted``, and that does not tell the ``ignored`` flags."""
+        """Return the state of a device whose counters end at ``most_counted``, and which has no ``ignored`` flags."""
         flags = tuple(flag and name not in ignored for name, flag in zip(STATES, self.flags, strict=True))
         outputs = 0 if OUTPUTS in ignored else self.outputs
         return StoredState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts), outputs)
@@ -108,7 +108,7 @@ class StoredState:
 
 @dataclass
 class Script:
-    """Commands, and the ticks that the model says they make.
+    """Commands, and the ticks that the model makes of them.
 
     ``drain`` clocks pass from a swap to the next write, ``commit_clocks`` from a commit to the bank that is committed.
     """
@@ -134,12 +134,12 @@ class Script:
         self.programs.append((0, None))
 
     def tick_every(self, clocks: int) -> None:
-        """Ticks every so many clocks from the next clock on; 0 for none."""
+        """Request ticks every so many clocks from the next clock on; 0 for none."""
         self._command(_PERIOD | clocks)
         self._period, self._until = clocks, 0
 
     def pace(self, clocks: int, least: int) -> None:
-        """Ticks every so many clocks, if they do not come so already; none less than ``least`` after the last one."""
+        """Request ticks every so many clocks, unless they come so already; the first after ``least`` clocks or more."""
         if self._period == clocks:
             return
         if self._period:
@@ -235,16 +235,16 @@ class Script:
 
     @property
     def writable(self) -> bool:
-        """Whether the idle bank can be written now."""
+        """True if the idle bank can be written now."""
         return not self.waiting and self.clocks >= self._writable_at
 
     @property
     def waiting(self) -> bool:
-        """Whether a committed program was not taken yet."""
+        """True if a committed program waits to be swapped in."""
         return self.model.idle is not None or self._commits is not None
 
     def request(self, *names: str, program: DualProgram | None = None, frames: int = 0, commit_clocks: int = 0) -> None:
-        """One clock with requests; ``program`` is what a commit commits, ``commit_clocks`` later unless as always."""
+        """Play one clock with requests; ``program`` is what a commit commits, after ``commit_clocks`` or as always."""
         mask = sum(1 << _REQUESTS.index(name) for name in names)
         self.commands.append(_REQUEST | mask << 16 | frames)
         self._pass(1)
@@ -308,7 +308,7 @@ class Script:
 
     @property
     def _outputs(self) -> int:
-        """Codes and markers that the device holds."""
+        """The codes and markers that the device holds."""
         if not self.expected:
             return self.power_up[1] << 24 | self.power_up[0]
         output = self.expected[-1] & ~(0xFF << _FAULTS_AT)
@@ -383,17 +383,17 @@ class Script:
 
     @property
     def swaps(self) -> int:
-        """How many programs were taken."""
+        """The number of swaps so far."""
         return len(self.swapped_programs)
 
     @property
     def all_counts(self) -> list[int]:
-        """Counts of all faults, in the order of FAULTS."""
+        """The counts of all faults, in the order of FAULTS."""
         return [*self.counts, *self._reported.values()]
 
     @property
     def counts(self) -> list[int]:
-        """Counts of the faults of the model: slew, clamp."""
+        """The counts of the faults of the model: slew, clamp."""
         return [self.model.fault_counts[fault] for fault in (Fault.SLEW, Fault.CLAMP)]
 
 

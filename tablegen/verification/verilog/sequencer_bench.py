@@ -19,7 +19,7 @@ STREAM_BENCH = Path(str(files("tablegen.verification.verilog"))) / "stream_bench
 
 @dataclass(frozen=True)
 class BenchRun:
-    """What came of a script: the first difference, if any, and the counters of the bench."""
+    """The result of a script: the first difference, if any, and the counters of the bench."""
 
     samples: int
     mismatch: Mismatch | None
@@ -32,12 +32,12 @@ class BenchRun:
 
     @property
     def equal(self) -> bool:
-        """Everything was as the model has it."""
+        """True if every tick equals the model's."""
         return self.mismatch is None and self.faults_counted and not self.refused and not self.jitter
 
 
 class SequencerBench:
-    """A compiled sequencer; ``sources`` are those of the runtime unless given.
+    """A compiled sequencer; ``sources`` are by default those of the runtime.
 
     Another ``top`` than the bench itself has an instance of it and passes its counters on.
     """

@@ -39,7 +39,7 @@ class Design:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A design ready to run."""
+    """A design that is ready to run."""
 
     simulator: str
     top: str
