@@ -1,4 +1,4 @@
-"""Where what arrives on the scanner should be doubted, or is worse than the errors of the codes say."""
+"""Checks of the expectation on the scanner: where it is doubtful, or worse than the errors of the codes."""
 
 from typing import Literal
 
@@ -17,7 +17,7 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 class Doubt(Struct, frozen=True):
-    """A sentence about one axis: a figure in percent, above ``limit``; ``code`` says which figure it is."""
+    """A doubt about one axis: its sentence, and a figure in percent above ``limit``; ``code`` names the figure."""
 
     code: Literal["expected-scaling-error", "operator-distance", "resonance"]
     text: str

@@ -1,4 +1,4 @@
-"""The least peak acceleration that any waveform of an axis could have: a linear programme, solved by HiGHS of scipy.
+"""The optimum of an axis: the least peak acceleration of any waveform, by a linear programme (HiGHS of scipy).
 
 It shares nothing with the fit of the build but the line: other times, other sums, another method. Only the scaling
 error and the range are asked for, not the place of the line, so that it is a little below what a build can reach.

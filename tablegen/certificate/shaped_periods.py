@@ -1,4 +1,4 @@
-"""Periods of a shaped axis, and what of their errors arrives in the position.
+"""Periods of a shaped axis, and the part of their errors that arrives in the position.
 
 Shaped codes err by more than rounded ones, at frequencies that the piezo does not follow. So they are judged behind the
 response of the axis; where none is known, in the band of the harmonics that are played.
@@ -21,7 +21,7 @@ _PERIODS = 17  # at most; of several the first is left out, in which the respons
 
 
 class Passage(Struct, frozen=True):
-    """What the position follows: a second-order response, a measured one, or a band from 0 Hz.
+    """The response that the position has: second order, measured, or a band from 0 Hz.
 
     Fields that do not apply are None.
     """
@@ -52,7 +52,7 @@ class Passage(Struct, frozen=True):
 
 
 class Changes(Struct, frozen=True):
-    """How often the codes of a converter change, in percent of the ticks, and by how many codes in the mean."""
+    """The rate of changes of a converter's codes, in percent of the ticks, and their mean size in codes."""
 
     percent: float
     mean_step: float
@@ -78,29 +78,29 @@ class Changes(Struct, frozen=True):
 
 
 class ShapedPeriods:
-    """``codes``, shape (periods, ticks), since the program began, and as much of one that is too long.
+    """The periods of a shaped axis since its program began; ``codes`` has the shape (periods, ticks).
 
-    ``asked`` are the unrounded codes of a period, as much of it.
+    ``target_codes`` are the unrounded codes of a period; of a period that is too long, both are its beginning.
     """
 
-    def __init__(self, line: LinePlan, asked: Floats) -> None:
+    def __init__(self, line: LinePlan, target_codes: Floats) -> None:
         program = line.program
-        self._line, self._asked = line, asked
-        ticks = len(asked)
+        self._line, self._target_codes = line, target_codes
+        ticks = len(target_codes)
         self.is_whole = ticks == program.ticks
         periods = max(1, min(_PERIODS, _SEVERAL_TICKS // ticks))
         self.codes = program.played(0, periods * ticks).reshape(periods, ticks)
         self._rounded = program.rounded.codes(np.arange(ticks, dtype=np.int64))
-        self._judged = slice(1 if periods > 1 else 0, None)
+        self._counted = slice(1 if periods > 1 else 0, None)
 
     @classmethod
-    def asked_ticks(cls, program: Program) -> int:
-        """Of how many ticks of a period the unrounded codes are needed."""
+    def target_ticks(cls, program: Program) -> int:
+        """Return the number of ticks of a period whose unrounded codes are needed."""
         return min(program.ticks, MOST_TICKS)
 
     @property
     def ticks(self) -> int:
-        """How many are judged."""
+        """The number of ticks of the judged periods."""
         return len(self.judged_codes)
 
     @property
@@ -112,7 +112,7 @@ class ShapedPeriods:
         Floats
             LSB of the converter, shape (periods, ticks).
         """
-        return np.asarray(self.codes[self._judged] - self._asked)
+        return np.asarray(self.codes[self._counted] - self._target_codes)
 
     @cached_property
     def position_errors(self) -> Floats:
@@ -145,21 +145,21 @@ class ShapedPeriods:
         Ints
             One period after another, shape (periods * ticks,).
         """
-        return self.codes[self._judged].reshape(-1)
+        return self.codes[self._counted].reshape(-1)
 
     @property
     def changes(self) -> Changes:
-        """Of the shaped codes."""
+        """The changes of the shaped codes."""
         return Changes.of(self.judged_codes)
 
     @property
     def rounded_changes(self) -> Changes:
-        """Of the codes without shaping."""
+        """The changes of the codes without shaping."""
         return Changes.of(np.tile(self._rounded, self.ticks // len(self._rounded)))
 
     def _arrived(self, codes: Ints) -> Floats:
-        errors = (codes - self._asked).reshape(-1)
-        return passed(self._line, errors).reshape(codes.shape)[self._judged]
+        errors = (codes - self._target_codes).reshape(-1)
+        return passed(self._line, errors).reshape(codes.shape)[self._counted]
 
 
 def passed(line: LinePlan, errors: Floats) -> Floats:

@@ -163,15 +163,15 @@ class _Decoder:
         return value if self._in_range(kind, value, key) else _ALREADY_REPORTED
 
     def _in_range(self, kind: types.FloatType | types.IntType, value: float, key: str) -> bool:
-        shown = _shown(value)
+        text = _shown(value)
         if kind.le is not None and value > kind.le:
-            self._wrong(key, f"{shown} is above {kind.le:.12g}")
+            self._wrong(key, f"{text} is above {kind.le:.12g}")
         elif kind.ge is not None and value < kind.ge:
-            self._wrong(key, f"{shown} is below {kind.ge:.12g}")
+            self._wrong(key, f"{text} is below {kind.ge:.12g}")
         elif kind.lt is not None and value >= kind.lt:
-            self._wrong(key, f"{shown} is not below {kind.lt:.12g}")
+            self._wrong(key, f"{text} is not below {kind.lt:.12g}")
         elif kind.gt is not None and value <= kind.gt:
-            self._wrong(key, f"{shown} is not above {kind.gt:.12g}")
+            self._wrong(key, f"{text} is not above {kind.gt:.12g}")
         else:
             return True
         return False
@@ -238,5 +238,5 @@ def _shown(value: Any) -> str:
         return short if float(short) == value else repr(value)
     if isinstance(value, date | time):
         return f"the date or time {value}"
-    shown = repr(value)
-    return shown if len(shown) <= 60 else shown[:57] + "..."
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

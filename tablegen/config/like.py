@@ -1,4 +1,4 @@
-"""The key ``[y] like = "x"``: y inherits the keys of x unless it has its own, on the values as they were written."""
+"""The key ``[y] like = "x"``: y inherits the keys of x unless it has its own, on the values as written."""
 
 from collections.abc import Mapping
 from typing import Any

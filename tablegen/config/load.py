@@ -353,8 +353,8 @@ def _check_ways(key: str, written: Mapping[str, Any], file: Document, problems: 
         first, second = (next(name for name in way if name in written) for way in used[:2])
         problems.add(file, f"{key}.{second}", f"{first} is given as well; keep one of the ways")
     elif missing := [name for name in used[0] if name not in written]:
-        given = next(name for name in used[0] if name in written)
-        problems.add(file, f"{key}.{missing[0]}", f"missing beside {given}")
+        other = next(name for name in used[0] if name in written)
+        problems.add(file, f"{key}.{missing[0]}", f"missing beside {other}")
 
 
 def _check_response(key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
@@ -403,7 +403,7 @@ def _band_limit_faults(limit: BandLimit) -> list[tuple[str, str]]:
         "harmonics": limit.harmonics == "fewest",
     }
     why = f"method = '{limit.method}' keeps no scaling error; take method = 'window'"
-    return [(key, why) for key, given in keys.items() if given]
+    return [(key, why) for key, is_set in keys.items() if is_set]
 
 
 def _table_faults(table: Table) -> list[tuple[str, str]]:

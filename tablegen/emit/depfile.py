@@ -36,7 +36,7 @@ def _escaped(name: bytes) -> bytes:
 
 
 def why_unsafe(name: str) -> str | None:
-    """Say why make or Ninja would not take a name for the one that it is, or would run a part of it; None if they do.
+    """Return why make or Ninja would misread a file name or run a part of it; None if neither would.
 
     An escape serves only where both read it alike: Ninja has none for most characters, and reads a backslash before
     another escaped character as a part of the name.

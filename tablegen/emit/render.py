@@ -1,4 +1,4 @@
-"""A plan and its certificates to a map of file name to content; nothing touches the disk here."""
+"""From a plan and its certificates to a map of file name to content, in memory alone."""
 
 import re
 from collections.abc import Sequence
@@ -111,7 +111,7 @@ def render_scan(
 
 
 def _unreadable(setup: Setup, plan: Plan, error: UnreadableManifest) -> Problem:
-    """Say that no command would take the build, and why; at the table that makes its manifest too long."""
+    """Return the problem of a build that no command could read, at the table that makes its manifest too long."""
     key, why = "", f"manifest.json of this build would be refused when it is read back: {error}"
     longest = max(plan.lines, key=lambda line: len(line.program.words))
     if isinstance(error, TooLongManifest) and longest.program.mode == "direct":

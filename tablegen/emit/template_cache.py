@@ -59,5 +59,5 @@ class TemplateCache(BytecodeCache):
             keep_newest(self.folder, _MOST_FILES)
 
     def _digest(self, bucket: Bucket, code: bytes) -> bytes:
-        """Of the code, its name, and what made it."""
+        """Return the digest of the code, its name, and the settings behind it."""
         return sha256(b"\n".join((self.made_by, bucket.key.encode(), bucket.checksum.encode(), code))).digest()

@@ -49,7 +49,7 @@ def _environment(literal: Callable[[int], str], filters: tuple[tuple[str, Callab
 
 
 def comment_safe(text: str) -> str:
-    """Text on one line of ASCII that can neither begin nor end a comment, nor continue a line."""
+    """Return text on one line of ASCII that can neither begin nor end a comment, nor continue a line."""
     plain = text.encode("unicode_escape").decode("ascii").replace("\\", "/")
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("?", ".").rstrip()  # ??/ is a backslash in C99
 

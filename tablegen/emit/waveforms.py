@@ -15,7 +15,7 @@ MOST_TICKS = 1 << 22
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """A line of x or a frame of y. All arrays have the shape (ticks,).
+    """A line of x or a frame of y; all arrays have the shape (ticks,).
 
     ``time_s`` begins with the period, in s; ``volts`` are those at the piezo that the codes make; ``codes`` are
     straight binary, 0 .. 2^dac_bits - 1; ``markers`` are ``start``, ``line``, ``pixel``, ``backward`` and ``inside``.

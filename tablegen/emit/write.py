@@ -1,4 +1,4 @@
-"""One writer: a map of file name to content, put on disk whole or not at all; and what an earlier build has left."""
+"""The writer of files: a map of file name to content, on disk whole or not at all; and leftovers of earlier builds."""
 
 import errno
 import os
@@ -20,11 +20,11 @@ _LITTER = re.compile(rf"{re.escape(_STAGED)}[a-z0-9_]{{8}}")  # as ``mkstemp`` n
 
 
 class CannotWrite(Exception):
-    """The output directory could not be written; what stood there before still stands."""
+    """The failure to write the output directory, whose earlier content still stands."""
 
 
 class NoPlace(CannotWrite):
-    """A pipe or a device stands where a file or a directory has to go: no disk is at fault, but what was asked for."""
+    """A pipe or a device where a file or a directory has to go: the request is wrong, and no disk is."""
 
 
 def write_files(
@@ -96,7 +96,7 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
 
 @contextmanager
 def _removed_if_empty(new_folders: Sequence[Path]) -> Iterator[None]:
-    """Directories that were made, the innermost first, go again at the end if nothing came to stand in them."""
+    """Remove new directories at the end, the innermost first, if no file came to stand in them."""
     try:
         yield
     finally:
@@ -158,12 +158,12 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def names_of_build(build: str, names: Iterable[str]) -> list[str]:
-    """Those names that files of a build of this name can have: its own begin with it, others are the sequencer's."""
+    """Return those names that a build of this name can have: its own begin with it, others are the runtime's."""
     return [name for name in names if name.startswith((f"{build}.", f"{build}_")) or of_the_runtime(name)]
 
 
 def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
-    """Files that look like a build's and are not of this one, nor outdated: a glob such as ``dac_*.v`` takes them.
+    """List files that look like a build's and are not of this one, nor outdated: a glob such as ``dac_*.v`` takes them.
 
     They begin with ``dac_`` and have the suffix of a file of the build, or an earlier manifest lists them.
     """

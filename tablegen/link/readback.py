@@ -99,8 +99,8 @@ class _ImageReader:
                 self._some(missing[: self._window])
             except Silent:
                 raise
-            except LinkLost as lost:
-                self._session.reopen(self._deadline, lost)
+            except LinkLost as loss:
+                self._session.reopen(self._deadline, loss)
                 self._offsets.clear()
             except SessionEnded:
                 restarts += 1

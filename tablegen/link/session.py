@@ -104,8 +104,8 @@ class LinkSession:
             self.hello(deadline, new_session)
         except Silent:
             raise
-        except LinkLost as lost:
-            self.reopen(deadline, lost)
+        except LinkLost as loss:
+            self.reopen(deadline, loss)
 
     def reopen(self, deadline: float, why: LinkLost) -> None:
         """Open a lost port again, and HELLO; repeat it until the deadline.
@@ -153,8 +153,8 @@ class LinkSession:
                 return self._repeat(kind, None, payload, answer_bytes, deadline)
             except Silent:
                 raise
-            except LinkLost as lost:
-                self.reopen(deadline, lost)
+            except LinkLost as loss:
+                self.reopen(deadline, loss)
             except Refused as refusal:
                 if refusal.reason != Reason.SESSION:
                     raise
@@ -181,8 +181,8 @@ class LinkSession:
                 return self._repeat(kind, number, body, answer_bytes, deadline)
             except Silent:
                 raise
-            except LinkLost as lost:
-                self.reopen(deadline, lost)  # same number, same bytes: a device that has acted only answers
+            except LinkLost as loss:
+                self.reopen(deadline, loss)  # same number, same bytes: a device that has acted only answers
             except Refused as refusal:
                 if refusal.reason == Reason.KEY and self.key is not None:
                     last, body = refusal, None  # the line may have spent the challenge

@@ -70,8 +70,8 @@ class Uploader:
                 generation, line = self._attempt()
             except Silent:
                 raise
-            except LinkLost as lost:
-                self._session.reopen(self._deadline, lost)
+            except LinkLost as loss:
+                self._session.reopen(self._deadline, loss)
             except SessionEnded:
                 self._count(Reason.SESSION, self._session.contested())
                 self._session.greet(self._deadline, new_session=True)

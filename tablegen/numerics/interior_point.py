@@ -120,9 +120,9 @@ def least_bound(
 def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Minimum:
     for step in range(_MOST_STEPS + 1):
         bound, below = state.bounds()
-        done = state.inside and (reached(bound) or (state.dual and bound - below <= gap * bound))
-        if done or step == _MOST_STEPS or not state.advance():
-            return Minimum(state.y, bound, below, step, done)
+        settled = state.inside and (reached(bound) or (state.dual and bound - below <= gap * bound))
+        if settled or step == _MOST_STEPS or not state.advance():
+            return Minimum(state.y, bound, below, step, settled)
     raise AssertionError("the last step returns")  # pragma: no cover
 
 
@@ -252,9 +252,9 @@ class _State:
             pull = (complement - one * lack) / slack
             right = np.append(residual[0] - rows.transposed(pull[0] - pull[1]), residual[1] + _sum(rows.share * pull))
             solution = factor.solve(right)
-            moved, wider = rows.times(solution[:size]), rows.share * solution[size]
-            slacks = np.stack([wider - moved, wider + moved]) + lack
-            return solution, moved, slacks, (complement - one * slacks) / slack
+            row_steps, wider = rows.times(solution[:size]), rows.share * solution[size]
+            slacks = np.stack([wider - row_steps, wider + row_steps]) + lack
+            return solution, row_steps, slacks, (complement - one * slacks) / slack
 
         products = slack * one
         mean = _sum(products) / products.size
@@ -264,11 +264,11 @@ class _State:
         if not (mean > 0.0 and isfinite(after)):  # contradictory constraints end here
             return False
         ratio = after / mean
-        solution, moved, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
+        solution, row_steps, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
         ahead, up = _NEAR * _reach(slack, slacks), _NEAR * _reach(one, ones)
         self.y = self.y + ahead * solution[:size]
         self.v += ahead * float(solution[size])
-        self._far = self._far + ahead * moved
+        self._far = self._far + ahead * row_steps
         self._slack = slack + ahead * slacks
         self._multiplier = one + up * ones
         return True

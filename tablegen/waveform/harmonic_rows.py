@@ -29,7 +29,7 @@ class HarmonicRows:
         self._factor = np.concatenate([[1.0 if derivative == 0 else 0.0], over])
         order = np.arange(harmonics + 1)
         minus = order[:, None] - order[None, :]
-        self._apart, self._sign, self._together = np.abs(minus), np.sign(minus), order[:, None] + order[None, :]
+        self._difference, self._sign, self._sum = np.abs(minus), np.sign(minus), order[:, None] + order[None, :]
 
     def times(self, y: Floats) -> Floats:
         """Return the rows applied to unknowns.
@@ -90,9 +90,9 @@ class HarmonicRows:
         """
         weight = diagonal * self._weight * self._weight
         cosines, sines = folded_sum(self._c * weight), folded_sum(self._s * weight)
-        near, far = cosines[self._apart], cosines[self._together]
+        near, far = cosines[self._difference], cosines[self._sum]
         cos_cos, sin_sin = 0.5 * (near + far), 0.5 * (near - far)
-        sin_cos = 0.5 * (sines[self._together] + self._sign * sines[self._apart])  # sine of the row
+        sin_cos = 0.5 * (sines[self._sum] + self._sign * sines[self._difference])  # sine of the row
         if self._derivative == 1:
             cos_cos, sin_sin, sin_cos = sin_sin, cos_cos, -sin_cos.T
         scale = self._factor[:, None] * self._factor[None, :]

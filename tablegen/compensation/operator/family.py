@@ -33,8 +33,8 @@ class Family:
         Floats
             In units of the displacement, shape of ``u``.
         """
-        moved = self.plays.branch(u, low, high, rising)
-        return moved if self.bouc_wen is None else moved + self.bouc_wen.branch(u, low, high, rising)
+        displacement = self.plays.branch(u, low, high, rising)
+        return displacement if self.bouc_wen is None else displacement + self.bouc_wen.branch(u, low, high, rising)
 
     def extent(self, stroke: float, centre: float) -> float:
         """Return the nm between the turns of a settled line."""

@@ -109,8 +109,8 @@ class Plays:
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
-        moved = plays(u, low, high, rising, self.thresholds, self.bends)
-        for transform, weights in zip(moved, self.weights, strict=True):
+        transforms = plays(u, low, high, rising, self.thresholds, self.bends)
+        for transform, weights in zip(transforms, self.weights, strict=True):
             for row, weight in zip(transform, weights, strict=True):
                 if weight:
                     total = total + float(weight) * row

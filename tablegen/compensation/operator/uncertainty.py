@@ -26,7 +26,7 @@ _FORMULAS = 0.15  # of what (1) and (23) say from the nearest trace to the scan,
 def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> tuple[float, float, float, float]:
     """Return by how much rms, scaling error, mismatch and size may be off at a stroke and a centre, in percent."""
     points = np.array([(line.stroke, line.centre) for line in lines])
-    missed, noise = np.array([line.left_out for line in lines]), np.array([line.in_fit for line in lines])
+    left_out, noise = np.array([line.left_out for line in lines]), np.array([line.in_fit for line in lines])
     known = covariance(points, points, _ALIKE)
     factor = Cholesky(known + _ALIKE.noise * np.diag(np.diag(known)))
     without = [1.0 / float(factor.solve(row)[i]) for i, row in enumerate(np.eye(len(points)))]
@@ -34,8 +34,8 @@ def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> t
     here = max(1.0 - _dot(near, factor.solve(near)), 0.0)
     many = _deviations(0.5 * len(points))  # what neighbours are missed by goes together: half of it is independent
     out = []
-    for by, left in zip(missed.T, noise.T, strict=True):
-        square, rest = (by * by).tolist(), (left * left).tolist()
+    for by, in_fit in zip(left_out.T, noise.T, strict=True):
+        square, rest = (by * by).tolist(), (in_fit * in_fit).tolist()
         strength = _variance([max(a - b, 0.0) / v for a, b, v in zip(square, rest, without, strict=True)])
         out.append(sqrt(_mean(rest) + many * many * strength * here))
     return out[0], out[1], out[2], out[3]

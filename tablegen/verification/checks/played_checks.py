@@ -130,7 +130,7 @@ def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, lim
     if not len(at):
         why = f"{axis}: the output did not reach the waveform within {len(capture.got)} ticks; play more --ticks"
         return Check(axis, "float waveform", "no code", "", f"{limit:.3f} LSB", why)
-    error: Floats = part(axis, capture.got)[at] - content.asked(k)
+    error: Floats = part(axis, capture.got)[at] - content.unrounded_codes(k)
     largest = int(np.argmax(np.abs(error)))
     worst = float(np.abs(error[largest]))
     failure = None
