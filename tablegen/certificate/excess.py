@@ -8,7 +8,7 @@ from msgspec import Struct
 from tablegen.base.warnings import FindingCode
 from tablegen.certificate.line_errors import ScalingError
 
-LARGEST_PERCENT = 1.0  # the error that nobody is told of
+LARGEST_PERCENT = 1.0  # the largest error without a warning
 _NOTHING_PERCENT = 0.0005  # what rounds to 0: no hysteresis
 Cause = Literal["quantisation", "band limit", "model"]
 _CALLED: dict[Cause, str] = {"quantisation": "quantisation", "band limit": "the band limit", "model": "the model"}

@@ -11,7 +11,7 @@ from tablegen.certificate.shaped_periods import Passage
 from tablegen.planning.line_plan import LinePlan
 
 FAR_PERCENT = 10.0  # of v_max, from the nearest measured line; the traces of `calibrate operator` are closer than twice
-# Behind a resonance: still above 1 % if its quality is half of what the scanner file says, which nobody knows better.
+# Behind a resonance: above 1 % even if its quality is half of that in the scanner file, which is uncertain.
 RESONANCE_PERCENT = 2.0
 _GRID = 32  # points per period of the highest harmonic
 

@@ -30,7 +30,7 @@ from tablegen.fixedpoint.table_shape import MOST_LENGTH
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 
 _MOST_TRIALS = 6  # of one key
-_MARGIN = 1.1  # what a first guess allows for: errors of rounding do not scale exactly
+_MARGIN = 1.1  # factor of the first guess, since errors of rounding do not scale exactly
 _HARDWARE = re.compile(r"([xy]\.)?(amplifier|dac)\.")
 _SCANNER = "scanner:"  # before a key of the scanner file
 _ROUNDED_LSB = 0.5  # of a code, whatever its table is
@@ -259,7 +259,7 @@ def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[
     low, high = limit.window
     windows = [(max(low, margin), min(high, round(1.0 - margin, 9))) for margin in _MARGINS]
     narrower = ({f"{axis}.band_limit.window": window} for window in windows if window != (low, high))
-    sharp = min(low, 1.0 - high) < _MARGINS[1]  # no number of harmonics draws a sharp turn
+    sharp = min(low, 1.0 - high) < _MARGINS[1]  # no number of harmonics makes a sharp turn
     if sharp:
         yield narrower
     most = min((line.program.phase.ticks - 1) // 2, max(_MOST_HARMONICS, harmonics))
@@ -267,7 +267,7 @@ def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[
         most = min(most, len(line.program.words) // 2 - 1)
     more = [min(harmonics << i, most) for i in range(1, _MOST_TRIALS + 1)]
     counts = [n for n in dict.fromkeys(more) if n > harmonics]
-    if line.kept_percent is not None:  # more harmonics would be gentler, and leave the same error
+    if line.kept_percent is not None:  # more harmonics would lower the acceleration and leave the same error
         errors = [float(at_most(line.kept_percent / (1 << i), 3)) for i in range(1, _MOST_TRIALS + 1)]
         yield ({f"{axis}.band_limit.max_scaling_error_percent": error} for error in errors)
     elif limit.cutoff_hz is None:

@@ -15,7 +15,7 @@ from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import LinePlan
 
-MOST_TICKS = 1 << 20  # that are judged of one period
+MOST_TICKS = 1 << 20  # ticks of one period that are judged
 _SEVERAL_TICKS = 1 << 18  # of several periods together
 _PERIODS = 17  # at most; of several the first is left out, in which the response settles
 

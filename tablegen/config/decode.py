@@ -88,7 +88,7 @@ class _Decoder:
         valid, built = True, {}
         if kind is Hysteresis:
             known_model = self._model(value, key)
-            if known_model is None:  # nobody knows its keys
+            if known_model is None:  # the keys of an unknown model are unknown
                 return _ALREADY_REPORTED
             kind = known_model
         known = _fields(kind)

@@ -121,7 +121,7 @@ def read_scan_file(path: Path) -> tuple[dict[str, Any], Document]:
         If it is not a scan file.
     """
     values, scan_file = read_toml(path, str(path))
-    if "v_max" in values and not _is_scan(values):  # else every key of it is a fault, and none says this
+    if "v_max" in values and not _is_scan(values):  # otherwise every key of it would be reported, and not this
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
     return values, scan_file
@@ -161,7 +161,7 @@ def assemble_setup(
         known_values, known, scanner_file = scanners[scanner_path]
         check_hardware(values, known_values, scan_file, scanner_file, problems)
         return _setup(scan, known, values, scan_file, scanner_file, scanner_path.parent, problems)
-    if not os.path.isfile(scanner_path):  # unlike the method of Path it never raises
+    if not os.path.isfile(scanner_path):  # os.path.isfile never raises, unlike the method of Path
         problems.add(
             scan_file, "scanner", f"{shown_path(scanner_path)} is not a file; the path is relative to this file"
         )

@@ -9,7 +9,7 @@ from msgspec import Struct
 from tablegen.numerics.arrays import Floats, Ints
 
 MAXIMUM_LINE_TICKS = 1 << 24
-_EXACT = 1 << 53  # integers below it are floats as they are
+_EXACT = 1 << 53  # integers below it are exact as floats
 
 
 class Window(Struct, frozen=True):

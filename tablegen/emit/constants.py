@@ -9,7 +9,7 @@ from tablegen.fixedpoint.synthesis import FRACTION_BITS
 # Constants that may need more than 32 bits: languages that give constants a type give these a wide one in every build.
 WIDE = frozenset({"UPDATE_RATE_MILLIHZ", "PHASE_STEP", "OFFSET_WORD"})
 
-DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # what INTERPOLATED says: the degree between words
+DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # value of INTERPOLATED: the degree between words
 
 
 def scan_constants(content: Content) -> dict[str, int]:

@@ -55,7 +55,7 @@ def why_unsafe(name: str) -> str | None:
     return None
 
 
-# What no build reads, beside the commands: the independent side, and what works out the input of builds.
+# Packages that no build reads, beside the commands: the independent side, and those that prepare the input.
 _OTHER_FOLDERS = (
     *("api", "calibration", "charts", "cli", "comparison", "correction", "fitting", "images", "library", "link"),
     *("refinement", "report", "sweep", "verification", "virtual"),

@@ -21,7 +21,7 @@ from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifes
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.version import __version__
 
-_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
+_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # names of plain files that manifests can list
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:

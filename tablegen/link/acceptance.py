@@ -96,7 +96,7 @@ def _output(contents: Contents, page: int) -> Finding | None:
     shape = contents.x_shape if page == 1 else contents.y_shape
     low, high = signed_limits(GAIN_BITS)
     output = contents.program(page).output
-    # twice what a code needs
+    # Twice the range of a code, so that every right offset fits.
     reach = 2 << (output.dac_bits + output.gain_q)
     good = (
         low <= output.gain_word <= high

@@ -9,12 +9,12 @@ from dataclasses import fields
 from tablegen.link.errors import NotUnderstood
 from tablegen.link.messages import DATA_BYTES, VERSION, AxisLimits, AxisShape, DeviceInfo, DeviceStatus
 
-PROGRAM_BYTES = 192  # as tablegen.link.program_image has it, without numpy
+PROGRAM_BYTES = 192  # as in tablegen.link.program_image, which imports numpy
 MAXIMUM_INDEX_BITS = 16
 MAXIMUM_HARMONICS = 4096
 MAXIMUM_LINE = (1 << 31) - 1
 _WORD_BITS = range(8, 25)  # of table words and of codes
-_CONVERTER_BITS = 63  # of AxisShape.converter: the bits of its word
+_CONVERTER_BITS = 63  # mask of the word's bits in AxisShape.converter
 _MAXIMUM_CONVERTER_BITS = 32
 _FOURIER_BYTES = 4
 _MAXIMUM_WORD_BYTES = 3
@@ -53,7 +53,7 @@ def _check_shape(name: str, shape: AxisShape) -> None:
     _check("HELLO", f"{name} index_bits", shape.index_bits, 0, MAXIMUM_INDEX_BITS)
     for field, bits in (("word_bits", shape.word_bits), ("dac_bits", shape.dac_bits)):
         _check("HELLO", f"{name} {field}", bits, _WORD_BITS.start, _WORD_BITS.stop - 1)
-    if shape.converter:  # 0 of a device that does not say it
+    if shape.converter:  # 0 if the device does not state it
         _check(
             "HELLO",
             f"{name} converter (its bits)",

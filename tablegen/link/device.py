@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 TIMEOUT_S = 5.0  # timeout of a request
 _UPLOAD_MARGIN_S = 15.0  # margin on top of the transfer time of an upload
 _UPLOAD_TIME_FACTOR = 4.0  # factor on the transfer time of an upload
-_MAX_LATE_S = 5.0  # by which answers may be late, in what is allowed
-_MAX_LATE_SUM_S = 900.0  # of all answers of a transfer, in what is allowed
+_MAX_LATE_S = 5.0  # lateness of answers that time-outs allow for
+_MAX_LATE_SUM_S = 900.0  # total lateness of the answers of a transfer that time-outs allow for
 _MAX_LINE_S = 600.0  # a device that announces a rate of 1 Hz must not hold the host for months
-_MAX_TRIES = 8  # for which there is time where answers are late
+_MAX_TRIES = 8  # tries that fit into a time-out when answers are late
 _POLL_S = 0.05
-_HELLO_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
+_HELLO_FRESH_S = 0.25  # a HELLO this recent is not repeated: an upload notices a change by itself
 _MAX_READINGS = 3
 _GENERATION_BYTES = 4
 _KEY_BYTES = range(16, 33)
@@ -197,7 +197,7 @@ class Device:
         if status.hash == image.info.hash and not force:
             return UploadResult(True, status.generation, None, len(image.data), 0, 0, 0, 0.0)
         before = status
-        session.status_at = -math.inf  # whatever comes of it, that will have changed
+        session.status_at = -math.inf  # the status changes, whatever becomes of the upload
         self._uploader = Uploader(session, image, deadline, progress, limits)
         result = self._uploader.run()
         playing = self.status()

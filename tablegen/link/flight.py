@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from tablegen.link.messages import Request
 from tablegen.link.pace import back_off
 
-_MIN_SILENCE_S = 5.0  # at least, and so many waits for one answer
+_MIN_SILENCE_S = 5.0  # silence before a device counts as lost, if longer than some waits
 _SILENCE_WAITS = 16
 _ANSWERED_IN_ORDER = (Request.BEGIN, Request.DATA, Request.CHALLENGE)
 
@@ -35,7 +35,7 @@ class Flight:
     def clear(self, now: float) -> None:
         """Empty the flight: nothing is on its way, and no answer is awaited."""
         self._on_way: dict[Key, Sent] = {}
-        self._late: dict[Key, Sent] = {}  # overdue: their answers may come all the same
+        self._late: dict[Key, Sent] = {}  # overdue requests, whose answers may still come
         self._longest_wait = 0.0
         self.last_answer_at = self._in_order_at = now
         self.in_vain = 0

@@ -12,7 +12,7 @@ NONCE_BYTES = 16
 HASH_BYTES = 32
 ANSWER = 0x80
 REFUSAL = 0xFF
-CUBIC = 128  # in the index bits of a shape
+CUBIC = 128  # flag in the index bits of a shape
 SPLINE_DEGREE = 3
 
 
@@ -193,7 +193,7 @@ class DeviceInfo:
     y_limits: AxisLimits
     update_rate_hz: int
     shaping: int = 0
-    degree: int = 0  # highest of a spline; 0 of a device that knows none: lines
+    degree: int = 0  # highest degree of a spline; 0 of a device that plays lines only
 
     def pack(self) -> bytes:
         """Return the beginning of the answer to HELLO."""

@@ -136,7 +136,7 @@ class ModelDevice:
         self._pending: _PendingRequest | None = None
         self._aborts: list[_PendingRequest] = []
         self._challenges = 0
-        self._before: _LastRequest | None = None  # what a COMMIT that is being looked at replaces
+        self._before: _LastRequest | None = None  # the request before a COMMIT that is being checked
 
     def reboot(self) -> None:
         """Start again, with nothing but what is in the firmware, and the next boot count."""
@@ -194,7 +194,7 @@ class ModelDevice:
             hash=known if active is None else active.info.hash,
         )
 
-    # What every request passes
+    # Checks that every request passes
 
     def _judge(self, frame: Frame) -> None:
         memory: _LastRequest | None = None

@@ -8,12 +8,12 @@ from tablegen.link.frames import OVERHEAD
 from tablegen.link.transport import byte_s
 
 LATENCY_S = 0.016  # latency of a USB bridge, which forwards bytes 60 times a second
-_DEVICE_DELAY_S = 0.02  # a device has other things to do
+_DEVICE_DELAY_S = 0.02  # delay of a device that is busy with other tasks
 _MARGIN = 1.5
-_DECAY = 0.8  # of a lateness, per answer
-_SPACINGS = 32  # of answers, for the rate of the line
+_DECAY = 0.8  # factor of the lateness at each answer
+_SPACINGS = 32  # answers from which the rate of the line is estimated
 _MIN_SPACINGS = 8
-_SPACED_BYTES = 100  # frames of so many bytes show a rate; smaller ones are drowned by latency
+_SPACED_BYTES = 100  # bytes of a frame that shows a rate; for smaller ones latency dominates
 _MIN_SLOWER = 2.0  # a line so many times slower than its rate is called slow
 _MIN_BACK_OFF_S = 1.0  # waits double at least up to this
 _MAX_BACK_OFF = 4  # or up to so many times the first wait
@@ -37,12 +37,12 @@ class Pace:
 
     def __init__(self, latency_s: float) -> None:
         self._latency_s = latency_s
-        self._line_free = 0.0  # when what was written has left
+        self._line_free = 0.0  # time at which the written bytes have left
         self._marks: dict[tuple[int, int], _Mark | None] = {}
-        self._sent = self._answered = 0  # bytes: all, and up to the request that was answered last
+        self._sent = self._answered = 0  # bytes sent, and those up to the request that was answered last
         self._answered_at = 0.0
         self._spacings: deque[float] = deque(maxlen=_SPACINGS)  # seconds per byte
-        self.late_s = 0.0  # the largest lateness, fading
+        self.late_s = 0.0  # largest lateness, which decays
 
     def forget(self) -> None:
         """Drop all requests on their way: the port is another one, and they will not be answered."""
@@ -74,7 +74,8 @@ class Pace:
         if between <= 0:
             return
         transfer = max(between, answer_bytes + OVERHEAD)
-        if mark.at < self._answered_at and transfer >= _SPACED_BYTES:  # it was on its way behind the one before
+        # Only a request that was under way when the one before was answered shows the rate.
+        if mark.at < self._answered_at and transfer >= _SPACED_BYTES:
             self._spacings.append((now - self._answered_at) / transfer)
         self._answered, self._answered_at = mark.end, now
 

@@ -207,7 +207,7 @@ class SequencerPlayer(_Queue):
         for _ in range(ticks):
             self._answer()
             before = self.sequencer.line
-            # a swap and a trigger begin at line 0; the line of a tick is the one before it is over
+            # A swap and a trigger begin at line 0; the line of a tick is the one before the tick is over.
             begins = self.sequencer.idle is not None and self.sequencer.running and self.sequencer.tick == 0
             tick = self._last = self.sequencer.step()
             if tick.swapped:

@@ -23,7 +23,7 @@ from tablegen.planning.line_plan import Plan
 
 Form = Literal["auto", "table", "fourier"]
 TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # bits of AxisShape.converter
-_RATE_TOLERANCE_HZ = 1.0  # a device tells its rate to the nearest whole one
+_RATE_TOLERANCE_HZ = 1.0  # a device states its rate to the nearest integer
 
 
 @dataclass(frozen=True, eq=False)

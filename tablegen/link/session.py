@@ -46,7 +46,7 @@ class LinkSession:
         self.exchange = Exchange(transport, latency_s, random)
         self.key = key
         self.info: DeviceInfo
-        self.status: DeviceStatus  # when HELLO was answered last, at the time
+        self.status: DeviceStatus  # status at the last answer to HELLO
         self.status_at = 0.0
         self.acts: dict[Request, None] = {}  # requests that act which were sent, in order, each once
         self._opener = opener
@@ -182,10 +182,10 @@ class LinkSession:
             except Silent:
                 raise
             except LinkLost as loss:
-                self.reopen(deadline, loss)  # same number, same bytes: a device that has acted only answers
+                self.reopen(deadline, loss)  # with the same number and bytes a device that has acted only answers
             except Refused as refusal:
                 if refusal.reason == Reason.KEY and self.key is not None:
-                    last, body = refusal, None  # the line may have spent the challenge
+                    last, body = refusal, None  # a repeated frame may have used up the challenge
                 elif refusal.reason in (Reason.SESSION, Reason.OLD):
                     self.greet(deadline, new_session=True)
                     last, body = self.contested(), None

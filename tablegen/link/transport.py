@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from tablegen.link.errors import LinkLost, NoPort, SerialMissing
 
 _POLL_S = 0.01  # pyserial's own wait; changing it for every read would configure the port again each time
-_WRITE_TIMEOUT_S = 5.0  # a port that takes nothing for so long has a cable without an end
+_WRITE_TIMEOUT_S = 5.0  # a port that takes no bytes for so long has no device behind it
 _MAX_READ_BYTES = 4096  # bytes per read, so that a noisy line cannot block it
 _BITS_PER_BYTE = 10  # bits of a byte on the wire: start, 8, stop
 

@@ -105,7 +105,7 @@ class Uploader:
     def _slow_baud(self) -> int | None:
         return self._exchange.pace.slow_baud(self._exchange.transport.baud)
 
-    # What is known of the device
+    # State of the device
 
     def _received(self, status: DeviceStatus) -> int:
         """Return the bytes of this upload that the device has."""
@@ -121,11 +121,11 @@ class Uploader:
         self._commit: Sent | None = None
         self._commit_body = b""
         self._nonce: bytes | None = None
-        self._status: DeviceStatus | None = None  # the last one since COMMIT, or since the device was busy
+        self._status: DeviceStatus | None = None  # last status since COMMIT, or since the device was busy
         self._asked_again = False  # the same COMMIT was sent though the scan is active
         self._poll_s = _POLL_S[0]
         self._poll_at = self._pause_until = 0.0
-        self._busy = False  # BEGIN was refused so: STATUS before the next one
+        self._busy = False  # BEGIN was refused as busy: STATUS comes before the next one
 
     def _in_force(self, status: DeviceStatus) -> bool:
         """Return True if this upload is active, and not an earlier one of the same scan."""
@@ -168,8 +168,8 @@ class Uploader:
             elif self._next < size:
                 self._send_data()
             elif self._digest and self._nonce is None and not flight.has(Request.CHALLENGE):
-                flight.forget(Request.CHALLENGE)  # the next one replaces what the device gave for it
-                self._send(Request.CHALLENGE, b"")  # only now: it expires
+                flight.forget(Request.CHALLENGE)  # a new challenge replaces the nonce of the lost one
+                self._send(Request.CHALLENGE, b"")  # as late as possible, since it expires
             elif self._commit is None and (self._nonce is not None or not self._digest):
                 self._send_commit()
             elif self._poll_at and now >= self._poll_at and not flight.has(Request.STATUS):
@@ -345,7 +345,7 @@ class Uploader:
         if sent.kind == Request.BEGIN and answer.reason == Reason.BUSY:
             self._wait_for_others()
         elif sent.kind == Request.DATA and answer.reason == Reason.UPLOAD:
-            if self._commit is not None:  # that may have ended the upload: STATUS and the same COMMIT again tell
+            if self._commit is not None:  # COMMIT may have ended the upload, which STATUS and the same COMMIT tell
                 self._next, self._poll_at = len(self._image.data), self._session.now()
             elif sent.round == self._round:
                 self._count(answer.reason, error)
@@ -357,7 +357,7 @@ class Uploader:
 
     def _begin_again(self) -> None:
         """Send BEGIN, and wait for what it says before anything else is sent."""
-        self._flight.forget(Request.BEGIN, Request.DATA)  # what they answer is of the upload before
+        self._flight.forget(Request.BEGIN, Request.DATA)  # their answers belong to the upload before
         self._begun = self._pipelined = False
         self._go_back(0)
 
@@ -390,7 +390,7 @@ class Uploader:
         from tablegen.link.program_image import take_apart
 
         info, contents = self._image.info, None
-        with suppress(ValueError):  # an image that is none is refused for what it is
+        with suppress(ValueError):  # a damaged image is refused without its contents
             contents = take_apart(self._image.data, info.x, info.y)
         return refused(answer.kind, answer.reason, answer.detail, self._session.info, contents, self._limits)
 

@@ -24,10 +24,10 @@ Word = Annotated[int, Meta(ge=-(1 << 31), lt=1 << 31)]
 Bits = Annotated[int, Meta(ge=8, le=24)]
 Pair = tuple[Natural, Natural]
 Digest = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
-# Never outside the directory.
+# A name of a file never leads outside the directory.
 MAXIMUM_FILE_NAME = 200
 FileName = Annotated[str, Meta(max_length=MAXIMUM_FILE_NAME, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
-# Of a file beside the scanner: what it was called. It may have any characters, for no path is made from it.
+# Name of a file beside the scanner file; it may have any characters, since no path is made from it.
 SourceName = Annotated[str, Meta(min_length=1, max_length=255)]
 Version = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9.+!-]*\Z")]
 Number = Annotated[int, Meta(ge=-(1 << 43), lt=1 << 43)]

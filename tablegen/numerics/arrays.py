@@ -50,7 +50,7 @@ def _tree_sum(values: Floats) -> Floats:
         return values[..., 0].copy() if count else np.zeros(values.shape[:-1])
     sums = values[..., :half].copy()
     sums[..., : count - half] += values[..., half:]
-    sums[..., count - half :] += 0.0  # as if values were followed by zeros
+    sums[..., count - half :] += 0.0  # as if zeros followed the values, so that -0.0 becomes 0.0
     while half > 1:
         half //= 2
         sums[..., :half] += sums[..., half : 2 * half]

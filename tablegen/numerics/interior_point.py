@@ -17,8 +17,8 @@ from tablegen.numerics.linear import Cholesky
 
 _MOST_STEPS = 60
 _REGULAR = 1e-14  # of each pivot; keeps the factorisation going where multipliers are 1e14 apart
-_NEAR = 0.98  # of the way to the nearest wall
-_FEASIBLE = 1e-9  # of a bound: what a row may be outside of it by at the end
+_NEAR = 0.98  # share of the way to the nearest bound
+_FEASIBLE = 1e-9  # share of a bound by which a row may exceed it at the end
 _FEASIBLE_DUAL = 1e-3  # the residual of the multipliers, whose sum is 1
 
 

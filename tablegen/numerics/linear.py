@@ -7,7 +7,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 _BLOCK = 1 << 16  # products that are computed at a time, so that they fit the cache
-_TOGETHER = 8  # columns from which those before them are taken at once: fewer and longer steps, each sum in its order
+_TOGETHER = 8  # columns that are eliminated at once: fewer and longer steps, each sum in its order
 
 
 class Cholesky:

@@ -8,7 +8,7 @@ from tablegen.config.load import Setup
 from tablegen.device.schedule import Schedule
 from tablegen.planning.drive import Drive
 
-MOST_LINES = 255  # that a device counts
+MOST_LINES = 255  # the largest count of a device
 _PRINTED_NM = 0.005
 BOUND = 0.005  # of the line, by which the image may drift in a frame; a pixel where that is more
 
@@ -47,7 +47,7 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
         return [after.drift_nm(line_s, first, schedule.lines, slower_than_s) for after in transients]
 
     lines = max(after.lines(line_s, schedule.lines, bound, MOST_LINES) for after in transients)
-    if axis == "x":  # the first bends, whatever the bound
+    if axis == "x":  # the first line is bent, whatever the bound
         lines = max(lines, 1)
     written_lines = min(lines, MOST_LINES)
     late, of = max((nm, which) for which, nm in enumerate(drifts(written_lines)))

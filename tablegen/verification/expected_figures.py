@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _TWO_DIGITS, _THREE_DIGITS = 0.051, 0.0051  # relative: what they round away
 _ZERO_PERCENT = 0.0005  # what is printed as 0
 _LEVEL_PERCENT = 90.0  # of scans, which a header states beside the distance
-_MOST_CHANGE, _LEAST_BETA = 2.0, 0.01  # of a branch between the line's stroke and the one that is played
+_MOST_CHANGE, _LEAST_BETA = 2.0, 0.01  # bounds of the change of a branch between the line's stroke and the played one
 
 
 def wrong_mismatch(axis: ManifestAxis) -> list[str]:

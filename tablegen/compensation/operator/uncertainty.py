@@ -20,7 +20,7 @@ _FEW = 3  # traces, below which all count
 _PLACES = 0.5  # share of what the family leaves that may be another one, for an offset that is v_max from all traces
 _WINDOW = 0.8  # of -1..1, where it counts; chords of a twentieth of the line
 _POINTS, _CHORD = 161, 10
-_FORMULAS = 0.15  # of what (1) and (23) say from the nearest trace to the scan, that may be wrong
+_FORMULAS = 0.15  # share of the factors (1) and (23) between the nearest trace and the scan that may be wrong
 
 
 def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> tuple[float, float, float, float]:
@@ -32,7 +32,7 @@ def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> t
     without = [1.0 / float(factor.solve(row)[i]) for i, row in enumerate(np.eye(len(points)))]
     near = covariance(np.array([[stroke, centre]]), points, _ALIKE)[0]
     here = max(1.0 - _dot(near, factor.solve(near)), 0.0)
-    many = _deviations(0.5 * len(points))  # what neighbours are missed by goes together: half of it is independent
+    many = _deviations(0.5 * len(points))  # errors of neighbours are correlated: half of them count as independent
     out = []
     for by, in_fit in zip(left_out.T, noise.T, strict=True):
         square, rest = (by * by).tolist(), (in_fit * in_fit).tolist()
@@ -82,7 +82,8 @@ def _variance(squares: Sequence[float]) -> float:
     count = len(squares)
     if count < _FEW:
         return _mean(squares)
-    return _mean(sorted(squares)[:-1]) / (1.0 - 1.15 / sqrt(count))  # about what is left of a normal's, or less
+    # About the share that remains of a normal distribution's, or less.
+    return _mean(sorted(squares)[:-1]) / (1.0 - 1.15 / sqrt(count))
 
 
 def _mean(values: Sequence[float]) -> float:

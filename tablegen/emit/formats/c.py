@@ -26,7 +26,7 @@ from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 
-# Patterns of what is checked are compiled when it is: a build needs none.
+# Patterns of checks are compiled on first use, since a build needs none.
 _NUMBER = r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?"
 _ARRAY = r"(?s)\b(\w+)\[\w*\] = \{(.*?)\};"
 

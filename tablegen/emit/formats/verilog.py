@@ -13,7 +13,7 @@ from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
 
-# Patterns of what is checked are compiled when it is: a build needs none.
+# Patterns of checks are compiled on first use, since a build needs none.
 _LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"
 _NUMBER = r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)"
 

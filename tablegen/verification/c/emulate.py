@@ -27,10 +27,10 @@ MEMORY, LAYOUT = _HERE / "stream_bench_memory.c", _HERE / "emulated.ld"
 FREESTANDING = ("-ffreestanding", "-static", "-ffunction-sections", "-fdata-sections")
 _RAM, _RAM_SIZE, _STACK = 0x20000000, 1 << 24, 1 << 16
 _FLASH, _FLASH_SIZE = 0x00010000, 1 << 24
-TRAP = _FLASH + _FLASH_SIZE - 16  # where a called function returns to: nothing else is there
+TRAP = _FLASH + _FLASH_SIZE - 16  # return address of a called function, where no code is
 _STACK_PAINT = 0xA5
 _ARRAY_WORDS = 8192  # words of the arrays in stream_bench_memory.c
-_SLICE_US = 500_000  # so that an interruption is seen
+_SLICE_US = 500_000  # short enough that an interruption is noticed
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Processor:
         require_emulator(COMPILERS[CORES[core].architecture])
         self.executable, self.core = executable, CORES[core]
         self.uc = self._processor()
-        self.uc.mem_map(_RAM, _RAM_SIZE)  # as one region each: every further one makes all accesses slower
+        self.uc.mem_map(_RAM, _RAM_SIZE)  # one region each, since every further one slows down all accesses
         self.uc.mem_map(_FLASH, _FLASH_SIZE)
         for segment in executable.segments:
             self.uc.mem_write(segment.address, segment.data)

@@ -21,8 +21,8 @@ from tablegen.verification.c.program import MOST_FILLED, OPTIONS, CProgram
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import SCRIPT
 
-_LINK = "dac_link"  # how the names of the link's sources begin
-_MIN_TICKS_PER_SECOND = 5000  # a slower program is taken for hanging
+_LINK = "dac_link"  # prefix of the link's sources
+_MIN_TICKS_PER_SECOND = 5000  # a slower program counts as hanging
 _PROGRAM = "step/stream_bench"
 _STEP, _FILL = "step_capture.bin", "fill_capture.bin"
 
@@ -64,7 +64,8 @@ class HostPlayer:
             "program": _PROGRAM,
             "script": SCRIPT,
             "plays": [(_STEP, ["steps"]), (_FILL, [])],
-            "most_bytes": 1_000_000 + 32 * self._ticks,  # twice what is right: a few too many are told as such
+            "most_bytes": 1_000_000
+            + 32 * self._ticks,  # twice the right size: a few ticks too many are reported as such
             "timeout": 60.0 + self._ticks / _MIN_TICKS_PER_SECOND,
         }
         failures: dict[str, str] = worker.run(self._work, c_play.__name__, job)

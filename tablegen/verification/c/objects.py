@@ -15,7 +15,7 @@ from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import file_sha256
 
 _CACHE = CachedFiles("objects", 300)
-# Settings by which compilers find or make something else.
+# Environment variables that change what compilers find or produce.
 _SETTINGS = (
     *("CFLAGS", "CPATH", "C_INCLUDE_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX", "CCC_OVERRIDE_OPTIONS"),
     *("SDKROOT", "MACOSX_DEPLOYMENT_TARGET"),

@@ -37,7 +37,7 @@ from tablegen.verification.play.sequencer_shape import SCRIPT, SequencerShape
 from tablegen.verification.play.session import make_session
 from tablegen.verification.play.stream import OUTPUTS, Script, read_states
 
-_UNTOLD = ("armed", "running", OUTPUTS)  # what the status of the C sequencer does not tell
+_UNTOLD = ("armed", "running", OUTPUTS)  # flags that the status of the C sequencer does not have
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
 
 

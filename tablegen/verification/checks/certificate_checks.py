@@ -23,7 +23,7 @@ from tablegen.verification.checks.shaped import stated_shaping
 from tablegen.verification.expected_figures import header_texts, wrong_mismatch, wrong_texts
 from tablegen.verification.position import wrong_position
 
-_ROUNDED = 1.0 + 1e-9  # the target is worked out again from what is played
+_ROUNDED = 1.0 + 1e-9  # rounding, since the target is computed again from the series that is played
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from tablegen.manifest.fields import ManifestAxis, ManifestSeries
 from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.verification.checks.shaped import MOST_TICKS, ShapedPlay, code_excess, step_excess
 
-_MOST_ADVANCES = 1 << 22  # of a period whose every advance is looked at
+_MOST_ADVANCES = 1 << 22  # advances of the longest period that is checked advance by advance
 _SLOPE_POINTS = 32  # per period of the highest harmonic
-_GRID = 1 << 21  # points of the waveform of a longer one, between which it is a cubic; of 1e-3 LSB at the very worst
+_GRID = 1 << 21  # points of a longer period, with cubics between them; errors below 1e-3 LSB
 _LEAST_POWER = 1e-30
 _SIX_DIGITS, _LONG_PERIOD = 1.1e-5, 1e-3  # relative: what six digits round away, also upwards
 

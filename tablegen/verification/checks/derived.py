@@ -15,8 +15,8 @@ from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.manifest.read import StoredBuild
 
-_RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations
-_WINDOW_TICKS = 2  # a window of a line is placed to the tick, and not more than so far from where it was asked for
+_RELATIVE = 1e-9  # relative error of floats after JSON and a few operations
+_WINDOW_TICKS = 2  # ticks by which a window may be off the requested place
 
 
 def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:

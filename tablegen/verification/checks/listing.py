@@ -10,7 +10,7 @@ from tablegen.emit.formats import UnknownFormat, files_of, get
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import StoredBuild
 
-_RUNTIME = ("dac_*.v", "dac_*.c", "dac_*.h")  # what a command line with a pattern takes in
+_RUNTIME = ("dac_*.v", "dac_*.c", "dac_*.h")  # patterns of command lines that take the runtime
 _REWRITTEN = ("c", "verilog")  # formats that are compared constant by constant and word by word, not as they stand
 
 

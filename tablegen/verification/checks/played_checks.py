@@ -287,7 +287,7 @@ def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], 
     return Check("serial", "converter word", f"{len(numbers)} samples", f"{len(wrong)} differ", "0", failure)
 
 
-_BESIDE = {  # modules that stand beside the sequencer: what they are to do, and what of it is lost on purpose
+_BESIDE = {  # modules beside the sequencer: their tests, and what is lost on purpose
     "coding": ("dac_coding", "words", ""),
     "spi": ("dac_spi", "samples, 8 ways to wire two converters", "missed"),
     "axi_stream": ("dac_axi_stream", "beats, 2 widths", "missed"),

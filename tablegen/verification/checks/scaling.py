@@ -18,7 +18,7 @@ from tablegen.verification.checks.certified import PlayedPeriod, at, on_grid, pl
 from tablegen.verification.checks.shaped import ShapedPlay
 
 CHORD = 0.05  # share of the line
-OPERATOR = "operator"  # the model whose waveform was found, not worked out of an equation
+OPERATOR = "operator"  # the model whose waveform follows from no equation
 _POINTS = 16, 513  # per harmonic, and beside them, over the window
 _ACCELERATION_POINTS = 32  # per harmonic
 _GRID = 4097  # points on which a branch is inverted first
@@ -168,7 +168,7 @@ def _inverse(branch: "ModelBranch | WaveformBranch", u: Floats) -> Floats:
     return s
 
 
-# Written once more, beside the build's own. Of models that are not here scaling errors are not compared.
+# Independent copies of the build's equations; scaling errors of other models are not compared.
 _EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
     "triangle": lambda branch: ModelBranch(0.0, 0.0),
     "sinusoidal": lambda branch: ModelBranch(branch.beta, 0.0),

@@ -52,7 +52,7 @@ def shaped_codes(program: Program, count: int) -> Ints:
     half = 1 << (bits - 1)
     ticks = np.arange(min(count, program.ticks), dtype=np.int64)
     exact = output.gain_word * program.samples(ticks) + output.offset_word
-    # The half of a code that rounds is taken off again: a remainder is about 0.
+    # Subtract the half code of the rounding again, so that remainders are centred on 0.
     value = np.resize(((exact + (1 << (output.gain_q - 1))) >> (output.gain_q - bits)) - half, count)
     order = output.shaping.order
     if order == 3:

@@ -11,7 +11,7 @@ from tablegen.numerics.arrays import Bools, Ints
 from tablegen.verification.checks.shaped import shaped_codes
 from tablegen.verification.play.stream import FLAGS, Script, Words
 
-UNDEFINED = np.uint64((1 << 64) - 1)  # how a capture is read where the simulator has an unknown bit
+UNDEFINED = np.uint64((1 << 64) - 1)  # value of a captured word with an unknown bit
 _MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults": (56, 0xFF)}
 
 
@@ -185,7 +185,7 @@ def _caught_up(program: DualProgram, place: Ints, since: Ints, model: Words) -> 
     for axis, one in (("x", program.x), ("y", program.y)):
         reached[reached] = _codes(one, place[reached], since[reached]) == part(axis, model)[reached]
     index = np.arange(len(place))
-    # Caught up is for good: one right tick since the program began, this one included, is enough.
+    # An output that has caught up stays so: one right tick since the program began, this one included, is enough.
     return (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= index - since)
 
 

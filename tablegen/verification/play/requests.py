@@ -19,8 +19,8 @@ _MANY_FRAMES = 0x8001  # a counter of fewer bits would count one
 _UNUSED_PAGES = (48, 144, 272, 1040, 32784)  # one bit more than a used one, or two bits
 _LONGER = 6000  # ticks by which a line is longer where that costs nothing
 _SWAPS = 14
-_REFUSAL_CLOCKS = 2  # until a refusal is there
-_WIDE_TICKS = 44  # fewer than a line, a frame or a window of such a program has to the model
+_REFUSAL_CLOCKS = 2  # clocks until a refusal is visible
+_WIDE_TICKS = 44  # ticks, fewer than the model has in a line, a frame or a window of such a program
 _IN_TURN: tuple[Kind, ...] = ("clamped", "held", "free", "free", "held")
 
 

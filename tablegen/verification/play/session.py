@@ -15,13 +15,13 @@ from tablegen.verification.play.requests import Requests
 from tablegen.verification.play.stream import Script
 from tablegen.verification.play.variation import variation
 
-_CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caught up
-_PARK_TICKS = 500  # in which most programs have parked, whatever the ticks are that were asked for
+_CATCH_UP_STRIDE = 64  # ticks between checks whether an output has caught up
+_PARK_TICKS = 500  # ticks in which most programs have parked
 _POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
 WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
 WIRED_CLOCKS = 240  # clocks between them
 _MANY_TICKS = 20_000  # of a session in C that has long lines too
-_TAKING_OVER_TICKS = 1500  # more than pass while its words are written
+_TAKING_OVER_TICKS = 1500  # more ticks than pass while the words of a program are written
 
 
 @dataclass(frozen=True)

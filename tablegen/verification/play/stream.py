@@ -119,9 +119,9 @@ class Script:
     commands: list[int] = field(default_factory=list)
     expected: "array[int]" = field(default_factory=lambda: array("Q"))  # as wide as Words
     swapped_programs: list[DualProgram] = field(default_factory=list)  # programs, one a swap
-    refused: bool = False  # a write was to be refused, and nobody has cleared that
+    refused: bool = False  # a write was to be refused, and the flag has not been cleared
     states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
-    programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # from which tick on which one plays
+    programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # each after its first tick
 
     def __post_init__(self) -> None:
         self.model = Sequencer(None, codes=self.power_up)
