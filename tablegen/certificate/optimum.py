@@ -1,7 +1,8 @@
 """The optimum of an axis: the least peak acceleration of any waveform, by a linear programme (HiGHS of scipy).
 
 It shares nothing with the fit of the build but the line: other times, other sums, another method. Only the scaling
-error and the range are asked for, not the place of the line, so that it is a little below what a build can reach.
+error and the range are constrained, and not the place of the line, so that the optimum is a little below what a build
+can reach.
 """
 
 from math import ceil, tau

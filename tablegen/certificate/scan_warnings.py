@@ -35,11 +35,10 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
 
 
 def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[float, Problem]]:
-    """List the warnings with remedies, every one of which was planned and measured.
+    """List the warnings of a scan, each with a percentage of the line, the worst first.
 
-    And what is to be doubted of what is expected on the scanner; and what trace and retrace are apart by ticks alone,
-    where that is more than a quarter of a pixel. Each with the percentage of the scan that it tells of, the worst
-    first.
+    They are errors above their limits, doubts about the expectation on the scanner, and pixels whose places in trace
+    and retrace differ by more than a quarter of a pixel. Every remedy in them was planned and measured.
     """
     warnings = []
     for line, exceeded in _exceeded(plan, certificates):

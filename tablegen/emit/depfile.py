@@ -22,8 +22,8 @@ _SUFFIX_RULE = re.compile(
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
     """Write a rule for the target, and a target without a rule for each prerequisite.
 
-    The latter are why a prerequisite that was removed makes its dependents be built again, and not make fail. Names are
-    those of which ``why_unsafe`` says nothing.
+    Because of the latter a removed prerequisite makes its dependents be built again, instead of make fail. All names
+    are safe by ``why_unsafe``.
     """
     names = [_escaped(os.fsencode(path)) for path in prerequisites]
     rule = b" \\\n ".join([_escaped(os.fsencode(target)) + b":", *names])

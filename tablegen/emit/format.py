@@ -1,8 +1,8 @@
 """The interface of a format of a build: a file in ``tablegen/emit/formats/``, or an entry point.
 
-A format declares its name, what it is for and its files; it renders integers that are made already, and says how its
-files are held against a manifest. Everything else (the writer, ``--check``, dependency files, removal of files that are
-no longer made, ``tablegen verify``) goes through all formats of a build alike.
+A format declares its name, its purpose and its files; it renders integers that were computed before, and compares its
+files with a manifest. Everything else (the writer, ``--check``, dependency files, removal of outdated files,
+``tablegen verify``) goes through all formats of a build alike.
 """
 
 from abc import ABC, abstractmethod

@@ -143,10 +143,10 @@ def settle(folder: Path) -> None:
 
 
 def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
-    """List the files of an earlier build that this one does not make, in order.
+    """List the files of an earlier build that this one does not write, in order.
 
     They are files that a manifest of ours lists, whose hash is that of its plan; their names are those of a build, and
-    their content is unchanged. A file that somebody has edited since is not among them; ``leftover_files`` names it.
+    their content is unchanged. A user-modified file is not among them; ``leftover_files`` names it.
     """
     files = set(files)
     try:

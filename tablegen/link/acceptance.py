@@ -1,6 +1,6 @@
-"""What a device checks before it takes a program: the specification behind docs/protocol.md.
+"""The checks of a device before it takes a program: the specification behind docs/protocol.md.
 
-Devices do the same in C; the host asks here before it uploads, so that it can say what would be refused.
+Devices do the same in C; the host calls it before an upload, to state what would be refused.
 """
 
 from dataclasses import dataclass

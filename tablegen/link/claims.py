@@ -1,6 +1,6 @@
-"""What a device may claim of itself: a value that no device can have ends in ``NotUnderstood``, by field and value.
+"""Checks of a device's claims: a value that no device can have raises ``NotUnderstood`` with field and value.
 
-HELLO and STATUS decide how much memory a host takes and how long it waits, so that nothing here is believed unseen.
+HELLO and STATUS decide how much memory a host takes and how long it waits, so that every field is checked first.
 The ranges are those of docs/protocol.md.
 """
 

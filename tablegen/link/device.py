@@ -304,11 +304,14 @@ class Device:
             return self.info.x_limits, self.info.y_limits  # the device has no other limits
 
     def narrow(self, x: AxisLimits, y: AxisLimits) -> Limits:
-        """Narrow the limits until the device's next start, or until this is called again; returns the active limits.
+        """Narrow the limits until the device's next start, or until this is called again; return the active limits.
 
         They are cut to those of the device's build.
 
-        Raises ``Refused`` for a device that cannot (``Feature.NARROWS``).
+        Raises
+        ------
+        Refused
+            If the device cannot (``Feature.NARROWS``).
         """
         return self._limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
 

@@ -1,4 +1,4 @@
-"""Requests out and answers in, on one port and in one session: framing, numbering, and how long to wait."""
+"""The exchange of requests and answers on one port and in one session: framing, numbering, and waits."""
 
 from dataclasses import dataclass
 from random import Random

@@ -1,4 +1,4 @@
-"""Requests on their way: how many there may be, when they are overdue, and which answers still count."""
+"""Requests on their way: their number, their time-outs, and the answers that still count."""
 
 from dataclasses import dataclass
 

@@ -31,8 +31,8 @@ class _Mark:
 class Pace:
     """The pace of a link, estimated from the answers that come.
 
-    What an answer takes longer than line and latency explain is its lateness. Waits allow for the largest, without a
-    cap; it fades as other answers come. Only a request that was sent once teaches (Karn).
+    The lateness of an answer is the time beyond what line and latency explain. Waits allow for the largest, without a
+    cap; it decays as other answers come. Only requests that were sent once count (Karn's algorithm).
     """
 
     def __init__(self, latency_s: float) -> None:

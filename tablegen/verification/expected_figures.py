@@ -1,7 +1,7 @@
 """The expectations on the scanner that a directory can confirm: the mismatch by the laws, and the text of headers.
 
-Traces are in no build, so that of an operator's figures the text of the emitted headers is the only other witness: a
-manifest that was edited alone is found to the digits that stand there.
+Traces are in no build, so that an operator's figures can only be compared with the text of the emitted headers: a
+manifest that was edited alone differs from the digits there.
 """
 
 import re

@@ -1,8 +1,8 @@
 """The position of an unshaped axis behind its response, computed again tick by tick from the words of a manifest.
 
 A second-order response is followed in time, from the state with which a period begins as it ends. A measured one is
-known at frequencies alone: there images of the codes at multiples of the update rate are added. Wanted is what the
-manifest states that arrives, in the middle of every tick.
+known at frequencies alone: there images of the codes at multiples of the update rate are added. The target is the
+series that the manifest states, in the middle of every tick.
 """
 
 from math import ceil, isfinite, pi

@@ -1,6 +1,6 @@
 """The formats of a build: a module here has the name of its format and a ``FORMAT``; entry points add others.
 
-A package of somebody else adds one as an entry point of the group ``tablegen.formats``: its name is the format's, its
+A third-party package adds one as an entry point of the group ``tablegen.formats``: its name is the format's, its
 object an instance of ``tablegen.emit.format.Format``.
 """
 

@@ -1,6 +1,6 @@
 """Objects of C that most builds share, cached in the user's folder by everything that decides their content.
 
-Where an object may depend on what nobody can tell here, such as files that options name, it is compiled every time.
+Where an object may depend on more than is known here, such as files that options name, it is compiled every time.
 """
 
 import os

@@ -1,7 +1,7 @@
 """A script for the bench of the sequencer, and the ticks that the integer model makes of it.
 
-Every call adds commands to the script and lets the model live through the same clocks, so that a script needs no second
-description of what it does. ``stream_bench.v`` plays it and captures; ``compare`` holds capture against model.
+Every call adds commands to the script and advances the model by the same clocks, so that a script needs no second
+description of its effect. ``stream_bench.v`` plays it and captures; ``compare`` compares capture and model.
 """
 
 import re
