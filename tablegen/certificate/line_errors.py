@@ -17,7 +17,7 @@ from tablegen.certificate.shaped_periods import ShapedPeriods
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.line import Sweep
 from tablegen.fixedpoint.runs import runs_of
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.extremes import extreme_points, extreme_ticks
 from tablegen.waveform.sampler import Expansion, Sampler, on_grid
@@ -244,7 +244,7 @@ class EmittedPeriod:
         starts = self.runs.starts
         begins = starts[slice(*np.searchsorted(starts, (first, stop)))]
         ends = starts[slice(*np.searchsorted(starts, (first + 1, stop + 1)))] - 1
-        return merged(begins, ends, np.arange(max(first, self.runs.ticks - 1), min(stop, self.runs.ticks)))
+        return union_sorted(begins, ends, np.arange(max(first, self.runs.ticks - 1), min(stop, self.runs.ticks)))
 
 
 def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
@@ -402,7 +402,7 @@ def _chords(
     for low, high in played.stretches(first, stop - baseline):
         begin = played.corners(low, high)
         if not played.by_tick:
-            begin = merged(begin, played.corners(low + baseline, high + baseline) - baseline)
+            begin = union_sorted(begin, played.corners(low + baseline, high + baseline) - baseline)
         if not len(begin):
             begin = np.array([low])
         x0, noise0, total0 = noise_and_total(begin)

@@ -159,10 +159,10 @@ class ShapedPeriods:
 
     def _arrived(self, codes: Ints) -> Floats:
         errors = (codes - self._target_codes).reshape(-1)
-        return passed(self._line, errors).reshape(codes.shape)[self._counted]
+        return errors_behind_response(self._line, errors).reshape(codes.shape)[self._counted]
 
 
-def passed(line: LinePlan, errors: Floats) -> Floats:
+def errors_behind_response(line: LinePlan, errors: Floats) -> Floats:
     """Return the position errors of code errors that begin from rest.
 
     Parameters

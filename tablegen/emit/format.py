@@ -101,13 +101,13 @@ def differing(name: str, stored: Mapping[str, int | str], expected: Mapping[str,
     wrong = []
     for key, value in expected.items():
         if key not in stored:
-            wrong.append(f"{name}: {key} is missing, it is {_shown(value)} in the manifest")
+            wrong.append(f"{name}: {key} is missing, it is {_display(value)} in the manifest")
         elif stored[key] != value:
-            wrong.append(f"{name}: {key} is {_shown(stored[key])}, it is {_shown(value)} in the manifest")
+            wrong.append(f"{name}: {key} is {_display(stored[key])}, it is {_display(value)} in the manifest")
     return wrong + [f"{name}: {key} is not in the manifest" for key in stored if key not in expected]
 
 
-def _shown(value: int | str) -> str:
+def _display(value: int | str) -> str:
     return repr(value) if isinstance(value, str) else f"{value:x}" if abs(value) >= 1 << 64 else str(value)
 
 

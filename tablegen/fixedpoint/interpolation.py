@@ -52,10 +52,10 @@ def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
     fraction = (phase >> (PHASE_BITS - index_bits - FRACTION_BITS)) & ((1 << FRACTION_BITS) - 1)
     here: Ints = table[index]
     there: Ints = table[(index + 1) & (len(table) - 1)]
-    return between(here, there, fraction, guard)
+    return lerp(here, there, fraction, guard)
 
 
-def between(here: Ints, there: Ints, fraction: Ints, guard: int) -> Ints:
+def lerp(here: Ints, there: Ints, fraction: Ints, guard: int) -> Ints:
     """Return the sample at a fraction in [0, 2^15) of the way from one word to the next; monotonic in the fraction.
 
     Parameters

@@ -122,9 +122,9 @@ class Output(Struct, frozen=True):
         Ints
             Codes, shape (n,).
         """
-        return remainders.codes(self.fed(sample)) if self.shaping.order else self.unclamped(sample)
+        return remainders.codes(self.shaping_input(sample)) if self.shaping.order else self.unclamped(sample)
 
-    def fed(self, sample: Ints) -> Ints:
+    def shaping_input(self, sample: Ints) -> Ints:
         """Return the input of shaping: codes with ``remainder_bits`` fraction bits, and half a code more.
 
         Parameters

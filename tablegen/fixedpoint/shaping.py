@@ -105,7 +105,7 @@ class Remainders:
         Parameters
         ----------
         unrounded
-            Codes with ``bits`` fraction bits, half a code added, shape (n,): see ``Output.fed``.
+            Codes with ``bits`` fraction bits, half a code added, shape (n,): see ``Output.shaping_input``.
 
         Returns
         -------
@@ -117,8 +117,8 @@ class Remainders:
         e1, e2, e3 = self.last
         codes = []
         for value in unrounded.tolist():
-            fed = value + feedback(e1, e2, e3)
-            e1, e2, e3 = (fed & mask) - half, e1, e2
-            codes.append(fed >> bits)
+            total = value + feedback(e1, e2, e3)
+            e1, e2, e3 = (total & mask) - half, e1, e2
+            codes.append(total >> bits)
         self.last = e1, e2, e3
         return np.array(codes, dtype=np.int64)

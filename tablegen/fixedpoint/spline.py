@@ -41,10 +41,10 @@ def cubic(table: Ints, phase: Ints) -> Ints:
     index_bits = index_bits_of(len(table))
     index = phase >> (PHASE_BITS - index_bits)
     fraction = (phase >> (PHASE_BITS - index_bits - SPLINE_FRACTION_BITS)) & ((1 << SPLINE_FRACTION_BITS) - 1)
-    return along([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
+    return evaluate_segment([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
 
 
-def along(words: Sequence[Ints], fraction: Ints) -> Ints:
+def evaluate_segment(words: Sequence[Ints], fraction: Ints) -> Ints:
     """Return the sample at a fraction in [0, 2^18) of the segment of four words.
 
     Horner's rule for 12 S = b0 + b1 v + b2 v^2 + b3 v^3 with v = fraction / 2^19; b_k holds the 2^k that the half of
@@ -72,7 +72,7 @@ def along(words: Sequence[Ints], fraction: Ints) -> Ints:
 
 
 def coefficients(words: Sequence[Ints]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Return b0 to b3 of Horner's rule in ``along``.
+    """Return b0 to b3 of Horner's rule in ``evaluate_segment``.
 
     Parameters
     ----------

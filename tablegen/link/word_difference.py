@@ -41,7 +41,9 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
         if there != word:
             name = _name(index)
             differing.append(
-                Difference(name, 4 * index, _shown(name, word), None if there is None else _shown(name, there))
+                Difference(
+                    name, 4 * index, _signed_word(name, word), None if there is None else _signed_word(name, there)
+                )
             )
     at = PROGRAM_BYTES
     for axis, page, words, shape in (("x", 1, expected.x, expected.x_shape), ("y", 2, expected.y, expected.y_shape)):
@@ -69,7 +71,7 @@ def _name(index: int) -> str:
     return f"{('scan', 'x', 'y')[page]}: {names[word] if word < len(names) else f'unused word {word}'}"
 
 
-def _shown(name: str, word: int) -> int:
+def _signed_word(name: str, word: int) -> int:
     return word - (1 << 32) if name[3:] in _SIGNED and word >> 31 else word
 
 

@@ -105,7 +105,7 @@ def folded_sum(values: Floats) -> Floats:
     return values[..., 0].copy()
 
 
-def merged(*ascending: Ints) -> Ints:
+def union_sorted(*ascending: Ints) -> Ints:
     """Return the values of ascending arrays, each once, ascending; numpy's union hashes, which is far slower here.
 
     Parameters

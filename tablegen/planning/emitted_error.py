@@ -77,7 +77,7 @@ def _played(program: Program, k: Ints) -> Ints:
     if not output.shaping.order:
         return program.codes(k) << FRACTION_BITS
     bits = remainder_bits(output.dac_bits)
-    fine = output.fed(program.samples(k)) - (1 << (bits - 1))
+    fine = output.shaping_input(program.samples(k)) - (1 << (bits - 1))
     return fine << (FRACTION_BITS - bits) if bits <= FRACTION_BITS else shift_round(fine, bits - FRACTION_BITS)
 
 

@@ -30,8 +30,8 @@ from tablegen.verification.checks.played_checks import (
 )
 from tablegen.verification.coverage import unplayed_c
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.play.capture import make_capture, recaptured
-from tablegen.verification.play.converter_words import packed
+from tablegen.verification.play.capture import make_capture, with_capture
+from tablegen.verification.play.converter_words import pack_captures
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SCRIPT, SequencerShape
 from tablegen.verification.play.session import make_session
@@ -101,7 +101,7 @@ class CTarget:
             step = player.played(fills=False)
         except (SimulationFailed, OSError, ValueError) as error:
             return Outcome([Check("program", self._name, f"{ticks} ticks", failure=f"program: {error}")])
-        capture = make_capture(stored, script, packed(step.capture, stored))
+        capture = make_capture(stored, script, pack_captures(step.capture, stored))
         sent = {"x": step.capture[::2] & np.uint64(0xFFFFFFFF), "y": step.capture[::2] >> np.uint64(32)}
         checks = [
             self._header(stored, step),
@@ -114,8 +114,8 @@ class CTarget:
         try:
             progress(f"compiling and playing {ticks} ticks, many a call")
             fill = player.played(fills=True)
-            codes = packed(fill.capture, stored)
-            filled = recaptured(capture, codes) or make_capture(stored, script, codes)
+            codes = pack_captures(fill.capture, stored)
+            filled = with_capture(capture, codes) or make_capture(stored, script, codes)
             checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
             checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))

@@ -11,7 +11,7 @@ import numpy as np
 
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.manifest.fields import ManifestAxis, ManifestSeries
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.verification.checks.shaped import MOST_TICKS, ShapedPlay, code_excess, step_excess
 
 _MOST_ADVANCES = 1 << 22  # advances of the longest period that is checked advance by advance
@@ -102,7 +102,7 @@ class PlayedPeriod:
         Ints
             Ticks, ascending, shape (n,).
         """
-        return merged(self.runs.starts, self.runs.lasts)
+        return union_sorted(self.runs.starts, self.runs.lasts)
 
     def errors(self, k: Ints) -> Floats:
         """Return the code less the unrounded code of the waveform.

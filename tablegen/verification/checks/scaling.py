@@ -13,7 +13,7 @@ import numpy as np
 
 from tablegen.base.input_errors import shortened
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.verification.checks.certified import PlayedPeriod, at, on_grid, played_series
 from tablegen.verification.checks.shaped import ShapedPlay
 
@@ -400,7 +400,7 @@ def _chords(
     length = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begins = merged(period.edges, period.edges - length)
+    begins = union_sorted(period.edges, period.edges - length)
     begins = begins[(begins >= first) & (begins + length < stop)]
     if not len(begins):
         begins = np.array([first], dtype=np.int64)

@@ -63,8 +63,8 @@ def shaped_codes(program: Program, count: int) -> Ints:
             residue = np.cumsum(residue)  # wraps at 2^64, a multiple of every code
         residue = (residue + half & 2 * half - 1) - half
     e1, e2, e3 = (np.concatenate([np.zeros(by, dtype=np.int64), residue])[:count] for by in (1, 2, 3))
-    fed = {1: e1, 2: 2 * e1 - e2}.get(order, e1 - e2 + e3 + output.shaping.zero * (e1 - e2) // 64)
-    codes: Ints = np.clip((value + fed - residue) // (2 * half), output.code_min, output.code_max)
+    feedback = {1: e1, 2: 2 * e1 - e2}.get(order, e1 - e2 + e3 + output.shaping.zero * (e1 - e2) // 64)
+    codes: Ints = np.clip((value + feedback - residue) // (2 * half), output.code_min, output.code_max)
     return codes
 
 
@@ -72,8 +72,8 @@ def _carried(value: Ints, half: int, zero: int) -> Ints:
     past = [0, 0, 0]
     for one in value.tolist():
         change = past[-1] - past[-2]
-        fed = one + change + past[-3] + zero * change // 64
-        past.append((fed + half) % (2 * half) - half)
+        feedback = one + change + past[-3] + zero * change // 64
+        past.append((feedback + half) % (2 * half) - half)
     return np.array(past[3:], dtype=np.int64)
 
 

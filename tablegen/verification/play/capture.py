@@ -111,7 +111,7 @@ def without_faults(words: Words) -> Words:
     return cleared
 
 
-def recaptured(capture: Capture, got: Words) -> Capture | None:
+def with_capture(capture: Capture, got: Words) -> Capture | None:
     """Return a second capture of the same session, if it has as many ticks as the first; else None.
 
     Parameters

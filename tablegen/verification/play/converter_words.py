@@ -9,7 +9,7 @@ from tablegen.verification.play.stream import Words
 _CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
 
 
-def packed(words: Words, stored: StoredBuild) -> Words:
+def pack_captures(words: Words, stored: StoredBuild) -> Words:
     """Return pairs of captured words as one word a tick, as models are stored: converter words turned back into codes.
 
     Parameters
