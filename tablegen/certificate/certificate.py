@@ -12,7 +12,7 @@ from tablegen.base.warnings import FindingCode
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
-    Refined,
+    LayerEffect,
     ScalingError,
     power_at_resonance_db,
     refined,
@@ -53,7 +53,7 @@ class Certificate(Struct, frozen=True):
     peak_slew_v_per_s: float
     beyond_cutoff_db: float | None
     at_resonance_db: float | None
-    refinement: dict[str, Refined] | None = None
+    refinement: dict[str, LayerEffect] | None = None
     expected: Expectation | None = None
     peak_acceleration: float | None = None
     optimum: float | None = None

@@ -45,7 +45,7 @@ class ScalingError(Struct, frozen=True):
     uncompensated: float
 
 
-class Refined(Struct, frozen=True):
+class LayerEffect(Struct, frozen=True):
     """The effect of the layer in one direction, by the scanner's model, in percent over the window.
 
     ``position`` is by how much of the line at most, ``scaling`` the scaling error, peak to peak, that it takes away.
@@ -322,14 +322,14 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
     return *(ideal if reached is line.target else follow(reached)), ideal[1]
 
 
-def refined(line: LinePlan, side: str, branch: Sweep) -> Refined:
+def refined(line: LinePlan, side: str, branch: Sweep) -> LayerEffect:
     """Compute the effect of the layer to first order: it shifts the modelled piezo by r / u'."""
     assert line.layer is not None
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     steepness = branch.slope(position if side == "forward" else 1.0 - position)
     shift = line.layer.value(line.drive.shape.times(side, position)) / steepness
-    return Refined(100.0 * float(np.max(np.abs(shift))), _peak_to_peak(np.gradient(shift, position)))
+    return LayerEffect(100.0 * float(np.max(np.abs(shift))), _peak_to_peak(np.gradient(shift, position)))
 
 
 def _peak_to_peak(values: Floats) -> float:

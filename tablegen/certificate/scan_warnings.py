@@ -7,7 +7,7 @@ from tablegen.base.input_errors import Problem
 from tablegen.base.warnings import Finding, as_printed, worst_first
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import Excess, excess
-from tablegen.certificate.expectation_checks import Doubt, doubts
+from tablegen.certificate.expectation_checks import ExpectationWarning, expectation_warnings
 from tablegen.certificate.matching import pixel_mismatch_percent, pixel_mismatch_warning
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
-    """List the errors above 1 % or above the uncompensated line, and the doubts, without remedies, which take time."""
+    """List errors above 1 % or the uncompensated line, and doubtful expectations, without remedies, which take time."""
     findings = [
         Finding("spoils", abs(one.percent), f"{one.text(line.axis)}{_behind_resonance(one, certificates[line.axis])}")
         for line, one in _exceeded(plan, certificates)
     ]
     findings += [
-        Finding("spoils", doubt_percent(doubt, certificates[line.axis]), doubt.text)
-        for line, doubt in _doubts(plan, certificates)
+        Finding("spoils", warning_percent(warning, certificates[line.axis]), warning.text)
+        for line, warning in _expectation_warnings(plan, certificates)
     ]
     return [one.text for one in worst_first(findings)]
 
@@ -47,19 +47,19 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
         why = f"{text}; {share}{_advice(setup, plan, line, exceeded)}"
         problem = setup.scan_file.problem(_key(setup, line, exceeded), why)
         warnings.append((abs(exceeded.percent), problem.coded(exceeded.code, line.axis)))
-    for line, doubt in _doubts(plan, certificates):
+    for line, warning in _expectation_warnings(plan, certificates):
         key, advice = _size_key(setup, line), ""
-        if doubt.code == "expected-scaling-error":
+        if warning.code == "expected-scaling-error":
             from tablegen.certificate.remedies import operator_remedies
 
-            remedies = operator_remedies(setup, plan, line, doubt.limit, own=False)
-            key, advice = _band_key(setup, line), "; " + _in_words(remedies, doubt.percent)
-        elif doubt.code == "resonance":
+            remedies = operator_remedies(setup, plan, line, warning.limit, own=False)
+            key, advice = _band_key(setup, line), "; " + _in_words(remedies, warning.percent)
+        elif warning.code == "resonance":
             from tablegen.certificate.remedies import resonance_remedies
 
-            advice = "; " + _in_words(resonance_remedies(setup, plan, line, doubt.limit), doubt.percent)
-        percent = doubt_percent(doubt, certificates[line.axis])
-        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice).coded(doubt.code, line.axis)))
+            advice = "; " + _in_words(resonance_remedies(setup, plan, line, warning.limit), warning.percent)
+        percent = warning_percent(warning, certificates[line.axis])
+        warnings.append((percent, setup.scan_file.problem(key, warning.text + advice).coded(warning.code, line.axis)))
     if mismatch := pixel_mismatch_warning(plan):
         fixed_ticks = setup.scan.timing.ticks_per_line is not None
         key = f"timing.{'ticks_per_line' if fixed_ticks else 'line_rate_hz'}"
@@ -69,11 +69,11 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
     return sorted(warnings, key=lambda one: -as_printed(one[0]))
 
 
-def doubt_percent(doubt: Doubt, certificate: Certificate) -> float:
+def warning_percent(warning: ExpectationWarning, certificate: Certificate) -> float:
     """Return the error of the scan in percent; for a distance, which is one of volts, the operator's uncertainty."""
     expected = certificate.expected
-    if doubt.code != "operator-distance" or expected is None:
-        return doubt.percent
+    if warning.code != "operator-distance" or expected is None:
+        return warning.percent
     return max((figure.value + (figure.uncertainty or 0.0) for figure in expected.rms.values()), default=0.0)
 
 
@@ -113,11 +113,13 @@ def _exceeded(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple
     return [(line, exceeded) for line, exceeded in every if exceeded is not None]
 
 
-def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
-    """List the doubts of both axes; one on a resonance is left out where the scaling error already names it."""
+def _expectation_warnings(
+    plan: Plan, certificates: Mapping[str, Certificate]
+) -> list[tuple[LinePlan, ExpectationWarning]]:
+    """List the warnings of both axes; one of a resonance is left out where the scaling error already names it."""
     explained = {line.axis for line, exceeded in _exceeded(plan, certificates) if exceeded.what == "scaling error"}
-    every = [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
-    return [(line, doubt) for line, doubt in every if doubt.code != "resonance" or line.axis not in explained]
+    every = [(line, warning) for line in plan.lines for warning in expectation_warnings(line, certificates[line.axis])]
+    return [(line, warning) for line, warning in every if warning.code != "resonance" or line.axis not in explained]
 
 
 def _behind_resonance(exceeded: Excess, certificate: Certificate) -> str:

@@ -12,7 +12,7 @@ from tablegen.fixedpoint.shaping import Shaping
 from tablegen.planning.line_plan import LinePlan
 
 
-class Rounded(Struct, frozen=True):
+class RoundedErrors(Struct, frozen=True):
     """The same scan without shaping: errors of the position in LSB, scaling errors, changes of codes."""
 
     max_error_lsb: float
@@ -34,7 +34,7 @@ class ShapedErrors(Struct, frozen=True):
     code_error_lsb: tuple[float, float]
     largest_step: int
     changes: Changes
-    rounded: Rounded
+    rounded: RoundedErrors
 
 
 def shaped_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[str, Sweep]) -> ShapedErrors | None:
@@ -55,5 +55,5 @@ def shaped_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[str
         code_error_lsb=largest_and_rms(periods.code_errors),
         largest_step=int(np.max(np.abs(np.diff(periods.judged_codes)))),
         changes=periods.changes,
-        rounded=Rounded(*largest_and_rms(periods.rounded_errors), scaling, periods.rounded_changes),
+        rounded=RoundedErrors(*largest_and_rms(periods.rounded_errors), scaling, periods.rounded_changes),
     )

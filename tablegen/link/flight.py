@@ -13,7 +13,7 @@ Key = tuple[int, int]  # type and seq
 
 
 @dataclass(slots=True)
-class Sent:
+class SentFrame:
     """A request on its way, and its time; ``end`` is that of the bytes of a DATA, which belongs to a ``round``."""
 
     kind: Request
@@ -34,8 +34,8 @@ class Flight:
 
     def clear(self, now: float) -> None:
         """Empty the flight: nothing is on its way, and no answer is awaited."""
-        self._on_way: dict[Key, Sent] = {}
-        self._late: dict[Key, Sent] = {}  # overdue requests, whose answers may still come
+        self._on_way: dict[Key, SentFrame] = {}
+        self._late: dict[Key, SentFrame] = {}  # overdue requests, whose answers may still come
         self._longest_wait = 0.0
         self.last_answer_at = self._in_order_at = now
         self.in_vain = 0
@@ -48,7 +48,7 @@ class Flight:
         """Return True if a request of this type, of this round, is on its way."""
         return any(s.kind == kind and of_round in (None, s.round) for s in self._on_way.values())
 
-    def add(self, sent: Sent) -> None:
+    def add(self, sent: SentFrame) -> None:
         """Add a frame that was sent; each wait in vain doubles the next."""
         wait = sent.due - sent.at
         self._longest_wait = max(self._longest_wait, wait)
@@ -56,7 +56,7 @@ class Flight:
         self._late.pop((sent.kind, sent.seq), None)
         self._on_way[sent.kind, sent.seq] = sent
 
-    def take(self, key: Key, now: float) -> Sent | None:
+    def take(self, key: Key, now: float) -> SentFrame | None:
         """Remove and return the frame of an answer, late ones too; None without one, or where it was answered already.
 
         A line keeps the order, so that what was sent before it and is not answered was lost.
@@ -83,7 +83,7 @@ class Flight:
         """Return the time at which the first request is overdue; None if there is none."""
         return min((self._due(sent) for sent in self._on_way.values()), default=None)
 
-    def _due(self, sent: Sent) -> float:
+    def _due(self, sent: SentFrame) -> float:
         """Return the time at which a request is overdue.
 
         While answers come in order, a line is slow, and has lost nothing: the next request has half its wait again.
@@ -92,7 +92,7 @@ class Flight:
             return sent.due
         return max(sent.due, self._in_order_at + (sent.due - sent.at) / 2.0)
 
-    def overdue(self, now: float) -> list[Sent]:
+    def overdue(self, now: float) -> list[SentFrame]:
         """Take away what is not answered in time; where nothing was heard since, that is all that is on its way."""
         late = [sent for sent in self._on_way.values() if self._due(sent) <= now]
         if any(sent.at >= self.last_answer_at for sent in late):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tablegen.link.claims import check_length
 from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
 from tablegen.link.exchange import Answer
-from tablegen.link.flight import Flight, Sent
+from tablegen.link.flight import Flight, SentFrame
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
 from tablegen.link.pace import Deadline
@@ -118,7 +118,7 @@ class Uploader:
         self._begun = False  # BEGIN was answered
         self._pipelined = True  # DATA need not wait for that
         self._next, self._confirmed, self._round = self._received(status), 0, 0
-        self._commit: Sent | None = None
+        self._commit: SentFrame | None = None
         self._commit_body = b""
         self._nonce: bytes | None = None
         self._status: DeviceStatus | None = None  # last status since COMMIT, or since the device was busy
@@ -181,14 +181,14 @@ class Uploader:
     def _send(self, kind: Request, payload: bytes, answer_bytes: int = NONCE_BYTES) -> None:
         seq = self._exchange.seq()
         due = self._exchange.send(kind, seq, payload, answer_bytes, again=self._flight.in_vain > 0)
-        self._flight.add(Sent(kind, seq, self._session.now(), due))
+        self._flight.add(SentFrame(kind, seq, self._session.now(), due))
 
     def _send_data(self) -> None:
         offset = self._next
         data = self._image.data[offset : offset + self._step]
         seq, end = self._exchange.seq(), offset + len(data)
         due = self._exchange.send(Request.DATA, seq, _CRC.pack(offset) + data, again=self._flight.in_vain > 0)
-        self._flight.add(Sent(Request.DATA, seq, self._session.now(), due, self._round, end))
+        self._flight.add(SentFrame(Request.DATA, seq, self._session.now(), due, self._round, end))
         self._retransmissions += offset < self._sent_to
         self._sent_to = max(self._sent_to, end)
         self._next = end
@@ -199,7 +199,7 @@ class Uploader:
         if self._nonce is not None:
             body += self._session.tag_of(self._nonce, Request.COMMIT, number, body, self._digest)
         self._commit_body = body
-        self._commit = Sent(Request.COMMIT, number, 0.0, 0.0, self._round)
+        self._commit = SentFrame(Request.COMMIT, number, 0.0, 0.0, self._round)
         self._repeat_commit(again=False)
 
     def _repeat_commit(self, again: bool = True) -> None:
@@ -289,7 +289,7 @@ class Uploader:
         self._next = max(self._next, received)
         self._confirm(received, lower=True)
 
-    def _take_data(self, received: int, sent: Sent) -> None:
+    def _take_data(self, received: int, sent: SentFrame) -> None:
         if not self._begun or received > len(self._image.data):
             self._pipelined = False  # BEGIN, or its answer, was lost
             if self._begun:  # it may belong to the upload before, but not again and again
@@ -310,7 +310,7 @@ class Uploader:
             if self._progress is not None:
                 self._progress(received, len(self._image.data))
 
-    def _take_commit(self, answer: Answer, sent: Sent) -> tuple[int, int | None] | None:
+    def _take_commit(self, answer: Answer, sent: SentFrame) -> tuple[int, int | None] | None:
         if not answer.reason:
             self._confirm(len(self._image.data))
             check_length("COMMIT", answer.payload, _COMMITTED.size)
@@ -340,7 +340,7 @@ class Uploader:
             raise error
         return None
 
-    def _take_refusal(self, answer: Answer, sent: Sent) -> None:
+    def _take_refusal(self, answer: Answer, sent: SentFrame) -> None:
         error = self._error(answer)
         if sent.kind == Request.BEGIN and answer.reason == Reason.BUSY:
             self._wait_for_others()

@@ -8,7 +8,7 @@ import numpy as np
 from msgspec.structs import asdict
 
 from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.line_errors import Refined, ScalingError
+from tablegen.certificate.line_errors import LayerEffect, ScalingError
 from tablegen.certificate.shaped_errors import ShapedErrors
 from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.dynamics import capped_inverse
@@ -113,7 +113,7 @@ def _expected(expectation: Expectation) -> dict[str, Any]:
     return record
 
 
-def _sides(figures: Mapping[str, ScalingError] | Mapping[str, Refined]) -> dict[str, dict[str, Any]]:
+def _sides(figures: Mapping[str, ScalingError] | Mapping[str, LayerEffect]) -> dict[str, dict[str, Any]]:
     return {
         side: {part: _figure(getattr(one, part)) for part in one.__struct_fields__} for side, one in figures.items()
     }

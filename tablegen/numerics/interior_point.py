@@ -69,7 +69,7 @@ class Rows(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Bounded:
+class BoundConstraint:
     """The constraint |R y - target| <= fixed + share v; ``target`` is (m,)."""
 
     rows: Rows
@@ -90,7 +90,7 @@ class Minimum:
 
 
 def least_bound(
-    parts: Sequence[Bounded], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
+    parts: Sequence[BoundConstraint], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
 ) -> Minimum:
     """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``.
 
@@ -129,7 +129,7 @@ def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Min
 class _Stack:
     """The rows of all parts, one above the other."""
 
-    def __init__(self, parts: Sequence[Bounded]) -> None:
+    def __init__(self, parts: Sequence[BoundConstraint]) -> None:
         self._rows = [part.rows for part in parts]
         self._ends = [len(part.target) for part in parts]
         self.target = np.concatenate([part.target for part in parts])
@@ -184,7 +184,7 @@ class _Stack:
 class _State:
     """The iterate y and v; slacks and multipliers of both sides of each row, upper and lower, (2, m)."""
 
-    def __init__(self, parts: Sequence[Bounded], start: Floats) -> None:
+    def __init__(self, parts: Sequence[BoundConstraint], start: Floats) -> None:
         self._rows, self.y = _Stack(parts), np.array(start, dtype=np.float64)
         self._far = self._rows.times(self.y) - self._rows.target
         moves = self._rows.share > 0.0

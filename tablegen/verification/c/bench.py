@@ -28,7 +28,7 @@ OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", 
 
 
 @dataclass(frozen=True)
-class CPlayed:
+class CRecord:
     """The record of a script: the ticks, the count of each fault, and the words of the states.
 
     ``constants`` are those of an emitted header that was compiled into the bench.
@@ -40,7 +40,7 @@ class CPlayed:
     constants: list[int] = field(default_factory=list)
 
     @classmethod
-    def of(cls, capture: Words, script: str, constants: int = 0) -> "CPlayed":
+    def of(cls, capture: Words, script: str, constants: int = 0) -> "CRecord":
         """Split what the bench wrote while it played a script: ticks, then counts, states, constants.
 
         Parameters
@@ -54,7 +54,7 @@ class CPlayed:
 
         Returns
         -------
-        CPlayed
+        CRecord
             Its ``capture`` has the shape (ticks,).
         """
         states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
@@ -167,11 +167,11 @@ class CBench:
         line = [*require_compiler(compiler), *options, *choices, *places, *parts, *map(str, OWN_SOURCES)]
         compile_line([*line, "-o", str(self.program)])
 
-    def play(self, script: Script, fourier: bool = False) -> CPlayed:
+    def play(self, script: Script, fourier: bool = False) -> CRecord:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
         return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
 
-    def run(self, words: str, timeout: float | None = None) -> CPlayed:
+    def run(self, words: str, timeout: float | None = None) -> CRecord:
         """Play a script in the form of ``script_words``; a bench fails that takes longer than ``timeout`` seconds."""
         written = run(self.program, words.encode("ascii"), timeout)
-        return CPlayed.of(np.frombuffer(written, dtype="<u8"), words, self._constants)
+        return CRecord.of(np.frombuffer(written, dtype="<u8"), words, self._constants)

@@ -16,7 +16,7 @@ import numpy as np
 
 from tablegen.base.installation import install_advice
 from tablegen.base.resources import c_runtime
-from tablegen.verification.c.bench import BENCH, OPTIONS, CPlayed, constants_written, defines, script_words, sine_of
+from tablegen.verification.c.bench import BENCH, OPTIONS, CRecord, constants_written, defines, script_words, sine_of
 from tablegen.verification.c.elf import Executable, read_executable
 from tablegen.verification.failures import SimulationFailed, ToolMissing
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -130,7 +130,7 @@ def compile_bare(
 
 
 @dataclass(frozen=True)
-class Called:
+class CallCost:
     """The cost of a call of a function; ``result`` is its first word."""
 
     result: int
@@ -228,7 +228,7 @@ class Processor:
         """Return from the function at whose entry the processor stands, until the next one."""
         self.run(int(self.uc.reg_read(self._lr)) & ~self._thumb, self.symbol(stop))
 
-    def call(self, function: str, *arguments: int) -> Called:
+    def call(self, function: str, *arguments: int) -> CallCost:
         """Call a function; instructions are counted, and the stack that was written to, in bytes."""
         from unicorn import UC_HOOK_BLOCK
 
@@ -251,7 +251,7 @@ class Processor:
         used = bytes(self.uc.mem_read(floor, _STACK))
         untouched = len(used) - len(used.lstrip(bytes([_STACK_PAINT])))
         executed = sum(times * self._instructions(at, size) for (at, size), times in counts.items() if at != TRAP)
-        return Called(int(self.uc.reg_read(self._arguments[0])), executed, _STACK - untouched)
+        return CallCost(int(self.uc.reg_read(self._arguments[0])), executed, _STACK - untouched)
 
     def _instructions(self, address: int, size: int) -> int:
         """Count the instructions of a block, whose lengths their first half-words tell."""
@@ -293,11 +293,11 @@ class CortexMBench:
             defines(shape, fill) if macro_values is None else macro_values,
         )
 
-    def play(self, script: Script, fourier: bool = False) -> CPlayed:
+    def play(self, script: Script, fourier: bool = False) -> CRecord:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
         return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
 
-    def run(self, words: str) -> CPlayed:
+    def run(self, words: str) -> CRecord:
         """Play a script in the form of ``script_words``."""
         script = np.frombuffer(bytes.fromhex(words), dtype=">u8").astype("<u8")
         processor = Processor(self.executable, self.core)
@@ -318,7 +318,7 @@ class CortexMBench:
                 processor.write("bench_script_words", len(part).to_bytes(4, "little"))
             processor.resume("bench_exchange")
         capture = np.concatenate(captures).astype(np.uint64)
-        return CPlayed.of(capture, words, self._constants)
+        return CRecord.of(capture, words, self._constants)
 
     def _check(self, processor: Processor) -> None:
         at = int.from_bytes(processor.read("bench_refused"), "little")

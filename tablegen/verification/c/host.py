@@ -15,7 +15,7 @@ import numpy as np
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.verification import process_group as worker
 from tablegen.verification.c import play as c_play
-from tablegen.verification.c.bench import BENCH, OWN_SOURCES, CPlayed, constants_written, macros, require_compiler
+from tablegen.verification.c.bench import BENCH, OWN_SOURCES, CRecord, constants_written, macros, require_compiler
 from tablegen.verification.c.objects import Objects
 from tablegen.verification.c.program import MOST_FILLED, OPTIONS, CProgram
 from tablegen.verification.failures import SimulationFailed
@@ -39,7 +39,7 @@ class HostPlayer:
         self._compiler = host_compiler()
         self._work, self._program, self._script, self._ticks = work, program, script, ticks
 
-    def played(self, fills: bool) -> CPlayed:
+    def played(self, fills: bool) -> CRecord:
         """Return what the bench captured, one tick or (``fills``) many ticks a call.
 
         Raises
@@ -51,7 +51,7 @@ class HostPlayer:
         if record in self._failures:
             raise SimulationFailed(self._failures[record])
         capture = np.frombuffer(read_bytes(self._work / record, BUILD_FILE), dtype="<u8")
-        return CPlayed.of(capture, self._script, constants_written(self._program.bench))
+        return CRecord.of(capture, self._script, constants_written(self._program.bench))
 
     @cached_property
     def _failures(self) -> dict[str, str]:

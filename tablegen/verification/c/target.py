@@ -13,7 +13,7 @@ import numpy as np
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification.build_report import Outcome, PlayJob, differing_check
-from tablegen.verification.c.bench import CPlayed, require_compiler, script_words
+from tablegen.verification.c.bench import CRecord, require_compiler, script_words
 from tablegen.verification.c.emulated import EMULATED, EmulatedPlayer
 from tablegen.verification.c.host import HostPlayer, host_compiler
 from tablegen.verification.c.program import c_program, header_constants
@@ -128,7 +128,7 @@ class CTarget:
         return host_compiler() if self.machine == "c" else EMULATED
 
     @staticmethod
-    def _header(stored: StoredBuild, step: CPlayed) -> Check:
+    def _header(stored: StoredBuild, step: CRecord) -> Check:
         """Check the constants of the header as the compiler reads them."""
         content = stored_content(stored)
         constants = header_constants(content)
@@ -140,5 +140,5 @@ class CTarget:
         return differing_check("c header", "manifest, by the compiler", f"{len(constants)} constants", wrong)
 
 
-def _states(script: Script, played: CPlayed) -> Check:
+def _states(script: Script, played: CRecord) -> Check:
     return check_states(script.states, read_states(played.states), (1 << 32) - 1, _UNTOLD)

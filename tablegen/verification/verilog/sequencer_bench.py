@@ -11,7 +11,7 @@ from tablegen.base.resources import verilog_runtime
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import CAPTURE, SCRIPT, SequencerShape
 from tablegen.verification.play.stream import Mismatch, Script, Words, compare, read_capture
-from tablegen.verification.verilog.simulate import Compiled, Design, compile_design
+from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
 
 TEST_MODULE = "tablegen.verification.verilog.cocotb_stream"
 STREAM_BENCH = Path(str(files("tablegen.verification.verilog"))) / "stream_bench.v"
@@ -56,7 +56,7 @@ class SequencerBench:
         self._script, self._capture = self.folder / SCRIPT, self.folder / CAPTURE
         runtime = verilog_runtime() if sources is None else list(sources)
         self._most_counted = (1 << int((parameters or {}).get("COUNT_BITS", 32))) - 1
-        self._design: Compiled = compile_design(
+        self._design: CompiledDesign = compile_design(
             simulator,
             Design(
                 [*runtime, STREAM_BENCH],
@@ -93,7 +93,7 @@ class SequencerBench:
         return run_bench(self._design, self.folder, clocks)
 
 
-def run_bench(design: Compiled, folder: Path, clocks: int) -> dict[str, Any]:
+def run_bench(design: CompiledDesign, folder: Path, clocks: int) -> dict[str, Any]:
     """Play the script of so many clocks that a compiled bench reads, and return the counters of the bench by name.
 
     Raises

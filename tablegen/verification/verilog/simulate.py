@@ -38,7 +38,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Compiled:
+class CompiledDesign:
     """A design that is ready to run."""
 
     simulator: str
@@ -97,7 +97,7 @@ class Compiled:
             raise SimulationFailed(_tail(log)) from None
 
 
-def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool = False) -> Compiled:
+def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool = False) -> CompiledDesign:
     """Compile into ``folder``, which is created; ``build.log`` is written there.
 
     Parameters
@@ -125,7 +125,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool
             arguments = _BUILD_ARGUMENTS[simulator]
             key = model_key(design.sources, design.includes, design.parameters, design.top, *arguments)
             if MODELS.take(key, model):
-                return Compiled(simulator, design.top, folder, runner)
+                return CompiledDesign(simulator, design.top, folder, runner)
         try:
             runner.build(
                 sources=[path.resolve() for path in design.sources],
@@ -141,7 +141,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool
             raise SimulationFailed(_tail(log)) from None
     if key:
         MODELS.keep(key, model)
-    return Compiled(simulator, design.top, folder, runner)
+    return CompiledDesign(simulator, design.top, folder, runner)
 
 
 def require(simulator: str) -> None:
