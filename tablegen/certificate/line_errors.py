@@ -293,13 +293,6 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
     times = shape.times(side, position)
 
     def at_times(series: FourierSeries) -> list[Floats]:
-        """Return value and slope of a series at the times of the line.
-
-        Returns
-        -------
-        list of Floats
-            Value, and slope per period, each of the shape of ``times``.
-        """
         if shape.waveform is not None:  # its branches are a series too, and equal ones have to leave nothing
             return list(values(times, (series, 0), (series, 1)))
         return played.expansion(series).at(times, 0, 1)

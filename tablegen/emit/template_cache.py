@@ -41,7 +41,7 @@ class TemplateCache(BytecodeCache):
                 bucket.bytecode_from_string(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep the code of a template; where that fails it is compiled again the next time, and nothing is raised."""
+        """Keep the code of a template; where that fails it is compiled again the next time."""
         if self.folder is None:
             return
         code = bucket.bytecode_to_string()
@@ -59,5 +59,5 @@ class TemplateCache(BytecodeCache):
             keep_newest(self.folder, _MOST_FILES)
 
     def _digest(self, bucket: Bucket, code: bytes) -> bytes:
-        """Return the digest of the code, its name, and the settings behind it."""
+        """Of the code, its name, and what made it."""
         return sha256(b"\n".join((self.made_by, bucket.key.encode(), bucket.checksum.encode(), code))).digest()
