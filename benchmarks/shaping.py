@@ -27,7 +27,7 @@ from building import Variant, write_variant
 from foreign_plants import TEN, V_MAX
 
 from tablegen.certificate.line_errors import EmittedPeriod, TickErrors, tick_scaling
-from tablegen.certificate.shaped_periods import passed
+from tablegen.certificate.shaped_periods import errors_behind_response
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.config.load import Setup, load
 from tablegen.fixedpoint.shaping import Remainders, Shaping, remainder_bits
@@ -70,7 +70,7 @@ def judged(line: LinePlan) -> tuple[float, float, float]:
     k = np.arange(ticks)
     asked = line.program.rounded.codes(k) - exact.errors(k)
     errors = (line.program.played(0, LINES * ticks).reshape(LINES, ticks) - asked).reshape(-1)
-    lines = passed(line, errors).reshape(LINES, ticks)[1:]
+    lines = errors_behind_response(line, errors).reshape(LINES, ticks)[1:]
     shape = line.drive.shape
     scaling = [
         max(

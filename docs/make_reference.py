@@ -180,13 +180,13 @@ def _members(kind: type) -> list[str]:
 
 
 def _summary(docstring: str) -> str:
-    """A docstring in one line of a table: its text, and of its sections what it raises."""
+    """Return a docstring as one line of a table: its text, its parameters, and what it raises."""
     text, *sections = _SECTION.split(docstring)
     words = [*text.split()]
     for title, body in zip(sections[::2], sections[1::2], strict=True):
-        if title == "Raises":
+        if title in ("Parameters", "Raises"):
             for head, *rest in (entry.splitlines() for entry in re.split(r"\n(?=\S)", body.strip())):
-                words += ["Raises", f"`{head.strip()}`:", *" ".join(rest).split()]
+                words += [*(["Raises"] if title == "Raises" else []), f"`{head.strip()}`:", *" ".join(rest).split()]
     return " ".join(words).replace("``", "`")
 
 

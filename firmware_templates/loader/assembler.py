@@ -48,12 +48,12 @@ class Program:
     names: dict[str, int] = field(default_factory=dict)
 
     def words(self) -> list[int]:
-        """The instructions, 16 bits each."""
+        """Return the instructions, 16 bits each."""
         return [_encode(line, self.names, place) for line, place in self.lines]
 
 
 def read(sources: Mapping[str, str]) -> Program:
-    """The program of these sources, in their order."""
+    """Return the program of these sources, in their order."""
     program = Program()
     at = 0
     for source, text in sources.items():
@@ -155,7 +155,7 @@ def depth(program: Program) -> int:
 
 
 def module(words: list[int]) -> str:
-    """The Verilog module."""
+    """Return the Verilog module."""
     rows = [words[at : at + 11] for at in range(0, len(words), 11)]
     text = ",\n".join("        " + ", ".join(f"16'h{word:04x}" for word in row) for row in rows)
     return f"""\
@@ -192,12 +192,12 @@ endmodule
 
 
 def program() -> Program:
-    """The sources as they are."""
+    """Read the sources as they are."""
     return read({name: (HERE / name).read_text("ascii") for name in SOURCES})
 
 
 def assemble() -> str:
-    """The module of the sources as they are."""
+    """Return the module of the sources as they are."""
     made = program()
     words = made.words()
     if len(words) > MOST_WORDS:

@@ -19,7 +19,7 @@ from building import BENCHES, REPOSITORY
 from limits import PATIENCE_S
 
 from tablegen.base.resources import verilog_runtime
-from tablegen.verification.verilog.simulate import Compiled, Design, compile_design
+from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
 
 sys.path.insert(0, str(REPOSITORY / "firmware_templates" / "loader"))
 _before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing but sources in a folder that ships
@@ -41,7 +41,7 @@ def compile_loader(
     parameters: Mapping[str, int | str] | None = None,
     simulator: str = "verilator",
     sources: Sequence[Path] | None = None,
-) -> Compiled:
+) -> CompiledDesign:
     """The bench with these parameters; ``sources`` are those of the runtime unless given."""
     names = assembler.program().names
     idle = {"IDLE_FROM": names["main"], "IDLE_TO": names["receive"] + 3}
@@ -56,7 +56,9 @@ class Simulation:
     addresses and bytes that its memory begins with.
     """
 
-    def __init__(self, compiled: Compiled, words: Sequence[int] = (), memory: Sequence[tuple[int, int]] = ()) -> None:
+    def __init__(
+        self, compiled: CompiledDesign, words: Sequence[int] = (), memory: Sequence[tuple[int, int]] = ()
+    ) -> None:
         self._compiled, self._words, self._memory = compiled, words, memory
         self._turn = 0
 

@@ -15,7 +15,7 @@ from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import ANSWER, SPLINE_DEGREE, AxisLimits, AxisShape, DeviceInfo, Feature, Request
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.verilog.simulate import Compiled
+from tablegen.verification.verilog.simulate import CompiledDesign
 
 _LINE_AT = 12  # in a status
 _MEMORY_BYTES = 2048
@@ -71,7 +71,7 @@ class Loader:
             for axis, own in zip("XY", limits, strict=True)
             for name, value in zip(names, own, strict=True)
         }
-        self.compiled: Compiled = compile_loader(
+        self.compiled: CompiledDesign = compile_loader(
             folder,
             {
                 "X_INTERPOLATED": DEGREES[x.mode],

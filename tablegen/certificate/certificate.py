@@ -1,4 +1,4 @@
-"""What a build promises, measured on every emitted integer of one whole period of each axis, and the limits on it."""
+"""The certificate of a build, measured on every emitted integer of one whole period of each axis, and its limits."""
 
 from collections.abc import Callable
 from math import floor, log10, sqrt
@@ -12,7 +12,7 @@ from tablegen.base.warnings import FindingCode
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
-    Refined,
+    LayerEffect,
     ScalingError,
     power_at_resonance_db,
     refined,
@@ -53,7 +53,7 @@ class Certificate(Struct, frozen=True):
     peak_slew_v_per_s: float
     beyond_cutoff_db: float | None
     at_resonance_db: float | None
-    refinement: dict[str, Refined] | None = None
+    refinement: dict[str, LayerEffect] | None = None
     expected: Expectation | None = None
     peak_acceleration: float | None = None
     optimum: float | None = None
@@ -62,17 +62,17 @@ class Certificate(Struct, frozen=True):
 
     @property
     def scaling_error_percent(self) -> float:
-        """The worst of both directions; ripple shorter than a chord counts in full."""
+        """The larger scaling error of both directions; ripple shorter than a chord counts in full."""
         return max((self._own(side) for side in self.scaling), default=0.0)
 
     @property
     def size_error_percent(self) -> float:
-        """The worst of both directions, with its sign."""
+        """The larger size error of both directions, with its sign."""
         return max((error.size for error in self.scaling.values()), key=abs, default=0.0)
 
     @property
     def scaling_on_scanner(self) -> tuple[str, float, float] | None:
-        """The worse direction, what is expected of it on the scanner and what the waveform has, in percent.
+        """The worse direction, its expected error on the scanner and that of the waveform, in percent.
 
         None where nothing is expected. The errors may add up.
         """
@@ -85,7 +85,7 @@ class Certificate(Struct, frozen=True):
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:
-    """Certificates of both axes."""
+    """Measure the certificates of both axes."""
     return {line.axis: _certify(line) for line in plan.lines}
 
 
@@ -159,7 +159,7 @@ def _expected_excess(certificate: Certificate, limit: float) -> tuple[FindingCod
 
 
 def _finer_table(line: LinePlan, written: str = "lengthen or widen {}") -> str:
-    """How a table is made to err less: one that is written, and one that the build chooses."""
+    """Return the advice for a table with smaller errors, one that is written or one that the build chooses."""
     table = f"{line.axis}.table"
     return written.format(table) if line.table_request is None else f"a lower {table}.max_error_lsb"
 

@@ -1,4 +1,4 @@
-"""What the emitted integers leave on the scanner by themselves: roundings, as the dynamics of the axis pass them on.
+"""The errors of the emitted integers alone on the scanner: roundings, behind the dynamics of the axis.
 
 The certificate's own figures are of the codes. A resonance makes more of their noise: with a line of some thousand
 codes at 1 kHz, several times as much.
@@ -19,7 +19,7 @@ _POINTS = 801  # over the window
 
 
 class ConverterErrors(Struct, frozen=True):
-    """Percent of the line inside the window, as ``Expectation`` has them; ``rms`` and ``scaling`` by direction."""
+    """The errors in percent of the line in the window, as in ``Expectation``; ``rms`` and ``scaling`` by direction."""
 
     rms: dict[str, float]
     scaling: dict[str, float]
@@ -39,31 +39,31 @@ def converter_errors(line: LinePlan, played: EmittedPeriod) -> ConverterErrors:
     rms: dict[str, float] = {}
     scaling: dict[str, float] = {}
     mismatch = 0.0
-    for moved in _periods(line, played):
-        count, apart = len(moved), []
+    for deviation in _periods(line, played):
+        count, errors = len(deviation), []
         for side, branch in sides.items():
-            here = np.interp(shape.times(side, position) * count - 0.5, np.arange(count), moved)
+            here = np.interp(shape.times(side, position) * count - 0.5, np.arange(count), deviation)
             error = 100.0 * here / branch.slope(position if side == "forward" else 1.0 - position)
             error -= float(np.mean(error))
             rms[side] = max(rms.get(side, 0.0), sqrt(float(np.mean(error * error))))
             scaling[side] = max(scaling.get(side, 0.0), float(np.ptp(error[chord:] - error[:-chord]) / span))
-            apart.append(error)
-        mismatch = max(mismatch, float(np.max(np.abs(apart[0] - apart[-1]))))
+            errors.append(error)
+        mismatch = max(mismatch, float(np.max(np.abs(errors[0] - errors[-1]))))
     return ConverterErrors(rms, scaling, mismatch)
 
 
 def _periods(line: LinePlan, played: EmittedPeriod) -> list[Floats]:
-    """Errors of w behind the dynamics: of one period, or of a shaped axis of several, of which the worst counts."""
+    """Return the errors of w behind the dynamics, of one period, or of several of a shaped axis (the worst counts)."""
     if played.shaped is not None and played.shaped.is_whole:
         return list(played.shaped.position_errors / line.codes_per_unit)
     ticks = line.program.ticks
     count = min(ticks, _MOST_TICKS)
     at = (2 * np.arange(count, dtype=np.int64) + 1) * ticks // (2 * count)
-    return [_moved(line, played.errors(at) / line.codes_per_unit, full=count == ticks)]
+    return [_behind_dynamics(line, played.errors(at) / line.codes_per_unit, full=count == ticks)]
 
 
-def _moved(line: LinePlan, error: Floats, full: bool) -> Floats:
-    """Errors of w, (n,), one a tick of a period, behind the dynamics."""
+def _behind_dynamics(line: LinePlan, error: Floats, full: bool) -> Floats:
+    """Return errors of w, one a tick of a period, (n,), behind the dynamics."""
     response = line.drive.response
     if response is None or not full:
         return error

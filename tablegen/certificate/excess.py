@@ -1,4 +1,4 @@
-"""Where a scan is worse than it should be: an error above 1 %, or above that of the line without any correction."""
+"""Scans that are worse than they should be: an error above 1 %, or above that of the line without any correction."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -8,14 +8,14 @@ from msgspec import Struct
 from tablegen.base.warnings import FindingCode
 from tablegen.certificate.line_errors import ScalingError
 
-LARGEST_PERCENT = 1.0  # the error that nobody is told of
+LARGEST_PERCENT = 1.0  # the largest error without a warning
 _NOTHING_PERCENT = 0.0005  # what rounds to 0: no hysteresis
 Cause = Literal["quantisation", "band limit", "model"]
 _CALLED: dict[Cause, str] = {"quantisation": "quantisation", "band limit": "the band limit", "model": "the model"}
 
 
 class Excess(Struct, frozen=True):
-    """The worst error of one axis that should be said: its figure in percent, what it is above, and its parts.
+    """The worst error of one axis that is worth a warning: its figure in percent, its limit, and its parts.
 
     ``what`` is "scaling error" (peak to peak) or "size error" (with its sign), ``side`` the direction, ``limit`` the
     percentage that it exceeds. ``parts`` are those of this direction.
@@ -34,12 +34,12 @@ class Excess(Struct, frozen=True):
 
     @property
     def times(self) -> float:
-        """By which factor the error is above what it may be."""
+        """The ratio of the error to its limit."""
         return abs(self.percent) / self.limit
 
     @property
     def cause(self) -> Cause:
-        """The largest part."""
+        """The largest part of the error."""
         parts: list[tuple[float, Cause]] = [
             (self.parts.quantisation, "quantisation"),
             (self.parts.band_limit, "band limit"),

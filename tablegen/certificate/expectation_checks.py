@@ -1,4 +1,4 @@
-"""Where what arrives on the scanner should be doubted, or is worse than the errors of the codes say."""
+"""Checks of the expectation on the scanner: where it is doubtful, or worse than the errors of the codes."""
 
 from typing import Literal
 
@@ -11,13 +11,13 @@ from tablegen.certificate.shaped_periods import Passage
 from tablegen.planning.line_plan import LinePlan
 
 FAR_PERCENT = 10.0  # of v_max, from the nearest measured line; the traces of `calibrate operator` are closer than twice
-# Behind a resonance: still above 1 % if its quality is half of what the scanner file says, which nobody knows better.
+# Behind a resonance: above 1 % even if its quality is half of that in the scanner file, which is uncertain.
 RESONANCE_PERCENT = 2.0
 _GRID = 32  # points per period of the highest harmonic
 
 
-class Doubt(Struct, frozen=True):
-    """A sentence about one axis: a figure in percent, above ``limit``; ``code`` says which figure it is."""
+class ExpectationWarning(Struct, frozen=True):
+    """A warning about one axis: its sentence, and a figure in percent above ``limit``; ``code`` names the figure."""
 
     code: Literal["expected-scaling-error", "operator-distance", "resonance"]
     text: str
@@ -25,12 +25,12 @@ class Doubt(Struct, frozen=True):
     limit: float
 
 
-def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
-    """List the doubts about the expectation of an axis.
+def expectation_warnings(line: LinePlan, certificate: Certificate) -> list[ExpectationWarning]:
+    """List the warnings about the expectation of an axis.
 
     The uncertainty is not counted: it stands beside the figure, and no change of the scan makes it smaller.
     """
-    doubt_list, axis, expected = [], line.axis, certificate.expected
+    warnings, axis, expected = [], line.axis, certificate.expected
     figures = {} if expected is None else expected.scaling
     side = max(figures, key=lambda one: figures[one].value, default="")
     if side and figures[side].value > LARGEST_PERCENT:
@@ -39,7 +39,7 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"{side}, above {LARGEST_PERCENT:g} %, since these harmonics do not make the waveform that its operator "
             "needs over the window"
         )
-        doubt_list.append(Doubt("expected-scaling-error", text, figures[side].value, LARGEST_PERCENT))
+        warnings.append(ExpectationWarning("expected-scaling-error", text, figures[side].value, LARGEST_PERCENT))
     position = certificate.position
     if position is not None and max(position.scaling.values(), default=0.0) > RESONANCE_PERCENT:
         side, percent = position.worst
@@ -48,7 +48,7 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"error is {percent:.3g} % {side}, above {RESONANCE_PERCENT:g} %; of the codes alone it is "
             f"{certificate.scaling[side].total:.3g} %"
         )
-        doubt_list.append(Doubt("resonance", text, percent, RESONANCE_PERCENT))
+        warnings.append(ExpectationWarning("resonance", text, percent, RESONANCE_PERCENT))
     if expected is not None and expected.distance is not None and expected.distance > FAR_PERCENT:
         w = line.drive_series.on_grid(_GRID * line.drive_series.harmonics)
         stroke = line.drive.v_amplitude * float(np.max(w) - np.min(w))
@@ -58,8 +58,8 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"trace of its operator, so that little is known there; record a trace of {here}, and give it to "
             "`tablegen calibrate operator` with the others"
         )
-        doubt_list.append(Doubt("operator-distance", text, expected.distance, FAR_PERCENT))
-    return doubt_list
+        warnings.append(ExpectationWarning("operator-distance", text, expected.distance, FAR_PERCENT))
+    return warnings
 
 
 def _hz(passage: Passage) -> str:

@@ -1,4 +1,4 @@
-"""What is expected on the scanner: by the operator of an axis, or of trace and retrace by the laws of its file.
+"""The expectation on the scanner: by the operator of an axis, or of trace and retrace by the laws of its file.
 
 A branch of (17) runs from turn to turn of a line of V_scan. Turnarounds are rounded, so that the drive of a build turns
 earlier: at a stroke of V_scan (w_max - w_min). The piezo's loop is that of this stroke, with the smaller residual of
@@ -77,10 +77,10 @@ def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
         return None
     x = np.linspace(*line.band_limit.window, _POINTS)
     there, back = (_share(line, target, side, x, low, high) for side in ("forward", "backward"))
-    apart = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
+    mismatch = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
     extent = drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) / drive.size_nm
     forward, backward = ((one.beta, one.u_peak) for one in played.peaks)
-    return 100.0 * extent * float(np.max(np.abs(apart))), PlayedStroke(forward, backward, extent)
+    return 100.0 * extent * float(np.max(np.abs(mismatch))), PlayedStroke(forward, backward, extent)
 
 
 def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:

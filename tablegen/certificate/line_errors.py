@@ -17,7 +17,7 @@ from tablegen.certificate.shaped_periods import ShapedPeriods
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.line import Sweep
 from tablegen.fixedpoint.runs import runs_of
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.extremes import extreme_points, extreme_ticks
 from tablegen.waveform.sampler import Expansion, Sampler, on_grid
@@ -30,7 +30,7 @@ _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
 class ScalingError(Struct, frozen=True):
-    """Scaling error of one direction in percent: peak to peak over the window, and of the window as a whole.
+    """The scaling error of one direction in percent, peak to peak over the window, and the size error of the window.
 
     ``total`` is of the emitted integers through the scanner's model; ``band_limit``, ``quantisation`` and
     ``model`` are its parts taken alone, the last being what the boost limit leaves of the dynamics. ``size`` is the
@@ -45,8 +45,8 @@ class ScalingError(Struct, frozen=True):
     uncompensated: float
 
 
-class Refined(Struct, frozen=True):
-    """What the layer moves in one direction, by the scanner's model, in percent over the window.
+class LayerEffect(Struct, frozen=True):
+    """The effect of the layer in one direction, by the scanner's model, in percent over the window.
 
     ``position`` is by how much of the line at most, ``scaling`` the scaling error, peak to peak, that it takes away.
     """
@@ -56,7 +56,7 @@ class Refined(Struct, frozen=True):
 
 
 class TickErrors:
-    """Errors of every tick of a period."""
+    """The errors of every tick of a period."""
 
     by_tick = True
 
@@ -64,15 +64,32 @@ class TickErrors:
         self._errors = errors
 
     def errors(self, k: Ints) -> Floats:
-        """Those at ticks k."""
+        """Return the errors at ticks.
+
+        Parameters
+        ----------
+        k
+            Ticks of the period, any shape.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape of ``k``.
+        """
         return self._errors[k]
 
     def corners(self, first: int, stop: int) -> Ints:
-        """All ticks in [first, stop)."""
+        """Return all ticks in [first, stop).
+
+        Returns
+        -------
+        Ints
+            Ticks, shape (stop - first,).
+        """
         return np.arange(first, stop)
 
     def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
-        """Ticks [first, stop) in parts that are worked out together."""
+        """Yield the ticks [first, stop) in parts that are computed together."""
         return pairwise([first, *range(first + _CHUNK_RUNS, stop, _CHUNK_RUNS), stop])
 
 
@@ -93,11 +110,11 @@ class EmittedPeriod:
         if self.runs.by_tick:
             self._by_tick = np.empty(self.runs.ticks)
             for which in self._chunks():
-                self._by_tick[which] = self.runs.codes[which] - self._asked(self.runs.starts[which])
+                self._by_tick[which] = self.runs.codes[which] - self._target_codes(self.runs.starts[which])
         self.shaped: ShapedPeriods | None = None
         if line.program.output.shaping.order:
-            ticks = np.arange(ShapedPeriods.asked_ticks(line.program), dtype=np.int64)
-            self.shaped = ShapedPeriods(line, self._asked(ticks))
+            ticks = np.arange(ShapedPeriods.target_ticks(line.program), dtype=np.int64)
+            self.shaped = ShapedPeriods(line, self._target_codes(ticks))
 
     def _extremes(self) -> Ints:
         """Return the ticks before and behind each extreme of the float waveform."""
@@ -111,7 +128,7 @@ class EmittedPeriod:
             self._expansions[id(series)] = series, Expansion(series)  # the series is kept, so that no other has its id
         return self._expansions[id(series)][1]
 
-    def _asked(self, k: Ints) -> Floats:
+    def _target_codes(self, k: Ints) -> Floats:
         codes = np.empty(len(k))
         for at in range(0, len(k), _CHUNK_RUNS):
             chunk = slice(at, at + _CHUNK_RUNS)
@@ -120,12 +137,23 @@ class EmittedPeriod:
         return codes
 
     def errors(self, k: Ints) -> Floats:
-        """Compute the emitted code less the unrounded target code at ticks k."""
-        return self._by_tick[k] if self.runs.by_tick else self.runs.at(k) - self._asked(k)
+        """Return the emitted code less the unrounded target code.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks), shape (n,).
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (n,).
+        """
+        return self._by_tick[k] if self.runs.by_tick else self.runs.at(k) - self._target_codes(k)
 
     @property
     def by_tick(self) -> bool:
-        """Whether every run is a single tick."""
+        """True if every run is a single tick."""
         return self.runs.by_tick
 
     def arriving(self) -> "list[EmittedPeriod | TickErrors]":
@@ -144,11 +172,11 @@ class EmittedPeriod:
         return self._figures[0]
 
     def error_moments(self) -> tuple[float, float]:
-        """Mean and mean square of the error over every tick; along a run it is the parabola of three of its ticks."""
+        """Return mean and mean square of the error over every tick, along a run by a parabola of three of its ticks."""
         return self._figures[1:]
 
     def power(self) -> float:
-        """Mean square of the codes about their mean."""
+        """Return the mean square of the codes about their mean."""
         ticks, offset = self.runs.ticks, float(self._line.program.output.offset_code)
         sums = np.zeros(2)
         for power in (1, 2):
@@ -158,13 +186,13 @@ class EmittedPeriod:
         return float(sums[1]) / ticks
 
     def largest_step(self) -> int:
-        """Between codes that follow each other, the last and the first too, in codes."""
+        """Return the largest step between consecutive codes, the last and the first too."""
         codes = self.runs.codes
         inside = (int(np.max(np.abs(np.diff(codes[at.start : at.stop + 1])), initial=0)) for at in self._chunks())
         return max(abs(int(codes[0] - codes[-1])), *inside)
 
     def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
-        """Ticks [first, stop) in parts whose runs are worked out together."""
+        """Yield the ticks [first, stop) in parts whose runs are computed together."""
         edges = self.runs.starts[slice(*np.searchsorted(self.runs.starts, (first + 1, stop)))][_CHUNK_RUNS::_CHUNK_RUNS]
         return pairwise([first, *edges.tolist(), stop])
 
@@ -178,8 +206,8 @@ class EmittedPeriod:
         largest, sums = 0.0, np.zeros(2)
         for which in self._chunks():
             n, starts = self.runs.lengths_of(which), self.runs.starts[which]
-            first = self._by_tick[which] if self.runs.by_tick else self.runs.codes[which] - self._asked(starts)
-            last = first if self.runs.by_tick else self.runs.codes[which] - self._asked(starts + n - 1)
+            first = self._by_tick[which] if self.runs.by_tick else self.runs.codes[which] - self._target_codes(starts)
+            last = first if self.runs.by_tick else self.runs.codes[which] - self._target_codes(starts + n - 1)
             largest = max(largest, float(np.max(np.abs(first))), float(np.max(np.abs(last))))
             sums += self._moments(which, n, first, last)
         mean, square = sums / self.runs.ticks
@@ -194,7 +222,9 @@ class EmittedPeriod:
         halfway = n // 2
         straight = first + (last - first) * (halfway / steps)
         height = np.where(n > 2, 4.0 * halfway * (steps - halfway) / steps**2, 1.0)
-        bend = np.where(n > 2, self.runs.codes[which] - self._asked(starts + halfway % n) - straight, 0.0) / height
+        bend = (
+            np.where(n > 2, self.runs.codes[which] - self._target_codes(starts + halfway % n) - straight, 0.0) / height
+        )
         arch, arch_square = 2.0 / 3.0 * (1.0 - 1.0 / steps), 8.0 / 15.0 * (1.0 - 1.0 / steps) * (1.0 + 1.0 / steps**2)
         mean = 0.5 * (first + last)
         square = mean * mean + (last - first) ** 2 * (n + 1) / (12.0 * steps)
@@ -202,13 +232,19 @@ class EmittedPeriod:
         return float(np.sum(n * (mean + arch * bend))), float(np.sum(n * square))
 
     def corners(self, first: int, stop: int) -> Ints:
-        """Ticks in [first, stop) at which a run begins or ends."""
+        """Return the ticks in [first, stop) at which a run begins or ends.
+
+        Returns
+        -------
+        Ints
+            Ticks, ascending, shape (n,), n <= stop - first.
+        """
         if self.runs.by_tick:
             return np.arange(first, stop)
         starts = self.runs.starts
         begins = starts[slice(*np.searchsorted(starts, (first, stop)))]
         ends = starts[slice(*np.searchsorted(starts, (first + 1, stop + 1)))] - 1
-        return merged(begins, ends, np.arange(max(first, self.runs.ticks - 1), min(stop, self.runs.ticks)))
+        return union_sorted(begins, ends, np.arange(max(first, self.runs.ticks - 1), min(stop, self.runs.ticks)))
 
 
 def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
@@ -232,7 +268,7 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     """
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
-    deviation, speed, wanted_speed = _followed(line, played, side, position)
+    deviation, speed, target_speed = _followed(line, played, side, position)
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
     chords = [_chords(line, one, side, position, deviation, steepness) for one in played.arriving()]
@@ -240,16 +276,16 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     triangle = 1.0 / branch.slope(branch.inverse(np.append(sweep, 0.5)))
     return ScalingError(
         total=max(_peak_to_peak(total) for total, _ in chords),
-        band_limit=_peak_to_peak(wanted_speed),
+        band_limit=_peak_to_peak(target_speed),
         quantisation=max(_peak_to_peak(noise) for _, noise in chords),
-        model=_peak_to_peak(speed - wanted_speed),
+        model=_peak_to_peak(speed - target_speed),
         size=100.0 * float(deviation[-1] - deviation[0]) / (high - low),
         uncompensated=_peak_to_peak(triangle[:-1] / triangle[-1]),
     )
 
 
 def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where the modelled piezo is, less ``position``; its speed over the line's; and that if the target arrived.
+    """Return where the modelled piezo is, less ``position``; its speed over the line's; and that of the target.
 
     What the layer moves is no error: it is there for what the model does not know. So all is taken without it.
     """
@@ -262,6 +298,13 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
         return played.expansion(series).at(times, 0, 1)
 
     def follow(series: FourierSeries) -> tuple[Floats, Floats]:
+        """Return what the piezo makes of a drive, without the layer.
+
+        Returns
+        -------
+        place, slope
+            Each of the shape of ``times``.
+        """
         value, slope = at_times(series)
         if line.layer is not None:
             layer_value, layer_slope = at_times(line.layer)
@@ -272,14 +315,14 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
     return *(ideal if reached is line.target else follow(reached)), ideal[1]
 
 
-def refined(line: LinePlan, side: str, branch: Sweep) -> Refined:
-    """Compute what the layer does, to first order: it moves the modelled piezo by r / u'."""
+def refined(line: LinePlan, side: str, branch: Sweep) -> LayerEffect:
+    """Compute the effect of the layer to first order: it shifts the modelled piezo by r / u'."""
     assert line.layer is not None
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     steepness = branch.slope(position if side == "forward" else 1.0 - position)
-    moved = line.layer.value(line.drive.shape.times(side, position)) / steepness
-    return Refined(100.0 * float(np.max(np.abs(moved))), _peak_to_peak(np.gradient(moved, position)))
+    shift = line.layer.value(line.drive.shape.times(side, position)) / steepness
+    return LayerEffect(100.0 * float(np.max(np.abs(shift))), _peak_to_peak(np.gradient(shift, position)))
 
 
 def _peak_to_peak(values: Floats) -> float:
@@ -292,10 +335,10 @@ def _reached(line: LinePlan) -> FourierSeries:
         return line.target
     n = np.arange(1.0, line.target.harmonics + 1.0)
     f = n * float(line.rate)
-    asked_real, asked_imaginary = line.drive.response.inverse(f)
-    given_real, given_imaginary, _ = capped_inverse(line.drive.response, f, line.drive.max_boost_db)
+    full_real, full_imaginary = line.drive.response.inverse(f)
+    capped_real, capped_imaginary, _ = capped_inverse(line.drive.response, f, line.drive.max_boost_db)
     # The phase is kept, so that the ratio is real.
-    ratio = np.hypot(given_real, given_imaginary) / np.hypot(asked_real, asked_imaginary)
+    ratio = np.hypot(capped_real, capped_imaginary) / np.hypot(full_real, full_imaginary)
     return FourierSeries(line.target.a0, line.target.a * ratio, line.target.b * ratio)
 
 
@@ -331,6 +374,18 @@ def _chords(
         return np.zeros(1), np.zeros(1)
 
     def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
+        """Return the errors in the middle of ticks.
+
+        Parameters
+        ----------
+        k
+            Ticks of the sweep, shape (n,).
+
+        Returns
+        -------
+        where, noise, total
+            Place on the line, its error by quantisation, and with that of the waveform; shares of the line, each (n,).
+        """
         t = (k + 0.5) / ticks
         where = t / turn if side == "forward" else (1.0 - t) / share
         noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)
@@ -340,7 +395,7 @@ def _chords(
     for low, high in played.stretches(first, stop - baseline):
         begin = played.corners(low, high)
         if not played.by_tick:
-            begin = merged(begin, played.corners(low + baseline, high + baseline) - baseline)
+            begin = union_sorted(begin, played.corners(low + baseline, high + baseline) - baseline)
         if not len(begin):
             begin = np.array([low])
         x0, noise0, total0 = noise_and_total(begin)

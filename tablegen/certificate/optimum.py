@@ -1,7 +1,8 @@
-"""The least peak acceleration that any waveform of an axis could have: a linear programme, solved by HiGHS of scipy.
+"""The optimum of an axis: the least peak acceleration of any waveform, by a linear programme (HiGHS of scipy).
 
 It shares nothing with the fit of the build but the line: other times, other sums, another method. Only the scaling
-error and the range are asked for, not the place of the line, so that it is a little below what a build can reach.
+error and the range are constrained, and not the place of the line, so that the optimum is a little below what a build
+can reach.
 """
 
 from math import ceil, tau
@@ -42,6 +43,20 @@ def least_acceleration(straight: Straightness, harmonics: int, percent: float) -
     scale = np.concatenate([[1.0], (tau * n) ** -2.0, (tau * n) ** -2.0])
 
     def rows(t: Floats, derivative: int) -> Floats:
+        """Return the rows of a derivative of the waveform, by its scaled coefficients.
+
+        Parameters
+        ----------
+        t
+            Times in periods, shape (m,).
+        derivative
+            Order, 0 to 2.
+
+        Returns
+        -------
+        Floats
+            Shape (m, 2 H + 1).
+        """
         angle, rate = tau * np.outer(t, n), (tau * n) ** derivative
         c, s = np.cos(angle), np.sin(angle)
         columns = {0: (c, s), 1: (-s, c), 2: (-c, -s)}[derivative]

@@ -1,4 +1,4 @@
-"""Errors of the position of an axis whose scanner has a response: held codes through it, less what should arrive.
+"""Errors of the position of an axis whose scanner has a response: held codes behind it, less the target.
 
 The codes of a tick are held, and each step of them drives the resonance. The certificate's other figures are of the
 codes of the period. Here all that a period of codes does is followed through the response, once it has settled: of a
@@ -29,7 +29,7 @@ _CHUNK = 1 << 14  # harmonics that are worked out together
 
 
 class ArrivingErrors(Struct, frozen=True):
-    """Errors in the middle of each tick, in LSB of the drive, and the scaling error of each direction, in percent."""
+    """The errors in the middle of each tick in LSB of the drive, and the scaling error of each direction in percent."""
 
     passage: Passage
     max_error_lsb: float
@@ -38,7 +38,7 @@ class ArrivingErrors(Struct, frozen=True):
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The direction with the larger scaling error, and that."""
+        """The direction with the larger scaling error, and that error."""
         return max(self.scaling.items(), key=lambda one: one[1])
 
 
@@ -60,24 +60,30 @@ def position_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[s
 
 
 def arriving(line: LinePlan, played: EmittedPeriod) -> Floats:
-    """Position in the middle of each tick less the one that the float waveform should make, in LSB, shape (ticks,)."""
+    """Return the position in the middle of each tick less the one that the float waveform should make.
+
+    Returns
+    -------
+    Floats
+        LSB of the converter, shape (ticks,).
+    """
     ticks, response, series = line.program.ticks, line.drive.response, line.series
     assert response is not None
     rate = float(line.rate)
     spectrum = np.fft.rfft(played.errors(np.arange(ticks, dtype=np.int64)))
     for first in range(0, len(spectrum), _CHUNK):
         n = np.arange(first, min(first + _CHUNK, len(spectrum)))
-        spectrum[n] *= _held(response, rate, ticks, n)
+        spectrum[n] *= _held_response(response, rate, ticks, n)
     # Of the waveform's own steps, what is beyond its harmonics' share: images of the update rate.
     n = np.arange(1, series.harmonics + 1)
     real, imaginary = response.inverse(np.asarray(n * rate))
-    beyond = _held(response, rate, ticks, n) - np.sinc(n / ticks) / (real + 1j * imaginary)
+    beyond = _held_response(response, rate, ticks, n) - np.sinc(n / ticks) / (real + 1j * imaginary)
     spectrum[n] += 0.5 * ticks * line.codes_per_unit * (series.a - 1j * series.b) * beyond
     position: Floats = np.fft.irfft(spectrum, ticks)
     return position
 
 
-def _held(response: Response, rate_hz: float, ticks: int, n: Ints) -> "Complex":
+def _held_response(response: Response, rate_hz: float, ticks: int, n: Ints) -> "Complex":
     """Compute the position in the middle of ticks of a sequence of held codes, over the codes, of its harmonics n."""
     match response:
         case SecondOrder() as second:

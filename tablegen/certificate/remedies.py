@@ -1,4 +1,4 @@
-"""What would make a scan good enough: changes of the scan file, each planned and measured before it is named.
+"""Remedies for a scan: changes of the scan file, each planned and measured before it is named.
 
 A change is searched for along one key at a time, and only along those that act on the cause. Each key takes a few
 trials, so that the search ends soon where nothing helps.
@@ -30,7 +30,7 @@ from tablegen.fixedpoint.table_shape import MOST_LENGTH
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 
 _MOST_TRIALS = 6  # of one key
-_MARGIN = 1.1  # what a first guess allows for: errors of rounding do not scale exactly
+_MARGIN = 1.1  # factor of the first guess, since errors of rounding do not scale exactly
 _HARDWARE = re.compile(r"([xy]\.)?(amplifier|dac)\.")
 _SCANNER = "scanner:"  # before a key of the scanner file
 _ROUNDED_LSB = 0.5  # of a code, whatever its table is
@@ -44,7 +44,7 @@ Change = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that was tried, what it leaves in percent, whether that is low enough, and whether all limits hold."""
+    """A tested change: the remaining error in percent, whether that is low enough, and whether all limits hold."""
 
     text: str
     percent: float
@@ -53,7 +53,7 @@ class Remedy:
 
     @property
     def enough(self) -> bool:
-        """Whether it can be taken."""
+        """True if the change is enough."""
         return self.low and self.within_limits
 
     def __str__(self) -> str:
@@ -61,18 +61,20 @@ class Remedy:
         return f"{self.text} leaves {self.percent:.3g} %{also}"
 
 
-def tried(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, most: float | None = None) -> list[Remedy]:
+def excess_remedies(
+    setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, most: float | None = None
+) -> list[Remedy]:
     """Plan and measure the remedies of one axis, a key each: the first value that is enough, or the best.
 
     ``exceeded`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan is enough, no other
     is looked for; of the hardware, both converter and amplifier are. A change that no plan can be made of is left out.
     """
-    return _tried(
+    return _best_remedies(
         _WAYS[exceeded.cause](setup, plan, line, exceeded), lambda change: _trial(setup, plan, line, change, most)
     )
 
 
-def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own: bool) -> list[Remedy]:
+def operator_remedies(setup: Setup, plan: Plan, line: LinePlan, most: float, own: bool) -> list[Remedy]:
     """Plan and measure remedies for the scaling error that an operator expects: at most ``most`` percent.
 
     With ``own`` the errors of the emitted waveform count as well.
@@ -87,13 +89,13 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
         if expected is None or not expected.scaling:
             return None
         more = {side: max(one.total, one.band_limit) for side, one in scaling_errors(changed_line).items() if own}
-        left = max(figure.value + more.get(side, 0.0) for side, figure in expected.scaling.items())
-        return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
+        remaining = max(figure.value + more.get(side, 0.0) for side, figure in expected.scaling.items())
+        return Remedy(_text(setup, change), remaining, remaining <= most, _keeps_the_error(plan, other))
 
-    return _tried(_other_bands(setup, plan, line), trial)
+    return _best_remedies(_other_bands(setup, plan, line), trial)
 
 
-def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
+def resonance_remedies(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
     """Plan and measure remedies for a resonance that the steps of the codes drive: shaping, or more codes."""
     hardware = [setup.hardware(one.axis) for one in plan.lines]
     shaping = _keys(setup.hardware(line.axis).where("dac.shaping"))
@@ -110,13 +112,13 @@ def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: floa
         other = _planned(setup, change)
         if other is None:
             return None
-        left = position_scaling(other.x if line.axis == "x" else other.y)
-        return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
+        remaining = position_scaling(other.x if line.axis == "x" else other.y)
+        return Remedy(_text(setup, change), remaining, remaining <= most, _keeps_the_error(plan, other))
 
-    return _tried(ways, trial)
+    return _best_remedies(ways, trial)
 
 
-def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | None]) -> list[Remedy]:
+def _best_remedies(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | None]) -> list[Remedy]:
     remedies = []
     for changes in ways:
         best: Remedy | None = None
@@ -155,8 +157,8 @@ def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float
     if other is None:
         return None
     scaling = scaling_errors(other.x if line.axis == "x" else other.y)
-    left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
-    return Remedy(_text(setup, change), left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+    remaining = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
+    return Remedy(_text(setup, change), remaining, excess(scaling, most) is None, _keeps_the_error(plan, other))
 
 
 def _planned(setup: Setup, change: Change) -> Plan | None:
@@ -172,14 +174,14 @@ def _text(setup: Setup, change: Change) -> str:
     def part(key: str, value: Any) -> str:
         name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
         written, factor = setup.scan_file.written_key(key)
-        shown = _value(value if factor == 1.0 else factor * value)
-        return f"{written.removeprefix(_SCANNER)} = {shown}{name}"
+        text = _value(value if factor == 1.0 else factor * value)
+        return f"{written.removeprefix(_SCANNER)} = {text}{name}"
 
     return " with ".join(part(key, value) for key, value in change.items() if value is not None)
 
 
 def _keeps_the_error(plan: Plan, other: Plan) -> bool:
-    """Whether no axis comes above ``limits.max_error_lsb`` that was not: a finer code is a smaller LSB."""
+    """Return True if no axis newly exceeds ``limits.max_error_lsb``: a finer code is a smaller LSB."""
     limit = plan.limits.max_error_lsb
     return limit is None or all(
         EmittedPeriod(new).largest_error() <= limit or EmittedPeriod(old).largest_error() > limit
@@ -214,7 +216,7 @@ def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, exceeded: Ex
 
 
 def _keys(places: Iterable[Place]) -> list[str]:
-    """Keys of a change, each once."""
+    """List the keys of a change, each once."""
     return list(dict.fromkeys(f"{_SCANNER if place.in_scanner else ''}{place.key}" for place in places))
 
 
@@ -250,14 +252,14 @@ def _against_band_limit(setup: Setup, plan: Plan, line: LinePlan, exceeded: Exce
 
 
 def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[Change]]:
-    """More harmonics, or a narrower window; first what helps more."""
+    """Yield more harmonics, or a narrower window; first what helps more."""
     axis = line.axis
     scan: FastAxis = getattr(setup.scan, axis)
     limit, harmonics = scan.band_limit, line.series.harmonics
     low, high = limit.window
     windows = [(max(low, margin), min(high, round(1.0 - margin, 9))) for margin in _MARGINS]
     narrower = ({f"{axis}.band_limit.window": window} for window in windows if window != (low, high))
-    sharp = min(low, 1.0 - high) < _MARGINS[1]  # no number of harmonics draws a sharp turn
+    sharp = min(low, 1.0 - high) < _MARGINS[1]  # no number of harmonics makes a sharp turn
     if sharp:
         yield narrower
     most = min((line.program.phase.ticks - 1) // 2, max(_MOST_HARMONICS, harmonics))
@@ -265,7 +267,7 @@ def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[
         most = min(most, len(line.program.words) // 2 - 1)
     more = [min(harmonics << i, most) for i in range(1, _MOST_TRIALS + 1)]
     counts = [n for n in dict.fromkeys(more) if n > harmonics]
-    if line.kept_percent is not None:  # more harmonics would be gentler, and leave the same error
+    if line.kept_percent is not None:  # more harmonics would lower the acceleration and leave the same error
         errors = [float(at_most(line.kept_percent / (1 << i), 3)) for i in range(1, _MOST_TRIALS + 1)]
         yield ({f"{axis}.band_limit.max_scaling_error_percent": error} for error in errors)
     elif limit.cutoff_hz is None:
@@ -290,13 +292,13 @@ def _against_model(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess) -
 
 
 def _slower(setup: Setup, plan: Plan) -> Iterator[Change]:
-    """Half the line rate, a quarter, and so on, by the key that sets it."""
+    """Yield half the line rate, a quarter, and so on, by the key that sets it."""
     timing = setup.scan.timing
     key = next((k for k in ("ticks_per_line", "ticks_per_pixel") if getattr(timing, k) is not None), "line_rate_hz")
-    given = getattr(timing, key)
+    requested = getattr(timing, key)
     for i in range(1, _MOST_TRIALS + 1):
         if plan.schedule.frame_ticks << i <= MAXIMUM_TICKS:
-            value = given / (1 << i) if key == "line_rate_hz" else given << i
+            value = requested / (1 << i) if key == "line_rate_hz" else requested << i
             yield {f"timing.{key}": value}
 
 

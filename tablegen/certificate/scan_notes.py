@@ -1,10 +1,10 @@
-"""What to know of a planned scan before its image is trusted, with weights: notes, and what to expect of an axis."""
+"""Notes and expectations of a planned scan, with weights: what to know before its image is trusted."""
 
 from collections.abc import Mapping
 
 from tablegen.base.warnings import Finding, axis_name, worst_first
 from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.matching import apart_note, apart_percent
+from tablegen.certificate.matching import pixel_mismatch_note, pixel_mismatch_percent
 from tablegen.planning.line_plan import Plan
 from tablegen.planning.settling import settling
 
@@ -45,8 +45,8 @@ def note_findings(plan: Plan) -> list[Finding]:
             f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
         )
         findings.append(Finding("note", 50.0 / schedule.ticks, text, code="rounded-pixels", axis="x"))
-    if apart := apart_note(plan):
-        findings.append(Finding("note", apart_percent(plan), apart, code="image-offset", axis="x"))
+    if mismatch := pixel_mismatch_note(plan):
+        findings.append(Finding("note", pixel_mismatch_percent(plan), mismatch, code="image-offset", axis="x"))
     pixels = (
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")

@@ -1,4 +1,4 @@
-"""Warnings of a scan that is worse than it should be: the error, its cause, and remedies that were tried."""
+"""Warnings of a scan that is worse than it should be: the error, its cause, and tested remedies."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -7,8 +7,8 @@ from tablegen.base.input_errors import Problem
 from tablegen.base.warnings import Finding, as_printed, worst_first
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import Excess, excess
-from tablegen.certificate.expectation_checks import Doubt, doubts
-from tablegen.certificate.matching import apart_percent, apart_warning
+from tablegen.certificate.expectation_checks import ExpectationWarning, expectation_warnings
+from tablegen.certificate.matching import pixel_mismatch_percent, pixel_mismatch_warning
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import LinePlan, Plan
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
-    """List the errors above 1 % or above the uncompensated line, and the doubts, without remedies, which take time."""
+    """List errors above 1 % or the uncompensated line, and doubtful expectations, without remedies, which take time."""
     findings = [
         Finding("spoils", abs(one.percent), f"{one.text(line.axis)}{_behind_resonance(one, certificates[line.axis])}")
         for line, one in _exceeded(plan, certificates)
     ]
     findings += [
-        Finding("spoils", doubt_percent(doubt, certificates[line.axis]), doubt.text)
-        for line, doubt in _doubts(plan, certificates)
+        Finding("spoils", warning_percent(warning, certificates[line.axis]), warning.text)
+        for line, warning in _expectation_warnings(plan, certificates)
     ]
     return [one.text for one in worst_first(findings)]
 
@@ -35,11 +35,10 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
 
 
 def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[float, Problem]]:
-    """Warnings with remedies, every one of which was planned and measured.
+    """List the warnings of a scan, each with a percentage of the line, the worst first.
 
-    And what is to be doubted of what is expected on the scanner; and what trace and retrace are apart by ticks alone,
-    where that is more than a quarter of a pixel. Each with the percentage of the scan that it tells of, the worst
-    first.
+    They are errors above their limits, doubts about the expectation on the scanner, and pixels whose places in trace
+    and retrace differ by more than a quarter of a pixel. Every remedy in them was planned and measured.
     """
     warnings = []
     for line, exceeded in _exceeded(plan, certificates):
@@ -48,36 +47,38 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
         why = f"{text}; {share}{_advice(setup, plan, line, exceeded)}"
         problem = setup.scan_file.problem(_key(setup, line, exceeded), why)
         warnings.append((abs(exceeded.percent), problem.coded(exceeded.code, line.axis)))
-    for line, doubt in _doubts(plan, certificates):
+    for line, warning in _expectation_warnings(plan, certificates):
         key, advice = _size_key(setup, line), ""
-        if doubt.code == "expected-scaling-error":
-            from tablegen.certificate.remedies import tried_on_operator
+        if warning.code == "expected-scaling-error":
+            from tablegen.certificate.remedies import operator_remedies
 
-            tried = tried_on_operator(setup, plan, line, doubt.limit, own=False)
-            key, advice = _band_key(setup, line), "; " + _in_words(tried, doubt.percent)
-        elif doubt.code == "resonance":
-            from tablegen.certificate.remedies import tried_against_resonance
+            remedies = operator_remedies(setup, plan, line, warning.limit, own=False)
+            key, advice = _band_key(setup, line), "; " + _in_words(remedies, warning.percent)
+        elif warning.code == "resonance":
+            from tablegen.certificate.remedies import resonance_remedies
 
-            advice = "; " + _in_words(tried_against_resonance(setup, plan, line, doubt.limit), doubt.percent)
-        percent = doubt_percent(doubt, certificates[line.axis])
-        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice).coded(doubt.code, line.axis)))
-    if apart := apart_warning(plan):
-        given = setup.scan.timing.ticks_per_line is not None
-        key = f"timing.{'ticks_per_line' if given else 'line_rate_hz'}"
-        warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart).coded("image-offset", "x")))
+            advice = "; " + _in_words(resonance_remedies(setup, plan, line, warning.limit), warning.percent)
+        percent = warning_percent(warning, certificates[line.axis])
+        warnings.append((percent, setup.scan_file.problem(key, warning.text + advice).coded(warning.code, line.axis)))
+    if mismatch := pixel_mismatch_warning(plan):
+        fixed_ticks = setup.scan.timing.ticks_per_line is not None
+        key = f"timing.{'ticks_per_line' if fixed_ticks else 'line_rate_hz'}"
+        warnings.append(
+            (pixel_mismatch_percent(plan), setup.scan_file.problem(key, mismatch).coded("image-offset", "x"))
+        )
     return sorted(warnings, key=lambda one: -as_printed(one[0]))
 
 
-def doubt_percent(doubt: Doubt, certificate: Certificate) -> float:
-    """Of the scan: a distance is one of volts, and tells what the operator may be wrong by."""
+def warning_percent(warning: ExpectationWarning, certificate: Certificate) -> float:
+    """Return the error of the scan in percent; for a distance, which is one of volts, the operator's uncertainty."""
     expected = certificate.expected
-    if doubt.code != "operator-distance" or expected is None:
-        return doubt.percent
+    if warning.code != "operator-distance" or expected is None:
+        return warning.percent
     return max((figure.value + (figure.uncertainty or 0.0) for figure in expected.rms.values()), default=0.0)
 
 
 def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], axis: str) -> str:
-    """Remedies that were tried for an axis above ``limits.max_scaling_error_percent``, in words."""
+    """Return tested remedies for an axis above ``limits.max_scaling_error_percent``, in words."""
     line = plan.x if axis == "x" else plan.y
     most = plan.limits.max_scaling_error_percent
     exceeded = excess(certificates[axis].scaling, most)
@@ -86,15 +87,15 @@ def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificat
     both = certificates[axis].scaling_on_scanner
     if both is None or most is None or both[1] + both[2] <= most:
         return ""
-    from tablegen.certificate.remedies import tried_on_operator
+    from tablegen.certificate.remedies import operator_remedies
 
-    return _in_words(tried_on_operator(setup, plan, line, most, own=True), both[1] + both[2])
+    return _in_words(operator_remedies(setup, plan, line, most, own=True), both[1] + both[2])
 
 
 def _advice(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, most: float | None = None) -> str:
-    from tablegen.certificate.remedies import tried  # only a scan that needs them pays for them
+    from tablegen.certificate.remedies import excess_remedies  # only a scan that needs them pays for them
 
-    return _in_words(tried(setup, plan, line, exceeded, most), abs(exceeded.percent))
+    return _in_words(excess_remedies(setup, plan, line, exceeded, most), abs(exceeded.percent))
 
 
 def _in_words(remedies: "list[Remedy]", percent: float) -> str:
@@ -112,11 +113,13 @@ def _exceeded(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple
     return [(line, exceeded) for line, exceeded in every if exceeded is not None]
 
 
-def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
-    """List the doubts of both axes; one on a resonance is left out where the scaling error already names it."""
+def _expectation_warnings(
+    plan: Plan, certificates: Mapping[str, Certificate]
+) -> list[tuple[LinePlan, ExpectationWarning]]:
+    """List the warnings of both axes; one of a resonance is left out where the scaling error already names it."""
     explained = {line.axis for line, exceeded in _exceeded(plan, certificates) if exceeded.what == "scaling error"}
-    every = [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
-    return [(line, doubt) for line, doubt in every if doubt.code != "resonance" or line.axis not in explained]
+    every = [(line, warning) for line in plan.lines for warning in expectation_warnings(line, certificates[line.axis])]
+    return [(line, warning) for line, warning in every if warning.code != "resonance" or line.axis not in explained]
 
 
 def _behind_resonance(exceeded: Excess, certificate: Certificate) -> str:

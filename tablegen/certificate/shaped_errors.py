@@ -1,4 +1,4 @@
-"""What shaping of an axis does to its errors, and what it costs: what only shaped axes have in their certificate."""
+"""The effect of shaping on the errors of an axis, and its cost: the certificate of shaped axes alone."""
 
 from collections.abc import Mapping
 
@@ -12,8 +12,8 @@ from tablegen.fixedpoint.shaping import Shaping
 from tablegen.planning.line_plan import LinePlan
 
 
-class Rounded(Struct, frozen=True):
-    """The same scan without shaping, judged alike: errors of the position in LSB, scaling errors, changes of codes."""
+class RoundedErrors(Struct, frozen=True):
+    """The same scan without shaping: errors of the position in LSB, scaling errors, changes of codes."""
 
     max_error_lsb: float
     rms_error_lsb: float
@@ -22,7 +22,7 @@ class Rounded(Struct, frozen=True):
 
 
 class ShapedErrors(Struct, frozen=True):
-    """Beside the certificate of a shaped axis, whose errors are those of the position.
+    """The additional figures of a shaped axis, whose errors are those of the position.
 
     ``ticks`` are judged, behind the ``passage``. ``code_error_lsb`` are the largest error of a code and the rms, and
     ``largest_step`` the largest step that was seen; ``rounded`` has what rounding alone would leave.
@@ -34,11 +34,11 @@ class ShapedErrors(Struct, frozen=True):
     code_error_lsb: tuple[float, float]
     largest_step: int
     changes: Changes
-    rounded: Rounded
+    rounded: RoundedErrors
 
 
 def shaped_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[str, Sweep]) -> ShapedErrors | None:
-    """Of an axis; None of one that is not shaped. Scaling errors are of whole periods only."""
+    """Return the figures of a shaped axis, None of any other; scaling errors are of whole periods only."""
     periods = played.shaped
     if periods is None:
         return None
@@ -55,5 +55,5 @@ def shaped_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[str
         code_error_lsb=largest_and_rms(periods.code_errors),
         largest_step=int(np.max(np.abs(np.diff(periods.judged_codes)))),
         changes=periods.changes,
-        rounded=Rounded(*largest_and_rms(periods.rounded_errors), scaling, periods.rounded_changes),
+        rounded=RoundedErrors(*largest_and_rms(periods.rounded_errors), scaling, periods.rounded_changes),
     )

@@ -1,4 +1,4 @@
-"""Periods of a shaped axis, and what of their errors arrives in the position.
+"""Periods of a shaped axis, and the part of their errors that arrives in the position.
 
 Shaped codes err by more than rounded ones, at frequencies that the piezo does not follow. So they are judged behind the
 response of the axis; where none is known, in the band of the harmonics that are played.
@@ -15,13 +15,13 @@ from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import LinePlan
 
-MOST_TICKS = 1 << 20  # that are judged of one period
+MOST_TICKS = 1 << 20  # ticks of one period that are judged
 _SEVERAL_TICKS = 1 << 18  # of several periods together
 _PERIODS = 17  # at most; of several the first is left out, in which the response settles
 
 
 class Passage(Struct, frozen=True):
-    """What the position follows: a second-order response, a measured one, or a band from 0 Hz.
+    """The response that the position has: second order, measured, or a band from 0 Hz.
 
     Fields that do not apply are None.
     """
@@ -34,7 +34,13 @@ class Passage(Struct, frozen=True):
 
     @classmethod
     def of(cls, line: LinePlan) -> "Passage":
-        """Return the passage of an axis."""
+        """Return the passage of an axis.
+
+        Raises
+        ------
+        TypeError
+            If the axis has a response of an unknown kind.
+        """
         match line.drive.response:
             case None:
                 return cls(band_hz=line.series.harmonics * float(line.rate))
@@ -46,14 +52,25 @@ class Passage(Struct, frozen=True):
 
 
 class Changes(Struct, frozen=True):
-    """How often the codes of a converter change, in percent of the ticks, and by how many codes in the mean."""
+    """The rate of changes of a converter's codes, in percent of the ticks, and their mean size in codes."""
 
     percent: float
     mean_step: float
 
     @classmethod
     def of(cls, codes: Ints) -> "Changes":
-        """Of consecutive codes, shape (n,)."""
+        """Return the changes of consecutive codes.
+
+        Parameters
+        ----------
+        codes
+            One a tick, shape (n,), n >= 1.
+
+        Returns
+        -------
+        Changes
+            Share of the n - 1 steps, and mean size of those that are not 0.
+        """
         steps = np.abs(np.diff(codes))
         count = int(np.count_nonzero(steps))
         share = count / max(len(steps), 1)
@@ -61,68 +78,103 @@ class Changes(Struct, frozen=True):
 
 
 class ShapedPeriods:
-    """``codes``, shape (periods, ticks), since the program began, and as much of one that is too long.
+    """The periods of a shaped axis since its program began; ``codes`` has the shape (periods, ticks).
 
-    ``asked`` are the unrounded codes of a period, as much of it.
+    ``target_codes`` are the unrounded codes of a period; of a period that is too long, both are its beginning.
     """
 
-    def __init__(self, line: LinePlan, asked: Floats) -> None:
+    def __init__(self, line: LinePlan, target_codes: Floats) -> None:
         program = line.program
-        self._line, self._asked = line, asked
-        ticks = len(asked)
+        self._line, self._target_codes = line, target_codes
+        ticks = len(target_codes)
         self.is_whole = ticks == program.ticks
         periods = max(1, min(_PERIODS, _SEVERAL_TICKS // ticks))
         self.codes = program.played(0, periods * ticks).reshape(periods, ticks)
         self._rounded = program.rounded.codes(np.arange(ticks, dtype=np.int64))
-        self._judged = slice(1 if periods > 1 else 0, None)
+        self._counted = slice(1 if periods > 1 else 0, None)
 
     @classmethod
-    def asked_ticks(cls, program: Program) -> int:
-        """Of how many ticks of a period the unrounded codes are needed."""
+    def target_ticks(cls, program: Program) -> int:
+        """Return the number of ticks of a period whose unrounded codes are needed."""
         return min(program.ticks, MOST_TICKS)
 
     @property
     def ticks(self) -> int:
-        """How many are judged."""
+        """The number of ticks of the judged periods."""
         return len(self.judged_codes)
 
     @property
     def code_errors(self) -> Floats:
-        """Emitted less asked for, of the periods that are judged, shape (periods, ticks)."""
-        return np.asarray(self.codes[self._judged] - self._asked)
+        """The emitted less the unrounded codes of the judged periods.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods, ticks).
+        """
+        return np.asarray(self.codes[self._counted] - self._target_codes)
 
     @cached_property
     def position_errors(self) -> Floats:
-        """The same in the position, in LSB."""
+        """The errors of the position in the judged periods.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods, ticks).
+        """
         return self._arrived(self.codes)
 
     @cached_property
     def rounded_errors(self) -> Floats:
-        """Those of the position without shaping."""
+        """The errors of the position in the judged periods if codes were rounded instead of shaped.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods, ticks).
+        """
         return self._arrived(np.tile(self._rounded, (len(self.codes), 1)))
 
     @property
     def judged_codes(self) -> Ints:
-        """The codes of the periods that are judged, shape (ticks,)."""
-        return self.codes[self._judged].reshape(-1)
+        """The codes of the judged periods.
+
+        Returns
+        -------
+        Ints
+            One period after another, shape (periods * ticks,).
+        """
+        return self.codes[self._counted].reshape(-1)
 
     @property
     def changes(self) -> Changes:
-        """Of the shaped codes."""
+        """The changes of the shaped codes."""
         return Changes.of(self.judged_codes)
 
     @property
     def rounded_changes(self) -> Changes:
-        """Of the codes without shaping."""
+        """The changes of the codes without shaping."""
         return Changes.of(np.tile(self._rounded, self.ticks // len(self._rounded)))
 
     def _arrived(self, codes: Ints) -> Floats:
-        errors = (codes - self._asked).reshape(-1)
-        return passed(self._line, errors).reshape(codes.shape)[self._judged]
+        errors = (codes - self._target_codes).reshape(-1)
+        return errors_behind_response(self._line, errors).reshape(codes.shape)[self._counted]
 
 
-def passed(line: LinePlan, errors: Floats) -> Floats:
-    """Compute the position errors of code errors that begin from rest, one a tick, shape (n,)."""
+def errors_behind_response(line: LinePlan, errors: Floats) -> Floats:
+    """Return the position errors of code errors that begin from rest.
+
+    Parameters
+    ----------
+    errors
+        LSB of the converter, one a tick, shape (n,).
+
+    Returns
+    -------
+    Floats
+        LSB of the converter, shape (n,).
+    """
     size = 1 << (2 * len(errors) - 1).bit_length()
     f: Floats = np.arange(size // 2 + 1, dtype=np.float64) * (float(line.rate) * line.program.ticks / size)
     spectrum = np.fft.rfft(errors, size)
@@ -139,5 +191,16 @@ def passed(line: LinePlan, errors: Floats) -> Floats:
 
 
 def largest_and_rms(errors: Floats) -> tuple[float, float]:
-    """Return the largest magnitude, and the root of the mean square."""
+    """Return the largest magnitude, and the root of the mean square.
+
+    Parameters
+    ----------
+    errors
+        Any shape, not empty.
+
+    Returns
+    -------
+    largest, rms
+        In the unit of ``errors``.
+    """
     return float(np.max(np.abs(errors))), sqrt(float(np.mean(errors * errors)))

@@ -1,4 +1,4 @@
-"""Plan and certificate in words: the block that stands in every emitted file and on the terminal. Plain ASCII."""
+"""Plan and certificate in words: the block in every emitted file and on the terminal, in plain ASCII."""
 
 from fractions import Fraction
 from math import log10
@@ -7,7 +7,7 @@ import numpy as np
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import excess
-from tablegen.certificate.matching import apart_percent
+from tablegen.certificate.matching import pixel_mismatch_percent
 from tablegen.certificate.shaped_errors import ShapedErrors
 from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.expectation import LEVEL_PERCENT, Expectation, Figure
@@ -38,7 +38,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
         ("g", f"{drive.g:.6f}   frequency, (23)"),
         ("m g V_scan", f"{drive.v_amplitude:.6g} V peak to peak"),
         ("branches", line.drive.hysteresis.described(line.drive.shape)),
-        ("line", f"{line.program.ticks} ticks, {rate(line.rate)}{_asked(line)}, turn {drive.turn:g}"),
+        ("line", f"{line.program.ticks} ticks, {rate(line.rate)}{_requested(line)}, turn {drive.turn:g}"),
         (
             "harmonics",
             f"{line.series.harmonics}, up to {_hz(line.series.harmonics * float(line.rate))}, {_method(line)}",
@@ -58,7 +58,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
 
 
 def _hold(line: LinePlan) -> str:
-    """How the compensation of the converter's hold changes the harmonics."""
+    """Describe how the compensation of the converter's hold changes the harmonics."""
     codes = line.program.phase.ticks
     text = f"{5e5 / (float(line.rate) * codes):.6g} us ahead, half of what a code holds"
     if line.program.hold > 1:
@@ -69,8 +69,8 @@ def _hold(line: LinePlan) -> str:
 
 def _method(line: LinePlan) -> str:
     low, high = line.band_limit.window
-    kept = "" if line.kept_percent is None else f", gentlest at {line.kept_percent:.3g} %"
-    return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}{kept}"
+    allowed = "" if line.kept_percent is None else f", gentlest at {line.kept_percent:.3g} %"
+    return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}{allowed}"
 
 
 def _needs_of_table(line: LinePlan) -> list[tuple[str, str]]:
@@ -84,7 +84,7 @@ def _chosen(line: LinePlan) -> str:
     return "" if line.table_request is None else f", {line.table_request}"
 
 
-def _asked(line: LinePlan) -> str:
+def _requested(line: LinePlan) -> str:
     same = abs(float(line.rate) - line.requested_hz) <= 1e-12 * line.requested_hz
     return " as asked" if same else f" (asked {_hz(line.requested_hz)})"
 
@@ -95,10 +95,10 @@ def _hz(value: float) -> str:
 
 def rate(value: Fraction) -> str:
     """Format a rate as a number, with the exact fraction where the number is not exact."""
-    shown = _hz(float(value))
+    number = _hz(float(value))
     if Fraction(f"{float(value):.6g}") == value:
-        return shown
-    return f"{shown} = {value.numerator}/{value.denominator} Hz"
+        return number
+    return f"{number} = {value.numerator}/{value.denominator} Hz"
 
 
 def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
@@ -143,7 +143,7 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
 
 
 def behind(passage: Passage) -> str:
-    """Behind what errors of the position are judged."""
+    """Describe the response behind which errors of the position are judged."""
     if passage.band_hz is not None:
         return f"up to {_hz(passage.band_hz)}: no response is known"
     if passage.frequency_hz is not None:
@@ -191,9 +191,9 @@ def expected_lines(expectation: Expectation) -> list[str]:
     """List what to expect on the scanner; each figure has its uncertainty, or a word that there is none."""
     if expectation.basis == "laws":
         assert expectation.mismatch is not None
-        apart = _percent(expectation.mismatch.value)
+        mismatch = _percent(expectation.mismatch.value)
         return [
-            f"trace and retrace up to {apart} % of the line apart by the laws, since turnarounds",
+            f"trace and retrace up to {mismatch} % of the line apart by the laws, since turnarounds",
             "are rounded; no measured uncertainty",
         ]
     rows = [
@@ -225,19 +225,18 @@ def _percent(value: float) -> str:
 
 
 def _windows(plan: Plan) -> list[str]:
-    """Which ticks are imaged, and how far apart trace and retrace are for that alone."""
+    """Describe which ticks are imaged, and the distance between trace and retrace for that alone."""
     schedule = plan.schedule
     text = f"imaged are ticks {schedule.forward.first}..{schedule.forward.stop - 1}"
     if not schedule.backward.count:
         return [text]
     text += f" and {schedule.backward.first}..{schedule.backward.stop - 1}"
-    return [
-        f"{text}; a pixel's places in trace and retrace are up to {_percent(apart_percent(plan))} % of the line apart"
-    ]
+    mismatch = _percent(pixel_mismatch_percent(plan))
+    return [f"{text}; a pixel's places in trace and retrace are up to {mismatch} % of the line apart"]
 
 
 def _volts(line: LinePlan) -> str:
-    """Said where the axes have converters or amplifiers of their own."""
+    """Describe the volts of an axis with a converter or an amplifier of its own."""
     zero, step = line.converter.v_zero, line.converter.v_per_code
     return f"{zero:.6g} V {'-' if step < 0.0 else '+'} {abs(step):.6g} V c, at the piezo"
 

@@ -16,7 +16,18 @@ class Response(Protocol):
     """A frequency response, normalised to 1 at 0 Hz."""
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Return real and imaginary part of 1 / H(f) at frequencies in Hz, each of the shape of ``f_hz``."""
+        """Return 1 / H(f).
+
+        Parameters
+        ----------
+        f_hz
+            Frequencies in Hz, any shape.
+
+        Returns
+        -------
+        real, imaginary
+            Dimensionless, each of the shape of ``f_hz``.
+        """
 
     @property
     def resonance_hz(self) -> float:
@@ -39,7 +50,18 @@ class SecondOrder(Struct, frozen=True):
     delay_s: float = 0.0
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Return real and imaginary part of 1 / H(f) at frequencies in Hz, each of the shape of ``f_hz``."""
+        """Return 1 / H(f).
+
+        Parameters
+        ----------
+        f_hz
+            Frequencies in Hz, any shape.
+
+        Returns
+        -------
+        real, imaginary
+            Dimensionless, each of the shape of ``f_hz``.
+        """
         r = f_hz / self.frequency_hz
         real, imaginary = 1.0 - r * r, r / self.quality
         s, c = sine_and_cosine(f_hz * self.delay_s)
@@ -69,10 +91,20 @@ class Measured(Struct, frozen=True):
     phase_turns: Floats
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Return real and imaginary part of 1 / H(f) at frequencies in Hz; gain and phase are interpolated linearly.
+        """Return 1 / H(f); gain and phase are interpolated linearly.
 
         Below the first point the gain is that of it, and the phase is linear to 0 at 0 Hz, as that of a dead time, or
         to the nearest half turn where the response is inverted.
+
+        Parameters
+        ----------
+        f_hz
+            Frequencies in Hz, any shape.
+
+        Returns
+        -------
+        real, imaginary
+            Dimensionless, each of the shape of ``f_hz``.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """Half-sample compensation of the converter's zero-order hold, for each harmonic of the scan.
 
-A code is held from its tick to the next. What the piezo sees of samples w(k / N) is harmonic n times
-``exp(-i pi n / N) sinc(n / N)``: half a tick late, and a little smaller. Docs/waveform.md has the convention of time.
+A code is held from its tick to the next. Of samples w(k / N) the piezo gets harmonic n times
+``exp(-i pi n / N) sinc(n / N)``: half a tick late, and a little smaller. docs/waveform.md has the convention of time.
 """
 
 from math import pi

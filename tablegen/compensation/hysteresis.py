@@ -86,20 +86,47 @@ class BranchShape(Sweep):
 
     @classmethod
     def at(cls, coordinates: Floats) -> "BranchShape":
-        """Return the branch at a point of ``basis``, (2,), whether it is monotonic or not."""
+        """Return the branch at a point of ``basis``, whether it is monotonic or not.
+
+        Parameters
+        ----------
+        coordinates
+            xi and xi_gamma, shape (2,).
+
+        Returns
+        -------
+        BranchShape
+            Its parameters are not checked.
+        """
         return cls(float(coordinates[0]), float(coordinates[1]))
 
     @property
     def coordinates(self) -> Floats:
-        """The coordinates of the branch in ``basis``, (2,)."""
+        """The coordinates of the branch in ``basis``.
+
+        Returns
+        -------
+        Floats
+            xi and xi_gamma, shape (2,).
+        """
         return np.array([self.xi, self.xi_gamma])
 
     @staticmethod
     def basis(tau: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives of u(tau) by each coordinate, of the shape of ``tau``.
+        """Return the derivatives of u(tau) by each coordinate.
 
         The branch is tau and a sum of these, so that fits are linear and have no poles. For calibration: numpy's sines,
         whose last bits differ between processors.
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        by_xi, by_xi_gamma
+            Each of the shape of ``tau``.
         """
         return np.sin(pi * tau), 2.0 * tau + np.cos(pi * tau) - 1.0
 
@@ -121,22 +148,66 @@ class BranchShape(Sweep):
         return float(beta), float(low + beta)
 
     def value(self, tau: FloatsLike) -> Floats:
-        """Return u(tau), equation (17), of the shape of ``tau``."""
+        """Return u(tau), equation (17).
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``tau``.
+        """
         return self.value_and_slope(tau)[0]
 
     def slope(self, tau: FloatsLike) -> Floats:
-        """Return du/dtau, of the shape of ``tau``."""
+        """Return du/dtau, the derivative of (17).
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``tau``.
+        """
         return self.value_and_slope(tau)[1]
 
     def value_and_slope(self, tau: FloatsLike) -> tuple[Floats, Floats]:
-        """Return u(tau) and du/dtau, from the same sines."""
+        """Return u(tau) and du/dtau, from the same sines.
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        value, slope
+            Each of the shape of ``tau``.
+        """
         tau = np.asarray(tau, dtype=np.float64)
         s, c = sine_and_cosine(0.5 * tau)
         value = self.linear * tau + self.xi * s + self.xi_gamma * (c - 1.0)
         return value, self.linear + pi * (self.xi * c - self.xi_gamma * s)
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
-        """Return int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, in closed form; of the shape of ``y``."""
+        """Return int_0^1 u(s) exp(-2 pi i y s) ds in closed form.
+
+        Parameters
+        ----------
+        y
+            Periods of the kernel in the sweep, any shape.
+
+        Returns
+        -------
+        real, imaginary
+            Each of the shape of ``y``.
+        """
         ramp, plain = ramp_moment(y), plain_moment(y)
         below, above = plain_moment(y - 0.5), plain_moment(y + 0.5)  # of exp(+- i pi s) times the kernel
         sine = 0.5 * (below[1] - above[1]), 0.5 * (above[0] - below[0])

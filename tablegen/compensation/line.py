@@ -33,18 +33,62 @@ class Sweep(ABC):
 
     @abstractmethod
     def value(self, tau: FloatsLike) -> Floats:
-        """Return u(tau), of the shape of ``tau``."""
+        """Return u(tau).
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``tau``.
+        """
 
     @abstractmethod
     def slope(self, tau: FloatsLike) -> Floats:
-        """Return du/dtau, above 0, of the shape of ``tau``."""
+        """Return du/dtau, above 0.
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``tau``.
+        """
 
     def value_and_slope(self, tau: FloatsLike) -> tuple[Floats, Floats]:
-        """Return value and slope at the same places; a subclass may compute them together."""
+        """Return value and slope at the same places; a subclass may compute them together.
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        value, slope
+            Each of the shape of ``tau``.
+        """
         return self.value(tau), self.slope(tau)
 
     def inverse(self, u: FloatsLike) -> Floats:
-        """Return tau(u): where the modelled piezo is when the normalised drive is u. Clipped to u in [0, 1]."""
+        """Return tau(u): where the modelled piezo is when the normalised drive is u.
+
+        Parameters
+        ----------
+        u
+            Normalised drive, clipped to 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Places in the sweep, shape of ``u``.
+        """
         u = np.clip(np.asarray(u, dtype=np.float64), 0.0, 1.0)
         grid = np.linspace(0.0, 1.0, _GRID)
         tau = np.interp(u, self.value(grid), grid)
@@ -54,7 +98,17 @@ class Sweep(ABC):
         return tau
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
-        """Return int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, for a Fourier series in closed form.
+        """Return int_0^1 u(s) exp(-2 pi i y s) ds, for a Fourier series in closed form.
+
+        Parameters
+        ----------
+        y
+            Periods of the kernel in the sweep, any shape.
+
+        Returns
+        -------
+        real, imaginary
+            Each of the shape of ``y``.
 
         Raises
         ------
@@ -103,11 +157,33 @@ class LineShape(Struct, frozen=True):
         return None
 
     def value(self, t: FloatsLike) -> Floats:
-        """Return w(t) with t in periods, of the shape of ``t``."""
+        """Return w(t), (14) and (17).
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``t``.
+        """
         return self._by_sweep(t, self.forward.value, lambda tau: 1.0 - self.backward.value(tau))
 
     def slope(self, t: FloatsLike) -> Floats:
-        """Return dw/dt per period, of the shape of ``t``."""
+        """Return dw/dt.
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Per period, shape of ``t``.
+        """
         return self._by_sweep(
             t,
             lambda tau: self.forward.slope(tau) / self.turn,
@@ -138,7 +214,20 @@ class LineShape(Struct, frozen=True):
         return (value - self.value(times)) / steepness, slope / self.slope(times)
 
     def times(self, side: str, position: Floats) -> Floats:
-        """Return when the sweep of one direction passes a normalised position, in periods."""
+        """Return when the sweep of one direction passes a normalised position.
+
+        Parameters
+        ----------
+        side
+            "forward" or "backward".
+        position
+            Positions on the line, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Times in periods, shape of ``position``.
+        """
         return self.turn * position if side == "forward" else self.turn + (1.0 - self.turn) * (1.0 - position)
 
     def _by_sweep(
@@ -166,12 +255,34 @@ class SweptSeries(Sweep):
         self.series, self.turn, self.forward = series, turn, forward
 
     def value(self, tau: FloatsLike) -> Floats:
-        """Return u(tau), of the shape of ``tau``."""
+        """Return u(tau).
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``tau``.
+        """
         w = self.series.value(self._times(tau))
         return w if self.forward else 1.0 - w
 
     def slope(self, tau: FloatsLike) -> Floats:
-        """Return du/dtau, of the shape of ``tau``."""
+        """Return du/dtau.
+
+        Parameters
+        ----------
+        tau
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``tau``.
+        """
         rise = self.series.value(self._times(tau), 1)
         return self.turn * rise if self.forward else (self.turn - 1.0) * rise
 
@@ -217,11 +328,33 @@ class WholeLine(LineShape, frozen=True, kw_only=True):
         return self if learnt is None else WholeLine.of(learnt, self.turn)
 
     def value(self, t: FloatsLike) -> Floats:
-        """Return w(t) with t in periods, of the shape of ``t``."""
+        """Return w(t).
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``t``.
+        """
         return self.series.value(t)
 
     def slope(self, t: FloatsLike) -> Floats:
-        """Return dw/dt per period, of the shape of ``t``."""
+        """Return dw/dt.
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Per period, shape of ``t``.
+        """
         return self.series.value(t, 1)
 
 

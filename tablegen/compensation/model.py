@@ -74,7 +74,13 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
         return None
 
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
-        """Return the line of one axis; None where it cannot be served, with the reason in ``problems``."""
+        """Return the line of one axis; None where it cannot be served, with the reason in ``problems``.
+
+        Raises
+        ------
+        NotImplementedError
+            If a model that compensates does not define it.
+        """
         raise NotImplementedError(type(self))
 
     def loop(

@@ -63,7 +63,7 @@ def law_of_sizes(p: list[float], apparent: list[float], size: SizeLaw, v: float)
     law, middle = OffsetLaw.fitted(p, apparent)
     for _ in range(_ROUNDS):
         centre *= middle
-        law, middle = OffsetLaw.fitted(p, [v / size.voltage(scan_nm * centre / seen) for seen in apparent])
+        law, middle = OffsetLaw.fitted(p, [v / size.voltage(scan_nm * centre / size_seen) for size_seen in apparent])
     return law
 
 
@@ -80,7 +80,7 @@ def surface_of(points: Sequence[tuple[float, float, float]], size: SizeLaw, driv
     driver, laws = Driver.of(driver), []
     for volts in sorted({size_v for _, _, size_v in points}):
         p = [driver.p(at) for at, _, size_v in points if size_v == volts]
-        apparent = [seen for _, seen, size_v in points if size_v == volts]
+        apparent = [size_seen for _, size_seen, size_v in points if size_v == volts]
         try:
             laws.append((volts / driver.span, law_of_sizes(p, apparent, size, volts / driver.span)))
         except Unphysical as reason:

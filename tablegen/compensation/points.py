@@ -115,7 +115,20 @@ def between_points(rows: Rows, v: float, v_max: float) -> tuple[float, float]:
 
 
 def check_size(largest: float, v: float, v_max: float) -> None:
-    """Raise ``Unphysical`` for a scan larger than the largest measured, both of v_max, by more than ``SIZE_REACH``."""
+    """Check that the points of a branch serve a scan of this size.
+
+    Parameters
+    ----------
+    largest, v
+        The largest measured amplitude and that of the scan, both as shares of v_max.
+    v_max
+        Range of the drive in V, for the message.
+
+    Raises
+    ------
+    Unphysical
+        If the scan is larger than the largest measured by more than ``SIZE_REACH``.
+    """
     if v > largest + SIZE_REACH + 1e-9:
         served = at_most((largest + SIZE_REACH) * v_max, 6)
         raise Unphysical(

@@ -1,1 +1,1 @@
-"""The two TOML files as frozen structs with units in their names; every fault at its file, line and key."""
+"""The two TOML files as frozen structs with units in their names; every fault with its file, line and key."""

@@ -65,9 +65,9 @@ class _Decoder:
                 if value in kind.values and isinstance(value, str):
                     return value
                 accepted = ", ".join(map(repr, kind.values))
-                return self._wrong(key, f"{_shown(value)} is not one of {accepted}")
+                return self._wrong(key, f"{_display(value)} is not one of {accepted}")
             case types.BoolType():
-                return value if isinstance(value, bool) else self._wrong(key, f"{_shown(value)} is not true or false")
+                return value if isinstance(value, bool) else self._wrong(key, f"{_display(value)} is not true or false")
         raise NotImplementedError(kind)  # pragma: no cover - a type that the schema does not use
 
     def _union(self, kind: types.UnionType, value: Any, key: str) -> Any:
@@ -78,17 +78,17 @@ class _Decoder:
             return self._any(next(t for t in some if (t in arrays) == isinstance(value, list)), value, key)
         words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
         if len(some) > 1 and isinstance(value, str):
-            wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
+            wrong = f"{_display(value)} is not a number, nor {' or '.join(map(repr, words))}"
             return value if value in words else self._wrong(key, wrong)
         return self._any(next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key)
 
     def struct(self, kind: type[Struct], value: Any, key: str) -> Any:
         if not isinstance(value, dict):
-            return self._wrong(key, f"{_shown(value)} is not a table")
+            return self._wrong(key, f"{_display(value)} is not a table")
         valid, built = True, {}
         if kind is Hysteresis:
             known_model = self._model(value, key)
-            if known_model is None:  # nobody knows its keys
+            if known_model is None:  # the keys of an unknown model are unknown
                 return _ALREADY_REPORTED
             kind = known_model
         known = _fields(kind)
@@ -120,7 +120,7 @@ class _Decoder:
         name = value.get("model", models.DEFAULT)
         try:
             if not isinstance(name, str):
-                raise models.UnknownModel(f"{_shown(name)} is not one of {', '.join(map(repr, models.names()))}")
+                raise models.UnknownModel(f"{_display(name)} is not one of {', '.join(map(repr, models.names()))}")
             return models.get(name)
         except models.UnknownModel as why:
             self._wrong(join_key(key, "model"), str(why))
@@ -128,7 +128,7 @@ class _Decoder:
 
     def _list(self, kind: types.ListType, value: Any, key: str) -> Any:
         if not isinstance(value, list):
-            return self._wrong(key, f"{_shown(value)} is not an array")
+            return self._wrong(key, f"{_display(value)} is not an array")
         if kind.min_length is not None and len(value) < kind.min_length:
             return self._wrong(key, f"{len(value)} entries are too few, at least {kind.min_length} are needed")
         if kind.max_length is not None and len(value) > kind.max_length:
@@ -139,7 +139,7 @@ class _Decoder:
     def _tuple(self, kind: types.TupleType, value: Any, key: str) -> Any:
         count = len(kind.item_types)
         if not isinstance(value, list) or len(value) != count:
-            return self._wrong(key, f"{_shown(value)} is not an array of {count} numbers")
+            return self._wrong(key, f"{_display(value)} is not an array of {count} numbers")
         built = [
             self._any(t, item, f"{key}[{i}]") for i, (t, item) in enumerate(zip(kind.item_types, value, strict=True))
         ]
@@ -147,7 +147,7 @@ class _Decoder:
 
     def _number(self, kind: types.FloatType, value: Any, key: str) -> Any:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            return self._wrong(key, f"{_shown(value)} is not a number")
+            return self._wrong(key, f"{_display(value)} is not a number")
         if isinstance(value, float) and not math.isfinite(value):
             return self._wrong(key, f"{value} is not a finite number")
         if not self._in_range(kind, value, key):
@@ -158,27 +158,27 @@ class _Decoder:
         if isinstance(value, bool) or not isinstance(value, int):
             whole = isinstance(value, float) and value.is_integer() and abs(value) < 1e15
             return self._wrong(
-                key, f"{value!r} has to be written {value:.0f}" if whole else f"{_shown(value)} is not a whole number"
+                key, f"{value!r} has to be written {value:.0f}" if whole else f"{_display(value)} is not a whole number"
             )
         return value if self._in_range(kind, value, key) else _ALREADY_REPORTED
 
     def _in_range(self, kind: types.FloatType | types.IntType, value: float, key: str) -> bool:
-        shown = _shown(value)
+        text = _display(value)
         if kind.le is not None and value > kind.le:
-            self._wrong(key, f"{shown} is above {kind.le:.12g}")
+            self._wrong(key, f"{text} is above {kind.le:.12g}")
         elif kind.ge is not None and value < kind.ge:
-            self._wrong(key, f"{shown} is below {kind.ge:.12g}")
+            self._wrong(key, f"{text} is below {kind.ge:.12g}")
         elif kind.lt is not None and value >= kind.lt:
-            self._wrong(key, f"{shown} is not below {kind.lt:.12g}")
+            self._wrong(key, f"{text} is not below {kind.lt:.12g}")
         elif kind.gt is not None and value <= kind.gt:
-            self._wrong(key, f"{shown} is not above {kind.gt:.12g}")
+            self._wrong(key, f"{text} is not above {kind.gt:.12g}")
         else:
             return True
         return False
 
     def _text(self, kind: types.StrType, value: Any, key: str) -> Any:
         if not isinstance(value, str):
-            return self._wrong(key, f"{_shown(value)} is not a text in quotes")
+            return self._wrong(key, f"{_display(value)} is not a text in quotes")
         if kind.min_length is not None and len(value) < kind.min_length:
             return self._wrong(key, "is empty")
         if kind.max_length is not None and len(value) > kind.max_length:
@@ -224,7 +224,7 @@ def _suggestion(name: str, known: list[str], written: dict[str, Any]) -> str:
     return f"did you mean {' or '.join(likely)}?{unit}"
 
 
-def _shown(value: Any) -> str:
+def _display(value: Any) -> str:
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list):
@@ -238,5 +238,5 @@ def _shown(value: Any) -> str:
         return short if float(short) == value else repr(value)
     if isinstance(value, date | time):
         return f"the date or time {value}"
-    shown = repr(value)
-    return shown if len(shown) <= 60 else shown[:57] + "..."
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -210,8 +210,8 @@ def _contradictions(tables: _Tables, scanner_file: Document) -> list[tuple[str, 
                     line = scanner_file.line_of(theirs)
                     at = f"{scanner_file.name}:{line}" if line else scanner_file.name
                     differences[f"{part}.{name}", theirs] = (
-                        f"{_shown(values[0])}, and {theirs} is {_shown(values[1])} at {at}; the scanner file's is that "
-                        "of the instrument: remove this key, or correct the other"
+                        f"{_display(values[0])}, and {theirs} is {_display(values[1])} at {at}; the scanner file's is "
+                        "that of the instrument: remove this key, or correct the other"
                     )
     return [(key, why) for (key, _), why in differences.items()]
 
@@ -265,7 +265,7 @@ def _place_text(hardware: AxisHardware, key: str, files: Mapping[bool, Document]
     return f"{place.key} at line {line}" if line else place.key
 
 
-def _shown(value: object) -> str:
+def _display(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:.12g}" if isinstance(value, float) else repr(value)

@@ -214,8 +214,8 @@ class _ScanSolver:
         limit = y.band_limit
         if y.off:
             limit = structs.replace(limit, harmonics=1)
-        chosen = "window" not in self._written_keys("band_limit") and frame.window != limit.window
-        short = chosen and limit.harmonics is None and limit.cutoff_hz is None
+        own_window = "window" not in self._written_keys("band_limit") and frame.window != limit.window
+        short = own_window and limit.harmonics is None and limit.cutoff_hz is None
         if short and limit.method == "window":
             count = _carried(y, frame.lines)
             limit = structs.replace(limit, harmonics=count)
@@ -231,8 +231,8 @@ class _ScanSolver:
         if timing.frame_rate_hz is not None:
             self._written_as["timing.line_rate_hz"] = ("timing.frame_rate_hz", 1.0 / frame.lines)
             rate = float(exact(timing.frame_rate_hz) * frame.lines)
-            shown = f"{timing.frame_rate_hz:g} Hz frames of {frame.lines} line periods"
-            self._choices.append(f"{shown}: {rate:.6g} Hz lines")
+            text = f"{timing.frame_rate_hz:g} Hz frames of {frame.lines} line periods"
+            self._choices.append(f"{text}: {rate:.6g} Hz lines")
             return rate
         key = next(key for key in RATES[2:] if getattr(timing, key) is not None)
         assert x.size_nm is not None

@@ -1,4 +1,4 @@
-"""The key ``[y] like = "x"``: y inherits the keys of x unless it has its own, on the values as they were written."""
+"""The key ``[y] like = "x"``: y inherits the keys of x unless it has its own, on the values as written."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -75,7 +75,7 @@ def _merged(
 ) -> dict[str, Any]:
     """Return the keys of y, and those of x that it does not replace; ``path`` is that of the table below the axis."""
     if path == "hysteresis" and "model" in y and y["model"] != x.get("model", y["model"]):
-        return dict(y)  # the keys of another model mean nothing to it
+        return dict(y)  # the keys of another model do not apply
     instead = _INSTEAD.get(path, _NOTHING)
     skipped = {key for own in y for key in instead.get(own, ())}
     merged = dict(y)

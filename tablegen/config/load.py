@@ -121,7 +121,7 @@ def read_scan_file(path: Path) -> tuple[dict[str, Any], Document]:
         If it is not a scan file.
     """
     values, scan_file = read_toml(path, str(path))
-    if "v_max" in values and not _is_scan(values):  # else every key of it is a fault, and none says this
+    if "v_max" in values and not _is_scan(values):  # otherwise every key of it would be reported, and not this
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
     return values, scan_file
@@ -161,7 +161,7 @@ def assemble_setup(
         known_values, known, scanner_file = scanners[scanner_path]
         check_hardware(values, known_values, scan_file, scanner_file, problems)
         return _setup(scan, known, values, scan_file, scanner_file, scanner_path.parent, problems)
-    if not os.path.isfile(scanner_path):  # unlike the method of Path it never raises
+    if not os.path.isfile(scanner_path):  # os.path.isfile never raises, unlike the method of Path
         problems.add(
             scan_file, "scanner", f"{shown_path(scanner_path)} is not a file; the path is relative to this file"
         )
@@ -353,8 +353,8 @@ def _check_ways(key: str, written: Mapping[str, Any], file: Document, problems: 
         first, second = (next(name for name in way if name in written) for way in used[:2])
         problems.add(file, f"{key}.{second}", f"{first} is given as well; keep one of the ways")
     elif missing := [name for name in used[0] if name not in written]:
-        given = next(name for name in used[0] if name in written)
-        problems.add(file, f"{key}.{missing[0]}", f"missing beside {given}")
+        other = next(name for name in used[0] if name in written)
+        problems.add(file, f"{key}.{missing[0]}", f"missing beside {other}")
 
 
 def _check_response(key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
@@ -403,7 +403,7 @@ def _band_limit_faults(limit: BandLimit) -> list[tuple[str, str]]:
         "harmonics": limit.harmonics == "fewest",
     }
     why = f"method = '{limit.method}' keeps no scaling error; take method = 'window'"
-    return [(key, why) for key, given in keys.items() if given]
+    return [(key, why) for key, is_set in keys.items() if is_set]
 
 
 def _table_faults(table: Table) -> list[tuple[str, str]]:

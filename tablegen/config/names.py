@@ -41,7 +41,7 @@ _RESERVED = frozenset(
 _RUNTIME = "dac"  # dac_link.h, dac_axis.v, DAC_PARKED, ...
 
 # Names of files, since NAME.h and NAME.c are written: headers of the C library, the runtime's own, devices of Windows.
-_TAKEN_FILES = frozenset(
+_RESERVED_FILES = frozenset(
     """
     assert aux com1 com2 com3 com4 com5 com6 com7 com8 com9 complex con ctype errno fenv float inttypes iso646 limits
     locale lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 lpt8 lpt9 math nul prn program_loader setjmp signal stdalign stdarg
@@ -60,7 +60,7 @@ def why_not_a_name(name: str) -> str | None:
         return f"{name!r} is reserved in C++ or refused by VHDL; accepted is {accepted}, none at the end"
     if name.lower().split("_")[0] == _RUNTIME:
         return f"{name!r} begins as the files and identifiers of the sequencer do, {_RUNTIME}_...; put a word before it"
-    if name.lower() in _TAKEN_FILES:
+    if name.lower() in _RESERVED_FILES:
         return f"{name!r} would make a {name}.h that hides another file of that name; add to it"
     if name.lower() in _RESERVED:
         return f"{name!r} is a reserved word of C, C++, Verilog, SystemVerilog or VHDL"

@@ -46,16 +46,22 @@ def parse_setting(text: str) -> Setting:
         values += _values(item.strip(), origin)
         if len(values) > MOST_VALUES:
             raise _refused(origin, f"has more than {MOST_VALUES} values")
-    seen: set[str] = set()
+    texts: set[str] = set()
     for value in values:
-        if repr(value) in seen:
+        if repr(value) in texts:
             raise _refused(origin, f"has {value!r} twice")
-        seen.add(repr(value))
+        texts.add(repr(value))
     return Setting(key, tuple(values), origin)
 
 
 def check_repeated_keys(settings: "Sequence[Setting]") -> None:
-    """Refuse a key that is given twice, or beside a table that holds it."""
+    """Check that no key is set twice, or beside a table that holds it.
+
+    Raises
+    ------
+    Rejected
+        If a key is.
+    """
     for at, setting in enumerate(settings):
         for other in settings[:at]:
             if setting.key == other.key:

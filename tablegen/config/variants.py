@@ -56,8 +56,8 @@ class Variant:
         return assemble_setup(self.path, self.values, self.file, self.scanners)
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{key} = {value}" for key, value in self.settings.items())
-        return f"<tablegen variant {self.name!r}: {shown or 'as the file has it'}>"
+        text = ", ".join(f"{key} = {value}" for key, value in self.settings.items())
+        return f"<tablegen variant {self.name!r}: {text or 'as the file has it'}>"
 
 
 def variants(
@@ -74,9 +74,9 @@ def variants(
         If the file cannot be read, or names are invalid or equal.
     """
     path = Path(path)
-    chosen = _chosen(settings)
-    check_repeated_keys(chosen)
-    if names := [setting for setting in chosen if setting.parts[0] in ("name", "scans")]:
+    swept = _chosen(settings)
+    check_repeated_keys(swept)
+    if names := [setting for setting in swept if setting.parts[0] in ("name", "scans")]:
         why = f"{names[0].key} is not set: names follow from what is, or stand in [[scans]]"
         raise Rejected([Problem(names[0].origin, 0, "", why)])
     values, file = read_scan_file(path)
@@ -86,21 +86,21 @@ def variants(
         raise Rejected([file.problem("name", why)])
     entries = _entries(values.pop("scans", None), file)
     total = max(len(entries), 1)
-    for setting in chosen:
+    for setting in swept:
         total *= len(setting.values)
     if total > MOST_VALUES:
         raise Rejected([file.problem("", f"{total} scans; one sweep takes at most {MOST_VALUES}")])
     scans: list[Variant] = []
-    labels, scanners = _labels(chosen), Scanners()
-    set_by = {setting.key: setting.origin for setting in chosen}
+    labels, scanners = _labels(swept), Scanners()
+    set_by = {setting.key: setting.origin for setting in swept}
     for entry, base, lines, differs in _bases(entries, values, file):
-        for combination in product(*(setting.values for setting in chosen)):
-            given_here: dict[str, Any] = {}
+        for combination in product(*(setting.values for setting in swept)):
+            swept_values: dict[str, Any] = {}
             settings_of_scan = dict(differs)
-            for setting, value in zip(chosen, combination, strict=True):
-                given_here = _merged(given_here, _nested(setting.parts, value))
+            for setting, value in zip(swept, combination, strict=True):
+                swept_values = _merged(swept_values, _nested(setting.parts, value))
                 settings_of_scan[setting.key] = value
-            own = _over(base, given_here)
+            own = _over(base, swept_values)
             name = _name(entry or library, list(zip(labels, combination, strict=True)), len(scans), total)
             own = {**own, "name": name}
             scans.append(
@@ -248,14 +248,14 @@ def _spelt(value: Any) -> str:
 def _refuse_clashes(scans: Sequence[Variant], library: str) -> None:
     """Refuse names that files or identifiers cannot have, or that two scans share on some disk."""
     problems = []
-    seen: dict[str, str] = {}
+    spellings: dict[str, str] = {}
     for variant in scans:
         if why := why_not_a_name(variant.name):
             problems.append(variant.file.problem("name", why))
         if variant.name.lower() == f"{library}_library".lower():
             problems.append(variant.file.problem("name", f"{variant.name!r} is the name of the index"))
-        other = seen.setdefault(variant.name.lower(), variant.name)
-        if seen[variant.name.lower()] is not variant.name:
+        other = spellings.setdefault(variant.name.lower(), variant.name)
+        if spellings[variant.name.lower()] is not variant.name:
             alike = "is the name of two scans" if other == variant.name else f"and {other!r} are one name on some disks"
             problems.append(variant.file.problem("name", f"{variant.name!r} {alike}"))
     if problems:

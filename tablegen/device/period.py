@@ -28,7 +28,13 @@ class Period:
 
     @property
     def ticks(self) -> Ints:
-        """The number of each tick in the period, (ticks,)."""
+        """The number of each tick in the period, (ticks,).
+
+        Returns
+        -------
+        Ints
+            Shape (ticks,).
+        """
         return np.arange(self.first, self.first + len(self.codes), dtype=np.int64)
 
 

@@ -35,9 +35,19 @@ class PlayedLines:
         self._remainders = program.x.output.begin(), program.y.output.begin()
 
     def unclamped(self, line: int, count: int = 1) -> tuple[Ints, Ints]:
-        """Return codes of x and y on the next lines, from ``line`` of a frame on, before clamp and slew guard.
+        """Return codes of x and y on the next lines, before clamp and slew guard.
 
-        There are ``count`` lines, all of one frame; shapes (ticks,).
+        Parameters
+        ----------
+        line
+            Line of the frame that is the first of them.
+        count
+            Number of lines, all of one frame.
+
+        Returns
+        -------
+        x, y
+            Codes, each of shape (count * ticks of a line,).
         """
         program, ticks = self._program, self._program.schedule.ticks
         y = program.y.unclamped(line * ticks, (line + count) * ticks, self._remainders[1])
@@ -51,7 +61,22 @@ class PlayedLines:
         return self.ticks(line, self.unclamped(line), settled)
 
     def ticks(self, line: int, unclamped: tuple[Ints, Ints], settled: bool = True) -> LineTicks:
-        """Return lines from ``line`` of a frame on as they leave the device, from their codes before the clamp."""
+        """Return lines as they leave the device.
+
+        Parameters
+        ----------
+        line
+            Line of the frame that is the first of them.
+        unclamped
+            Their codes of x and y before the clamp, each of shape (count * ticks of a line,).
+        settled
+            False while the scan settles, when no tick is valid.
+
+        Returns
+        -------
+        LineTicks
+            Codes and markers, each of the shape of the codes.
+        """
         schedule = self._program.schedule
         count = len(unclamped[0]) // schedule.ticks
         first, pixel, backward, inside = (_repeated(marker, count) for marker in self._markers)

@@ -9,7 +9,7 @@ from msgspec import Struct
 from tablegen.numerics.arrays import Floats, Ints
 
 MAXIMUM_LINE_TICKS = 1 << 24
-_EXACT = 1 << 53  # integers below it are floats as they are
+_EXACT = 1 << 53  # integers below it are exact as floats
 
 
 class Window(Struct, frozen=True):
@@ -68,7 +68,18 @@ class Schedule(Struct, frozen=True):
         return self.line_rate / self.lines
 
     def seconds(self, ticks: Ints) -> Floats:
-        """Return the times of ticks, in s from tick 0, of their shape: the nearest float to the exact quotient."""
+        """Return the times of ticks: the nearest float to the exact quotient.
+
+        Parameters
+        ----------
+        ticks
+            Ticks, counted from 0, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Times in s from tick 0, shape (n,).
+        """
         rate = self.update_rate_hz
         if rate.numerator < _EXACT and int(np.max(ticks, initial=0)) * rate.denominator < _EXACT:
             return ticks * rate.denominator / rate.numerator
@@ -83,8 +94,12 @@ class Schedule(Struct, frozen=True):
 def pixel_starts(window: Window, pixels: int) -> Ints:
     """Return the ticks at which pixels start: tick i of the window where floor(i pixels / count) rises.
 
-    A device adds ``pixels`` to an accumulator and subtracts ``count`` when it can: no multiplier. Shape (pixels,) where
-    the window has a tick for each.
+    A device adds ``pixels`` to an accumulator and subtracts ``count`` when it can: no multiplier.
+
+    Returns
+    -------
+    Ints
+        Ticks, ascending, shape (pixels,) where the window has a tick for each.
     """
     i = np.arange(window.count, dtype=np.int64)
     pixel = i * pixels // max(window.count, 1)

@@ -15,7 +15,7 @@ from tablegen.device.schedule import Schedule
 from tablegen.device.slew import limit_slew
 from tablegen.numerics.arrays import Bools, Ints
 
-_MOST_TICKS = 1 << 14  # of lines that are computed at a time, so that they fit the cache
+_MOST_TICKS = 1 << 14  # ticks of lines that are computed at a time, so that they fit the cache
 
 
 class SequencerState(Enum):
@@ -83,7 +83,7 @@ class Sequencer:
             self.codes = self.playing.x.output.park_code, self.playing.y.output.park_code
             self.parked = True
         self._lines: PlayedLines | None = None
-        # The lines that were computed ahead, where their codes are clamped, and which tick of them is the next one.
+        # Lines that were computed ahead, where their codes are clamped, and the next tick in them.
         self._ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
         self._at = 0

@@ -8,7 +8,22 @@ _AHEAD = 256  # ticks of a ramp that are examined at a time
 
 
 def limit_slew(targets: Ints, code: int, step: int) -> Ints:
-    """Return codes of shape (ticks,) that follow ``targets`` from ``code`` on, by at most ``step`` >= 1 a tick."""
+    """Return codes that follow their targets by at most ``step`` a tick.
+
+    Parameters
+    ----------
+    targets
+        Codes that are to be played, one a tick, shape (ticks,).
+    code
+        The code that was played before the first tick.
+    step
+        Codes a tick, at least 1.
+
+    Returns
+    -------
+    Ints
+        Codes that are played, shape (ticks,).
+    """
     codes = targets.copy()
     jumps = np.flatnonzero(np.abs(np.diff(targets)) > step) + 1  # ticks before which the output may be at the target
     at = 0

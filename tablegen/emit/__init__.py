@@ -1,1 +1,1 @@
-"""The plan as files: every emitter renders integers that were made once, and computes nothing."""
+"""The plan as files: every emitter formats integers that were computed before, and computes none."""

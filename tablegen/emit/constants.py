@@ -9,11 +9,11 @@ from tablegen.fixedpoint.synthesis import FRACTION_BITS
 # Constants that may need more than 32 bits: languages that give constants a type give these a wide one in every build.
 WIDE = frozenset({"UPDATE_RATE_MILLIHZ", "PHASE_STEP", "OFFSET_WORD"})
 
-DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # what INTERPOLATED says: the degree between words
+DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # value of INTERPOLATED: the degree between words
 
 
 def scan_constants(content: Content) -> dict[str, int]:
-    """All numbers of a build by their names without the scan's: those of the schedule, then X_... and Y_..."""
+    """Return all numbers of a build by their names without the scan's: those of the schedule, then X_... and Y_..."""
     constants = sequence_constants(content.schedule)
     for axis in content.axes:
         own = axis_constants(axis.program, axis.harmonics)
@@ -28,7 +28,7 @@ def shaping_constants(content: Content) -> dict[str, int]:
 
 
 def sequence_constants(schedule: Schedule) -> dict[str, int]:
-    """Constants of the scan: ticks, lines and pixels."""
+    """Return the constants of the scan: ticks, lines and pixels."""
     return {
         "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
         "LINE_TICKS": schedule.ticks,
@@ -49,7 +49,7 @@ def sequence_constants(schedule: Schedule) -> dict[str, int]:
 
 
 def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
-    """Constants of an axis, whose table comes from so many harmonics."""
+    """Return the constants of an axis, whose table comes from so many harmonics."""
     output = program.output
     return {
         "TABLE_LENGTH": len(program.words),
@@ -86,10 +86,10 @@ def _own_shaping(shaping: Shaping) -> dict[str, int]:
 
 
 def is_wide(name: str) -> bool:
-    """Whether a constant of this name, with X_ or Y_ before it or not, is of 64 bits; all others fit 32."""
+    """Return True if a constant of this name, with X_ or Y_ before it or not, has 64 bits; all others fit 32."""
     return name.removeprefix("X_").removeprefix("Y_") in WIDE
 
 
 def storage_bits(bits: int) -> int:
-    """Bits in which the C holds table words, or converter words, of so many bits."""
+    """Return the bits in which the C holds table words, or converter words, of so many bits."""
     return 16 if bits <= 16 else 32

@@ -1,4 +1,4 @@
-"""What formats render: the integers of a build, and words for its comments.
+"""The content that formats render: the integers of a build, and words for its comments.
 
 ``tablegen.emit.render`` makes it from a plan, ``tablegen.emit.stored`` from a manifest.
 """
@@ -27,12 +27,12 @@ class AxisContent(Struct, frozen=True, eq=False):
 
     @property
     def harmonics(self) -> int:
-        """H, the highest harmonic."""
+        """The highest harmonic H."""
         return len(self.fourier_words) // 2
 
 
 class Content(Struct, frozen=True, eq=False):
-    """A build as formats see it. What stands in comments alone is empty where a manifest is the source."""
+    """A build as formats see it; the content of comments alone is empty where a manifest is the source."""
 
     name: str
     hash: str
@@ -56,5 +56,5 @@ class Content(Struct, frozen=True, eq=False):
 
     @property
     def sine_index_bits(self) -> int:
-        """log2 of the longest interpolated table, whose sine renders all; 0 where no table is rendered."""
+        """The logarithm to base 2 of the longest interpolated table, whose sine renders all; 0 where none is."""
         return max(axis.program.index_bits for axis in self.axes)

@@ -22,8 +22,8 @@ _SUFFIX_RULE = re.compile(
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
     """Write a rule for the target, and a target without a rule for each prerequisite.
 
-    The latter are why a prerequisite that was removed makes its dependents be built again, and not make fail. Names are
-    those of which ``why_unsafe`` says nothing.
+    Because of the latter a removed prerequisite makes its dependents be built again, instead of make fail. All names
+    are safe by ``why_unsafe``.
     """
     names = [_escaped(os.fsencode(path)) for path in prerequisites]
     rule = b" \\\n ".join([_escaped(os.fsencode(target)) + b":", *names])
@@ -36,7 +36,7 @@ def _escaped(name: bytes) -> bytes:
 
 
 def why_unsafe(name: str) -> str | None:
-    """Say why make or Ninja would not take a name for the one that it is, or would run a part of it; None if they do.
+    """Return why make or Ninja would misread a file name or run a part of it; None if neither would.
 
     An escape serves only where both read it alike: Ninja has none for most characters, and reads a backslash before
     another escaped character as a part of the name.
@@ -55,7 +55,7 @@ def why_unsafe(name: str) -> str | None:
     return None
 
 
-# What no build reads, beside the commands: the independent side, and what works out the input of builds.
+# Packages that no build reads, beside the commands: the independent side, and those that prepare the input.
 _OTHER_FOLDERS = (
     *("api", "calibration", "charts", "cli", "comparison", "correction", "fitting", "images", "library", "link"),
     *("refinement", "report", "sweep", "verification", "virtual"),

@@ -1,8 +1,8 @@
-"""A format: what a build can be written as. Each is one file in ``tablegen/emit/formats/``, or an entry point.
+"""The interface of a format of a build: a file in ``tablegen/emit/formats/``, or an entry point.
 
-A format declares its name, what it is for and its files; it renders integers that are made already, and says how its
-files are held against a manifest. Everything else (the writer, ``--check``, dependency files, removal of files that are
-no longer made, ``tablegen verify``) goes through all formats of a build alike.
+A format declares its name, its purpose and its files; it renders integers that were computed before, and compares its
+files with a manifest. Everything else (the writer, ``--check``, dependency files, removal of outdated files,
+``tablegen verify``) goes through all formats of a build alike.
 """
 
 from abc import ABC, abstractmethod
@@ -18,7 +18,7 @@ from tablegen.emit.content import Content
 
 
 class Comparison(Struct, frozen=True):
-    """Files of a build held against its manifest: what was compared, and every difference in a sentence."""
+    """The comparison of files of a build with its manifest: what was compared, and every difference in a sentence."""
 
     subject: str
     compared: str
@@ -26,7 +26,7 @@ class Comparison(Struct, frozen=True):
 
 
 class Format(ABC):
-    """What a build can be written as. A subclass sets ``name``, ``purpose`` and ``file_names``, and renders."""
+    """A format of a build; a subclass sets ``name``, ``purpose`` and ``file_names``, and renders."""
 
     name: ClassVar[str]
     """How ``[emit] formats`` and ``--format`` call it: lower-case letters, digits and hyphens."""
@@ -39,14 +39,20 @@ class Format(ABC):
 
     @abstractmethod
     def files(self, content: Content) -> dict[str, bytes]:
-        """Render the files of a build by name, without the runtime. Raises ``Unphysical`` if it cannot hold it."""
+        """Render the files of a build by name, without the runtime.
+
+        Raises
+        ------
+        Unphysical
+            If the format cannot hold the build.
+        """
 
     def runtime(self) -> list[Path]:
-        """Files that go with it unchanged, such as a sequencer."""
+        """Return the files that go with the format unchanged, such as a sequencer."""
         return []
 
     def sources(self) -> list[Path]:
-        """Files beside its module that decide what it writes: templates, and the runtime."""
+        """Return the files beside its module that decide what it writes: templates, and the runtime."""
         return self.runtime()
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
@@ -64,7 +70,7 @@ class Format(ABC):
         return [Comparison("files", f"{count} file{'s' if count != 1 else ''}", wrong)]
 
     def _first_difference(self, stored: bytes, right: bytes) -> str | None:
-        """Where a file and what the manifest makes of it differ first, but for the comment at the beginning."""
+        """Describe the first difference of a file from the manifest's, but for the comment at the beginning."""
         skipped, body = self._after_comment(stored)
         expected = self._after_comment(right)[1]
         if body == expected:
@@ -81,7 +87,7 @@ class Format(ABC):
         return f"has {skipped + len(ours)} lines, {skipped + len(others)} by the manifest"
 
     def _after_comment(self, content: bytes) -> tuple[int, bytes]:
-        """How many lines of comment a file begins with, which no manifest has, and what follows."""
+        """Count the lines of comment at the beginning of a file, which no manifest has, and return those after them."""
         lines, skipped = content.splitlines(keepends=True), 0
         if self.comment is not None:
             mark = self.comment.encode("ascii")
@@ -95,13 +101,13 @@ def differing(name: str, stored: Mapping[str, int | str], expected: Mapping[str,
     wrong = []
     for key, value in expected.items():
         if key not in stored:
-            wrong.append(f"{name}: {key} is missing, it is {_shown(value)} in the manifest")
+            wrong.append(f"{name}: {key} is missing, it is {_display(value)} in the manifest")
         elif stored[key] != value:
-            wrong.append(f"{name}: {key} is {_shown(stored[key])}, it is {_shown(value)} in the manifest")
+            wrong.append(f"{name}: {key} is {_display(stored[key])}, it is {_display(value)} in the manifest")
     return wrong + [f"{name}: {key} is not in the manifest" for key in stored if key not in expected]
 
 
-def _shown(value: int | str) -> str:
+def _display(value: int | str) -> str:
     return repr(value) if isinstance(value, str) else f"{value:x}" if abs(value) >= 1 << 64 else str(value)
 
 

@@ -15,7 +15,7 @@ from tablegen.numerics.arrays import Ints
 
 
 class Memory(Struct, frozen=True, eq=False):
-    """Words that a device holds in one memory; ``name`` is x, y, x_fourier, y_fourier, program or sine.
+    """The words of one memory of a device; ``name`` is x, y, x_fourier, y_fourier, program or sine.
 
     ``words`` are integers of ``bits`` bits, in two's complement but for the program's registers, which are unsigned.
     """
@@ -27,15 +27,15 @@ class Memory(Struct, frozen=True, eq=False):
 
     @property
     def word_bytes(self) -> int:
-        """Bytes of a word in files of bytes: 1, 2 or 4, the least that hold it."""
+        """The bytes of a word in files of bytes: 1, 2 or 4, the least that hold it."""
         return 1 if self.bits <= 8 else 2 if self.bits <= 16 else 4
 
     def hexadecimal(self) -> list[str]:
-        """Each word in two's complement of ``bits`` bits, in as many digits as these take."""
+        """Return each word in two's complement of ``bits`` bits, in as many digits as these take."""
         return memory_file(self.words, self.bits).decode("ascii").split()
 
     def raw(self) -> bytes:
-        """Each word in ``word_bytes`` bytes, sign-extended, the least significant byte first."""
+        """Return each word in ``word_bytes`` bytes, sign-extended, the least significant byte first."""
         mask = (1 << 8 * self.word_bytes) - 1
         return np.array([word & mask for word in self.words], dtype=f"<u{self.word_bytes}").tobytes()
 
@@ -45,13 +45,26 @@ class Memory(Struct, frozen=True, eq=False):
 
 
 def memories(content: Content) -> list[Memory]:
-    """All tables of a build: what its ``.mem`` files hold, in the same order."""
+    """Return all tables of a build: the content of its ``.mem`` files, in the same order."""
     fourier = {axis.axis: axis.fourier_words for axis in content.axes}
     return _memories(content.schedule, content.x.program, content.y.program, fourier)
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
-    """Write the words, each in as many hexadecimal digits as ``bits`` take."""
+    """Write words, each in as many hexadecimal digits as ``bits`` take.
+
+    Parameters
+    ----------
+    words
+        Integers of up to ``bits`` bits, negative ones in two's complement, shape (n,).
+    bits
+        Word length.
+
+    Returns
+    -------
+    bytes
+        A line a word.
+    """
     digits, mask = -(-bits // 4), (1 << bits) - 1
     values = np.asarray(words if isinstance(words, np.ndarray | list) else list(words), dtype=np.int64)
     if len(values) and digits % 2 == 0:  # whole bytes, which are spelled all at once
@@ -63,11 +76,21 @@ def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
 def memory_files(
     name: str, schedule: Schedule, x: Program, y: Program, fourier: Mapping[Literal["x", "y"], Ints]
 ) -> dict[str, bytes]:
-    """All memory files of a build by their names; ``fourier`` has the Fourier words of "x" and "y" in order.
+    """Write all memory files of a build.
 
     The registers are those for uploaded tables: a host that uploads Fourier words instead writes HARMONICS over the
     last register of their axis, which is 0 here. The quarter sine is that of the longest interpolated table, and serves
     shorter ones too; where no table is interpolated there is none.
+
+    Parameters
+    ----------
+    fourier
+        Fourier words of "x" and "y" in order, Q2.30, each of shape (2 H + 1,).
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by file name.
     """
     memories = _memories(schedule, x, y, fourier)
     return {f"{name}_{memory.name}.mem": memory_file(memory.words, memory.bits) for memory in memories}

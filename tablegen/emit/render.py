@@ -1,4 +1,4 @@
-"""A plan and its certificates to a map of file name to content; nothing touches the disk here."""
+"""From a plan and its certificates to a map of file name to content, in memory alone."""
 
 import re
 from collections.abc import Sequence
@@ -21,14 +21,30 @@ from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifes
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.version import __version__
 
-_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
+_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # names of plain files that manifests can list
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:
-    """Every file of a build by name: those of its formats, what goes with them, and the manifest last.
+    """Render every file of a build by name: those of its formats, what goes with them, and the manifest last.
 
-    ``formats`` are those of the plan unless given. Raises ``UnknownFormat``, and ``Unphysical`` for a scan that a
-    format cannot hold.
+    Parameters
+    ----------
+    formats
+        Names of formats; by default those of the plan.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by file name.
+
+    Raises
+    ------
+    UnknownFormat
+        If a format is unknown, or writes a file that another one or the runtime has.
+    Unphysical
+        If a format cannot hold the scan.
+    FormatFailed
+        If a format of another distribution fails.
     """
     chosen_formats = chosen(plan.formats if formats is None else formats)
     record = plan_record(plan)
@@ -95,7 +111,7 @@ def render_scan(
 
 
 def _unreadable(setup: Setup, plan: Plan, error: UnreadableManifest) -> Problem:
-    """Say that no command would take the build, and why; at the table that makes its manifest too long."""
+    """Return the problem of a build that no command could read, at the table that makes its manifest too long."""
     key, why = "", f"manifest.json of this build would be refused when it is read back: {error}"
     longest = max(plan.lines, key=lambda line: len(line.program.words))
     if isinstance(error, TooLongManifest) and longest.program.mode == "direct":

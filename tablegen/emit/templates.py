@@ -49,12 +49,23 @@ def _environment(literal: Callable[[int], str], filters: tuple[tuple[str, Callab
 
 
 def comment_safe(text: str) -> str:
-    """Text on one line of ASCII that can neither begin nor end a comment, nor continue a line."""
+    """Return text on one line of ASCII that can neither begin nor end a comment, nor continue a line."""
     plain = text.encode("unicode_escape").decode("ascii").replace("\\", "/")
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("?", ".").rstrip()  # ??/ is a backslash in C99
 
 
 def rows(words: Ints | list[str]) -> list[str]:
-    """Words as lines of text, ten a line, with commas between; those that are text already as they are."""
+    """Format words as lines of text, ten a line, with commas between.
+
+    Parameters
+    ----------
+    words
+        Integers, shape (n,), or their texts.
+
+    Returns
+    -------
+    list of str
+        The lines, without a comma at their ends.
+    """
     values = words if isinstance(words, list) else [str(word) for word in words.tolist()]
     return [", ".join(values[i : i + _WORDS_PER_ROW]) for i in range(0, len(values), _WORDS_PER_ROW)]

@@ -15,7 +15,7 @@ MOST_TICKS = 1 << 22
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """A line of x or a frame of y. All arrays have the shape (ticks,).
+    """A line of x or a frame of y; all arrays have the shape (ticks,).
 
     ``time_s`` begins with the period, in s; ``volts`` are those at the piezo that the codes make; ``codes`` are
     straight binary, 0 .. 2^dac_bits - 1; ``markers`` are ``start``, ``line``, ``pixel``, ``backward`` and ``inside``.
@@ -35,7 +35,13 @@ def waveforms(content: Content) -> tuple[Waveform, Waveform]:
 
 
 def require_period(content: Content) -> None:
-    """Raise ``Unphysical`` for codes without a period, and for a frame that would make a file of 100 MB and more."""
+    """Check that a build has a period, of a size that a file of samples can have.
+
+    Raises
+    ------
+    Unphysical
+        If codes are shaped and so have no period, or if a frame would make a file of 100 MB and more.
+    """
     if any(axis.program.output.shaping.order for axis in content.axes):
         raise Unphysical(
             "a file of samples has one period, and shaped codes have none: their remainders run on from line to line; "

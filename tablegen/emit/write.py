@@ -1,4 +1,4 @@
-"""One writer: a map of file name to content, put on disk whole or not at all; and what an earlier build has left."""
+"""The writer of files: a map of file name to content, on disk whole or not at all; and leftovers of earlier builds."""
 
 import errno
 import os
@@ -20,22 +20,34 @@ _LITTER = re.compile(rf"{re.escape(_STAGED)}[a-z0-9_]{{8}}")  # as ``mkstemp`` n
 
 
 class CannotWrite(Exception):
-    """The output directory could not be written; what stood there before still stands."""
+    """The failure to write the output directory, whose earlier content still stands."""
 
 
 class NoPlace(CannotWrite):
-    """A pipe or a device stands where a file or a directory has to go: no disk is at fault, but what was asked for."""
+    """A pipe or a device where a file or a directory has to go: the request is wrong, and no disk is."""
 
 
 def write_files(
     folder: Path, files: Mapping[str, bytes], outdated: Sequence[str] | Callable[[], Sequence[str]] = ()
 ) -> list[str]:
-    """Write what changed, remove what is ``outdated``, and return the names of what was written, in order.
+    """Write what changed, remove what is outdated, and return the names of what was written, in order.
 
     Everything is first written beside its place and only then renamed into it, the manifest last: a full disk or
     an interruption leaves the directory as it was, or with a manifest that ``build --check`` finds stale. So does a cut
     of power: what was renamed has reached the disk before the manifest is. Two writers of one directory take turns, and
-    what one that was killed has left behind is removed. ``outdated`` may be a function, which is asked in one's turn.
+    what one that was killed has left behind is removed.
+
+    Parameters
+    ----------
+    outdated
+        Names of files to remove, or a function that returns them while the directory is locked.
+
+    Raises
+    ------
+    NoPlace
+        If something else than a directory is at ``folder``.
+    CannotWrite
+        If the system refuses to write.
     """
     if (other := other_than_file(folder)) not in (None, "a directory"):
         raise NoPlace(f"{folder}: is {other}, where a directory has to go")
@@ -84,7 +96,7 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
 
 @contextmanager
 def _removed_if_empty(new_folders: Sequence[Path]) -> Iterator[None]:
-    """Directories that were made, the innermost first, go again at the end if nothing came to stand in them."""
+    """Remove new directories at the end, the innermost first, if no file came to stand in them."""
     try:
         yield
     finally:
@@ -110,7 +122,13 @@ def _settle_files(paths: Sequence[Path]) -> None:
 
 
 def settle(folder: Path) -> None:
-    """Let what was renamed and removed in a directory reach the disk, where the system can."""
+    """Let what was renamed and removed in a directory reach the disk, where the system can.
+
+    Raises
+    ------
+    OSError
+        If the disk reports an error.
+    """
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:  # Windows opens no directories
@@ -125,10 +143,10 @@ def settle(folder: Path) -> None:
 
 
 def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
-    """List the files of an earlier build that this one does not make, in order.
+    """List the files of an earlier build that this one does not write, in order.
 
     They are files that a manifest of ours lists, whose hash is that of its plan; their names are those of a build, and
-    their content is unchanged. A file that somebody has edited since is not among them; ``leftover_files`` names it.
+    their content is unchanged. A user-modified file is not among them; ``leftover_files`` names it.
     """
     files = set(files)
     try:
@@ -140,12 +158,12 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def names_of_build(build: str, names: Iterable[str]) -> list[str]:
-    """Those names that files of a build of this name can have: its own begin with it, others are the sequencer's."""
+    """Return those names that a build of this name can have: its own begin with it, others are the runtime's."""
     return [name for name in names if name.startswith((f"{build}.", f"{build}_")) or of_the_runtime(name)]
 
 
 def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
-    """Files that look like a build's and are not of this one, nor outdated: a glob such as ``dac_*.v`` takes them.
+    """List files that look like a build's and are not of this one, nor outdated: a glob such as ``dac_*.v`` takes them.
 
     They begin with ``dac_`` and have the suffix of a file of the build, or an earlier manifest lists them.
     """

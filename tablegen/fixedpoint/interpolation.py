@@ -32,20 +32,64 @@ def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
 
     sample = t0 2^G + round((t1 - t0) fraction / 2^(15 - G)), ties up; the word after the last is the first.
     |t1 - t0| < 2^24 and fraction < 2^15, hence the product stays below 2^39.
+
+    Parameters
+    ----------
+    table
+        Words of up to 24 bits, shape (2^P,).
+    phase
+        Phases of 32 bits, any shape.
+    guard
+        G, the bits of a sample below the LSB of a word.
+
+    Returns
+    -------
+    Ints
+        Samples with ``guard`` bits below the word's LSB, shape of ``phase``.
     """
     index_bits = index_bits_of(len(table))
     index = phase >> (PHASE_BITS - index_bits)
     fraction = (phase >> (PHASE_BITS - index_bits - FRACTION_BITS)) & ((1 << FRACTION_BITS) - 1)
     here: Ints = table[index]
     there: Ints = table[(index + 1) & (len(table) - 1)]
-    return between(here, there, fraction, guard)
+    return lerp(here, there, fraction, guard)
 
 
-def between(here: Ints, there: Ints, fraction: Ints, guard: int) -> Ints:
-    """Return the sample at a fraction in [0, 2^15) of the way from one word to the next; monotonic in the fraction."""
+def lerp(here: Ints, there: Ints, fraction: Ints, guard: int) -> Ints:
+    """Return the sample at a fraction in [0, 2^15) of the way from one word to the next; monotonic in the fraction.
+
+    Parameters
+    ----------
+    here, there
+        Consecutive words, of one shape.
+    fraction
+        Whole numbers of 15 bits, of the shape of the words.
+    guard
+        Bits of a sample below the LSB of a word.
+
+    Returns
+    -------
+    Ints
+        Samples, of the same shape.
+    """
     return (here << guard) + shift_round((there - here) * fraction, FRACTION_BITS - guard)
 
 
 def direct(table: Ints, k: Ints, guard: int) -> Ints:
-    """Return samples of a table with one word an advance: word k times 2^G."""
+    """Return samples of a table with one word an advance: word k times 2^G.
+
+    Parameters
+    ----------
+    table
+        Words, shape (ticks of a period,).
+    k
+        Advances in [0, len(table)), any shape.
+    guard
+        G, the bits of a sample below the LSB of a word.
+
+    Returns
+    -------
+    Ints
+        Samples, shape of ``k``.
+    """
     return np.asarray(table[k] << guard)

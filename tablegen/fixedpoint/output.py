@@ -41,23 +41,66 @@ class Output(Struct, frozen=True):
         return shift_round(self.offset_word, self.gain_q)
 
     def unclamped(self, sample: Ints) -> Ints:
-        """Return codes before the clamp, of the shape of ``sample``.
+        """Return codes before the clamp, unshaped.
 
         |gain_word| <= 2^17 and |sample| <= 2^24 give a product of at most 2^41; |offset_word| < 2^42 by
         construction; the sum and its rounding stay below 2^43.
+
+        Parameters
+        ----------
+        sample
+            Samples of the table, any shape.
+
+        Returns
+        -------
+        Ints
+            Codes, shape of ``sample``.
         """
         return shift_round(self.gain_word * sample + self.offset_word, self.gain_q)
 
     def unrounded(self, sample: Ints) -> Floats:
-        """Return codes before the rounding, as real numbers, of the shape of ``sample``."""
+        """Return codes before the rounding, as real numbers.
+
+        Parameters
+        ----------
+        sample
+            Samples of the table, any shape.
+
+        Returns
+        -------
+        Floats
+            Codes in LSB of the converter, shape of ``sample``.
+        """
         return np.asarray((self.gain_word * sample + self.offset_word) / float(1 << self.gain_q))
 
     def code(self, sample: Ints) -> Ints:
-        """Return codes as the converter plays them, without shaping, of the shape of ``sample``."""
+        """Return codes as the converter plays them, without shaping.
+
+        Parameters
+        ----------
+        sample
+            Samples of the table, any shape.
+
+        Returns
+        -------
+        Ints
+            Codes in [code_min, code_max], shape of ``sample``.
+        """
         return self.clamp(self.unclamped(sample))
 
     def clamp(self, codes: Ints) -> Ints:
-        """Return codes within the limits of this axis."""
+        """Return codes within the limits of this axis.
+
+        Parameters
+        ----------
+        codes
+            Codes of any size and shape.
+
+        Returns
+        -------
+        Ints
+            Codes in [code_min, code_max], shape of ``codes``.
+        """
         return np.clip(codes, self.code_min, self.code_max)
 
     def begin(self) -> Remainders:
@@ -65,11 +108,35 @@ class Output(Struct, frozen=True):
         return Remainders(self.shaping, remainder_bits(self.dac_bits))
 
     def shaped(self, sample: Ints, remainders: Remainders) -> Ints:
-        """Return codes before the clamp at consecutive ticks, shape (n,), and update ``remainders``."""
-        return remainders.codes(self.fed(sample)) if self.shaping.order else self.unclamped(sample)
+        """Return codes before the clamp at consecutive ticks, and update ``remainders``.
 
-    def fed(self, sample: Ints) -> Ints:
-        """Return the input of shaping: codes with ``remainder_bits`` fraction bits, and half a code more."""
+        Parameters
+        ----------
+        sample
+            Samples of the table, shape (n,).
+        remainders
+            Those that the tick before the first has left.
+
+        Returns
+        -------
+        Ints
+            Codes, shape (n,).
+        """
+        return remainders.codes(self.shaping_input(sample)) if self.shaping.order else self.unclamped(sample)
+
+    def shaping_input(self, sample: Ints) -> Ints:
+        """Return the input of shaping: codes with ``remainder_bits`` fraction bits, and half a code more.
+
+        Parameters
+        ----------
+        sample
+            Samples of the table, any shape.
+
+        Returns
+        -------
+        Ints
+            Fixed-point codes, shape of ``sample``.
+        """
         half = 1 << (self.gain_q - 1)
         return (self.gain_word * sample + self.offset_word + half) >> (self.gain_q - remainder_bits(self.dac_bits))
 

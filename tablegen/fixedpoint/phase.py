@@ -33,5 +33,16 @@ class RationalPhase(Struct, frozen=True):
         return (1 << PHASE_BITS) % self.ticks
 
     def at(self, k: Ints) -> Ints:
-        """Return floor(k 2^32 / L) for k in [0, L): k < 2^31, hence k 2^32 < 2^63."""
+        """Return floor(k 2^32 / L); k < 2^31, hence k 2^32 < 2^63.
+
+        Parameters
+        ----------
+        k
+            Advances in [0, L), any shape.
+
+        Returns
+        -------
+        Ints
+            Phases in [0, 2^32), shape of ``k``.
+        """
         return (np.asarray(k, dtype=np.int64) << PHASE_BITS) // self.ticks

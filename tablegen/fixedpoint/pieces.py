@@ -38,15 +38,47 @@ class Pieces(Struct, frozen=True, eq=False):
     index_bits: int
 
     def ends_of_samples(self) -> Ints:
-        """Return the first and the last sample of each piece, of shape (2, n)."""
+        """Return the first and the last sample of each piece.
+
+        Returns
+        -------
+        Ints
+            Shape (2, n).
+        """
         return np.stack([self.base + shift_round(self.slope * f, self.shift) for f in (self.begins, self.ends - 1)])
 
     def first_fraction(self, piece: Ints, sample: Ints) -> Ints:
-        """Return the least fractions at which these pieces reach these samples, both of shape (n,)."""
+        """Return the least fractions at which these pieces reach these samples.
+
+        Parameters
+        ----------
+        piece
+            Indices of pieces, shape (m,).
+        sample
+            A sample for each of them, shape (m,).
+
+        Returns
+        -------
+        Ints
+            Fractions with ``fraction_bits`` bits, shape (m,).
+        """
         return _first_fraction(self.slope[piece], sample - self.base[piece], self.shift)
 
     def phase(self, piece: Ints, fraction: Ints) -> Ints:
-        """Return the least phases of 32 bits that have these fractions of the segments of these pieces."""
+        """Return the least phases of 32 bits that have these fractions of the segments of these pieces.
+
+        Parameters
+        ----------
+        piece
+            Indices of pieces, shape (m,).
+        fraction
+            A fraction with ``fraction_bits`` bits for each of them, shape (m,).
+
+        Returns
+        -------
+        Ints
+            Phases in [0, 2^32), shape (m,).
+        """
         place = (self.segment[piece] << self.fraction_bits) | fraction
         return np.asarray(place << (PHASE_BITS - self.fraction_bits - self.index_bits))
 

@@ -57,7 +57,18 @@ class Program(Struct, frozen=True, eq=False):
         return 0 if self.mode == "direct" else index_bits_of(len(self.words))
 
     def resting(self, words: Ints) -> Ints:
-        """Return the samples of constant tables, one for each of ``words``: they bound all samples."""
+        """Return the samples of constant tables, one for each of ``words``: they bound all samples.
+
+        Parameters
+        ----------
+        words
+            Table words, any shape.
+
+        Returns
+        -------
+        Ints
+            Samples, shape of ``words``.
+        """
         return words * SPLINE_UNIT if self.mode == "cubic" else words << self.guard
 
     @property
@@ -66,7 +77,18 @@ class Program(Struct, frozen=True, eq=False):
         return replace(self, output=replace(self.output, shaping=OFF)) if self.output.shaping.order else self
 
     def samples(self, k: Ints) -> Ints:
-        """Return samples at ticks k in [0, ticks), of the shape of ``k``, with ``guard`` bits below the word's LSB."""
+        """Return the samples of the table at ticks.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks), any shape.
+
+        Returns
+        -------
+        Ints
+            Shape of ``k``; a word's LSB is 2^guard, or 12 in ``cubic`` mode.
+        """
         advance = k if self.hold == 1 else k // self.hold
         if self.mode == "direct":
             return direct(self.words, advance, self.guard)
@@ -75,7 +97,17 @@ class Program(Struct, frozen=True, eq=False):
         return interpolate(self.words, self.phase.at(advance), self.guard)
 
     def codes(self, k: Ints) -> Ints:
-        """Return codes at ticks k in [0, ticks), shape (n,), before the slew guard.
+        """Return codes before the slew guard.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks), shape (n,).
+
+        Returns
+        -------
+        Ints
+            Codes in [code_min, code_max], shape (n,).
 
         Raises
         ------
@@ -89,18 +121,48 @@ class Program(Struct, frozen=True, eq=False):
         return np.concatenate([self.output.code(self.samples(k[first : first + _CHUNK_TICKS])) for first in chunks])
 
     def require_period(self) -> None:
-        """Raise ``ValueError`` where the output is shaped, so that codes depend on all ticks before."""
+        """Check that codes are periodic.
+
+        Raises
+        ------
+        ValueError
+            If the output is shaped, so that codes depend on all ticks before.
+        """
         if self.output.shaping.order:
             raise ValueError("shaped codes are not periodic: they are played from the beginning of a program")
 
     def unclamped(self, first: int, stop: int, remainders: Remainders) -> Ints:
-        """Return codes at ticks [first, stop) of a period before the clamp, and update ``remainders``."""
+        """Return codes at ticks [first, stop) of a period before the clamp, and update ``remainders``.
+
+        Parameters
+        ----------
+        first, stop
+            Ticks of the period, 0 <= first < stop <= ticks.
+        remainders
+            Those that the tick before ``first`` has left.
+
+        Returns
+        -------
+        Ints
+            Codes, shape (stop - first,).
+        """
         chunks = range(first, stop, _CHUNK_TICKS)
         samples = (self.samples(np.arange(at, min(at + _CHUNK_TICKS, stop), dtype=np.int64)) for at in chunks)
         return np.concatenate([self.output.shaped(chunk, remainders) for chunk in samples])
 
     def played(self, first: int, stop: int) -> Ints:
-        """Return codes at ticks [first, stop) since a program began, over as many periods, before the slew guard."""
+        """Return codes at ticks [first, stop) since a program began, over as many periods, before the slew guard.
+
+        Parameters
+        ----------
+        first, stop
+            Ticks, 0 <= first <= stop.
+
+        Returns
+        -------
+        Ints
+            Codes in [code_min, code_max], shape (stop - first,).
+        """
         if not self.output.shaping.order:
             return self.codes(np.arange(first, stop, dtype=np.int64) % self.ticks)
         remainders, codes = self.output.begin(), []

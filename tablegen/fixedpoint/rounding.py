@@ -10,7 +10,18 @@ Integer = TypeVar("Integer", int, Ints)
 
 
 def round_half_up(x: Floats) -> Ints:
-    """Return the nearest integers to finite x with |x| < 2^53, ties up, of the shape of ``x``."""
+    """Return the nearest integers, ties up.
+
+    Parameters
+    ----------
+    x
+        Finite numbers with |x| < 2^53, any shape.
+
+    Returns
+    -------
+    Ints
+        Shape of ``x``.
+    """
     whole = np.floor(x)
     # Not floor(x + 0.5): that sum rounds by itself, up to 1 for 0.49999999999999994.
     return (whole + (x - whole >= 0.5)).astype(np.int64)
@@ -32,6 +43,19 @@ def signed_limits(bits: int) -> tuple[int, int]:
 
 
 def saturate(value: Ints, bits: int) -> Ints:
-    """Return ``value`` limited to the signed range of ``bits`` bits."""
+    """Return ``value`` limited to the signed range of ``bits`` bits.
+
+    Parameters
+    ----------
+    value
+        Integers of any size and shape.
+    bits
+        Word length, sign included.
+
+    Returns
+    -------
+    Ints
+        Shape of ``value``.
+    """
     low, high = signed_limits(bits)
     return np.clip(value, low, high)

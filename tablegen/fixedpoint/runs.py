@@ -29,13 +29,30 @@ class Runs(Struct, frozen=True, eq=False):
 
     @property
     def lengths(self) -> Ints:
-        """The ticks of each run, (runs,)."""
+        """The length of each run.
+
+        Returns
+        -------
+        Ints
+            Ticks, shape (runs,).
+        """
         if self.by_tick:
             return np.broadcast_to(np.int64(1), (self.ticks,))
         return np.diff(self.starts, append=self.ticks)
 
     def lengths_of(self, which: slice) -> Ints:
-        """Return the ticks of some runs; ``which`` begins at a run and may end beyond the last one."""
+        """Return the lengths of some runs.
+
+        Parameters
+        ----------
+        which
+            Slice of the runs; it begins at a run and may end beyond the last one.
+
+        Returns
+        -------
+        Ints
+            Ticks, shape (n,) for n runs in the slice.
+        """
         after = which.stop if which.stop is not None and which.stop < len(self.starts) else None
         return np.diff(self.starts[which], append=self.ticks if after is None else self.starts[after])
 
@@ -46,11 +63,28 @@ class Runs(Struct, frozen=True, eq=False):
 
     @property
     def lasts(self) -> Ints:
-        """The last tick of each run."""
+        """The last tick of each run.
+
+        Returns
+        -------
+        Ints
+            Ticks, shape (runs,).
+        """
         return self.starts if self.by_tick else np.append(self.starts[1:], self.ticks) - 1
 
     def at(self, k: Ints) -> Ints:
-        """Return the codes at ticks k, of its shape."""
+        """Return the codes at ticks.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks), shape (n,).
+
+        Returns
+        -------
+        Ints
+            Codes, shape (n,).
+        """
         if self.by_tick:
             return self.codes[k]
         if len(k) <= _CHUNK_TICKS:
@@ -68,7 +102,18 @@ class Runs(Struct, frozen=True, eq=False):
         return self.codes[first - 1 :].take(np.cumsum(begins, dtype=np.int32)[k - low])
 
     def split_at(self, k: Ints) -> "Runs":
-        """Return the same playback with runs that begin at ticks k as well, ascending and each once."""
+        """Return the same playback with runs that begin at these ticks as well.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks), ascending and each once, shape (n,).
+
+        Returns
+        -------
+        Runs
+            At most n runs more.
+        """
         if self.by_tick:
             return self
         within = np.searchsorted(self.starts, k, side="right") - 1
@@ -169,7 +214,18 @@ class _Inverse:
         self._sample_falls = pieces.slope <= 0
 
     def sample(self, piece: Ints, code: Ints) -> Ints:
-        """Return the samples at which these pieces first play these codes, both of shape (n,)."""
+        """Return the samples at which these pieces first play these codes.
+
+        Parameters
+        ----------
+        piece, code
+            Indices of pieces and a code for each, both of shape (m,).
+
+        Returns
+        -------
+        Ints
+            Samples, shape (m,).
+        """
         product = (((code + self._code_falls[piece]) << self._gain_q) - self._bound[piece]) * self._sign
         least = product + np.where(self._sample_falls[piece], 0, self._gain - 1)
         return np.asarray(least // self._gain)

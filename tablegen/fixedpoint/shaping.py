@@ -100,14 +100,25 @@ class Remainders:
         self.last: tuple[int, int, int] = (0, 0, 0)
 
     def codes(self, unrounded: Ints) -> Ints:
-        """Return codes before the clamp of values with ``bits`` remainder bits and half a code added, shape (n,)."""
+        """Return codes before the clamp at consecutive ticks, and carry the remainders on.
+
+        Parameters
+        ----------
+        unrounded
+            Codes with ``bits`` fraction bits, half a code added, shape (n,): see ``Output.shaping_input``.
+
+        Returns
+        -------
+        Ints
+            Codes, shape (n,).
+        """
         bits, half, mask = self._bits, 1 << (self._bits - 1), (1 << self._bits) - 1
         feedback = self._shaping.feedback
         e1, e2, e3 = self.last
         codes = []
         for value in unrounded.tolist():
-            fed = value + feedback(e1, e2, e3)
-            e1, e2, e3 = (fed & mask) - half, e1, e2
-            codes.append(fed >> bits)
+            total = value + feedback(e1, e2, e3)
+            e1, e2, e3 = (total & mask) - half, e1, e2
+            codes.append(total >> bits)
         self.last = e1, e2, e3
         return np.array(codes, dtype=np.int64)

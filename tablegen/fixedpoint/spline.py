@@ -25,20 +25,44 @@ def cubic(table: Ints, phase: Ints) -> Ints:
     The table has 2^P words of up to 21 bits, 3 <= P <= 14. The top P bits of a phase are the index of the first of four
     words, the next 18 the fraction of the segment that is behind it; the rest is dropped. Word k is the coefficient of
     the B-spline centred on (k - 1) / 2^P.
+
+    Parameters
+    ----------
+    table
+        Coefficients of the B-spline, shape (2^P,).
+    phase
+        Phases of 32 bits, any shape.
+
+    Returns
+    -------
+    Ints
+        Samples, shape of ``phase``.
     """
     index_bits = index_bits_of(len(table))
     index = phase >> (PHASE_BITS - index_bits)
     fraction = (phase >> (PHASE_BITS - index_bits - SPLINE_FRACTION_BITS)) & ((1 << SPLINE_FRACTION_BITS) - 1)
-    return along([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
+    return evaluate_segment([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
 
 
-def along(words: Sequence[Ints], fraction: Ints) -> Ints:
+def evaluate_segment(words: Sequence[Ints], fraction: Ints) -> Ints:
     """Return the sample at a fraction in [0, 2^18) of the segment of four words.
 
     Horner's rule for 12 S = b0 + b1 v + b2 v^2 + b3 v^3 with v = fraction / 2^19; b_k holds the 2^k that the half of
     each v takes. For words of B bits |b3| <= 2^(B+6), |b2| <= 1.5 2^(B+5), |b1| <= 1.5 2^(B+3), and the sums on the
     way are no larger than b3, hence each product stays below 2^(B+24). The roundings add up to less than 1, so that a
     sample never leaves the 12-fold words.
+
+    Parameters
+    ----------
+    words
+        Four arrays of one shape: the consecutive words of each segment.
+    fraction
+        Whole numbers of 18 bits, of the same shape.
+
+    Returns
+    -------
+    Ints
+        Samples, 12 times the spline, of the same shape.
     """
     b0, b1, b2, b3 = coefficients(words)
     sample = b3
@@ -48,7 +72,18 @@ def along(words: Sequence[Ints], fraction: Ints) -> Ints:
 
 
 def coefficients(words: Sequence[Ints]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Return b0 to b3 of the segments of four words, each of their shape."""
+    """Return b0 to b3 of Horner's rule in ``evaluate_segment``.
+
+    Parameters
+    ----------
+    words
+        Four arrays of one shape: the consecutive words of each segment.
+
+    Returns
+    -------
+    b0, b1, b2, b3
+        Each of the shape of a word.
+    """
     first, second, third, fourth = words
     outer, inner = fourth - first, second - third
     return (

@@ -24,8 +24,8 @@ def spline_factors(harmonics: int, length: int) -> tuple[Floats, Floats]:
     """
     share = np.arange(1, harmonics + 1) / length
     overlap = np.full(harmonics, _OVERLAP[0])
-    for apart, value in enumerate(_OVERLAP[1:], 1):
-        overlap += 2.0 * value * sine_and_cosine(apart * share)[1]
+    for knots, value in enumerate(_OVERLAP[1:], 1):
+        overlap += 2.0 * value * sine_and_cosine(knots * share)[1]
     wave = sinc(share)
     square = wave * wave
     size = 5040.0 * square * square / overlap

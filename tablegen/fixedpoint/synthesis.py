@@ -35,7 +35,13 @@ class FourierWords(Struct, frozen=True, eq=False):
 
     @property
     def in_order(self) -> Ints:
-        """The 2 H + 1 words in the order in which devices hold them: a0, a1..aH, b1..bH."""
+        """The words in the order in which devices hold them: a0, a1..aH, b1..bH.
+
+        Returns
+        -------
+        Ints
+            Q2.30, shape (2 H + 1,).
+        """
         return np.concatenate([[self.a0], self.a, self.b])
 
 
@@ -70,6 +76,11 @@ def sine_table(length: int) -> Ints:
     """Return round(2^30 sin(2 pi j / length)) for j in [0, length), ties away from 0 so that the table is odd.
 
     A device holds a quarter of it: for a length divisible by 4 the rest follows by symmetry, word for word.
+
+    Returns
+    -------
+    Ints
+        Read-only, shape (length,).
     """
     return _cached_sine_table(length) if length <= _CACHED else _sine_table(length)
 
@@ -92,6 +103,11 @@ def sine_quarter(index_bits: int) -> Ints:
 
     index_bits >= 3. sin(pi/2) is not among them: it is 2^30, the only word that does not fit 30 bits. The sine table of
     a shorter length is every 2^n-th word of a longer one.
+
+    Returns
+    -------
+    Ints
+        Words with 30 fraction bits, shape (2^(index_bits - 2),).
     """
     return sine_table(1 << index_bits)[: 1 << (index_bits - 2)]
 
@@ -99,7 +115,12 @@ def sine_quarter(index_bits: int) -> Ints:
 def sine_periods(index_bits: int) -> Ints:
     """Return a period and a quarter of the sine table of 2^index_bits words: the cosine begins a quarter later.
 
-    The C runtime renders with it, from a longer table too. Shape (5/4 2^index_bits,), index_bits >= 2.
+    The C runtime renders with it, from a longer table too. index_bits >= 2.
+
+    Returns
+    -------
+    Ints
+        Words with 30 fraction bits, shape (5/4 2^index_bits,).
     """
     sines = sine_table(1 << index_bits)
     return np.concatenate([sines, sines[: len(sines) // 4]])
@@ -127,11 +148,25 @@ def _cached_waves(length: int, harmonics: int) -> tuple[Ints, Ints]:
 
 
 def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
-    """Return the table words saturate(round(2^(bits-1) s(k / length))) for k = 0..length-1, ties up, int64, (length,).
+    """Return the table words saturate(round(2^(bits-1) s(k / length))) for k = 0..length-1, ties up.
 
     acc = a0 2^30 + sum_n a_n C[n k mod length] + b_n S[n k mod length], exact in 64 bits, so that the order of the
     terms and any use of symmetry do not matter; C[j] is S[j + length/4], or the cosine rounded alike
     where the length is not divisible by 4. Then one rounding shift by 60 - (bits - 1).
+
+    Parameters
+    ----------
+    words
+        The 2 H + 1 Fourier words.
+    length
+        Words of the table.
+    bits
+        Word length, sign included.
+
+    Returns
+    -------
+    Ints
+        Shape (length,).
     """
     # Word length - k has the cosines of word k, and its sines with the other sign.
     half = length // 2 + 1

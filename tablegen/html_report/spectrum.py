@@ -94,7 +94,7 @@ def quantisation(subject: Subject) -> Section:
     for axis, entry in subject.axes:
         k = _looked_at(entry.program)
         shaped = entry.output.shaping is not None
-        error = (entry.program.played(0, len(k)) if shaped else entry.program.codes(k)) - entry.asked(k)
+        error = (entry.program.played(0, len(k)) if shaped else entry.program.codes(k)) - entry.unrounded_codes(k)
         period_s = entry.line.rate_exact[1] / entry.line.rate_exact[0]
         times, unit = (1e3, "ms") if period_s < 1.0 else (1.0, "s")
         charts.append(

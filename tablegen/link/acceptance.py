@@ -1,6 +1,6 @@
-"""What a device checks before it takes a program: the specification behind docs/protocol.md.
+"""The checks of a device before it takes a program: the specification behind docs/protocol.md.
 
-Devices do the same in C; the host asks here before it uploads, so that it can say what would be refused.
+Devices do the same in C; the host calls it before an upload, to state what would be refused.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _FIRST = np.zeros(1, dtype=np.int64)  # the first advance of a period
 
 @dataclass(frozen=True, eq=False)
 class Playing:
-    """What a device does while a program is checked: the programs of x and y, and whether a scan runs."""
+    """The state of a device while a program is checked: the programs of x and y, and whether a scan runs."""
 
     x: Program
     y: Program
@@ -48,8 +48,8 @@ def first_objection(
         return Reason.SCHEDULE, 0
     for checked in (_period, _output):
         for page in (1, 2):
-            if found := checked(contents, page):
-                return found
+            if failure := checked(contents, page):
+                return failure
     for page in (1, 2):
         if not _shaping_is_good(contents, page, order):
             return Reason.SHAPING, page - 1
@@ -61,8 +61,8 @@ def first_objection(
             return Reason.STEP, page - 1
     for check in (_fourier, _word, _range, _slew):
         for page in (1, 2):
-            if found := check(contents, page):
-                return found
+            if failure := check(contents, page):
+                return failure
     return _jump(contents, x, y, playing)
 
 
@@ -81,13 +81,13 @@ def _schedule_is_good(contents: Contents) -> bool:
 
 def _period(contents: Contents, page: int) -> Finding | None:
     ticks, lines = contents.scan("line_ticks"), contents.scan("frame_lines")
-    wanted = ticks if page == 1 else lines if contents.scan("y_steps") else ticks * lines
+    expected = ticks if page == 1 else lines if contents.scan("y_steps") else ticks * lines
     period = contents.axis(page, "phase_period")
-    step = (1 << PHASE_BITS) // wanted & ((1 << PHASE_BITS) - 1)
+    step = (1 << PHASE_BITS) // expected & ((1 << PHASE_BITS) - 1)
     good = (
-        period == wanted
+        period == expected
         and contents.axis(page, "phase_step") == step
-        and contents.axis(page, "phase_remainder") == (1 << PHASE_BITS) % wanted
+        and contents.axis(page, "phase_remainder") == (1 << PHASE_BITS) % expected
     )
     return None if good else (Reason.PERIOD, page - 1)
 
@@ -96,7 +96,7 @@ def _output(contents: Contents, page: int) -> Finding | None:
     shape = contents.x_shape if page == 1 else contents.y_shape
     low, high = signed_limits(GAIN_BITS)
     output = contents.program(page).output
-    # twice what a code needs
+    # Twice the range of a code, so that every right offset fits.
     reach = 2 << (output.dac_bits + output.gain_q)
     good = (
         low <= output.gain_word <= high

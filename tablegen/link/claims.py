@@ -1,6 +1,6 @@
-"""What a device may claim of itself: a value that no device can have ends in ``NotUnderstood``, by field and value.
+"""Checks of a device's claims: a value that no device can have raises ``NotUnderstood`` with field and value.
 
-HELLO and STATUS decide how much memory a host takes and how long it waits, so that nothing here is believed unseen.
+HELLO and STATUS decide how much memory a host takes and how long it waits, so that every field is checked first.
 The ranges are those of docs/protocol.md.
 """
 
@@ -9,12 +9,12 @@ from dataclasses import fields
 from tablegen.link.errors import NotUnderstood
 from tablegen.link.messages import DATA_BYTES, VERSION, AxisLimits, AxisShape, DeviceInfo, DeviceStatus
 
-PROGRAM_BYTES = 192  # as tablegen.link.program_image has it, without numpy
+PROGRAM_BYTES = 192  # as in tablegen.link.program_image, which imports numpy
 MAXIMUM_INDEX_BITS = 16
 MAXIMUM_HARMONICS = 4096
 MAXIMUM_LINE = (1 << 31) - 1
 _WORD_BITS = range(8, 25)  # of table words and of codes
-_CONVERTER_BITS = 63  # of AxisShape.converter: the bits of its word
+_CONVERTER_BITS = 63  # mask of the word's bits in AxisShape.converter
 _MAXIMUM_CONVERTER_BITS = 32
 _FOURIER_BYTES = 4
 _MAXIMUM_WORD_BYTES = 3
@@ -31,7 +31,13 @@ def most_bytes(info: DeviceInfo) -> int:
 
 
 def check_device(info: DeviceInfo) -> None:
-    """Raise ``NotUnderstood`` for the first field of HELLO that no device of this version can have."""
+    """Check every field of HELLO.
+
+    Raises
+    ------
+    NotUnderstood
+        For the first field that no device of this version can have.
+    """
     _check("HELLO", "version", info.version, VERSION, VERSION)
     _check("HELLO", "window", info.window, 1, 255)
     _check("HELLO", "data_bytes", info.data_bytes, 1, DATA_BYTES)
@@ -47,7 +53,7 @@ def _check_shape(name: str, shape: AxisShape) -> None:
     _check("HELLO", f"{name} index_bits", shape.index_bits, 0, MAXIMUM_INDEX_BITS)
     for field, bits in (("word_bits", shape.word_bits), ("dac_bits", shape.dac_bits)):
         _check("HELLO", f"{name} {field}", bits, _WORD_BITS.start, _WORD_BITS.stop - 1)
-    if shape.converter:  # 0 of a device that does not say it
+    if shape.converter:  # 0 if the device does not state it
         _check(
             "HELLO",
             f"{name} converter (its bits)",
@@ -58,7 +64,13 @@ def _check_shape(name: str, shape: AxisShape) -> None:
 
 
 def check_unchanged(before: DeviceInfo, now: DeviceInfo) -> None:
-    """Raise ``NotUnderstood`` where HELLO announces another device than the one that was there before."""
+    """Check that HELLO announces the device that was there before.
+
+    Raises
+    ------
+    NotUnderstood
+        If a field differs.
+    """
     for field in (field.name for field in fields(DeviceInfo)):
         was, is_now = getattr(before, field), getattr(now, field)
         if was != is_now:
@@ -74,7 +86,13 @@ def check_status(status: DeviceStatus, info: DeviceInfo, source: str) -> None:
 
 
 def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> None:
-    """Raise ``NotUnderstood`` where active limits are wider than those of the device's build."""
+    """Check that active limits are no wider than those of the device's build.
+
+    Raises
+    ------
+    NotUnderstood
+        If one is wider.
+    """
     for name, active, build in (("x", limits[0], info.x_limits), ("y", limits[1], info.y_limits)):
         inner = active.within(build)
         for field in (field.name for field in fields(AxisLimits)):
@@ -86,7 +104,13 @@ def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> Non
 
 
 def check_length(source: str, payload: bytes, size: int) -> None:
-    """Raise ``NotUnderstood`` for an answer that is too short; a longer one is of a later version."""
+    """Check that an answer is long enough; a longer one is of a later version.
+
+    Raises
+    ------
+    NotUnderstood
+        If it is shorter than ``size`` bytes.
+    """
     if len(payload) < size:
         raise NotUnderstood(f"{source}: its answer has {len(payload)} bytes; at least {size} are needed")
 

@@ -1,4 +1,4 @@
-"""``Device``: an instrument at the end of a serial line, for control software. It prints nothing."""
+"""The class ``Device``: an instrument at the end of a serial line, for control software; nothing is printed."""
 
 import math
 import random as random_module
@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 TIMEOUT_S = 5.0  # timeout of a request
 _UPLOAD_MARGIN_S = 15.0  # margin on top of the transfer time of an upload
 _UPLOAD_TIME_FACTOR = 4.0  # factor on the transfer time of an upload
-_MAX_LATE_S = 5.0  # by which answers may be late, in what is allowed
-_MAX_LATE_SUM_S = 900.0  # of all answers of a transfer, in what is allowed
+_MAX_LATE_S = 5.0  # lateness of answers that time-outs allow for
+_MAX_LATE_SUM_S = 900.0  # total lateness of the answers of a transfer that time-outs allow for
 _MAX_LINE_S = 600.0  # a device that announces a rate of 1 Hz must not hold the host for months
-_MAX_TRIES = 8  # for which there is time where answers are late
+_MAX_TRIES = 8  # tries that fit into a time-out when answers are late
 _POLL_S = 0.05
-_HELLO_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
+_HELLO_FRESH_S = 0.25  # a HELLO this recent is not repeated: an upload notices a change by itself
 _MAX_READINGS = 3
 _GENERATION_BYTES = 4
 _KEY_BYTES = range(16, 33)
@@ -64,14 +64,29 @@ class Device:
         random: Random | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Open a port and say HELLO.
+        """Open a port and send HELLO.
 
-        ``port`` is a port or URL of pyserial, a function that opens a ``Transport`` (again and again), or an open one.
-        ``key`` has 16 to 32 bytes. ``latency_s`` is that of bridges on the way, ``timeout_s`` that of a request (plus
-        8 times what answers come late, by 5 s at most).
-        ``random`` and ``sleep`` are for tests.
+        Parameters
+        ----------
+        port
+            A port or URL of pyserial, a function that opens a ``Transport`` (again and again), or an open one.
+        key
+            16 to 32 bytes.
+        latency_s
+            Latency of bridges between host and device.
+        timeout_s
+            Bound of a request, to which 8 times the lateness of answers is added, up to 5 s.
+        random, sleep
+            Replacements for tests.
 
-        Raises ``NoPort``, ``NoAnswer``, ``Refused`` (the device speaks another version), ``SerialMissing``.
+        Raises
+        ------
+        NoPort, SerialMissing
+            If the port cannot be opened.
+        NoAnswer, Refused
+            If no device answers, or one of another version.
+        ValueError
+            If the key has another length.
         """
         if key is not None and len(key) not in _KEY_BYTES:
             raise ValueError(f"a key of {len(key)} bytes; devices have 16 to 32")
@@ -105,22 +120,22 @@ class Device:
 
     @property
     def info(self) -> DeviceInfo:
-        """What the device is."""
+        """The properties of the device, fixed at its build."""
         return self._session.info
 
     @property
     def hello(self) -> DeviceStatus:
-        """What it did at first, or at the end of the last upload; ``status`` asks again."""
+        """The status at the last HELLO, or at the end of the last upload; ``status`` asks again."""
         return self._session.status
 
     @property
     def acts(self) -> tuple[Request, ...]:
-        """Requests that were sent and change what the device does: it may have carried them out."""
+        """The requests that were sent and change what the device does: it may have carried them out."""
         return tuple(self._session.acts)
 
     @property
     def upload_state(self) -> UploadState | None:
-        """What is known of the last upload, for the time when it is interrupted; None if there was none."""
+        """The progress of the last upload, for the time when it is interrupted; None if there was none."""
         return None if self._uploader is None else self._uploader.state
 
     def status(self) -> DeviceStatus:
@@ -129,7 +144,13 @@ class Device:
         return self._session.status_of(payload)
 
     def needs_key(self) -> bool:
-        """Return whether uploads carry a tag; raises ``Refused`` if they do and no key was given. Sends nothing."""
+        """Return True if uploads carry a tag; nothing is sent.
+
+        Raises
+        ------
+        Refused
+            If they do and there is no key.
+        """
         return self._session.needs_key(Request.COMMIT)
 
     def upload(
@@ -143,12 +164,28 @@ class Device:
     ) -> UploadResult:
         """Put a new scan into the instrument, which goes on with the old one until a line of the new one starts.
 
-        ``progress`` is called with the bytes that the device has, and with all. A scan that is already active is not
-        sent, unless ``force``. ``timeout_s`` bounds everything (default: ``upload_time_s``). ``limits`` make refusals
-        say more. What a device would refuse, ``tablegen.link.prepare.check`` says before.
+        What a device would refuse, ``tablegen.link.prepare.check`` says before.
 
-        Raises ``Refused``, ``LinkLost``, ``OutOfTime``, ``NotPlaying``. The old scan plays on then, and the device
-        keeps what it has received: the same upload again goes on from there.
+        Parameters
+        ----------
+        progress
+            Function that is called with the bytes that the device has, and with all.
+        force
+            True to send a scan that is already active too.
+        timeout_s
+            Bound of the whole upload in s; by default ``upload_time_s``.
+        limits
+            Limits of the device, to explain refusals in more detail.
+
+        Raises
+        ------
+        Refused, LinkLost, OutOfTime
+            If the device refuses, is gone, or takes too long: the old scan plays on, and the device keeps what it has
+            received, so that the same upload again goes on from there.
+        NotPlaying
+            If the device took the upload and plays something else.
+        NotUnderstood
+            If its answers contradict each other.
         """
         session = self._session
         deadline = Deadline(session.now(), lambda: self.upload_time_s(image) if timeout_s is None else timeout_s)
@@ -160,7 +197,7 @@ class Device:
         if status.hash == image.info.hash and not force:
             return UploadResult(True, status.generation, None, len(image.data), 0, 0, 0, 0.0)
         before = status
-        session.status_at = -math.inf  # whatever comes of it, that will have changed
+        session.status_at = -math.inf  # the status changes, whatever becomes of the upload
         self._uploader = Uploader(session, image, deadline, progress, limits)
         result = self._uploader.run()
         playing = self.status()
@@ -194,7 +231,17 @@ class Device:
     def readback(self, *, timeout_s: float | None = None) -> bytes:
         """Read back the image of the scan that plays, as bytes.
 
-        Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
+        Parameters
+        ----------
+        timeout_s
+            Bound in s; by default what the longest image takes.
+
+        Raises
+        ------
+        Refused
+            If the device does not hold it: a scan that came with the firmware, or memory in use.
+        OutOfTime
+            If the scan changed each time it was read, or the device takes too long.
         """
         size = most_bytes(self.info)
         deadline = Deadline(
@@ -209,11 +256,19 @@ class Device:
         raise OutOfTime("the scan changed while it was read; is another program uploading?")
 
     def park(self) -> None:
-        """End the scan: ramp to the park codes, and hold them. ``wait_for(State.PARKED)`` waits for that."""
+        """Park: end the scan, ramp to the park codes and hold them; ``wait_for(State.PARKED)`` waits for the end."""
         self._act(Request.PARK)
 
     def arm(self, frames: int = 0) -> None:
-        """Let the next trigger play so many frames; 0 is without end."""
+        """Let the next trigger play so many frames; 0 is without end.
+
+        Raises
+        ------
+        ValueError
+            If ``frames`` does not fit 32 bits.
+        Refused
+            If the device refuses.
+        """
         if not 0 <= frames < 1 << 32:
             raise ValueError(f"{frames} frames; 0 (endless) to 2^32 - 1")
         self._act(Request.ARM, frames.to_bytes(4, "little"))
@@ -223,17 +278,23 @@ class Device:
         self._act(Request.TRIGGER)
 
     def clear(self) -> None:
-        """Forget faults and their counts."""
+        """Clear faults and their counts."""
         self._act(Request.CLEAR)
 
     def abort(self) -> int:
-        """Forget an upload, and withdraw a program that waits; the generation that plays."""
+        """Discard an upload and withdraw a waiting program; return the generation that plays."""
         payload = self._act(Request.ABORT, plain=True)
         check_length("ABORT", payload, _GENERATION_BYTES)
         return int.from_bytes(payload[:_GENERATION_BYTES], "little")
 
     def limits(self) -> Limits:
-        """Ask for the active limits of x and y."""
+        """Ask for the active limits of x and y.
+
+        Raises
+        ------
+        Refused
+            If the device refuses for another reason than that it has no such request.
+        """
         size = 2 * AxisLimits.LAYOUT.size
         try:
             return self._limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
@@ -243,16 +304,25 @@ class Device:
             return self.info.x_limits, self.info.y_limits  # the device has no other limits
 
     def narrow(self, x: AxisLimits, y: AxisLimits) -> Limits:
-        """Narrow the limits until the device's next start, or until this is called again; returns the active limits.
+        """Narrow the limits until the device's next start, or until this is called again; return the active limits.
 
         They are cut to those of the device's build.
 
-        Raises ``Refused`` for a device that cannot (``Feature.NARROWS``).
+        Raises
+        ------
+        Refused
+            If the device cannot (``Feature.NARROWS``).
         """
         return self._limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
 
     def wait_for(self, state: DeviceState, timeout_s: float) -> DeviceStatus:
-        """Wait until the sequencer is in a state. Raises ``OutOfTime``."""
+        """Wait until the sequencer is in a state.
+
+        Raises
+        ------
+        OutOfTime
+            If it is not within ``timeout_s`` seconds.
+        """
         deadline = self._until(timeout_s)
         while True:
             status = self.status()
@@ -266,7 +336,7 @@ class Device:
             self._sleep(min(_POLL_S, deadline - self._session.now()))
 
     def _sleep(self, seconds: float) -> None:
-        """On the clock of the port, and emptying it."""
+        """Sleep by the clock of the port, and empty it meanwhile."""
         self._session.exchange.receive(self._session.now() + seconds)
 
     def _act(self, kind: Request, payload: bytes = b"", answer_bytes: int = 16, plain: bool = False) -> bytes:
@@ -279,7 +349,7 @@ class Device:
         return self._session.now() + timeout_s
 
     def _late_s(self) -> float:
-        """By which answers are late."""
+        """Return the time in s by which answers are late."""
         return min(self._session.exchange.pace.late_s, _MAX_LATE_S)
 
     def _limits(self, payload: bytes) -> Limits:

@@ -1,45 +1,45 @@
-"""What can go wrong between a host and a device, each with what to do about it in its message."""
+"""The errors between a host and a device, each with what to do about it in its message."""
 
 from tablegen.base.installation import install_advice
 
 
 class LinkError(Exception):
-    """The base of them all; the message is for people."""
+    """The base class of the errors of a link; the message is for people."""
 
 
 class SerialMissing(LinkError):
-    """pyserial is not installed."""
+    """The missing installation of pyserial."""
 
     def __init__(self) -> None:
         super().__init__(f"pyserial is missing; {install_advice('serial')}")
 
 
 class NoPort(LinkError):
-    """The port cannot be opened."""
+    """The failure to open a port."""
 
 
 class NoAnswer(LinkError):
-    """The port is there, and nobody speaks the protocol on it."""
+    """The silence of a port that was opened: no device speaks the protocol on it."""
 
 
 class LinkLost(LinkError):
-    """A device that did answer does no more, or its port has gone."""
+    """The loss of a device that did answer, or of its port."""
 
 
 class Silent(LinkLost):
-    """The port is there, but a device that did answer does no more: opening it again could reset what it plays."""
+    """The silence of a device that did answer, on a port that is there: opening it again could reset what it plays."""
 
 
 class OutOfTime(LinkError):
-    """The device answers, but what was asked for did not come about before the deadline."""
+    """The end of the time for a request, although the device answers."""
 
 
 class NotPlaying(LinkError):
-    """The device took an upload, and plays something else."""
+    """The playback of something else than the upload that the device took."""
 
 
 class Unsuitable(LinkError):
-    """The device would refuse this scan; nothing was sent. ``objections`` are all that was found."""
+    """A scan that the device would refuse; nothing was sent. ``objections`` are all reasons."""
 
     def __init__(self, objections: list[str]) -> None:
         super().__init__("\n".join(objections))
@@ -47,7 +47,7 @@ class Unsuitable(LinkError):
 
 
 class Refused(LinkError):
-    """The device refused a request.
+    """The refusal of a request by the device.
 
     ``request``, ``reason`` and ``detail`` are numbers as in docs/protocol.md, ``explanation`` says what to do.
     """
@@ -58,7 +58,7 @@ class Refused(LinkError):
 
 
 class NotUnderstood(LinkError):
-    """The device answers, but not as docs/protocol.md has it."""
+    """An answer that is not as docs/protocol.md has it."""
 
     def __init__(self, what: str, remedy: str = "do the versions of tablegen and firmware match?") -> None:
         super().__init__(f"the device sent an invalid answer: {what}; {remedy}")

@@ -1,4 +1,4 @@
-"""Requests out and answers in, on one port and in one session: framing, numbering, and how long to wait."""
+"""The exchange of requests and answers on one port and in one session: framing, numbering, and waits."""
 
 from dataclasses import dataclass
 from random import Random
@@ -15,7 +15,7 @@ _ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # their answers tell 
 
 @dataclass(slots=True)
 class Answer:
-    """What answers a request: ``payload`` of an answer, or of a refusal ``reason`` and ``detail``."""
+    """The answer to a request: its ``payload``, or the ``reason`` and ``detail`` of a refusal."""
 
     kind: int
     seq: int
@@ -25,7 +25,7 @@ class Answer:
 
 
 class Exchange:
-    """Sends requests and tells which answers belong to its session; it repeats nothing by itself.
+    """The frames of one session on one port: it sends requests and sorts answers, and repeats nothing by itself.
 
     Requests that act are numbered apart from the others: so many uploads may lie between two of them.
     """
@@ -51,7 +51,7 @@ class Exchange:
 
     @property
     def noise(self) -> bool:
-        """Whether bytes have come since the last answer that are no frames."""
+        """True if bytes that are no frames have come since the last answer."""
         return self._reader.bad_frames > self._bad_before or self._strange_bytes > MAXIMUM_FRAME
 
     def new_session(self) -> None:
@@ -63,12 +63,12 @@ class Exchange:
         return self.transport.now()
 
     def seq(self) -> int:
-        """For a request that does not act."""
+        """Return the next ``seq`` of requests that do not act."""
         self._free = (self._free + 1) % 256
         return self._free
 
     def number(self) -> int:
-        """For a request that acts."""
+        """Return the next ``seq`` of requests that act."""
         self._number = (self._number + 1) % 256
         return self._number
 
@@ -83,19 +83,19 @@ class Exchange:
         return now + self.pace.sent((kind, seq), now, self.transport.baud, (len(wire), answer_bytes), learn)
 
     def receive(self, until: float) -> list[Answer]:
-        """Answers of this session that have come, or come first until then, whatever else is on the line."""
-        found: list[Answer] = []
-        while not found:
+        """Return the answers of this session that have come, or the first that come until then."""
+        answers: list[Answer] = []
+        while not answers:
             data = self.transport.read(max(until - self.now(), 0.0))
             frames = self._reader.feed(data)
             for frame in frames:
-                found += self._answer(frame)
+                answers += self._answer(frame)
             self._strange_bytes = 0 if frames else self._strange_bytes + len(data)
-            if found:
+            if answers:
                 self._bad_before = self._reader.bad_frames
             if self.now() >= until:
                 break
-        return found
+        return answers
 
     def _answer(self, frame: Frame) -> list[Answer]:
         """Read an answer of this session; nothing where it is of another one, or an echo of a request."""

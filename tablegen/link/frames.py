@@ -14,7 +14,7 @@ OVERHEAD = MINIMUM_FRAME + 2  # bytes of a frame on the wire beside its payload
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A request or an answer. ``type`` and ``seq`` are 8 bits, ``session`` 32, ``payload`` at most 244 bytes."""
+    """A request or an answer: ``type`` and ``seq`` have 8 bits, ``session`` 32, ``payload`` at most 244 bytes."""
 
     type: int
     seq: int
@@ -22,9 +22,12 @@ class Frame:
     payload: bytes = b""
 
     def encode(self) -> bytes:
-        """As it goes onto the wire, with the 0x00 that ends it.
+        """Return the frame as it goes onto the wire, with the 0x00 that ends it.
 
-        Raises ``ValueError`` if the payload is too long.
+        Raises
+        ------
+        ValueError
+            If the payload is too long.
         """
         if len(self.payload) > MAXIMUM_PAYLOAD:
             raise ValueError(f"a payload of {len(self.payload)} bytes; at most {MAXIMUM_PAYLOAD} fit into a frame")
@@ -35,7 +38,10 @@ class Frame:
 def decode(wire: bytes) -> Frame:
     """Decode a frame from the bytes between two 0x00 on the wire.
 
-    Raises ``ValueError`` where it is none: damaged, too short or too long.
+    Raises
+    ------
+    ValueError
+        If it is damaged, too short or too long.
     """
     data = cobs_decode(wire)
     if not MINIMUM_FRAME <= len(data) <= MAXIMUM_FRAME:
@@ -49,7 +55,7 @@ def decode(wire: bytes) -> Frame:
 
 
 class FrameReader:
-    """Frames out of whatever pieces a line delivers; ``bad_frames`` counts what was dropped."""
+    """The frames in whatever pieces a line delivers; ``bad_frames`` counts the damaged ones."""
 
     def __init__(self) -> None:
         self.bad_frames = 0
@@ -57,7 +63,7 @@ class FrameReader:
         self._overflown = False
 
     def feed(self, received: bytes) -> list[Frame]:
-        """Frames that are complete with these bytes, in order."""
+        """Return the frames that are complete with these bytes, in order; damaged ones are counted and dropped."""
         frames = []
         *ended, rest = received.split(b"\0")
         for piece in ended:
@@ -75,7 +81,7 @@ class FrameReader:
         return frames
 
     def _add(self, piece: bytes) -> None:
-        """Noise without an end takes no memory without end."""
+        """Append bytes of a frame up to its greatest length, so that endless noise takes no endless memory."""
         if len(self._begun) + len(piece) > MAXIMUM_FRAME + 1:
             self._begun.clear()
             self._overflown = True
@@ -84,7 +90,7 @@ class FrameReader:
 
 
 def cobs_encode(data: bytes) -> bytes:
-    """Consistent overhead byte stuffing of at most 254 bytes: one byte more, and no zero among them."""
+    """Encode at most 254 bytes by consistent overhead byte stuffing: one byte more, and no zero among them."""
     assert len(data) <= MAXIMUM_FRAME
     return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0"))
 
@@ -92,7 +98,10 @@ def cobs_encode(data: bytes) -> bytes:
 def cobs_decode(stuffed: bytes) -> bytes:
     """Decode bytes of ``cobs_encode``, without the 0x00 that ended them.
 
-    Raises ``ValueError`` where a distance leads past the end.
+    Raises
+    ------
+    ValueError
+        If a distance leads past the end.
     """
     blocks = []
     at = 0

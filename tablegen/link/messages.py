@@ -1,4 +1,4 @@
-"""What requests and answers say: the tables of docs/protocol.md."""
+"""The payloads of requests and answers: the tables of docs/protocol.md."""
 
 import struct
 from dataclasses import dataclass, fields
@@ -12,12 +12,12 @@ NONCE_BYTES = 16
 HASH_BYTES = 32
 ANSWER = 0x80
 REFUSAL = 0xFF
-CUBIC = 128  # in the index bits of a shape
+CUBIC = 128  # flag in the index bits of a shape
 SPLINE_DEGREE = 3
 
 
 class Request(IntEnum):
-    """Types of requests; the answer has bit 7 set."""
+    """The types of requests; the answer has bit 7 set."""
 
     HELLO = 1
     BEGIN = 2
@@ -35,7 +35,7 @@ class Request(IntEnum):
 
 
 class Reason(IntEnum):
-    """Why a request was refused."""
+    """The reasons of refusals."""
 
     TYPE = 1
     PAYLOAD = 2
@@ -69,7 +69,7 @@ class Reason(IntEnum):
 
 
 class Feature(IntFlag):
-    """What a device can do."""
+    """The features of a device."""
 
     TABLES = 1
     FOURIER = 2
@@ -80,7 +80,7 @@ class Feature(IntFlag):
 
 
 class DeviceState(IntEnum):
-    """What the sequencer of a device does."""
+    """The states of the sequencer of a device."""
 
     NO_PROGRAM = 0
     PARKED = 1
@@ -89,7 +89,7 @@ class DeviceState(IntEnum):
 
 
 class Upload(IntEnum):
-    """What became of an upload so far."""
+    """The states of an upload."""
 
     NONE = 0
     RECEIVING = 1
@@ -101,20 +101,23 @@ PERMITS = 1  # bit of Status.flags
 
 
 class _Struct:
-    """A payload of fixed layout; ``unpack`` ignores what later versions may append.
-
-    Raises ``ValueError`` for fewer bytes than the layout has.
-    """
+    """A payload of fixed layout; ``unpack`` ignores what later versions may append."""
 
     LAYOUT: ClassVar[struct.Struct]
 
     def pack(self) -> bytes:
-        """As it stands in a payload."""
+        """Return the payload."""
         return self.LAYOUT.pack(*(getattr(self, field.name) for field in fields(self)))  # type: ignore[arg-type]
 
     @classmethod
     def unpack(cls, payload: bytes) -> Self:
-        """Read the fields of a payload."""
+        """Read the fields of a payload.
+
+        Raises
+        ------
+        ValueError
+            If it has fewer bytes than the layout.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for {cls.__name__}, which has {cls.LAYOUT.size}")
         return cls(*cls.LAYOUT.unpack_from(payload))
@@ -122,7 +125,7 @@ class _Struct:
 
 @dataclass(frozen=True, slots=True)
 class AxisShape(_Struct):
-    """Bits of the index of the (longest) table, 0 where it is not interpolated; of its words; of a code.
+    """The widths of an axis: bits of the index of its (longest) table, 0 if not interpolated; of its words; of a code.
 
     Those of a cubic table have 128 added. ``converter``, of a device: bits of the converter's word, + 64 for two's
     complement, + 128 for left alignment.
@@ -137,23 +140,23 @@ class AxisShape(_Struct):
 
     @property
     def mode(self) -> Literal["interpolated", "cubic", "direct"]:
-        """How the table is played."""
+        """The mode in which the table is played."""
         return "direct" if not self.index_bits else "cubic" if self.index_bits & CUBIC else "interpolated"
 
     @property
     def length_bits(self) -> int:
-        """log2 of the words; 0 of a table that is not interpolated."""
+        """The logarithm to base 2 of the number of words; 0 of a table that is not interpolated."""
         return self.index_bits & ~CUBIC
 
     @property
     def word_bytes(self) -> int:
-        """Bytes of a table word in an image."""
+        """The bytes of a table word in an image."""
         return 2 if self.word_bits <= 16 else 3
 
 
 @dataclass(frozen=True, slots=True)
 class AxisLimits(_Struct):
-    """Beyond these no program of an axis may go: straight binary codes, and codes a tick."""
+    """The limits of all programs of an axis: straight binary codes, and codes a tick."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4I")
 
@@ -174,7 +177,7 @@ class AxisLimits(_Struct):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """What a device is, fixed at its build (56 bytes). ``shaping`` is its highest order of shaped output."""
+    """The properties of a device, fixed at its build (56 bytes); ``shaping`` is its highest order of shaped output."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
 
@@ -190,17 +193,23 @@ class DeviceInfo:
     y_limits: AxisLimits
     update_rate_hz: int
     shaping: int = 0
-    degree: int = 0  # highest of a spline; 0 of a device that knows none: lines
+    degree: int = 0  # highest degree of a spline; 0 of a device that plays lines only
 
     def pack(self) -> bytes:
-        """As it stands in the answer to HELLO."""
+        """Return the beginning of the answer to HELLO."""
         parts = (self.x.pack(), self.y.pack(), self.x_limits.pack(), self.y_limits.pack())
         first = (self.version, self.features, self.window, self.data_bytes, self.harmonics, self.shaping, self.degree)
         return self.LAYOUT.pack(*first, self.image_bytes, *parts, self.update_rate_hz)
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
-        """Read the beginning of the answer to HELLO. Raises ``ValueError`` if it is too short."""
+        """Read the beginning of the answer to HELLO.
+
+        Raises
+        ------
+        ValueError
+            If it is too short.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a device")
         version, features, window, data, harmonics, shaping, degree, image, *parts, rate = cls.LAYOUT.unpack_from(
@@ -226,7 +235,7 @@ class DeviceInfo:
 
 @dataclass(frozen=True, slots=True)
 class DeviceStatus:
-    """What a device does (76 bytes)."""
+    """The status of a device (76 bytes)."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B5I16sI32s")
 
@@ -245,11 +254,11 @@ class DeviceStatus:
 
     @property
     def permits(self) -> bool:
-        """Whether the interlock does, or there is none."""
+        """True if the interlock permits a scan, or there is none."""
         return bool(self.flags & PERMITS)
 
     def pack(self) -> bytes:
-        """As it stands in an answer."""
+        """Return the answer to STATUS."""
         return self.LAYOUT.pack(
             self.state,
             self.upload,
@@ -267,7 +276,13 @@ class DeviceStatus:
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceStatus":
-        """Read an answer. Raises ``ValueError`` if it is too short, or of an unknown state."""
+        """Read the answer to STATUS.
+
+        Raises
+        ------
+        ValueError
+            If it is too short, or of an unknown state.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a status")
         state, upload, *numbers, counts, bad, digest = cls.LAYOUT.unpack_from(payload)
@@ -293,7 +308,7 @@ class DeviceStatus:
 
 @dataclass(frozen=True, slots=True)
 class ImageInfo:
-    """What BEGIN announces (48 bytes)."""
+    """The announcement of an image by BEGIN (48 bytes)."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<32s2I4s4s")
 
@@ -304,12 +319,18 @@ class ImageInfo:
     y: AxisShape
 
     def pack(self) -> bytes:
-        """As it stands in BEGIN."""
+        """Return the payload of BEGIN."""
         return self.LAYOUT.pack(self.hash, self.image_bytes, self.image_crc, self.x.pack(), self.y.pack())
 
     @classmethod
     def unpack(cls, payload: bytes) -> "ImageInfo":
-        """Read the payload of BEGIN. Raises ``ValueError`` if it is too short."""
+        """Read the payload of BEGIN.
+
+        Raises
+        ------
+        ValueError
+            If it is too short.
+        """
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for an image")
         digest, size, crc, x, y = cls.LAYOUT.unpack_from(payload)

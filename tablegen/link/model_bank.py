@@ -19,7 +19,7 @@ _MIN_INDEX_BITS = 3  # least index bits of an interpolated table
 
 
 class RequestRefused(Exception):
-    """A request is."""
+    """A request that the device refuses, with the reason and its detail of docs/protocol.md."""
 
     def __init__(self, reason: Reason, detail: int = 0) -> None:
         super().__init__(reason, detail)
@@ -27,18 +27,18 @@ class RequestRefused(Exception):
 
 
 @dataclass
-class Held:
-    """An upload in progress; ``announced`` is what BEGIN said."""
+class IncomingUpload:
+    """An upload in progress; ``announcement`` is the payload of its BEGIN."""
 
     info: ImageInfo
-    announced: bytes
+    announcement: bytes
     data: bytearray
     state: Upload = Upload.RECEIVING
 
 
 @dataclass(frozen=True)
-class Taken:
-    """The program that plays by an upload, since which generation, and the line of the old one that was its last."""
+class ActiveUpload:
+    """An upload that plays: the generation since which it does, and the last line of the old program."""
 
     info: ImageInfo
     image: bytes
@@ -47,7 +47,13 @@ class Taken:
 
 
 def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
-    """Return the program of an image. Raises ``ValueError`` where it cannot be played at all."""
+    """Return the program of an image.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be played at all.
+    """
     scan = contents.scan
     schedule = Schedule(
         ticks=scan("line_ticks"),
@@ -67,7 +73,7 @@ def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
 
 
 class Bank:
-    """``held`` is the upload in progress, ``taken`` the one that plays; ``limits`` are the active ones.
+    """The memory of a device: the upload in progress, the one that plays, and the active limits.
 
     ``staged``: the image is kept, and not its tables.
     """
@@ -77,17 +83,23 @@ class Bank:
         self.power_up()
 
     def power_up(self) -> None:
-        """Nothing but what is in the firmware."""
-        self.held: Held | None = None
-        self.taken: Taken | None = None
+        """Reset the memory to the firmware's."""
+        self.incoming: IncomingUpload | None = None
+        self.active: ActiveUpload | None = None
         self.limits = self._info.x_limits, self._info.y_limits
         self._stage_is_whole = True
 
     def begin(self, payload: bytes) -> bytes:
-        """Return the answer to BEGIN."""
+        """Return the answer to BEGIN.
+
+        Raises
+        ------
+        RequestRefused
+            If an upload is being checked, or the image does not fit the device.
+        """
         info = ImageInfo.unpack(payload)
-        held = self.held
-        if (held is not None and held.state is not Upload.RECEIVING) or not self._player.writable:
+        incoming = self.incoming
+        if (incoming is not None and incoming.state is not Upload.RECEIVING) or not self._player.writable:
             raise RequestRefused(Reason.BUSY)
         for axis, (ours, theirs) in enumerate(((self._info.x, info.x), (self._info.y, info.y))):
             fits = theirs.index_bits == 0 or _MIN_INDEX_BITS <= theirs.length_bits <= ours.index_bits
@@ -98,32 +110,38 @@ class Bank:
                 raise RequestRefused(Reason.SHAPE, axis)
         if not PROGRAM_BYTES <= info.image_bytes <= self._info.image_bytes:
             raise RequestRefused(Reason.LENGTH, self._info.image_bytes)
-        if held is None or held.announced != payload:
+        if incoming is None or incoming.announcement != payload:
             self._stage_is_whole = False
-            held = self.held = Held(info, payload, bytearray())
-        return struct.pack("<I", len(held.data))
+            incoming = self.incoming = IncomingUpload(info, payload, bytearray())
+        return struct.pack("<I", len(incoming.data))
 
     def data(self, payload: bytes) -> bytes:
-        """Return the answer to DATA."""
-        held = self.held
-        if held is None:
+        """Return the answer to DATA.
+
+        Raises
+        ------
+        RequestRefused
+            If no upload was announced, or its program words cannot be played.
+        """
+        incoming = self.incoming
+        if incoming is None:
             raise RequestRefused(Reason.UPLOAD)
         (offset,) = struct.unpack_from("<I", payload)
-        before = len(held.data)
-        if offset == before and before + len(payload) - 4 <= held.info.image_bytes:
-            held.data += payload[4:]
-            if before < PROGRAM_BYTES <= len(held.data):
+        before = len(incoming.data)
+        if offset == before and before + len(payload) - 4 <= incoming.info.image_bytes:
+            incoming.data += payload[4:]
+            if before < PROGRAM_BYTES <= len(incoming.data):
                 try:
-                    self._look_at_words(held)
+                    self._check_words(incoming)
                 except RequestRefused:
-                    self.held = None
+                    self.incoming = None
                     raise
-        return struct.pack("<I", len(held.data))
+        return struct.pack("<I", len(incoming.data))
 
-    def _look_at_words(self, held: Held) -> None:
-        """Once the program words are there, an image that is not as long as they say is forgotten."""
-        words = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", held.data)
-        shapes = ((held.info.x, self._info.x), (held.info.y, self._info.y))
+    def _check_words(self, incoming: IncomingUpload) -> None:
+        """Check the program words of an upload: shapes, harmonics, and the length of its image."""
+        words = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", incoming.data)
+        shapes = ((incoming.info.x, self._info.x), (incoming.info.y, self._info.y))
         for page, (shape, _) in enumerate(shapes, 1):
             harmonics = words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]
             most = self._info.harmonics if shape.index_bits else 0
@@ -133,50 +151,73 @@ class Bank:
             period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
             if not shape.index_bits and period > 1 << ours.index_bits:
                 raise RequestRefused(Reason.SHAPE, page - 1)
-        size = PROGRAM_BYTES + sum(layout(words, held.info.x, held.info.y))
-        if size != held.info.image_bytes:
+        size = PROGRAM_BYTES + sum(layout(words, incoming.info.x, incoming.info.y))
+        if size != incoming.info.image_bytes:
             raise RequestRefused(Reason.LENGTH, size)
 
-    def find(self, image_crc: int) -> Taken | Held:
-        """Find what a COMMIT means: the program that plays already, or a complete upload."""
-        held, taken = self.held, self.taken
-        if held is None:
-            if taken is None or taken.info.image_crc != image_crc:
-                raise RequestRefused(Reason.UPLOAD)
-            return taken
-        if held.info.image_crc != image_crc:
-            raise RequestRefused(Reason.UPLOAD)
-        if held.state is not Upload.RECEIVING:
-            raise RequestRefused(Reason.BUSY)
-        if len(held.data) < held.info.image_bytes:
-            raise RequestRefused(Reason.INCOMPLETE, len(held.data))
-        return held
+    def find(self, image_crc: int) -> ActiveUpload | IncomingUpload:
+        """Find what a COMMIT means: the program that plays already, or a complete upload.
 
-    def accept(self, held: Held, authentic: Callable[[bytes], None]) -> DualProgram:
-        """Check an upload, and return its program. ``authentic`` raises if the tag is not the image's."""
-        image = bytes(held.data)
-        if zlib.crc32(image) != held.info.image_crc:
+        Raises
+        ------
+        RequestRefused
+            If no complete upload has this CRC, or one is being checked.
+        """
+        incoming, active = self.incoming, self.active
+        if incoming is None:
+            if active is None or active.info.image_crc != image_crc:
+                raise RequestRefused(Reason.UPLOAD)
+            return active
+        if incoming.info.image_crc != image_crc:
+            raise RequestRefused(Reason.UPLOAD)
+        if incoming.state is not Upload.RECEIVING:
+            raise RequestRefused(Reason.BUSY)
+        if len(incoming.data) < incoming.info.image_bytes:
+            raise RequestRefused(Reason.INCOMPLETE, len(incoming.data))
+        return incoming
+
+    def accept(self, incoming: IncomingUpload, authentic: Callable[[bytes], None]) -> DualProgram:
+        """Check an upload, and return its program.
+
+        Parameters
+        ----------
+        authentic
+            Function that raises if the tag is not the image's.
+
+        Raises
+        ------
+        RequestRefused
+            If the image is damaged or cannot be played within the limits.
+        """
+        image = bytes(incoming.data)
+        if zlib.crc32(image) != incoming.info.image_crc:
             raise RequestRefused(Reason.IMAGE)
         authentic(image)
-        contents = take_apart(image, held.info.x, held.info.y)
+        contents = take_apart(image, incoming.info.x, incoming.info.y)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
         if objection := first_objection(contents, *self.limits, playing, self._info.shaping):
             raise RequestRefused(*objection)
         return program_of(contents, self._info.update_rate_hz)
 
-    def take(self, held: Held) -> None:
+    def take(self, incoming: IncomingUpload) -> None:
         """Make an upload the current one, once the sequencer has taken its program."""
-        self.taken = Taken(held.info, bytes(held.data), self._player.swaps, self._player.swapped_at)
-        self.held = None
+        self.active = ActiveUpload(incoming.info, bytes(incoming.data), self._player.swaps, self._player.swapped_at)
+        self.incoming = None
         self._stage_is_whole = True
 
     def readback(self, offset: int, count: int) -> bytes:
-        """Bytes of the image that plays."""
-        taken = self.taken
-        if taken is None or (self._staged and not self._stage_is_whole):
+        """Return bytes of the image that plays.
+
+        Raises
+        ------
+        RequestRefused
+            If the image is not held.
+        """
+        active = self.active
+        if active is None or (self._staged and not self._stage_is_whole):
             raise RequestRefused(Reason.READBACK)
-        image = taken.image if self._staged else _of_tables(taken)
+        image = active.image if self._staged else _of_tables(active)
         return image[offset : offset + count]
 
     def limit(self, payload: bytes) -> bytes:
@@ -188,7 +229,7 @@ class Bank:
         return b"".join(limits.pack() for limits in self.limits)
 
 
-def _of_tables(taken: Taken) -> bytes:
+def _of_tables(active: ActiveUpload) -> bytes:
     """Return the image of the tables that play."""
-    program = program_of(take_apart(taken.image, taken.info.x, taken.info.y))
-    return make_image(program, taken.info.hash.hex()).data
+    program = program_of(take_apart(active.image, active.info.x, active.info.y))
+    return make_image(program, active.info.hash.hex()).data

@@ -1,7 +1,4 @@
-"""A device in Python: bytes in, bytes out. What docs/protocol.md says that a device answers, as a program.
-
-Devices in C and Verilog are held against it, and hosts are tested with it. What plays is a ``Player``.
-"""
+"""A model of a device in Python: bytes in, bytes out, as docs/protocol.md has it."""
 
 import hashlib
 import hmac
@@ -27,7 +24,7 @@ from tablegen.link.messages import (
     Request,
     Upload,
 )
-from tablegen.link.model_bank import Bank, Held, RequestRefused, Taken
+from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused
 from tablegen.link.players import Player
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
@@ -44,7 +41,7 @@ IDENTITY_BYTES = range(4, 33)
 
 
 @dataclass
-class _Remembered:
+class _LastRequest:
     """The last request that acts; ``answer`` is None while it is in progress."""
 
     seq: int
@@ -53,12 +50,12 @@ class _Remembered:
 
 
 @dataclass
-class _AtWork:
-    """A COMMIT, or an ABORT, that has not been answered yet."""
+class _PendingRequest:
+    """A COMMIT or an ABORT that has not been answered yet."""
 
     request: Frame
-    memory: _Remembered
-    before: _Remembered | None = None
+    memory: _LastRequest
+    before: _LastRequest | None = None
     nonce: bytes | None = None
     ticks: int = 0
     swaps: int = 0
@@ -73,7 +70,7 @@ def tag(key: bytes, nonce: bytes, request: Frame, image: bytes | None = None) ->
 
 
 class ModelDevice:
-    """A device with this ``info`` in front of ``player``; ``boot_hash`` is that of the program it starts with.
+    """A model of a device in front of ``player``; ``boot_hash`` is that of the program with which it starts.
 
     ``key``: 16 to 32 bytes, with the feature KEY; nonces then come from ``identity``, of 4 to 32 bytes, ``boot`` and a
     counter, or from ``nonces``, and may be used for ``CHALLENGE_MS`` of the clock ``milliseconds``. ``reboot`` counts
@@ -133,13 +130,13 @@ class ModelDevice:
         self._reader = FrameReader()
         self._out = bytearray()
         self._session: int | None = None
-        self._last: _Remembered | None = None
+        self._last: _LastRequest | None = None
         self._nonce: bytes | None = None
         self._challenged_at = 0
-        self._at_work: _AtWork | None = None
-        self._aborts: list[_AtWork] = []
+        self._pending: _PendingRequest | None = None
+        self._aborts: list[_PendingRequest] = []
         self._challenges = 0
-        self._before: _Remembered | None = None  # what a COMMIT that is being looked at replaces
+        self._before: _LastRequest | None = None  # the request before a COMMIT that is being checked
 
     def reboot(self) -> None:
         """Start again, with nothing but what is in the firmware, and the next boot count."""
@@ -151,10 +148,10 @@ class ModelDevice:
     @property
     def memory(self) -> bytearray:
         """The image of the upload in progress, from the memory; empty without one."""
-        return bytearray() if self._bank.held is None else self._bank.held.data
+        return bytearray() if self._bank.incoming is None else self._bank.incoming.data
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the host."""
+        """Receive bytes from the host."""
         for frame in self._reader.feed(data):
             if not frame.type & ANSWER:
                 self._judge(frame)
@@ -167,40 +164,40 @@ class ModelDevice:
 
     def tick(self, ticks: int = 1) -> None:
         """Play so many ticks, and answer what waited for them."""
-        commit, held = self._at_work, self._bank.held
-        if commit is not None and held is not None and held.state is Upload.CHECKING:
+        commit, incoming = self._pending, self._bank.incoming
+        if commit is not None and incoming is not None and incoming.state is Upload.CHECKING:
             first = min(ticks, commit.ticks)
             self.player.advance(first)
             commit.ticks -= first
             ticks -= first
             if commit.ticks == 0:
-                self._check(commit, held)
+                self._check(commit, incoming)
         self.player.advance(ticks)
         self._settle()
 
     def status(self) -> DeviceStatus:
         """Return the answer to STATUS."""
-        player, held, taken = self.player, self._bank.held, self._bank.taken
+        player, incoming, active = self.player, self._bank.incoming, self._bank.active
         known = bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else self._boot_hash
         return DeviceStatus(
             state=player.state,
-            upload=Upload.NONE if held is None else held.state,
+            upload=Upload.NONE if incoming is None else incoming.state,
             faults=player.faults,
             flags=PERMITS if self.permits else 0,
             boot=self.boot,
             generation=player.swaps,
             line=player.line,
-            received=0 if held is None else len(held.data),
-            image_crc=0 if held is None else held.info.image_crc,
+            received=0 if incoming is None else len(incoming.data),
+            image_crc=0 if incoming is None else incoming.info.image_crc,
             fault_counts=player.fault_counts,
             bad_frames=self._reader.bad_frames,
-            hash=known if taken is None else taken.info.hash,
+            hash=known if active is None else active.info.hash,
         )
 
-    # What every request passes
+    # Checks that every request passes
 
     def _judge(self, frame: Frame) -> None:
-        memory: _Remembered | None = None
+        memory: _LastRequest | None = None
         try:
             if frame.type != Request.HELLO and frame.session != self._session:
                 raise RequestRefused(Reason.SESSION)
@@ -212,7 +209,7 @@ class ModelDevice:
                     return
                 if frame.type in _TAGGED and frame.type != Request.COMMIT:
                     self._check_tag(frame, self._use_nonce())
-                memory = _Remembered(frame.seq, frame.type)
+                memory = _LastRequest(frame.seq, frame.type)
                 self._before, self._last = self._last, memory
             answer = self._requests[frame.type](frame)
             if answer is not None:
@@ -221,7 +218,13 @@ class ModelDevice:
             self._refuse(frame, refused, memory)
 
     def _is_repeated(self, frame: Frame) -> bool:
-        """Whether it was dealt with by the answer of last time. Raises ``RequestRefused`` if it was overtaken."""
+        """Return True if a request repeats the last one, whose answer is sent again.
+
+        Raises
+        ------
+        RequestRefused
+            If a later request has replaced it.
+        """
         if self._last is None:
             return False
         behind = (self._last.seq - frame.seq) & 0xFF
@@ -266,19 +269,19 @@ class ModelDevice:
         if not self._key:
             return
         plain = _PAYLOAD_BYTES.get(frame.type, 0)
-        given = frame.payload[plain:]
+        received_tag = frame.payload[plain:]
         bare = Frame(frame.type, frame.seq, frame.session, frame.payload[:plain])
-        if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), given):
+        if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), received_tag):
             raise RequestRefused(Reason.KEY)
 
-    def _answer(self, frame: Frame, payload: bytes, memory: _Remembered | None) -> None:
+    def _answer(self, frame: Frame, payload: bytes, memory: _LastRequest | None) -> None:
         self._send(Frame(frame.type | ANSWER, frame.seq, frame.session, payload), memory)
 
-    def _refuse(self, frame: Frame, refused: RequestRefused, memory: _Remembered | None) -> None:
+    def _refuse(self, frame: Frame, refused: RequestRefused, memory: _LastRequest | None) -> None:
         payload = Refusal(frame.type, refused.reason, refused.detail).pack()
         self._send(Frame(messages.REFUSAL, frame.seq, frame.session, payload), memory)
 
-    def _send(self, answer: Frame, memory: _Remembered | None) -> None:
+    def _send(self, answer: Frame, memory: _LastRequest | None) -> None:
         wire = answer.encode()
         if memory is not None:
             memory.answer = wire
@@ -292,67 +295,67 @@ class ModelDevice:
         return self.info.pack() + self.status().pack()
 
     def _commit(self, frame: Frame) -> bytes | None:
-        found = self._bank.find(*struct.unpack_from("<I", frame.payload))
-        if isinstance(found, Taken):
-            return struct.pack("<II", found.generation, found.line)
+        upload = self._bank.find(*struct.unpack_from("<I", frame.payload))
+        if isinstance(upload, ActiveUpload):
+            return struct.pack("<II", upload.generation, upload.line)
         if not self.permits:
             raise RequestRefused(Reason.INTERLOCK)
         assert self._last is not None
-        found.state = Upload.CHECKING
-        self._at_work = _AtWork(frame, self._last, self._before, self._use_nonce(), self._checking)
+        upload.state = Upload.CHECKING
+        self._pending = _PendingRequest(frame, self._last, self._before, self._use_nonce(), self._checking)
         if self._checking == 0:
-            self._check(self._at_work, found)
+            self._check(self._pending, upload)
         return None
 
-    def _check(self, commit: _AtWork, held: Held) -> None:
+    def _check(self, commit: _PendingRequest, incoming: IncomingUpload) -> None:
         """Check an image, and bring it into the idle bank."""
         try:
-            program = self._bank.accept(held, lambda image: self._check_tag(commit.request, commit.nonce, image))
+            program = self._bank.accept(incoming, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
             if not self.player.commit(program):
                 raise RequestRefused(Reason.TICKS)
         except RequestRefused as refused:
-            self._at_work = None
+            self._pending = None
             if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS):
-                held.state = Upload.RECEIVING
+                incoming.state = Upload.RECEIVING
             else:
-                self._bank.held = None
+                self._bank.incoming = None
             is_used = refused.reason != Reason.KEY
             if not is_used and self._last is commit.memory:
                 self._last = commit.before
             self._refuse(commit.request, refused, commit.memory if is_used else None)
             return
-        held.state = Upload.WAITING
+        incoming.state = Upload.WAITING
         commit.swaps = self.player.swaps
 
     def _settle(self) -> None:
         """Answer a COMMIT and its ABORTs once the sequencer has said what became of the program that waited."""
-        commit, held, player = self._at_work, self._bank.held, self.player
-        if commit is None or held is None or held.state is not Upload.WAITING:
+        commit, incoming, player = self._pending, self._bank.incoming, self.player
+        if commit is None or incoming is None or incoming.state is not Upload.WAITING:
             return
         if player.swaps != commit.swaps:
-            self._bank.take(held)
+            self._bank.take(incoming)
             self._answer(commit.request, struct.pack("<II", player.swaps, player.swapped_at), commit.memory)
         elif player.writable:
-            self._bank.held = None
+            self._bank.incoming = None
             self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         else:
             return
-        self._at_work = None
+        self._pending = None
         for abort in self._aborts:
             self._answer(abort.request, struct.pack("<I", player.swaps), abort.memory)
         self._aborts.clear()
 
     def _abort(self, frame: Frame) -> bytes | None:
-        commit, held = self._at_work, self._bank.held
+        commit, incoming = self._pending, self._bank.incoming
         assert self._last is not None
-        if held is not None and held.state is Upload.WAITING:
+        if incoming is not None and incoming.state is Upload.WAITING:
             if not self.player.withdraw():
                 raise RequestRefused(Reason.TICKS)
-            self._aborts.append(_AtWork(frame, self._last))
+            self._aborts.append(_PendingRequest(frame, self._last))
             return None
-        self._at_work = self._bank.held = None
+        self._pending = self._bank.incoming = None
         if commit is not None:
             self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         return struct.pack("<I", self.player.swaps)
@@ -361,8 +364,8 @@ class ModelDevice:
         offset, count = struct.unpack("<IB", frame.payload)
         return struct.pack("<I", offset) + self._bank.readback(offset, count)
 
-    def _passed_on(self, done: bool) -> bytes:
-        if not done:
+    def _passed_on(self, accepted: bool) -> bytes:
+        if not accepted:
             raise RequestRefused(Reason.TICKS)
         return b""
 

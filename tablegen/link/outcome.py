@@ -1,4 +1,4 @@
-"""What became of an upload: its result, what is known while it runs, and what is said when its time is over."""
+"""The result of an upload, its progress, and the error at the end of its time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ ProgressCall = Callable[[int, int], None]  # (bytes that the device has, all byt
 
 @dataclass(frozen=True, slots=True)
 class UploadResult:
-    """What became of an upload.
+    """The result of an upload.
 
-    ``line`` is that of the old frame which was the last, None where the answer was lost. ``bytes`` of the
-    image, ``wire_bytes`` that were sent for it, ``resumed`` bytes that the device had before. ``slow_baud`` is about
-    the rate at which answers came, None where it was not far below that of the port.
+    ``line`` is the last line of the old frame, None where the answer was lost. ``bytes`` are those of the image,
+    ``wire_bytes`` those that were sent for it, ``resumed`` those that the device had before. ``slow_baud`` is about the
+    rate at which answers came, None where it was not far below that of the port.
     """
 
     already_running: bool
@@ -33,7 +33,7 @@ class UploadResult:
 
 @dataclass(frozen=True, slots=True)
 class UploadState:
-    """What is known of an upload: the bytes that the device confirmed, all bytes, and whether a COMMIT was sent."""
+    """The progress of an upload: the bytes that the device confirmed, all bytes, and whether a COMMIT was sent."""
 
     confirmed: int
     total: int

@@ -1,4 +1,4 @@
-"""How long answers take: what line and latency explain, and what every answer teaches beyond that."""
+"""The time that answers take: by line and latency, and by the lateness of the answers so far."""
 
 from collections import deque
 from collections.abc import Callable
@@ -8,12 +8,12 @@ from tablegen.link.frames import OVERHEAD
 from tablegen.link.transport import byte_s
 
 LATENCY_S = 0.016  # latency of a USB bridge, which forwards bytes 60 times a second
-_DEVICE_DELAY_S = 0.02  # a device has other things to do
+_DEVICE_DELAY_S = 0.02  # delay of a device that is busy with other tasks
 _MARGIN = 1.5
-_DECAY = 0.8  # of a lateness, per answer
-_SPACINGS = 32  # of answers, for the rate of the line
+_DECAY = 0.8  # factor of the lateness at each answer
+_SPACINGS = 32  # answers from which the rate of the line is estimated
 _MIN_SPACINGS = 8
-_SPACED_BYTES = 100  # frames of so many bytes show a rate; smaller ones are drowned by latency
+_SPACED_BYTES = 100  # bytes of a frame that shows a rate; for smaller ones latency dominates
 _MIN_SLOWER = 2.0  # a line so many times slower than its rate is called slow
 _MIN_BACK_OFF_S = 1.0  # waits double at least up to this
 _MAX_BACK_OFF = 4  # or up to so many times the first wait
@@ -21,7 +21,7 @@ _MAX_BACK_OFF = 4  # or up to so many times the first wait
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """A request as it was sent: when, how far it ended in all bytes, and when its answer should come."""
+    """A request that was sent: its time, its end in the count of all bytes, and the expected time of its answer."""
 
     at: float
     end: int
@@ -29,28 +29,28 @@ class _Mark:
 
 
 class Pace:
-    """Learns the way to a device from the answers that come.
+    """The pace of a link, estimated from the answers that come.
 
-    What an answer takes longer than line and latency explain is its lateness. Waits allow for the largest, without a
-    cap; it fades as other answers come. Only a request that was sent once teaches (Karn).
+    The lateness of an answer is the time beyond what line and latency explain. Waits allow for the largest, without a
+    cap; it decays as other answers come. Only requests that were sent once count (Karn's algorithm).
     """
 
     def __init__(self, latency_s: float) -> None:
         self._latency_s = latency_s
-        self._line_free = 0.0  # when what was written has left
+        self._line_free = 0.0  # time at which the written bytes have left
         self._marks: dict[tuple[int, int], _Mark | None] = {}
-        self._sent = self._answered = 0  # bytes: all, and up to the request that was answered last
+        self._sent = self._answered = 0  # bytes sent, and those up to the request that was answered last
         self._answered_at = 0.0
         self._spacings: deque[float] = deque(maxlen=_SPACINGS)  # seconds per byte
-        self.late_s = 0.0  # the largest lateness, fading
+        self.late_s = 0.0  # largest lateness, which decays
 
     def forget(self) -> None:
-        """Forget all requests on their way: the port is another one, and they will not be answered."""
+        """Drop all requests on their way: the port is another one, and they will not be answered."""
         self._marks.clear()
         self._line_free = 0.0
 
     def sent(self, key: tuple[int, int], now: float, baud: int | None, sizes: tuple[int, int], learn: bool) -> float:
-        """Note that a request leaves, and return how long to wait for its answer.
+        """Record that a request leaves, and return how long to wait for its answer.
 
         ``key`` is its type and seq, ``sizes`` the bytes of the request on the wire and of the answer's payload.
         ``learn`` is false where the answer's time says nothing about the way.
@@ -65,7 +65,7 @@ class Pace:
         return _MARGIN * (way + self.late_s) + _DEVICE_DELAY_S
 
     def answered(self, key: tuple[int, int], now: float, answer_bytes: int) -> None:
-        """Note that an answer of so many bytes of payload has come."""
+        """Record that an answer of so many bytes of payload has come."""
         mark = self._marks.pop(key, None)
         if mark is None:
             return
@@ -73,13 +73,14 @@ class Pace:
         between = mark.end - self._answered
         if between <= 0:
             return
-        moved = max(between, answer_bytes + OVERHEAD)
-        if mark.at < self._answered_at and moved >= _SPACED_BYTES:  # it was on its way behind the one before
-            self._spacings.append((now - self._answered_at) / moved)
+        transfer = max(between, answer_bytes + OVERHEAD)
+        # Only a request that was under way when the one before was answered shows the rate.
+        if mark.at < self._answered_at and transfer >= _SPACED_BYTES:
+            self._spacings.append((now - self._answered_at) / transfer)
         self._answered, self._answered_at = mark.end, now
 
     def slow_baud(self, baud: int | None) -> int | None:
-        """About the rate at which answers come, in bit/s, where it is far below ``baud``; None where it is not.
+        """Return about the rate of the answers in bit/s where it is far below ``baud``, else None.
 
         Most answers through a long way follow each other closely. So the quarter of the answers with the shortest
         spacing decides.
@@ -94,9 +95,9 @@ class Pace:
 
 
 class Deadline:
-    """When something has to have ended: what is allowed may grow while a host learns how long it takes.
+    """The end of the time for a transfer; the time may grow while the host learns how slow the link is.
 
-    The most that ``allowed_s`` has told so far counts. Times are those of the port's clock, in seconds.
+    The largest result of ``allowed_s`` so far counts. Times are those of the port's clock, in seconds.
     """
 
     def __init__(self, start: float, allowed_s: Callable[[], float]) -> None:
@@ -104,7 +105,7 @@ class Deadline:
 
     @property
     def at(self) -> float:
-        """The time."""
+        """The time of the deadline in s."""
         self._most_s = max(self._most_s, self._allowed_s())
         return self._start + self._most_s
 

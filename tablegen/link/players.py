@@ -1,4 +1,4 @@
-"""What plays behind a model of a device: the integer model tick by tick, or whole lines at once for virtual time."""
+"""The sequencers behind a model of a device: tick by tick, or whole lines at once for virtual time."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -13,11 +13,11 @@ MAX_REQUESTS = 8  # requests that a sequencer in C queues until its next tick
 
 
 class Player(Protocol):
-    """A sequencer as the link sees it. Requests are False, and change nothing, where too many wait for a tick."""
+    """A sequencer as the link sees it; requests return False, and change nothing, where too many wait for a tick."""
 
     @property
     def swaps(self) -> int:
-        """Programs taken since the start."""
+        """The number of programs that were swapped in since the start."""
 
     @property
     def line(self) -> int:
@@ -25,7 +25,7 @@ class Player(Protocol):
 
     @property
     def swapped_at(self) -> int:
-        """The line that the old program had come to when the last one was taken."""
+        """The line of the old program at the last swap."""
 
     @property
     def state(self) -> DeviceState:
@@ -37,21 +37,21 @@ class Player(Protocol):
 
     @property
     def faults(self) -> int:
-        """Sticky, as bits: 1 slew, 2 clamp, 4 overrun, 8 underrun."""
+        """The sticky faults as bits: 1 slew, 2 clamp, 4 overrun, 8 underrun."""
 
     @property
     def fault_counts(self) -> tuple[int, int, int, int]:
-        """In the order of the bits."""
+        """The counts of the faults, in the order of the bits."""
 
     @property
     def writable(self) -> bool:
-        """Whether no program waits, nor will."""
+        """True if no program waits to be swapped in, nor will."""
 
     def commit(self, program: DualProgram) -> bool:
-        """To be taken at the next line start, or on the next tick where no scan plays."""
+        """Commit a program, to be swapped in at the next line start, or on the next tick where no scan plays."""
 
     def withdraw(self) -> bool:
-        """Withdraw a program that was committed and is not yet taken."""
+        """Withdraw a program that was committed and is not swapped in yet."""
 
     def arm(self, frames: int) -> bool:
         """Let the next trigger start so many frames; 0 is without end."""
@@ -60,7 +60,7 @@ class Player(Protocol):
         """Start at line 0."""
 
     def park(self) -> bool:
-        """No more frames."""
+        """Park after the current tick; no frame follows."""
 
     def clear(self) -> bool:
         """Clear the faults."""
@@ -69,11 +69,11 @@ class Player(Protocol):
         """Play so many ticks."""
 
     def restart(self) -> None:
-        """As at power-up."""
+        """Restart as at power-up."""
 
 
 class _Queue:
-    """Requests that wait for the next tick, as in the C runtime."""
+    """The requests that wait for the next tick, as in the C runtime."""
 
     def __init__(self, boot: DualProgram | None) -> None:
         self._boot = boot
@@ -83,7 +83,7 @@ class _Queue:
         self.restart()
 
     def restart(self) -> None:
-        """As at power-up: the boot program, if there is one, waits for the first tick."""
+        """Restart as at power-up: the boot program, if there is one, waits for the first tick."""
         self._requests.clear()
         self._commits = self.swaps = self.swapped_at = 0
         self._power_up()
@@ -97,15 +97,15 @@ class _Queue:
         raise NotImplementedError
 
     def commit(self, program: DualProgram) -> bool:
-        """Commit a program, to be taken at the next start of a line."""
+        """Commit a program, to be swapped in at the next start of a line."""
 
         def act() -> None:
             self._commits -= 1
             self._take(program)
 
-        done = self._ask(act)
-        self._commits += done
-        return done
+        accepted = self._ask(act)
+        self._commits += accepted
+        return accepted
 
     def _ask(self, act: Callable[[], None]) -> bool:
         if len(self._requests) == MAX_REQUESTS:
@@ -119,15 +119,15 @@ class _Queue:
 
 
 class SequencerPlayer(_Queue):
-    """Every tick of ``tablegen.device.sequencer``; ``seen`` is called with generation, line and tick of each."""
+    """A player of every tick of ``tablegen.device.sequencer``; ``on_tick`` gets generation, line and tick of each."""
 
     def __init__(
         self,
         boot: DualProgram | None,
         codes: tuple[int, int] = (0, 0),
-        seen: Callable[[int, int, Tick], None] | None = None,
+        on_tick: Callable[[int, int, Tick], None] | None = None,
     ) -> None:
-        self._codes, self._seen = codes, seen
+        self._codes, self._on_tick = codes, on_tick
         self._last: Tick | None = None
         super().__init__(boot)
 
@@ -164,18 +164,18 @@ class SequencerPlayer(_Queue):
 
     @property
     def faults(self) -> int:
-        """Slew and clamp; the others need a clock."""
+        """The faults slew and clamp; the others need a clock."""
         return int(self.sequencer.faults)
 
     @property
     def fault_counts(self) -> tuple[int, int, int, int]:
-        """In the order of the bits."""
+        """The counts of the faults, in the order of the bits."""
         counts = self.sequencer.fault_counts
         return counts[Fault.SLEW], counts[Fault.CLAMP], 0, 0
 
     @property
     def writable(self) -> bool:
-        """Whether no program waits, nor will."""
+        """True if no program waits to be swapped in, nor will."""
         return self._commits == 0 and self.sequencer.idle is None
 
     def withdraw(self) -> bool:
@@ -183,7 +183,7 @@ class SequencerPlayer(_Queue):
         return self._ask(self.sequencer.withdraw)
 
     def arm(self, frames: int) -> bool:
-        """For the next trigger."""
+        """Let the next trigger start so many frames; 0 is without end."""
         return self._ask(lambda: self.sequencer.arm(frames))
 
     def trigger(self) -> bool:
@@ -195,7 +195,7 @@ class SequencerPlayer(_Queue):
         return self._ask(act)
 
     def park(self) -> bool:
-        """No more frames."""
+        """Park after the current tick; no frame follows."""
         return self._ask(self.sequencer.park)
 
     def clear(self) -> bool:
@@ -207,20 +207,20 @@ class SequencerPlayer(_Queue):
         for _ in range(ticks):
             self._answer()
             before = self.sequencer.line
-            # a swap and a trigger begin at line 0; the line of a tick is the one before it is over
+            # A swap and a trigger begin at line 0; the line of a tick is the one before the tick is over.
             begins = self.sequencer.idle is not None and self.sequencer.running and self.sequencer.tick == 0
             tick = self._last = self.sequencer.step()
             if tick.swapped:
                 self.swaps += 1
                 self.swapped_at = before
-            if self._seen is not None:
-                self._seen(self.swaps, 0 if begins else before, tick)
+            if self._on_tick is not None:
+                self._on_tick(self.swaps, 0 if begins else before, tick)
 
 
 class LinePlayer(_Queue):
-    """Lines, frames, swaps and requests on the ticks of ``SequencerPlayer``, but no codes: there are no faults.
+    """A player of lines, frames, swaps and requests on the ticks of ``SequencerPlayer``, without codes and faults.
 
-    How long parking takes is reckoned from the code at which it began, exactly where no swap was being caught up with
+    The duration of parking follows from the code at which it begins, exactly where no swap was being caught up with
     and no axis is shaped.
     """
 
@@ -251,7 +251,7 @@ class LinePlayer(_Queue):
 
     @property
     def writable(self) -> bool:
-        """Whether no program waits, nor will."""
+        """True if no program waits to be swapped in, nor will."""
         return self._commits == 0 and self._waits is None
 
     def withdraw(self) -> bool:
@@ -265,7 +265,7 @@ class LinePlayer(_Queue):
         return self._ask(act)
 
     def arm(self, frames: int) -> bool:
-        """For the next trigger."""
+        """Let the next trigger start so many frames; 0 is without end."""
 
         def act() -> None:
             self._armed, self._armed_frames = True, frames
@@ -284,7 +284,7 @@ class LinePlayer(_Queue):
         return self._ask(act)
 
     def park(self) -> bool:
-        """No more frames."""
+        """Park after the current tick; no frame follows."""
 
         def act() -> None:
             if self._running and self.playing is not None:
@@ -294,7 +294,7 @@ class LinePlayer(_Queue):
         return self._ask(act)
 
     def clear(self) -> bool:
-        """There are no faults."""
+        """Clear the faults, of which there are none."""
         return self._ask(lambda: None)
 
     def advance(self, ticks: int) -> None:
@@ -322,7 +322,7 @@ class LinePlayer(_Queue):
             self._parks_for = max(self._parks_for, _ramp(program, from_codes))
 
     def _play(self, program: DualProgram, most: int) -> int:
-        """Ticks of the line, at most so many; returns how many."""
+        """Play at most so many ticks of the line, and return how many."""
         ticks = min(most, program.schedule.ticks - self._tick)
         self._played = True
         self._tick += ticks
@@ -343,7 +343,7 @@ class LinePlayer(_Queue):
             self._parks_for = self._way_to_park(program)
 
     def _way_to_park(self, program: DualProgram) -> int:
-        """From the last tick that was played."""
+        """Return the ticks of parking from the last tick that was played."""
         schedule = program.schedule
         k = (self.line * schedule.ticks + self._tick - 1) % schedule.frame_ticks
         x, y = (
@@ -354,7 +354,7 @@ class LinePlayer(_Queue):
 
 
 def _ramp(program: DualProgram, codes: tuple[int, int]) -> int:
-    """Ticks from these codes to the park codes on both axes."""
+    """Return the ticks of the ramp from these codes to the park codes of both axes."""
     return max(
         -(-abs(axis.output.park_code - code) // axis.output.max_step)
         for axis, code in zip((program.x, program.y), codes, strict=True)

@@ -1,4 +1,4 @@
-"""What is uploaded of a scan, and whether a device would take it: asked here, before anything is sent."""
+"""The image of a scan for an upload, and the check, before anything is sent, that a device would accept it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +23,12 @@ from tablegen.planning.line_plan import Plan
 
 Form = Literal["auto", "table", "fourier"]
 TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # bits of AxisShape.converter
-_RATE_TOLERANCE_HZ = 1.0  # a device tells its rate to the nearest whole one
+_RATE_TOLERANCE_HZ = 1.0  # a device states its rate to the nearest integer
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedScan:
-    """What can be uploaded: a program, the hash of its plan, and the Fourier words of both axes.
+    """A scan that can be uploaded: a program, the hash of its plan, and the Fourier words of both axes.
 
     These are int64 of shape (2 H + 1,), in the order of devices.
     """
@@ -47,7 +47,13 @@ class PreparedScan:
 
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
-        """Prepare the scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
+        """Prepare the scan that ``tablegen build`` wrote into a folder.
+
+        Raises
+        ------
+        NotABuild
+            If the folder holds none, or its manifest was changed.
+        """
         stored = read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
@@ -57,23 +63,32 @@ class PreparedScan:
 
     @property
     def axes(self) -> tuple[tuple[str, Program, Ints], tuple[str, Program, Ints]]:
-        """Name, program and Fourier words of both."""
+        """The name, the program and the Fourier words of each axis, x first.
+
+        Returns
+        -------
+        tuple of tuple
+            The words are Q2.30 of shape (2 H + 1,).
+        """
         return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
 
     def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> ProgramImage:
         """Make the image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
 
-        Raises ``Unsuitable`` where an axis has no Fourier words that would render its table.
+        Raises
+        ------
+        Unsuitable
+            If an axis has no Fourier words that would render its table.
         """
         if form == "fourier" and (direct := [name for name, axis, _ in self.axes if axis.mode == "direct"]):
             raise Unsuitable(
                 [f"{name}: a direct table cannot be computed from Fourier words; use --as table" for name in direct]
             )
-        chosen = [
+        fourier = [
             words if form == "fourier" or (form == "auto" and _rendered(axis, words, info)) else None
             for _, axis, words in self.axes
         ]
-        return make_image(self.program, self.digest, chosen[0], chosen[1])
+        return make_image(self.program, self.digest, fourier[0], fourier[1])
 
     def like(self, image: bytes) -> ProgramImage:
         """Make the image that a device which plays this scan should hold, each axis in the form that this one has."""
@@ -82,14 +97,14 @@ class PreparedScan:
 
 
 def harmonics_of(image: bytes) -> tuple[int, int]:
-    """Harmonics of x and y; 0 where a table follows, or the image is too short to tell."""
+    """Return the harmonics of x and y; 0 where a table follows, or the image is too short to tell."""
     words = np.frombuffer(image.ljust(PROGRAM_BYTES, b"\0"), dtype="<u4", count=PROGRAM_BYTES // 4)
     x, y = (int(words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]) for page in (1, 2))
     return x, y
 
 
 def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
-    """Whether Fourier words are the smaller form of an axis that the device takes."""
+    """Return True if Fourier words are the smaller form of an axis that the device takes."""
     if axis.mode == "direct":
         return False
     if info is not None:
@@ -101,18 +116,26 @@ def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
 
 
 def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
-    """Whether a device with these active limits would accept the image, as far as can be known without it.
+    """Check that a device with these active limits would accept the image, as far as can be known without it.
 
-    Raises ``Unsuitable`` with everything that is found.
+    Parameters
+    ----------
+    any_rate
+        True to accept another update rate than the device has.
+
+    Raises
+    ------
+    Unsuitable
+        If it would not, with every objection.
     """
-    found = [*_device(image, info, scan), *([] if any_rate else _rate(scan, info))]
+    objections = [*_device(image, info, scan), *([] if any_rate else _rate(scan, info))]
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
-        found += [f"{name}: {why}" for why in _axis(axis, shape, theirs)]
+        objections += [f"{name}: {why}" for why in _axis(axis, shape, theirs)]
     contents = take_apart(image.data, image.info.x, image.info.y)
     if objection := first_objection(contents, *limits, None, info.shaping):
-        found.append(explain(*objection, info, contents, limits))
-    if found:
-        raise Unsuitable(found)
+        objections.append(explain(*objection, info, contents, limits))
+    if objections:
+        raise Unsuitable(objections)
 
 
 def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[str]:

@@ -1,4 +1,4 @@
-"""The image of a program: what an upload puts into a device, and what a device reads out of it (docs/protocol.md)."""
+"""The image of a program: the bytes that an upload sends and a readback returns (docs/protocol.md)."""
 
 import zlib
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _HARMONICS_WORD = AXIS_WORDS.index("harmonics")
 
 @dataclass(frozen=True, slots=True)
 class ProgramImage:
-    """What is uploaded, and what BEGIN says of it."""
+    """An image for an upload, and its announcement by BEGIN."""
 
     info: ImageInfo
     data: bytes
@@ -33,9 +33,19 @@ class ProgramImage:
 def make_image(
     program: DualProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
 ) -> ProgramImage:
-    """Make the image of a program of the plan with this SHA-256 (64 hexadecimal digits).
+    """Make the image of a program.
 
-    Where Fourier words are given, int64 of shape (2 H + 1,) in the order of devices, they go in place of the table.
+    Parameters
+    ----------
+    digest
+        SHA-256 of the plan, 64 hexadecimal digits.
+    x_fourier, y_fourier
+        Fourier words that replace the table, Q2.30 of shape (2 H + 1,) in the order of devices.
+
+    Returns
+    -------
+    ProgramImage
+        What an upload sends.
     """
     harmonics = [0 if words is None else len(words) // 2 for words in (x_fourier, y_fourier)]
     words = program_words(program.schedule, program.x, program.y, (harmonics[0], harmonics[1]))
@@ -59,7 +69,7 @@ def _bytes(words: Ints, size: int) -> bytes:
 
 
 def _words(data: bytes, size: int) -> Ints:
-    """Signed words of so many bytes."""
+    """Return the signed words of bytes, ``size`` bytes each."""
     raw = np.frombuffer(data, dtype=np.uint8).reshape(-1, size)
     wide = np.where(raw[:, -1:] & 0x80, np.uint8(255), np.uint8(0)).repeat(8, axis=1)
     wide[:, :size] = raw
@@ -68,7 +78,7 @@ def _words(data: bytes, size: int) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """An image taken apart: the program words, unsigned, and the words of both axes, signed."""
+    """The parts of an image: the program words, unsigned, and the words of both axes, signed."""
 
     words: tuple[int, ...]
     x_shape: AxisShape
@@ -93,14 +103,24 @@ class Contents:
         return (self.signed(page, "offset_high") << OFFSET_LOW_BITS) + self.axis(page, "offset_low")
 
     def shaping(self, page: int) -> Shaping:
-        """How the output of x (1) or y (2) is shaped. Raises ``ValueError`` where the word says none."""
+        """Return the shaping of the output of x (1) or y (2).
+
+        Raises
+        ------
+        ValueError
+            If the word of shaping defines none.
+        """
         return Shaping.of_word(self.axis(page, "shaping"))
 
     def program(self, page: int) -> Program:
         """Return the program of x (1) or y (2), with tables rendered from Fourier words. Its converter is a plain one.
 
-        Its output is not shaped where the word of shaping says none. Raises ``ValueError`` where it could not be played
-        at all.
+        Its output is not shaped where the word of shaping defines none.
+
+        Raises
+        ------
+        ValueError
+            If it could not be played at all.
         """
         shape, words = (self.x_shape, self.x) if page == 1 else (self.y_shape, self.y)
         if self.axis(page, "harmonics"):
@@ -135,7 +155,7 @@ def _signed(word: int) -> int:
 
 
 def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int]:
-    """Bytes that follow the program words for x and for y."""
+    """Return the bytes that follow the program words for x and for y."""
     sizes = []
     for page, shape in ((1, x), (2, y)):
         harmonics = words[page * PAGE_WORDS + _HARMONICS_WORD]
@@ -148,7 +168,10 @@ def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int
 def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
     """Take apart an image of tables of these shapes.
 
-    Raises ``ValueError`` where its length is not what its program words say.
+    Raises
+    ------
+    ValueError
+        If its length is not what its program words say.
     """
     if len(data) < PROGRAM_BYTES:
         raise ValueError(f"an image of {len(data)} bytes; the program words alone have {PROGRAM_BYTES}")

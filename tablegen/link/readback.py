@@ -1,4 +1,4 @@
-"""The image of the program that plays, read out of a device: several requests on their way at a time."""
+"""The readback of the image that plays, with several requests on their way at a time."""
 
 import struct
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ _MAX_RESTARTS = 4
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Pieces of an image by their offset, and the bytes that no image of the device exceeds."""
+    """The pieces of an image by their offset, and the bytes that no image of the device exceeds."""
 
     pieces: dict[int, bytes]
     most: int
 
     @property
     def end(self) -> int | None:
-        """Bytes of the image: the first piece that is short is its last; None where none was short so far."""
+        """The bytes of the image: the first piece that is short is its last; None where none was short so far."""
         ends = [at + len(piece) for at, piece in self.pieces.items() if len(piece) < DATA_BYTES]
         return min(ends, default=None)
 
@@ -37,7 +37,13 @@ class Reading:
         return [at for at in range(0, end, DATA_BYTES) if at not in self.pieces]
 
     def image(self) -> bytes:
-        """Join the pieces. Raises ``NotUnderstood`` where they make no image."""
+        """Join the pieces.
+
+        Raises
+        ------
+        NotUnderstood
+            If they make no image.
+        """
         last = max(self.pieces)
         end = last + len(self.pieces[last]) if self.end is None else self.end
         if end > self.most:
@@ -54,26 +60,37 @@ class Reading:
 
 
 def read_back(session: LinkSession, deadline: Deadline) -> Reading:
-    """Read all pieces. The caller looks whether the scan changed meanwhile, and takes the image if it did not.
+    """Read all pieces; the caller checks whether the scan changed meanwhile.
 
-    Raises ``Refused`` where the device does not hold it, ``OutOfTime``, and what lines raise.
+    Raises
+    ------
+    Refused
+        If the device does not hold the image.
+    LinkLost, OutOfTime
+        If the device is gone, or takes too long.
     """
     return _ImageReader(session, deadline).read()
 
 
 class _ImageReader:
-    """Pieces of an image that have come, and requests for others that may still be answered, however late."""
+    """The pieces of an image that have come, and the requests that may still be answered, however late."""
 
     def __init__(self, session: LinkSession, deadline: Deadline) -> None:
         self._session, self._until = session, deadline
         self._reading = Reading({}, most_bytes(session.info))
-        self._found = self._reading.pieces
-        self._asked: dict[int, int] = {}  # offsets by seq
+        self._pieces = self._reading.pieces
+        self._offsets: dict[int, int] = {}  # offsets by seq
         self._window = session.info.window
         self._in_vain = 0
 
     def read(self) -> Reading:
-        """All pieces, up to the first that is short."""
+        """Read all pieces, up to the first that is short.
+
+        Raises
+        ------
+        LinkLost, OutOfTime
+            If the device is gone, or takes too long.
+        """
         restarts = 0
         while missing := self._reading.missing():
             if self._session.now() >= self._deadline:
@@ -82,15 +99,15 @@ class _ImageReader:
                 self._some(missing[: self._window])
             except Silent:
                 raise
-            except LinkLost as lost:
-                self._session.reopen(self._deadline, lost)
-                self._asked.clear()
+            except LinkLost as loss:
+                self._session.reopen(self._deadline, loss)
+                self._offsets.clear()
             except SessionEnded:
                 restarts += 1
                 if restarts > _MAX_RESTARTS:
                     raise self._session.contested() from None
-                self._session.greet(self._deadline, anew=True)
-                self._asked.clear()
+                self._session.greet(self._deadline, new_session=True)
+                self._offsets.clear()
         return self._reading
 
     @property
@@ -101,41 +118,41 @@ class _ImageReader:
         exchange = self._session.exchange
         slow = exchange.pace.slow_baud(exchange.transport.baud)
         why = f"the line is slow, answers come at about {slow} baud: give --baud {slow}" if slow else "it takes long"
-        have = sum(map(len, self._found.values()))
+        have = sum(map(len, self._pieces.values()))
         return OutOfTime(f"timeout: {have} bytes of the image were read; {why}, or increase --timeout")
 
-    def _some(self, wanted: list[int]) -> None:
-        """So many pieces at once; fewer the next time if some did not come."""
+    def _some(self, offsets: list[int]) -> None:
+        """Read some pieces at once; reduce the window if some of them did not come."""
         exchange = self._session.exchange
         now = due = exchange.now()
-        for count, at in enumerate(wanted):
+        for count, at in enumerate(offsets):
             seq = exchange.seq()
             ahead = count * MAXIMUM_FRAME  # bytes of answers
             due = exchange.send(
                 Request.READBACK, seq, _REQUEST.pack(at, DATA_BYTES), ahead + 4 + DATA_BYTES, self._in_vain > 0
             )
-            self._asked[seq] = at
+            self._offsets[seq] = at
         until = min(now + back_off(due - now, self._in_vain), self._deadline)
-        heard = False
-        while exchange.now() < until and not all(at in self._found for at in wanted):
+        any_answer = False
+        while exchange.now() < until and not all(at in self._pieces for at in offsets):
             for answer in exchange.receive(until):
-                heard = self._take(answer) or heard
-        if not all(at in self._found for at in wanted):
+                any_answer = self._take(answer) or any_answer
+        if not all(at in self._pieces for at in offsets):
             self._window = max(self._window // 2, 1)
-        self._in_vain = 0 if heard else self._in_vain + 1
+        self._in_vain = 0 if any_answer else self._in_vain + 1
         if self._in_vain >= _MAX_IN_VAIN:
             raise self._session.silent()
 
     def _take(self, answer: Answer) -> bool:
-        """Whether it is the answer to one of the requests."""
-        if answer.kind != Request.READBACK or answer.seq not in self._asked:
+        """Store the piece of an answer; return True if it belongs to one of the requests."""
+        if answer.kind != Request.READBACK or answer.seq not in self._offsets:
             return False
-        at = self._asked.pop(answer.seq)
+        at = self._offsets.pop(answer.seq)
         if answer.reason == Reason.SESSION:
             raise SessionEnded
         if answer.reason:
             raise refused(answer.kind, answer.reason, answer.detail, self._session.info)
-        self._found[at] = _piece(answer.payload, at)
+        self._pieces[at] = _piece(answer.payload, at)
         return True
 
 

@@ -1,4 +1,4 @@
-"""What refusals mean, in a sentence each, with what to do about them: docs/protocol.md, "Reasons"."""
+"""Explanations of refusals, each with what to do: docs/protocol.md, "Reasons"."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -49,10 +49,10 @@ def refused(
 ) -> Refused:
     """Return the error for a refusal; what is known of the device and of the scan makes it more precise."""
     names = [known.name for known in Request if known == request]
-    asked = names[0] if names else f"request {request}"
+    request_name = names[0] if names else f"request {request}"
     sentence = explain(reason, detail, info, contents, limits)
     name = Reason(reason).name.lower() if reason in list(Reason) else str(reason)
-    return Refused(request, reason, detail, f"the device refused {asked} ({name}): {sentence}")
+    return Refused(request, reason, detail, f"the device refused {request_name} ({name}): {sentence}")
 
 
 def keyless(request: Request) -> Refused:
@@ -136,15 +136,15 @@ _SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {
 
 
 def _codes(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
-    asked = "" if contents is None else f" {contents.axis(page, 'code_min')}..{contents.axis(page, 'code_max')}"
+    codes = "" if contents is None else f" {contents.axis(page, 'code_min')}..{contents.axis(page, 'code_max')}"
     limit = "the limit" if limits is None else f"{limits.code_min}..{limits.code_max}"
-    return f"its codes{asked} go beyond {limit} of the device; lower scanner and scan, or raise the limit in its build"
+    return f"its codes{codes} go beyond {limit} of the device; lower scanner and scan, or raise the limit in its build"
 
 
 def _step(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
-    asked = "" if contents is None else f" of {contents.axis(page, 'max_step')} codes a tick"
+    step = "" if contents is None else f" of {contents.axis(page, 'max_step')} codes a tick"
     limit = "the limit" if limits is None else str(limits.max_step)
-    return f"its max_step{asked} is beyond {limit} of the device; lower max_slew_v_per_s, or raise the limit"
+    return f"its max_step{step} is beyond {limit} of the device; lower max_slew_v_per_s, or raise the limit"
 
 
 def _word(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:

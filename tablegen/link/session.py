@@ -28,11 +28,11 @@ _REOPEN_INTERVAL_S = 0.25
 
 
 class SessionEnded(Exception):
-    """The device knows another session, or none: the next request has to be HELLO. For use within the client."""
+    """The end of a session: the device knows another one, or none, and the next request has to be HELLO. Internal."""
 
 
 class LinkSession:
-    """One host at one device. Requests end in an answer or an error before their deadline, a time of ``now``."""
+    """A session of a host with a device; requests end in an answer or an error before a deadline, a time of ``now``."""
 
     def __init__(
         self,
@@ -46,12 +46,12 @@ class LinkSession:
         self.exchange = Exchange(transport, latency_s, random)
         self.key = key
         self.info: DeviceInfo
-        self.status: DeviceStatus  # when HELLO was answered last, at the time
+        self.status: DeviceStatus  # status at the last answer to HELLO
         self.status_at = 0.0
         self.acts: dict[Request, None] = {}  # requests that act which were sent, in order, each once
         self._opener = opener
         self._sleep = sleep
-        self._heard = False
+        self._has_answered = False
 
     def now(self) -> float:
         """Return the time by the clock of the port."""
@@ -61,23 +61,29 @@ class LinkSession:
         """Give the port back."""
         self.exchange.transport.close()
 
-    def hello(self, deadline: float, anew: bool = False) -> None:
-        """Begin, or go on, and learn ``info`` and ``status``; ``anew`` is with another session."""
-        if anew:
+    def hello(self, deadline: float, new_session: bool = False) -> None:
+        """Send HELLO, and store ``info`` and ``status``; ``new_session`` begins another session."""
+        if new_session:
             self.exchange.new_session()
         payload = self._repeat(Request.HELLO, None, bytes([VERSION]), HELLO_BYTES, deadline)
         size = DeviceInfo.LAYOUT.size
         check_length("HELLO", payload, HELLO_BYTES)
         info = DeviceInfo.unpack(payload)
         check_device(info)
-        if self._heard:
+        if self._has_answered:
             check_unchanged(self.info, info)
         self.info = info
         self.status, self.status_at = self.status_of(payload[size:], "HELLO"), self.now()
-        self._heard = True
+        self._has_answered = True
 
     def status_of(self, payload: bytes, source: str = "STATUS") -> DeviceStatus:
-        """Unpack a status that answered the request ``source``. Raises ``NotUnderstood`` for an impossible one."""
+        """Unpack a status that answered the request ``source``.
+
+        Raises
+        ------
+        NotUnderstood
+            If the status is impossible.
+        """
         check_length(source, payload, DeviceStatus.LAYOUT.size)
         try:
             status = DeviceStatus.unpack(payload)
@@ -86,17 +92,29 @@ class LinkSession:
         check_status(status, self.info, source)
         return status
 
-    def greet(self, deadline: float, anew: bool = False) -> None:
-        """HELLO again, on a port that may have gone meanwhile."""
+    def greet(self, deadline: float, new_session: bool = False) -> None:
+        """Send HELLO again, on a port that may have gone meanwhile.
+
+        Raises
+        ------
+        LinkLost
+            If the port does not come back before the deadline.
+        """
         try:
-            self.hello(deadline, anew)
+            self.hello(deadline, new_session)
         except Silent:
             raise
-        except LinkLost as lost:
-            self.reopen(deadline, lost)
+        except LinkLost as loss:
+            self.reopen(deadline, loss)
 
     def reopen(self, deadline: float, why: LinkLost) -> None:
-        """Open a port that has gone again, and HELLO; tries until the deadline. Without an opener raises ``why``."""
+        """Open a lost port again, and HELLO; repeat it until the deadline.
+
+        Raises
+        ------
+        LinkLost
+            ``why``, or what failed last.
+        """
         if self._opener is None:
             raise why
         while True:
@@ -121,22 +139,38 @@ class LinkSession:
                     raise
 
     def ask(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
-        """Send a request that does not act, and return the payload of its answer."""
+        """Send a request that does not act, and return the payload of its answer.
+
+        Raises
+        ------
+        Refused
+            If the device refuses the request.
+        LinkLost
+            If the device is gone, or does not answer before the deadline.
+        """
         for _ in range(_MAX_RESTARTS):
             try:
                 return self._repeat(kind, None, payload, answer_bytes, deadline)
             except Silent:
                 raise
-            except LinkLost as lost:
-                self.reopen(deadline, lost)
+            except LinkLost as loss:
+                self.reopen(deadline, loss)
             except Refused as refusal:
                 if refusal.reason != Reason.SESSION:
                     raise
-                self.greet(deadline, anew=True)
+                self.greet(deadline, new_session=True)
         raise self.contested()
 
     def act(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float, tagged: bool = True) -> bytes:
-        """Send a request that acts, with a tag where the device needs one; it is carried out once."""
+        """Send a request that acts, with a tag where the device needs one; it is carried out once.
+
+        Raises
+        ------
+        Refused
+            If the device refuses the request.
+        LinkLost
+            If the device is gone, or does not answer before the deadline.
+        """
         number, body = self.exchange.number(), None
         last: LinkError = self.contested()
         for _ in range(_MAX_RESTARTS):
@@ -147,13 +181,13 @@ class LinkSession:
                 return self._repeat(kind, number, body, answer_bytes, deadline)
             except Silent:
                 raise
-            except LinkLost as lost:
-                self.reopen(deadline, lost)  # same number, same bytes: a device that has acted only answers
+            except LinkLost as loss:
+                self.reopen(deadline, loss)  # with the same number and bytes a device that has acted only answers
             except Refused as refusal:
                 if refusal.reason == Reason.KEY and self.key is not None:
-                    last, body = refusal, None  # the line may have spent the challenge
+                    last, body = refusal, None  # a repeated frame may have used up the challenge
                 elif refusal.reason in (Reason.SESSION, Reason.OLD):
-                    self.greet(deadline, anew=True)
+                    self.greet(deadline, new_session=True)
                     last, body = self.contested(), None
                 else:
                     raise
@@ -167,7 +201,13 @@ class LinkSession:
         return self.tag_of(nonce, kind, number, payload, b"")
 
     def needs_key(self, kind: Request) -> bool:
-        """Whether a request that acts needs a tag; raises ``Refused`` where no key was given."""
+        """Return True if a request that acts needs a tag.
+
+        Raises
+        ------
+        Refused
+            If it does and there is no key.
+        """
         if not self.info.features & Feature.KEY:
             return False
         if self.key is None:
@@ -175,7 +215,7 @@ class LinkSession:
         return True
 
     def tag_of(self, nonce: bytes, kind: int, number: int, payload: bytes, digest: bytes) -> bytes:
-        """BLAKE2s of a request under the key; ``digest`` is that of the image, with COMMIT."""
+        """Return the BLAKE2s tag of a request under the key; ``digest`` is that of the image, with COMMIT."""
         assert self.key is not None
         check_length("CHALLENGE", nonce, NONCE_BYTES)
         head = bytes([kind, number]) + self.exchange.session.to_bytes(4, "little")
@@ -188,12 +228,12 @@ class LinkSession:
 
     def silent(self) -> LinkError:
         """Return the error where nobody answers."""
-        if self._heard and self.exchange.noise:
+        if self._has_answered and self.exchange.noise:
             return Silent(
                 "the device no longer answers, and bytes come that are not its frames: does its console write to the "
                 "same line, or did it restart with another baud rate?"
             )
-        if self._heard:
+        if self._has_answered:
             return Silent("the device no longer answers; is it still on?")
         if self.exchange.noise:
             why = "the received bytes are not frames of the device: is --baud the rate of the device?"
@@ -202,9 +242,16 @@ class LinkSession:
         return NoAnswer(f"the port is open, but no device answers: {why}")
 
     def _repeat(self, kind: Request, number: int | None, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
-        """Send a request until it is answered. Raises ``Refused``, ``LinkLost``, ``NoAnswer``.
+        """Send a request until it is answered.
 
-        What acts has its ``number``; the rest has another one each time, so that answers tell how long the way is.
+        A request that acts has its ``number``; any other has a new one each time, so that answers show the delay.
+
+        Raises
+        ------
+        Refused
+            If the device refuses the request.
+        LinkLost, NoAnswer
+            If no answer comes before the deadline.
         """
         sent = set()
         for count in range(_MAX_TRIES):
@@ -224,6 +271,6 @@ class LinkSession:
 
     def _payload(self, answer: Answer) -> bytes:
         if answer.reason:
-            info = self.info if self._heard else None
+            info = self.info if self._has_answered else None
             raise refused(answer.kind, answer.reason, answer.detail, info)
         return answer.payload

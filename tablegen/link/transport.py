@@ -1,4 +1,4 @@
-"""The way to a device: bytes to it, bytes from it, and a clock. pyserial opens real ones."""
+"""Transports: bytes to a device, bytes from it, and a clock. pyserial opens real ones."""
 
 import errno
 import time
@@ -9,13 +9,13 @@ from typing import Any, Protocol
 from tablegen.link.errors import LinkLost, NoPort, SerialMissing
 
 _POLL_S = 0.01  # pyserial's own wait; changing it for every read would configure the port again each time
-_WRITE_TIMEOUT_S = 5.0  # a port that takes nothing for so long has a cable without an end
+_WRITE_TIMEOUT_S = 5.0  # a port that takes no bytes for so long has no device behind it
 _MAX_READ_BYTES = 4096  # bytes per read, so that a noisy line cannot block it
 _BITS_PER_BYTE = 10  # bits of a byte on the wire: start, 8, stop
 
 
 class Transport(Protocol):
-    """What the client needs of a port. ``write`` and ``read`` raise ``LinkLost`` when it has gone."""
+    """The interface of a port for the client; ``write`` and ``read`` raise ``LinkLost`` when it has gone."""
 
     baud: int | None  # bits a second, for time-outs; None where bytes take no time
 
@@ -29,21 +29,26 @@ class Transport(Protocol):
         """Give the port back. It can be called twice."""
 
     def now(self) -> float:
-        """Seconds of a clock that never goes back."""
+        """Return the seconds of a clock that never goes back."""
 
 
 Opener = Callable[[], Transport]
 
 
 def byte_s(baud: int | None) -> float:
-    """Seconds that a byte takes on the wire."""
+    """Return the seconds that a byte takes on the wire."""
     return _BITS_PER_BYTE / baud if baud else 0.0
 
 
 def open_port(url: str, baud: int = 115200) -> Transport:
     """Open a port of pyserial: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, or any other URL of it.
 
-    Raises ``NoPort`` where it cannot be opened, ``SerialMissing`` without pyserial.
+    Raises
+    ------
+    NoPort
+        If it cannot be opened.
+    SerialMissing
+        If pyserial is not installed.
     """
     try:
         import serial
@@ -81,7 +86,7 @@ def _why_not(url: str, error: Exception) -> str:
 
 
 class SerialTransport:
-    """A port that pyserial has opened."""
+    """A port of pyserial."""
 
     def __init__(self, port: Any, name: str, baud: int | None) -> None:
         self.baud = baud
@@ -89,14 +94,26 @@ class SerialTransport:
         self._name = name
 
     def write(self, data: bytes) -> None:
-        """Pass on bytes. Raises ``LinkLost`` where the port is gone or takes none."""
+        """Write bytes to the port.
+
+        Raises
+        ------
+        LinkLost
+            If the port is gone or takes none.
+        """
         try:
             self._port.write(data)
         except Exception as error:  # a port that vanishes raises OSError, TypeError and others
             raise self._lost(error) from None
 
     def read(self, timeout_s: float) -> bytes:
-        """Read what has come within ``timeout_s`` seconds. Raises ``LinkLost`` where the port is gone."""
+        """Read what has come within ``timeout_s`` seconds.
+
+        Raises
+        ------
+        LinkLost
+            If the port is gone.
+        """
         end = self.now() + timeout_s
         received = bytearray()
         try:

@@ -1,4 +1,4 @@
-"""An upload: BEGIN, DATA within the device's window, and COMMIT, on their way at once; gone back where one is lost."""
+"""An upload: BEGIN, DATA within the device's window, and COMMIT, on their way at once, and repeated after a loss."""
 
 import hashlib
 import struct
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tablegen.link.claims import check_length
 from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
 from tablegen.link.exchange import Answer
-from tablegen.link.flight import Flight, Sent
+from tablegen.link.flight import Flight, SentFrame
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
 from tablegen.link.pace import Deadline
@@ -29,7 +29,7 @@ _COMMITTED = struct.Struct("<2I")
 
 
 class Uploader:
-    """One upload in a session, until it is active or has failed."""
+    """An upload in a session, until it is active or has failed."""
 
     def __init__(
         self,
@@ -50,25 +50,31 @@ class Uploader:
         self._sent_to = 0  # bytes that were sent at least once
         self._resumed: int | None = None
         self._retransmissions = 0
-        self._anew: dict[int, int] = {}
+        self._restarts: dict[int, int] = {}
         self._flight = Flight(session.info.window, self._start)
         self._before = session.status
         self._had = self._received(session.status)  # bytes that the device had before
         self._restart(session.status)
 
     def run(self) -> UploadResult:
-        """Upload; the result, or a ``LinkError``."""
+        """Upload the image, and return the result.
+
+        Raises
+        ------
+        LinkError
+            If the device refuses it, is gone, or takes too long.
+        """
         sent = self._exchange.bytes_sent
         while True:
             try:
                 generation, line = self._attempt()
             except Silent:
                 raise
-            except LinkLost as lost:
-                self._session.reopen(self._deadline, lost)
+            except LinkLost as loss:
+                self._session.reopen(self._deadline, loss)
             except SessionEnded:
                 self._count(Reason.SESSION, self._session.contested())
-                self._session.greet(self._deadline, anew=True)
+                self._session.greet(self._deadline, new_session=True)
             else:
                 break
             self._restart(self._session.status)
@@ -89,7 +95,7 @@ class Uploader:
 
     @property
     def state(self) -> UploadState:
-        """What is known of it."""
+        """The progress of the upload."""
         return UploadState(self._confirmed, len(self._image.data), self._committed)
 
     @property
@@ -99,37 +105,37 @@ class Uploader:
     def _slow_baud(self) -> int | None:
         return self._exchange.pace.slow_baud(self._exchange.transport.baud)
 
-    # What is known of the device
+    # State of the device
 
     def _received(self, status: DeviceStatus) -> int:
-        """Bytes of this upload that the device has."""
+        """Return the bytes of this upload that the device has."""
         same = status.image_crc == self._image.info.image_crc and status.upload == Upload.RECEIVING
         return min(status.received, len(self._image.data)) if same else 0
 
     def _restart(self, status: DeviceStatus) -> None:
-        """After HELLO: nothing is on its way, and the device says what it has."""
+        """Start again after HELLO: nothing is on its way, and ``status`` has the bytes of the device."""
         self._flight.clear(self._session.now())
         self._begun = False  # BEGIN was answered
         self._pipelined = True  # DATA need not wait for that
         self._next, self._confirmed, self._round = self._received(status), 0, 0
-        self._commit: Sent | None = None
+        self._commit: SentFrame | None = None
         self._commit_body = b""
         self._nonce: bytes | None = None
-        self._status: DeviceStatus | None = None  # the last one since COMMIT, or since the device was busy
+        self._status: DeviceStatus | None = None  # last status since COMMIT, or since the device was busy
         self._asked_again = False  # the same COMMIT was sent though the scan is active
         self._poll_s = _POLL_S[0]
         self._poll_at = self._pause_until = 0.0
-        self._busy = False  # BEGIN was refused so: STATUS before the next one
+        self._busy = False  # BEGIN was refused as busy: STATUS comes before the next one
 
     def _in_force(self, status: DeviceStatus) -> bool:
-        """Whether this upload is, and not an earlier one of the same scan."""
+        """Return True if this upload is active, and not an earlier one of the same scan."""
         same, before = status.hash == self._image.info.hash, self._before
         return self._committed and same and (before.hash, before.generation) != (status.hash, status.generation)
 
     def _count(self, reason: int, error: LinkError) -> None:
         """Count an error that may happen by chance, but not without end."""
-        self._anew[reason] = self._anew.get(reason, 0) + 1
-        if self._anew[reason] > (_MAX_KEY_RESTARTS if reason == Reason.KEY else _MAX_RESTARTS):
+        self._restarts[reason] = self._restarts.get(reason, 0) + 1
+        if self._restarts[reason] > (_MAX_KEY_RESTARTS if reason == Reason.KEY else _MAX_RESTARTS):
             raise error
 
     # The loop
@@ -142,8 +148,8 @@ class Uploader:
             self._overdue(now)
             self._fill(now)
             for answer in self._exchange.receive(self._wake()):
-                if done := self._take(answer):
-                    return done
+                if result := self._take(answer):
+                    return result
 
     def _fill(self, now: float) -> None:
         """Send whatever may be on its way now."""
@@ -162,8 +168,8 @@ class Uploader:
             elif self._next < size:
                 self._send_data()
             elif self._digest and self._nonce is None and not flight.has(Request.CHALLENGE):
-                flight.forget(Request.CHALLENGE)  # the next one replaces what the device gave for it
-                self._send(Request.CHALLENGE, b"")  # only now: it expires
+                flight.forget(Request.CHALLENGE)  # a new challenge replaces the nonce of the lost one
+                self._send(Request.CHALLENGE, b"")  # as late as possible, since it expires
             elif self._commit is None and (self._nonce is not None or not self._digest):
                 self._send_commit()
             elif self._poll_at and now >= self._poll_at and not flight.has(Request.STATUS):
@@ -175,14 +181,14 @@ class Uploader:
     def _send(self, kind: Request, payload: bytes, answer_bytes: int = NONCE_BYTES) -> None:
         seq = self._exchange.seq()
         due = self._exchange.send(kind, seq, payload, answer_bytes, again=self._flight.in_vain > 0)
-        self._flight.add(Sent(kind, seq, self._session.now(), due))
+        self._flight.add(SentFrame(kind, seq, self._session.now(), due))
 
     def _send_data(self) -> None:
         offset = self._next
         data = self._image.data[offset : offset + self._step]
         seq, end = self._exchange.seq(), offset + len(data)
         due = self._exchange.send(Request.DATA, seq, _CRC.pack(offset) + data, again=self._flight.in_vain > 0)
-        self._flight.add(Sent(Request.DATA, seq, self._session.now(), due, self._round, end))
+        self._flight.add(SentFrame(Request.DATA, seq, self._session.now(), due, self._round, end))
         self._retransmissions += offset < self._sent_to
         self._sent_to = max(self._sent_to, end)
         self._next = end
@@ -193,7 +199,7 @@ class Uploader:
         if self._nonce is not None:
             body += self._session.tag_of(self._nonce, Request.COMMIT, number, body, self._digest)
         self._commit_body = body
-        self._commit = Sent(Request.COMMIT, number, 0.0, 0.0, self._round)
+        self._commit = SentFrame(Request.COMMIT, number, 0.0, 0.0, self._round)
         self._repeat_commit(again=False)
 
     def _repeat_commit(self, again: bool = True) -> None:
@@ -207,7 +213,7 @@ class Uploader:
         self._flight.add(self._commit)
 
     def _wake(self) -> float:
-        """When something is to be done without an answer."""
+        """Return the time of the next action without an answer."""
         due = self._flight.next_due()
         times = [self._deadline] if due is None else [self._deadline, due]
         times += [at for at in (self._poll_at, self._pause_until) if at > self._session.now()]
@@ -227,7 +233,7 @@ class Uploader:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Where nothing is on its way that could confirm what was sent, it has to be sent again."""
+        """Send again what no request on its way could confirm."""
         if (
             self._begun
             and self._commit is None
@@ -283,7 +289,7 @@ class Uploader:
         self._next = max(self._next, received)
         self._confirm(received, lower=True)
 
-    def _take_data(self, received: int, sent: Sent) -> None:
+    def _take_data(self, received: int, sent: SentFrame) -> None:
         if not self._begun or received > len(self._image.data):
             self._pipelined = False  # BEGIN, or its answer, was lost
             if self._begun:  # it may belong to the upload before, but not again and again
@@ -304,7 +310,7 @@ class Uploader:
             if self._progress is not None:
                 self._progress(received, len(self._image.data))
 
-    def _take_commit(self, answer: Answer, sent: Sent) -> tuple[int, int | None] | None:
+    def _take_commit(self, answer: Answer, sent: SentFrame) -> tuple[int, int | None] | None:
         if not answer.reason:
             self._confirm(len(self._image.data))
             check_length("COMMIT", answer.payload, _COMMITTED.size)
@@ -329,34 +335,34 @@ class Uploader:
             self._wait_for_others()
         elif answer.reason in (Reason.KEY, Reason.UPLOAD, Reason.IMAGE):
             self._count(answer.reason, error)
-            self._begin_anew()
+            self._begin_again()
         else:
             raise error
         return None
 
-    def _take_refusal(self, answer: Answer, sent: Sent) -> None:
+    def _take_refusal(self, answer: Answer, sent: SentFrame) -> None:
         error = self._error(answer)
         if sent.kind == Request.BEGIN and answer.reason == Reason.BUSY:
             self._wait_for_others()
         elif sent.kind == Request.DATA and answer.reason == Reason.UPLOAD:
-            if self._commit is not None:  # that may have ended the upload: STATUS and the same COMMIT again tell
+            if self._commit is not None:  # COMMIT may have ended the upload, which STATUS and the same COMMIT tell
                 self._next, self._poll_at = len(self._image.data), self._session.now()
             elif sent.round == self._round:
                 self._count(answer.reason, error)
-                self._begin_anew()
+                self._begin_again()
         elif sent.kind == Request.DATA and answer.reason in _LAYOUT_REASONS and not self._begun:
             pass  # it belongs to the upload before
         else:
             raise error
 
-    def _begin_anew(self) -> None:
+    def _begin_again(self) -> None:
         """Send BEGIN, and wait for what it says before anything else is sent."""
-        self._flight.forget(Request.BEGIN, Request.DATA)  # what they answer is of the upload before
+        self._flight.forget(Request.BEGIN, Request.DATA)  # their answers belong to the upload before
         self._begun = self._pipelined = False
         self._go_back(0)
 
     def _wait_for_others(self) -> None:
-        self._begin_anew()
+        self._begin_again()
         self._busy = True
         self._pause_until = self._session.now() + _BUSY_S
 
@@ -384,12 +390,12 @@ class Uploader:
         from tablegen.link.program_image import take_apart
 
         info, contents = self._image.info, None
-        with suppress(ValueError):  # an image that is none is refused for what it is
+        with suppress(ValueError):  # a damaged image is refused without its contents
             contents = take_apart(self._image.data, info.x, info.y)
         return refused(answer.kind, answer.reason, answer.detail, self._session.info, contents, self._limits)
 
     def _out_of_time(self, now: float) -> OutOfTime:
-        silence_s = now - self._flight.heard_at
+        silence_s = now - self._flight.last_answer_at
         received = 0 if self._status is None else self._received(self._status)
         ours = self._status is not None and self._status.image_crc == self._image.info.image_crc
         return out_of_time(

@@ -1,4 +1,4 @@
-"""What a device holds against what it should hold, by the names of its words."""
+"""Differences between the words of a device and those of a scan, by their names."""
 
 from dataclasses import dataclass
 
@@ -14,21 +14,21 @@ _SIGNED = {"gain", "offset_high"}
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A word that is another one; ``address`` is that of its first byte in the image, ``found`` None beyond its end."""
+    """A word that differs; ``address`` is that of its first byte in the image, ``actual`` None beyond the end."""
 
     word: str
     address: int
     expected: int
-    found: int | None
+    actual: int | None
 
     def __str__(self) -> str:
-        if self.found is None:
+        if self.actual is None:
             return f"its image ends before {self.word} (byte {self.address})"
-        return f"{self.word} (byte {self.address}) is {self.found}, not {self.expected}"
+        return f"{self.word} (byte {self.address}) is {self.actual}, not {self.expected}"
 
 
 def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
-    """All words of an image read out of a device that are not those of the scan, in order; empty if there are none.
+    """Return all words of an image of a device that are not those of the scan, in order.
 
     Each axis is compared in the form in which the device holds it, words or Fourier words.
     """
@@ -41,7 +41,9 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
         if there != word:
             name = _name(index)
             differing.append(
-                Difference(name, 4 * index, _shown(name, word), None if there is None else _shown(name, there))
+                Difference(
+                    name, 4 * index, _signed_word(name, word), None if there is None else _signed_word(name, there)
+                )
             )
     at = PROGRAM_BYTES
     for axis, page, words, shape in (("x", 1, expected.x, expected.x_shape), ("y", 2, expected.y, expected.y_shape)):
@@ -69,7 +71,7 @@ def _name(index: int) -> str:
     return f"{('scan', 'x', 'y')[page]}: {names[word] if word < len(names) else f'unused word {word}'}"
 
 
-def _shown(name: str, word: int) -> int:
+def _signed_word(name: str, word: int) -> int:
     return word - (1 << 32) if name[3:] in _SIGNED and word >> 31 else word
 
 

@@ -1,1 +1,1 @@
-"""``manifest.json``: a build as plain data, written and read; the reader knows nothing of how it was made."""
+"""The manifest of a build, ``manifest.json``: plain data, written and read; the reader knows nothing of the build."""

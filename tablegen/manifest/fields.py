@@ -1,4 +1,4 @@
-"""What ``manifest.json`` holds, field by field: types with their ranges, and the programs that these fields are."""
+"""The fields of ``manifest.json``: types with their ranges, and the programs that these fields are."""
 
 from fractions import Fraction
 from itertools import pairwise
@@ -24,10 +24,10 @@ Word = Annotated[int, Meta(ge=-(1 << 31), lt=1 << 31)]
 Bits = Annotated[int, Meta(ge=8, le=24)]
 Pair = tuple[Natural, Natural]
 Digest = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
-# Never outside the directory.
+# A name of a file never leads outside the directory.
 MAXIMUM_FILE_NAME = 200
 FileName = Annotated[str, Meta(max_length=MAXIMUM_FILE_NAME, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
-# Of a file beside the scanner: what it was called. It may have any characters, for no path is made from it.
+# Name of a file beside the scanner file; it may have any characters, since no path is made from it.
 SourceName = Annotated[str, Meta(min_length=1, max_length=255)]
 Version = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9.+!-]*\Z")]
 Number = Annotated[int, Meta(ge=-(1 << 43), lt=1 << 43)]
@@ -37,21 +37,21 @@ LEAST_V_PER_CODE = 1e-15  # a range of 1 mV in 24 bits, behind an amplifier of 1
 
 
 class ManifestBranch(Struct):
-    """Hysteresis of one branch: the peak of its residual, and where that is."""
+    """The hysteresis of one branch: the peak of its residual, and its place."""
 
     beta: float
     u_peak: float
 
 
 class ManifestResonance(Struct):
-    """Where the response is largest, and half its width there."""
+    """The frequency at which the response is largest, and half its width there."""
 
     hz: float
     half_width_hz: float
 
 
 class ManifestDrive(Struct):
-    """Volts at the piezo, and the shape that they follow."""
+    """The volts at the piezo, and the shape that they follow."""
 
     v_offset: Volts
     v_amplitude: Volts
@@ -90,7 +90,7 @@ class ManifestSeries(Struct):
 
 
 class ManifestFourier(Struct):
-    """w(t) in float64, its words, and what the piezo is to follow where dynamics or a layer make that another one."""
+    """The waveform w(t) in float64, its words, and the target where dynamics or a layer make that another one."""
 
     harmonics: Annotated[int, Meta(ge=1, le=4096)]
     a0: Coefficient
@@ -111,14 +111,14 @@ class ManifestFourier(Struct):
 
 
 class ManifestAskedTable(Struct):
-    """What was asked of a table that the build chose: its worst error, and the keys that were free."""
+    """The request for a table that the build chose: its worst error, and the keys that were free."""
 
     max_error_lsb: Annotated[float, Meta(gt=0.0, le=1e6)]
     free: list[Literal["mode", "length", "bits"]]
 
 
 class ManifestTable(Struct):
-    """The words that are played."""
+    """The table: the words that are played."""
 
     mode: Mode
     bits: Bits
@@ -129,7 +129,7 @@ class ManifestTable(Struct):
 
 
 class ManifestShaping(Struct, forbid_unknown_fields=True):
-    """How remainders of the rounding are fed back; without it they are not."""
+    """The feedback of remainders of the rounding; without it there is none."""
 
     order: Annotated[int, Meta(ge=1, le=3)]
     zero: Annotated[int, Meta(ge=0, le=MAXIMUM_ZERO)]
@@ -138,7 +138,7 @@ class ManifestShaping(Struct, forbid_unknown_fields=True):
 class ManifestOutput(Struct):
     """The output stage, and volts of its codes; ``own_hardware`` of y where they are not those of x.
 
-    ``channel`` is the output of a dual converter, if that was said.
+    ``channel`` is the output of a dual converter, where the configuration gives it.
     """
 
     gain_word: Number
@@ -161,7 +161,7 @@ class ManifestOutput(Struct):
 
 
 class ManifestFigure(Struct):
-    """A figure in percent, and what it is uncertain by."""
+    """A figure in percent, and its uncertainty."""
 
     value: float
     uncertainty: float | None = None
@@ -176,7 +176,7 @@ class ManifestStroke(Struct):
 
 
 class ManifestExpected(Struct):
-    """What the scanner should do with the line, by an operator or by the laws of the scanner file."""
+    """The expectation of the line on the scanner, by an operator or by the laws of the scanner file."""
 
     basis: Literal["traces", "laws"]
     rms_percent: dict[str, ManifestFigure] = {}
@@ -188,7 +188,7 @@ class ManifestExpected(Struct):
 
 
 class ManifestResponse(Struct):
-    """Points of a measured response: ascending Hz, gain over that at low frequency, phase in turns."""
+    """The points of a measured response: ascending Hz, gain over that at low frequency, phase in turns."""
 
     hz: list[Annotated[float, Meta(gt=0.0)]]
     gain: list[Annotated[float, Meta(gt=0.0)]]
@@ -202,7 +202,7 @@ class ManifestResponse(Struct):
 
 
 class ManifestPassage(Struct):
-    """What the position follows: a second-order response, a measured one, or a band from 0 Hz."""
+    """The response that the position has: second order, measured, or a band from 0 Hz."""
 
     band_hz: Annotated[float, Meta(gt=0.0)] | None = None
     frequency_hz: Annotated[float, Meta(gt=0.0)] | None = None
@@ -212,14 +212,14 @@ class ManifestPassage(Struct):
 
 
 class ManifestChanges(Struct):
-    """How often codes change, and by how many codes."""
+    """The rate of changes of codes, and their mean size in codes."""
 
     percent: float
     mean_step: float
 
 
 class ManifestRounded(Struct):
-    """What the scan would be without shaping."""
+    """The figures of the scan without shaping."""
 
     max_error_lsb: float
     rms_error_lsb: float
@@ -228,7 +228,7 @@ class ManifestRounded(Struct):
 
 
 class ManifestShaped(Struct):
-    """What shaping does, and what it costs."""
+    """The effect of shaping, and its cost."""
 
     passage: ManifestPassage
     ticks: Positive
@@ -240,7 +240,7 @@ class ManifestShaped(Struct):
 
 
 class ManifestPosition(Struct):
-    """What the held codes of an unshaped axis leave in its position, behind the response of the scanner."""
+    """The errors of the held codes of an unshaped axis in its position, behind the response of the scanner."""
 
     passage: ManifestPassage
     max_error_lsb: float
@@ -249,7 +249,7 @@ class ManifestPosition(Struct):
 
 
 class ManifestCertificate(Struct):
-    """What the build promised of an axis."""
+    """The certificate of an axis."""
 
     max_error_lsb: Annotated[float, Meta(ge=0.0)]
     ticks: int | None = None
@@ -283,18 +283,24 @@ class ManifestAxis(Struct):
 
     @property
     def resting(self) -> bool:
-        """Whether it states that it does not move."""
+        """True if the axis is static."""
         return self.drive.size_nm == 0.0
 
     @property
     def fourier_words(self) -> Ints:
-        """In the order in which devices hold them."""
+        """The Fourier words in the order in which devices hold them: a0, a1..aH, b1..bH.
+
+        Returns
+        -------
+        Ints
+            Q2.30, shape (2 H + 1,).
+        """
         fourier = self.fourier
         return np.array([fourier.a0_word, *fourier.a_words, *fourier.b_words], dtype=np.int64)
 
     @property
     def program(self) -> Program:
-        """What the device plays."""
+        """The program of the axis in a device."""
         output = self.output
         return Program(
             RationalPhase(self.line.ticks // self.line.hold_ticks),
@@ -319,11 +325,21 @@ class ManifestAxis(Struct):
             ),
         )
 
-    def asked(self, k: Ints) -> Floats:
-        """Compute the unrounded codes of the float waveform at ticks k in [0, ticks) of the period.
+    def unrounded_codes(self, k: Ints) -> Floats:
+        """Compute the unrounded codes of the float waveform.
 
         V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
         phases, in none of the ways in which the build does it.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks) of the period, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Codes in LSB of the converter, shape (n,).
         """
         advance, period = k // self.line.hold_ticks, self.line.ticks // self.line.hold_ticks
         if period <= 4 * len(k):
@@ -348,7 +364,7 @@ class ManifestAxis(Struct):
         return whole
 
     def _angles(self, advances: Ints, period: int) -> Floats:
-        """Phases of all harmonics at some advances in rad, shape (advances, harmonics)."""
+        """Return the phases of all harmonics at some advances in rad, shape (advances, harmonics)."""
         n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
         phases: Floats = (np.outer(advances, n) % period).astype(np.float64)
         return 2.0 * np.pi / period * phases
@@ -360,7 +376,7 @@ class ManifestAxis(Struct):
 
 
 class ManifestSequence(Struct):
-    """The schedule."""
+    """The schedule of the scan."""
 
     update_rate_hz: tuple[Annotated[int, Meta(ge=1)], Annotated[int, Meta(ge=1)]]
     line_ticks: Annotated[int, Meta(ge=1, le=MAXIMUM_LINE_TICKS)]
@@ -376,7 +392,7 @@ class ManifestSequence(Struct):
 
     @property
     def schedule(self) -> Schedule:
-        """As the model has it."""
+        """The schedule as the model has it."""
         return Schedule(
             ticks=self.line_ticks,
             lines=self.frame_lines,
@@ -394,14 +410,14 @@ class ManifestSequence(Struct):
 
 
 class ManifestAxes(Struct, forbid_unknown_fields=True):
-    """Both axes; a third one has nothing to play it."""
+    """Both axes; no device plays a third one."""
 
     x: ManifestAxis
     y: ManifestAxis
 
 
 class Manifest(Struct):
-    """What is read of a manifest; keys that were added since are passed over."""
+    """The part of a manifest that is read; keys that were added since are ignored."""
 
     tablegen: Version
     hash: Digest

@@ -1,4 +1,4 @@
-"""What writer and reader of ``manifest.json`` agree on: its name, and the hash that names a plan."""
+"""The common ground of writer and reader of ``manifest.json``: its name, and the hash that names a plan."""
 
 import hashlib
 import json
@@ -10,7 +10,13 @@ CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of 
 
 
 def read_json(content: bytes) -> Any:
-    """Read a manifest. Raises ``ValueError`` for all that is no JSON, or nested as no manifest is."""
+    """Read a manifest.
+
+    Raises
+    ------
+    ValueError
+        If it is no JSON, or nested as no manifest is.
+    """
     try:
         return json.loads(content, parse_constant=_no_number)
     except RecursionError:
@@ -22,6 +28,6 @@ def _no_number(text: str) -> float:
 
 
 def content_hash(record: dict[str, Any]) -> str:
-    """SHA-256 of a plan's record in canonical JSON."""
+    """Return the SHA-256 of a plan's record in canonical JSON."""
     canonical = json.dumps(record, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return hashlib.sha256(canonical.encode("ascii")).hexdigest()

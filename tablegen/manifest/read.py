@@ -27,11 +27,11 @@ from tablegen.manifest.format import MANIFEST, RECORD, content_hash, read_json
 
 
 class NotABuild(Exception):
-    """The directory holds no manifest, or one that is none of ours or cannot be played; says which and why."""
+    """A directory without a manifest, or with one that is not ours or cannot be played; the message has the reason."""
 
 
 class DamagedManifest(ValueError):
-    """The content of a manifest is damaged, or cannot be played; ``reasons`` says why, each on its own."""
+    """A manifest that is damaged, or cannot be played; ``reasons`` has each reason."""
 
     def __init__(self, reasons: list[str]) -> None:
         self.reasons = [shortened(why) for why in reasons]
@@ -39,7 +39,7 @@ class DamagedManifest(ValueError):
 
 
 class ForeignManifest(ValueError):
-    """The content is that of another program."""
+    """A manifest of another program."""
 
 
 class StoredBuild(Struct, frozen=True, eq=False, dict=True):
@@ -56,7 +56,7 @@ class StoredBuild(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def own_hash(self) -> str:
-        """The hash worked out again from what the manifest says."""
+        """The hash of the plan, computed again from the manifest."""
         return _hash(self.plain)
 
     @property
@@ -177,7 +177,7 @@ def _hash(plain: dict[str, Any]) -> str:
 
 
 def _wrong_schedule(sequence: ManifestSequence) -> list[str]:
-    """Why no device could play this schedule."""
+    """List why no device could play this schedule."""
     wrong = []
     for key, (first, count), whole in (
         ("forward_ticks", sequence.forward_ticks, sequence.line_ticks),
@@ -191,7 +191,7 @@ def _wrong_schedule(sequence: ManifestSequence) -> list[str]:
 
 
 def _finite(value: Any) -> bool:
-    """Whether all floats below a value are finite: JSON as Python reads it knows NaN."""
+    """Return True if all floats below a value are finite: JSON as Python reads it knows NaN."""
     if isinstance(value, Struct):
         return all(_finite(getattr(value, name)) for name in value.__struct_fields__)
     if isinstance(value, dict):
@@ -203,7 +203,7 @@ def _finite(value: Any) -> bool:
 
 
 def _wrong_axes(manifest: Manifest) -> list[str]:
-    """Why no device could play these axes."""
+    """List why no device could play these axes."""
     wrong = []
     line = manifest.sequence.line_ticks
     for name, axis, ticks, holds in (
@@ -246,7 +246,7 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
             (abs(output.v_per_code) >= LEAST_V_PER_CODE, f"output.v_per_code is {output.v_per_code:g}"),
             (_finite(axis), "holds a number that is not finite"),
             (
-                {len(found) for found in (fourier.a, fourier.b, fourier.a_words, fourier.b_words)}
+                {len(coefficients) for coefficients in (fourier.a, fourier.b, fourier.a_words, fourier.b_words)}
                 == {fourier.harmonics},
                 f"fourier has not {fourier.harmonics} harmonics",
             ),

@@ -1,4 +1,4 @@
-"""The plan and its certificate as plain data: what the manifest says of them."""
+"""The plan and its certificate as plain data: the content of the manifest."""
 
 from collections.abc import Mapping
 from decimal import ROUND_CEILING, Context, Decimal
@@ -8,7 +8,7 @@ import numpy as np
 from msgspec.structs import asdict
 
 from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.line_errors import Refined, ScalingError
+from tablegen.certificate.line_errors import LayerEffect, ScalingError
 from tablegen.certificate.shaped_errors import ShapedErrors
 from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.dynamics import capped_inverse
@@ -21,7 +21,7 @@ from tablegen.planning.line_plan import LinePlan, Plan
 
 
 def plan_record(plan: Plan) -> dict[str, Any]:
-    """Everything that decides what a device plays, as JSON-ready data: axes and schedule."""
+    """Return everything that decides what a device plays, as JSON-ready data: axes and schedule."""
     axes = {line.axis: _axis(line) for line in plan.lines}
     x, y = axes["x"]["output"], axes["y"]["output"]
     if any(x[key] != y[key] for key in CONVERTER_KEYS):
@@ -67,7 +67,7 @@ def _passage(passage: Passage) -> dict[str, Any]:
 
 
 def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
-    """Behind what it was judged, and the same without shaping."""
+    """Return the passage behind which the position is judged, and the figures without shaping."""
     largest, rms = shaped.code_error_lsb
     rounded = shaped.rounded
     return {
@@ -113,14 +113,14 @@ def _expected(expectation: Expectation) -> dict[str, Any]:
     return record
 
 
-def _sides(figures: Mapping[str, ScalingError] | Mapping[str, Refined]) -> dict[str, dict[str, Any]]:
+def _sides(figures: Mapping[str, ScalingError] | Mapping[str, LayerEffect]) -> dict[str, dict[str, Any]]:
     return {
         side: {part: _figure(getattr(one, part)) for part in one.__struct_fields__} for side, one in figures.items()
     }
 
 
 def _bound(value: float) -> float:
-    """Six significant digits, rounded up: what is printed as a maximum has to be one."""
+    """Round up to six significant digits: a maximum has to be one as printed."""
     return float(Context(prec=6, rounding=ROUND_CEILING).create_decimal(Decimal(value)))
 
 

@@ -1,4 +1,4 @@
-"""``manifest.json``: the machine-readable record of a build."""
+"""The writer of ``manifest.json``, the machine-readable record of a build."""
 
 import hashlib
 import json
@@ -16,11 +16,11 @@ _json = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode  # one, for 
 
 
 class UnreadableManifest(ValueError):
-    """The manifest of a build would be refused when it is read back; the message says why."""
+    """A manifest that would be refused when it is read back; the message has the reason."""
 
 
 class TooLongManifest(UnreadableManifest):
-    """It has more bytes than are read of a manifest."""
+    """A manifest with more bytes than are read."""
 
 
 def manifest_file(
@@ -51,7 +51,15 @@ def manifest_file(
 
 
 def require_readable(content: bytes) -> None:
-    """Raise ``UnreadableManifest`` for a manifest that a build may have and that its own reader refuses."""
+    """Check that the reader of manifests accepts one before it is written.
+
+    Raises
+    ------
+    TooLongManifest
+        If it has more bytes than are read.
+    UnreadableManifest
+        If its reader refuses it.
+    """
     if len(content) > MANIFEST_KIND.most_bytes:
         raise TooLongManifest(f"it has {len(content)} bytes, above the {MANIFEST_KIND.most_bytes} that are read")
     try:
@@ -61,7 +69,7 @@ def require_readable(content: bytes) -> None:
 
 
 def _readable(value: Any, indent: str = "") -> str:
-    """JSON with a key a line, and arrays of numbers on one line."""
+    """Format JSON with a key a line, and arrays of numbers on one line."""
     if isinstance(value, dict) and value:
         inner = indent + "  "
         items = (f"{inner}{_json(key)}: {_readable(item, inner)}" for key, item in value.items())

@@ -23,7 +23,18 @@ def freeze(*arrays: np.ndarray[Shape, np.dtype[np.generic]]) -> None:
 
 
 def tree_sum(values: Floats) -> Floats:
-    """Sum along the last axis, in pairs at half the length, an order that every machine shares."""
+    """Sum along the last axis, in pairs at half the length, an order that every machine shares.
+
+    Parameters
+    ----------
+    values
+        Any shape (..., n); not changed.
+
+    Returns
+    -------
+    Floats
+        The sums, shape (...).
+    """
     rows = max(_BLOCK // max(values.shape[-1], 1), 1)
     flat = values.reshape(-1, values.shape[-1])
     if len(flat) <= rows:
@@ -39,7 +50,7 @@ def _tree_sum(values: Floats) -> Floats:
         return values[..., 0].copy() if count else np.zeros(values.shape[:-1])
     sums = values[..., :half].copy()
     sums[..., : count - half] += values[..., half:]
-    sums[..., count - half :] += 0.0  # as if values were followed by zeros
+    sums[..., count - half :] += 0.0  # as if zeros followed the values, so that -0.0 becomes 0.0
     while half > 1:
         half //= 2
         sums[..., :half] += sums[..., half : 2 * half]
@@ -47,7 +58,18 @@ def _tree_sum(values: Floats) -> Floats:
 
 
 def tree_sum_down(values: Floats) -> Floats:
-    """Sum along the first axis with every bit of ``tree_sum``: several times as fast with many columns."""
+    """Sum along the first axis with every bit of ``tree_sum``: several times as fast with many columns.
+
+    Parameters
+    ----------
+    values
+        Shape (n, ...); not changed.
+
+    Returns
+    -------
+    Floats
+        The sums, shape (...).
+    """
     count = len(values)
     half = (1 << max(count - 1, 0).bit_length()) // 2
     if not half:
@@ -63,7 +85,18 @@ def tree_sum_down(values: Floats) -> Floats:
 
 
 def folded_sum(values: Floats) -> Floats:
-    """Sum along the last axis in another fixed order than ``tree_sum``, in place: ``values`` is overwritten."""
+    """Sum along the last axis in another fixed order than ``tree_sum``, in place: ``values`` is overwritten.
+
+    Parameters
+    ----------
+    values
+        Shape (..., n), n >= 1; its contents are undefined afterwards.
+
+    Returns
+    -------
+    Floats
+        The sums, shape (...).
+    """
     count = values.shape[-1]
     while count > 1:
         half = (count + 1) // 2
@@ -72,15 +105,37 @@ def folded_sum(values: Floats) -> Floats:
     return values[..., 0].copy()
 
 
-def merged(*ascending: Ints) -> Ints:
-    """Return the values of ascending arrays, each once, ascending; numpy's union hashes, which is far slower here."""
+def union_sorted(*ascending: Ints) -> Ints:
+    """Return the values of ascending arrays, each once, ascending; numpy's union hashes, which is far slower here.
+
+    Parameters
+    ----------
+    ascending
+        At least one array, each of shape (n,) with an n of its own.
+
+    Returns
+    -------
+    Ints
+        The union, shape (m,) with m at most the sum of all n.
+    """
     values = np.concatenate(ascending)
     values.sort(kind="stable")
     return values[np.append(True, values[1:] != values[:-1])] if len(values) else values
 
 
 def distinct(k: Ints, count: int) -> Ints:
-    """Return the values of ``k``, each once, ascending; 0 <= k < count."""
+    """Return the values of ``k``, each once, ascending; 0 <= k < count.
+
+    Parameters
+    ----------
+    k
+        Shape (n,), in any order.
+
+    Returns
+    -------
+    Ints
+        Shape (m,), m <= n.
+    """
     if count > 4 * len(k):
         return np.unique(k)
     present = np.zeros(count, dtype=np.bool_)  # faster than sorting
@@ -89,7 +144,18 @@ def distinct(k: Ints, count: int) -> Ints:
 
 
 def multiples(k: Ints, count: int, most: int) -> Iterator[Ints]:
-    """Yield n k modulo count for n = 1..most, in one array that is overwritten; 0 <= k < count."""
+    """Yield n k modulo count for n = 1..most, in one array that is overwritten; 0 <= k < count.
+
+    Parameters
+    ----------
+    k
+        Any shape; not changed.
+
+    Yields
+    ------
+    Ints
+        Shape of ``k``; copy it to keep it beyond the next step.
+    """
     at, step = np.zeros(k.shape, dtype=np.uint64), k.astype(np.uint64)
     less = np.empty_like(at)
     for _ in range(most):

@@ -17,8 +17,8 @@ from tablegen.numerics.linear import Cholesky
 
 _MOST_STEPS = 60
 _REGULAR = 1e-14  # of each pivot; keeps the factorisation going where multipliers are 1e14 apart
-_NEAR = 0.98  # of the way to the nearest wall
-_FEASIBLE = 1e-9  # of a bound: what a row may be outside of it by at the end
+_NEAR = 0.98  # share of the way to the nearest bound
+_FEASIBLE = 1e-9  # share of a bound by which a row may exceed it at the end
 _FEASIBLE_DUAL = 1e-3  # the residual of the multipliers, whose sum is 1
 
 
@@ -26,17 +26,50 @@ class Rows(Protocol):
     """A linear map of unknowns (n,) to (m,)."""
 
     def times(self, y: Floats) -> Floats:
-        """Return R y, (m,)."""
+        """Return R y.
+
+        Parameters
+        ----------
+        y
+            Unknowns, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Shape (m,).
+        """
 
     def transposed(self, z: Floats) -> Floats:
-        """Return R^T z, (n,)."""
+        """Return R^T z.
+
+        Parameters
+        ----------
+        z
+            One value a row, shape (m,).
+
+        Returns
+        -------
+        Floats
+            Shape (n,).
+        """
 
     def gram(self, diagonal: Floats) -> Floats:
-        """Return R^T diag R, (n, n)."""
+        """Return R^T diag(diagonal) R.
+
+        Parameters
+        ----------
+        diagonal
+            One weight a row, shape (m,).
+
+        Returns
+        -------
+        Floats
+            Shape (n, n), symmetric.
+        """
 
 
 @dataclass(frozen=True, eq=False)
-class Bounded:
+class BoundConstraint:
     """The constraint |R y - target| <= fixed + share v; ``target`` is (m,)."""
 
     rows: Rows
@@ -57,9 +90,26 @@ class Minimum:
 
 
 def least_bound(
-    parts: Sequence[Bounded], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
+    parts: Sequence[BoundConstraint], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
 ) -> Minimum:
-    """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``."""
+    """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``.
+
+    Parameters
+    ----------
+    parts
+        Constraints on the same n unknowns, of any number of rows each.
+    start
+        First unknowns, shape (n,); they need not satisfy the constraints.
+    gap
+        Relative distance of v from its lower bound at which the iteration ends.
+    reached
+        Function that ends the iteration at the first v for which it is true.
+
+    Returns
+    -------
+    Minimum
+        The last iterate; ``settled`` is False if neither condition was met.
+    """
     state = _State(parts, start)
     with np.errstate(
         over="ignore", divide="ignore", invalid="ignore"
@@ -70,16 +120,16 @@ def least_bound(
 def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Minimum:
     for step in range(_MOST_STEPS + 1):
         bound, below = state.bounds()
-        done = state.inside and (reached(bound) or (state.dual and bound - below <= gap * bound))
-        if done or step == _MOST_STEPS or not state.advance():
-            return Minimum(state.y, bound, below, step, done)
+        settled = state.inside and (reached(bound) or (state.dual and bound - below <= gap * bound))
+        if settled or step == _MOST_STEPS or not state.advance():
+            return Minimum(state.y, bound, below, step, settled)
     raise AssertionError("the last step returns")  # pragma: no cover
 
 
 class _Stack:
     """The rows of all parts, one above the other."""
 
-    def __init__(self, parts: Sequence[Bounded]) -> None:
+    def __init__(self, parts: Sequence[BoundConstraint]) -> None:
         self._rows = [part.rows for part in parts]
         self._ends = [len(part.target) for part in parts]
         self.target = np.concatenate([part.target for part in parts])
@@ -89,15 +139,36 @@ class _Stack:
         )
 
     def times(self, y: Floats) -> Floats:
+        """Return R y, (n,) to (m,).
+
+        Returns
+        -------
+        Floats
+            Rows of all parts, shape (m,).
+        """
         return np.concatenate([rows.times(y) for rows in self._rows])
 
     def transposed(self, z: Floats) -> Floats:
+        """Return R^T z, (m,) to (n,).
+
+        Returns
+        -------
+        Floats
+            Sum over all parts, shape (n,).
+        """
         first, *others = [rows.transposed(of) for rows, of in self._split(z)]
         for other in others:
             first = first + other
         return first
 
     def gram(self, diagonal: Floats) -> Floats:
+        """Return R^T diag(diagonal) R, (m,) to (n, n).
+
+        Returns
+        -------
+        Floats
+            Sum over all parts, shape (n, n).
+        """
         first, *others = [rows.gram(of) for rows, of in self._split(diagonal)]
         for other in others:
             first += other
@@ -113,7 +184,7 @@ class _Stack:
 class _State:
     """The iterate y and v; slacks and multipliers of both sides of each row, upper and lower, (2, m)."""
 
-    def __init__(self, parts: Sequence[Bounded], start: Floats) -> None:
+    def __init__(self, parts: Sequence[BoundConstraint], start: Floats) -> None:
         self._rows, self.y = _Stack(parts), np.array(start, dtype=np.float64)
         self._far = self._rows.times(self.y) - self._rows.target
         moves = self._rows.share > 0.0
@@ -166,13 +237,24 @@ class _State:
         lack, residual = self._room() - slack, self._residual()
 
         def step(complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-            """Return the steps of (y, v), rows, slacks and multipliers that change their products by ``complement``."""
+            """Return the steps that change the products of slacks and multipliers by ``complement``.
+
+            Parameters
+            ----------
+            complement
+                Shape (2, m).
+
+            Returns
+            -------
+            solution, moves, slacks, multipliers
+                Steps of (y, v), (n + 1,); of the rows, (m,); of slacks and multipliers, (2, m).
+            """
             pull = (complement - one * lack) / slack
             right = np.append(residual[0] - rows.transposed(pull[0] - pull[1]), residual[1] + _sum(rows.share * pull))
             solution = factor.solve(right)
-            moved, wider = rows.times(solution[:size]), rows.share * solution[size]
-            slacks = np.stack([wider - moved, wider + moved]) + lack
-            return solution, moved, slacks, (complement - one * slacks) / slack
+            row_steps, wider = rows.times(solution[:size]), rows.share * solution[size]
+            slacks = np.stack([wider - row_steps, wider + row_steps]) + lack
+            return solution, row_steps, slacks, (complement - one * slacks) / slack
 
         products = slack * one
         mean = _sum(products) / products.size
@@ -182,11 +264,11 @@ class _State:
         if not (mean > 0.0 and isfinite(after)):  # contradictory constraints end here
             return False
         ratio = after / mean
-        solution, moved, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
+        solution, row_steps, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
         ahead, up = _NEAR * _reach(slack, slacks), _NEAR * _reach(one, ones)
         self.y = self.y + ahead * solution[:size]
         self.v += ahead * float(solution[size])
-        self._far = self._far + ahead * moved
+        self._far = self._far + ahead * row_steps
         self._slack = slack + ahead * slacks
         self._multiplier = one + up * ones
         return True

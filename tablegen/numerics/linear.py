@@ -7,7 +7,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 _BLOCK = 1 << 16  # products that are computed at a time, so that they fit the cache
-_TOGETHER = 8  # columns from which those before them are taken at once: fewer and longer steps, each sum in its order
+_TOGETHER = 8  # columns that are eliminated at once: fewer and longer steps, each sum in its order
 
 
 class Cholesky:
@@ -45,7 +45,18 @@ class Cholesky:
         self._columns = columns
 
     def solve(self, right: Floats) -> Floats:
-        """Return x with A x = right; both have shape (n,)."""
+        """Return the solution x of A x = right.
+
+        Parameters
+        ----------
+        right
+            Shape (n,); not changed.
+
+        Returns
+        -------
+        Floats
+            Shape (n,).
+        """
         x = np.array(right, dtype=np.float64)
         begins = range(0, len(x), _TOGETHER)
         for begin in begins:

@@ -9,14 +9,36 @@ from tablegen.numerics.turns import sinc, sine_and_cosine, spherical_bessel_1
 
 
 def plain_moment(y: Floats) -> tuple[Floats, Floats]:
-    """Return E(y), real and imaginary part, of the shape of ``y``."""
+    """Return E(y).
+
+    Parameters
+    ----------
+    y
+        Real numbers of any shape.
+
+    Returns
+    -------
+    real, imaginary
+        Each of the shape of ``y``.
+    """
     s, c = sine_and_cosine(0.5 * y)
     height = sinc(y)
     return height * c, -height * s
 
 
 def ramp_moment(y: Floats) -> tuple[Floats, Floats]:
-    """Return M(y), real and imaginary part, of the shape of ``y``."""
+    """Return M(y).
+
+    Parameters
+    ----------
+    y
+        Real numbers of any shape.
+
+    Returns
+    -------
+    real, imaginary
+        Each of the shape of ``y``.
+    """
     s, c = sine_and_cosine(0.5 * y)
     even, odd = 0.5 * sinc(y), 0.5 * spherical_bessel_1(y)
     return even * c - odd * s, -even * s - odd * c

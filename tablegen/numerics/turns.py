@@ -43,7 +43,18 @@ def _horner(coefficients: list[float], square: _Real) -> _Real:
 
 
 def sine_and_cosine(turns: FloatsLike) -> tuple[Floats, Floats]:
-    """Return (sin(2 pi turns), cos(2 pi turns)), of the argument's shape."""
+    """Return sine and cosine of angles in turns.
+
+    Parameters
+    ----------
+    turns
+        Angles in turns (2 pi rad), any shape.
+
+    Returns
+    -------
+    sine, cosine
+        Each of the shape of ``turns``.
+    """
     x = np.asarray(turns, dtype=np.float64)
     if x.size <= _BLOCK:
         return _sine_and_cosine(x)
@@ -82,24 +93,68 @@ def sine_and_cosine_of(turns: float) -> tuple[float, float]:
 
 
 def sine(turns: FloatsLike) -> Floats:
-    """Return sin(2 pi turns), of the argument's shape."""
+    """Return sin(2 pi turns).
+
+    Parameters
+    ----------
+    turns
+        Angles in turns (2 pi rad), any shape.
+
+    Returns
+    -------
+    Floats
+        Shape of ``turns``.
+    """
     return sine_and_cosine(turns)[0]
 
 
 def cosine(turns: FloatsLike) -> Floats:
-    """Return cos(2 pi turns), of the argument's shape."""
+    """Return cos(2 pi turns).
+
+    Parameters
+    ----------
+    turns
+        Angles in turns (2 pi rad), any shape.
+
+    Returns
+    -------
+    Floats
+        Shape of ``turns``.
+    """
     return sine_and_cosine(turns)[1]
 
 
 def sinc(y: FloatsLike) -> Floats:
-    """Return sin(pi y) / (pi y), exactly 1 at y = 0 and exactly 0 at every other whole y, of the argument's shape."""
+    """Return sin(pi y) / (pi y), exactly 1 at y = 0 and exactly 0 at every other whole y.
+
+    Parameters
+    ----------
+    y
+        Real numbers of any shape.
+
+    Returns
+    -------
+    Floats
+        Shape of ``y``.
+    """
     x = np.asarray(y, dtype=np.float64)
     safe = np.where(x == 0.0, 1.0, x)
     return np.where(x == 0.0, 1.0, sine(0.5 * safe) / (pi * safe))
 
 
 def spherical_bessel_1(y: FloatsLike) -> Floats:
-    """Return j1(pi y) = (sin(pi y) - pi y cos(pi y)) / (pi y)^2, by its series where the difference would cancel."""
+    """Return j1(pi y) = (sin(pi y) - pi y cos(pi y)) / (pi y)^2, by its series where the difference would cancel.
+
+    Parameters
+    ----------
+    y
+        Real numbers of any shape.
+
+    Returns
+    -------
+    Floats
+        Shape of ``y``; 0 at y = 0.
+    """
     x = np.asarray(y, dtype=np.float64)
     small = np.abs(x) < 0.3
     safe = np.where(small, 1.0, x) * pi

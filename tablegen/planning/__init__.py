@@ -1,1 +1,1 @@
-"""From a checked configuration to one immutable plan: the ticks, what is feasible, the integers of each axis."""
+"""From a validated configuration to one immutable plan: ticks, checks of feasibility, integers of each axis."""

@@ -22,8 +22,8 @@ def allowed_error(limit: BandLimit, limits: Limits, codes: float, counts_turns: 
     """
     if limit.max_scaling_error_percent is not None:
         return AllowedError(limit.max_scaling_error_percent, True)
-    chosen = limit.harmonics == "fewest" or (limit.harmonics is None and counts_turns)
-    if limit.method != "window" or limit.cutoff_hz is not None or not chosen or not codes > 0.0:
+    free = limit.harmonics == "fewest" or (limit.harmonics is None and counts_turns)
+    if limit.method != "window" or limit.cutoff_hz is not None or not free or not codes > 0.0:
         return None
     most = 0.5 * min(limits.max_scaling_error_percent or _UNLIMITED_PERCENT, _UNLIMITED_PERCENT)
     return AllowedError(min(100.0 * 2.0 / (CHORD * codes), most), limit.harmonics == "fewest")

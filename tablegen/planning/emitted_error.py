@@ -33,6 +33,13 @@ class IdealCodes:
         grid = slow_grid(series, extreme_points(series))
 
         def slope_and_bend(t: Floats) -> tuple[Floats, ...]:
+            """Return the first and the second derivative of the waveform.
+
+            Returns
+            -------
+            tuple of Floats
+                Per period and per period^2, each of the shape of ``t``.
+            """
             return values(t, (series, 1), (series, 2))
 
         self._extremes = extreme_ticks(grid, slope_and_bend, ticks)
@@ -70,7 +77,7 @@ def _played(program: Program, k: Ints) -> Ints:
     if not output.shaping.order:
         return program.codes(k) << FRACTION_BITS
     bits = remainder_bits(output.dac_bits)
-    fine = output.fed(program.samples(k)) - (1 << (bits - 1))
+    fine = output.shaping_input(program.samples(k)) - (1 << (bits - 1))
     return fine << (FRACTION_BITS - bits) if bits <= FRACTION_BITS else shift_round(fine, bits - FRACTION_BITS)
 
 

@@ -1,4 +1,4 @@
-"""How many harmonics an axis plays: as written, as a cutoff passes, or as an allowed scaling error takes."""
+"""The number of harmonics of an axis: as written, as a cutoff passes, or as an allowed scaling error needs."""
 
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -31,8 +31,8 @@ class HarmonicChoice:
         self._file, self._problems = setup.scan_file, problems
         self.usual = feasible.harmonics(rate, period)
         self.most = feasible.most_harmonics(period)
-        learnt = 1 if scan.refinement is None else len(scan.refinement.a)
-        self._least = min(learnt, self.most)
+        layer = 1 if scan.refinement is None else len(scan.refinement.a)
+        self._least = min(layer, self.most)
         written = "harmonics" if self._limit.max_scaling_error_percent is None else "max_scaling_error_percent"
         self.key = f"{axis}.band_limit.{written}"
 

@@ -88,7 +88,13 @@ class LinePlan(Struct, frozen=True, eq=False):
         return self.drive.v_amplitude / self.converter.v_per_code
 
     def codes(self, start: int, stop: int) -> Ints:
-        """Return the emitted codes at ticks [start, stop) since the program began, shape (stop - start,)."""
+        """Return the emitted codes at ticks [start, stop) since the program began.
+
+        Returns
+        -------
+        Ints
+            Shape (stop - start,).
+        """
         return self.program.played(start, stop)
 
 

@@ -1,4 +1,4 @@
-"""The layer that `tablegen refine` learnt: the check that it belongs to the scan that is built, and its series."""
+"""The layer that `tablegen refine` learnt: the check that it belongs to the scan, and its series."""
 
 import hashlib
 import json
@@ -69,30 +69,30 @@ def _remedy(axis: str) -> str:
     return f"remove [{axis}.refinement], build, and run tablegen refine on a new trace"
 
 
-def _faults(learnt: Refinement, scan: FastAxis, drive: Drive, rate_hz: float, span: float) -> list[tuple[str, str]]:
+def _faults(layer: Refinement, scan: FastAxis, drive: Drive, rate_hz: float, span: float) -> list[tuple[str, str]]:
     """Return the keys by which the scan differs from the one at which the layer was learnt, each with the reason."""
     faults = []
-    if abs(drive.v_amplitude - learnt.v_amplitude) > AMPLITUDE_REACH * learnt.v_amplitude:
-        by = 100.0 * (drive.v_amplitude / learnt.v_amplitude - 1.0)
-        why = f"learnt at {learnt.v_amplitude:.6g} V, this scan drives {drive.v_amplitude:.6g} V"
+    if abs(drive.v_amplitude - layer.v_amplitude) > AMPLITUDE_REACH * layer.v_amplitude:
+        by = 100.0 * (drive.v_amplitude / layer.v_amplitude - 1.0)
+        why = f"learnt at {layer.v_amplitude:.6g} V, this scan drives {drive.v_amplitude:.6g} V"
         faults.append(("v_amplitude", f"{why}, {by:+.3g} % of it; up to {100 * AMPLITUDE_REACH:g} % are served"))
-    if abs(drive.v_offset - learnt.v_offset) > OFFSET_REACH * span:
-        why = f"learnt at {learnt.v_offset:.6g} V, this scan is at {drive.v_offset:.6g} V"
-        by = drive.v_offset - learnt.v_offset
+    if abs(drive.v_offset - layer.v_offset) > OFFSET_REACH * span:
+        why = f"learnt at {layer.v_offset:.6g} V, this scan is at {drive.v_offset:.6g} V"
+        by = drive.v_offset - layer.v_offset
         faults.append(("v_offset", f"{why}, {by:+.4g} V off; up to {OFFSET_REACH * span:g} V are served"))
-    if abs(rate_hz - learnt.rate_hz) > RATE_REACH * learnt.rate_hz:
-        by = 100.0 * (rate_hz / learnt.rate_hz - 1.0)
-        why = f"learnt at {learnt.rate_hz:.6g} Hz, this scan has {rate_hz:.6g} Hz"
+    if abs(rate_hz - layer.rate_hz) > RATE_REACH * layer.rate_hz:
+        by = 100.0 * (rate_hz / layer.rate_hz - 1.0)
+        why = f"learnt at {layer.rate_hz:.6g} Hz, this scan has {rate_hz:.6g} Hz"
         faults.append(("rate_hz", f"{why}, {by:+.3g} % of it; up to {100 * RATE_REACH:g} % are served"))
-    if abs(drive.turn - learnt.turn) > TURN_REACH + 1e-12:
-        why = f"learnt at {learnt.turn:.6g}, this scan turns at {drive.turn:.6g}"
-        by = drive.turn - learnt.turn
+    if abs(drive.turn - layer.turn) > TURN_REACH + 1e-12:
+        why = f"learnt at {layer.turn:.6g}, this scan turns at {drive.turn:.6g}"
+        by = drive.turn - layer.turn
         faults.append(("turn", f"{why}, {by:+.3g} off; up to {TURN_REACH:g} are served"))
-    (low, high), limit = learnt.window, scan.band_limit
+    (low, high), limit = layer.window, scan.band_limit
     beyond = max(low - limit.window[0], limit.window[1] - high)
     if beyond > WINDOW_REACH + 1e-12:
         why = f"learnt over {low:g}..{high:g}, this scan images {limit.window[0]:g}..{limit.window[1]:g}"
         faults.append(("window", f"{why}, {beyond:.3g} beyond; up to {WINDOW_REACH:g} are served"))
-    if limit.directions == "both" and learnt.directions != "both":
+    if limit.directions == "both" and layer.directions != "both":
         faults.append(("directions", "learnt forward only, and this scan images both directions"))
     return faults

@@ -8,8 +8,8 @@ from tablegen.config.load import Setup
 from tablegen.device.schedule import Schedule
 from tablegen.planning.drive import Drive
 
-MOST_LINES = 255  # that a device counts
-_SHOWN_NM = 0.005
+MOST_LINES = 255  # the largest count of a device
+_PRINTED_NM = 0.005
 BOUND = 0.005  # of the line, by which the image may drift in a frame; a pixel where that is more
 
 
@@ -47,10 +47,10 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
         return [after.drift_nm(line_s, first, schedule.lines, slower_than_s) for after in transients]
 
     lines = max(after.lines(line_s, schedule.lines, bound, MOST_LINES) for after in transients)
-    if axis == "x":  # the first bends, whatever the bound
+    if axis == "x":  # the first line is bent, whatever the bound
         lines = max(lines, 1)
-    shown = min(lines, MOST_LINES)
-    late, of = max((nm, which) for which, nm in enumerate(drifts(shown)))
+    written_lines = min(lines, MOST_LINES)
+    late, of = max((nm, which) for which, nm in enumerate(drifts(written_lines)))
     after_offset, after_size = drifts(0)
     slowest_s = transients[0].measured_s
     return Settling(
@@ -60,7 +60,7 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
         after_offset,
         after_size,
         late,
-        drifts(shown, slowest_s)[of],
+        drifts(written_lines, slowest_s)[of],
         slowest_s,
         max(after.most_memory_nm for after in transients),
     )
@@ -92,11 +92,11 @@ def settling_text(settled: Settling) -> list[str]:
         f"{lines} after a change of offset of {settled.offset_v:.4g} V; "
         f"drifts {settled.drift_nm:.3g} nm in the first frame"
     ]
-    if settled.size_drift_nm >= _SHOWN_NM:
+    if settled.size_drift_nm >= _PRINTED_NM:
         out.append(f"drifts {settled.size_drift_nm:.3g} nm after half the size")
-    if settled.memory_nm >= _SHOWN_NM:
+    if settled.memory_nm >= _PRINTED_NM:
         out.append(f"hysteresis bends the first sweep by up to {settled.memory_nm:.3g} nm")
-    if settled.extrapolated_nm >= _SHOWN_NM:
+    if settled.extrapolated_nm >= _PRINTED_NM:
         share = 100.0 * settled.extrapolated_nm / settled.late_nm
         out.append(
             f"after {min(settled.lines, MOST_LINES)} lines drifts {settled.late_nm:.3g} nm, {share:.2g} % of it slower "

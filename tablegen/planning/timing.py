@@ -78,14 +78,14 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
     else:
         ticks = floor(rate / exact(timing.line_rate_hz) + Fraction(1, 2))
     if not 8 <= ticks <= MAXIMUM_LINE_TICKS:
-        shown = str(ticks) if ticks < 1 << 64 else "more than 2^64"
+        count = str(ticks) if ticks < 1 << 64 else "more than 2^64"
         if key == "timing.line_rate_hz":
             low, high = at_least(float(rate / MAXIMUM_LINE_TICKS), 6), at_most(float(rate / 8), 6)
             fits = f"at {float(rate):g} updates a second the line rate can be {low} to {high} Hz"
         else:
             most = floor(MAXIMUM_LINE_TICKS * share / timing.pixels)
             fits = "take more of them" if ticks < 8 else f"at most {most} fit" if most else "take fewer pixels"
-        problems.add(file, key, f"a line of {shown} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
+        problems.add(file, key, f"a line of {count} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
     elif ticks * timing.lines > MAXIMUM_TICKS:
         what = "lines" if file.written_key("timing.lines")[0] == "timing.lines" else "line periods"
         problems.add(

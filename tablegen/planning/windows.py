@@ -12,7 +12,7 @@ from tablegen.device.schedule import Schedule, Window, pixel_starts
 from tablegen.numerics.arrays import Floats
 
 _HALF = Fraction(1, 2)
-_ROUNDING = 1e-12  # of the line: places that are the same may differ so in their last bits
+_ROUNDING = 1e-12  # share of the line by which equal places may differ in their last bits
 
 
 def line_windows(

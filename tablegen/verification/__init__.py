@@ -1,1 +1,1 @@
-"""Hold what streams out of the Verilog sequencer against model and float waveform; needs the extra ``hdl``."""
+"""Compare what a build's sequencer plays, in C or in Verilog, with the model and the float waveform."""

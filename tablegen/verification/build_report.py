@@ -1,4 +1,4 @@
-"""Verify a build in its directory: its files, then what its own sequencer plays of its own numbers."""
+"""Verify a build in its directory: its files, then the playback of its own numbers by its own sequencer."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -30,7 +30,7 @@ Progress = Callable[[str | Callable[[], str]], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of playing: without a session nothing was played, and a check says why."""
+    """The outcome of a playback: without a session nothing was played, and a check has the reason."""
 
     checks: list[Check]
     session: BuildSession | None = None
@@ -41,25 +41,37 @@ class Outcome:
 
 
 class Target(Protocol):
-    """A format in which a build has its sequencer, and something that plays it."""
+    """A target of verification: a format that has a sequencer, and a machine that plays it."""
 
     @property
     def format_name(self) -> str | None:
-        """The format that is played; None where nothing is."""
+        """The format that is played; None for a target that plays nothing."""
 
     def require(self) -> None:
-        """Raise ``ToolMissing`` unless all that it needs is there."""
+        """Check that the tools of the target are installed.
+
+        Raises
+        ------
+        ToolMissing
+            If one is not.
+        """
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
-        """Raise ``NotABuild`` for a build that it cannot play."""
+        """Check that the target can play a build.
+
+        Raises
+        ------
+        NotABuild
+            If it cannot.
+        """
 
     def play(self, job: "PlayJob") -> Outcome:
-        """Play the build, and check what comes."""
+        """Play the build, and check the record."""
 
 
 @dataclass(frozen=True)
 class PlayJob:
-    """The build in ``folder`` is played in the directory ``work``; ``limits`` of x and y are in LSB."""
+    """A job: the build in ``folder`` is played in the directory ``work``; ``limits`` of x and y are in LSB."""
 
     folder: Path
     work: Path
@@ -72,7 +84,7 @@ class PlayJob:
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """What came of a verification: ``failures`` are empty if all is well."""
+    """The result of a verification: ``failures`` are empty if every check passed."""
 
     name: str
     checks: list[Check]
@@ -87,7 +99,7 @@ class Report:
 
     @property
     def failures(self) -> list[str]:
-        """What every failed check has to say."""
+        """The messages of all failed checks."""
         return [check.failure for check in self.checks if check.failure is not None]
 
 
@@ -101,11 +113,27 @@ def verify_build(
     *,
     other_version: bool = False,
 ) -> Report:
-    """Verify the build in ``folder`` for a target; it is played in ``work``, an empty directory.
+    """Verify the build in ``folder`` for a target.
 
-    A build of another version fails unless ``other_version``, since its runtime cannot be compared with the installed
-    one. Raises ``NotABuild`` and ``ToolMissing``. Everything else that is wrong is a failed check, and none hides
-    another.
+    Everything that is wrong with the build itself is a failed check, and none hides another.
+
+    Parameters
+    ----------
+    work
+        Empty directory in which the build is played.
+    most_ticks
+        Bound of the ticks that are played.
+    seed
+        Seed of the random parts of the session.
+    other_version
+        True to accept a build of another version, whose runtime cannot be compared with the installed one.
+
+    Raises
+    ------
+    NotABuild
+        If the folder holds no build, or none that this target can play.
+    ToolMissing
+        If a compiler or simulator is not installed.
     """
     stored = read_build(folder)
     if target.format_name is not None and target.format_name not in stored.formats:
@@ -146,14 +174,14 @@ def verify_build(
 
 
 class Stopwatch:
-    """Seconds, spread over the checks that they were spent on."""
+    """The time of a verification in s, shared out among its checks."""
 
     def __init__(self) -> None:
         self._begun = self._last = monotonic()
 
     @property
     def seconds(self) -> float:
-        """All of them."""
+        """The time of all checks."""
         return monotonic() - self._begun
 
     def timed(self, checks: list[Check]) -> list[Check]:

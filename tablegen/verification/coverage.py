@@ -1,4 +1,4 @@
-"""Which modules and options of an emitted runtime a session plays, and which it does not."""
+"""The modules and options of an emitted runtime that a session plays, and those that it does not."""
 
 from collections.abc import Iterable, Sequence
 

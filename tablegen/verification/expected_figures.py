@@ -1,7 +1,7 @@
-"""What is expected on the scanner, as far as a directory tells: the mismatch by the laws, and what its headers say.
+"""The expectations on the scanner that a directory can confirm: the mismatch by the laws, and the text of headers.
 
-Traces are in no build, so that of an operator's figures the text of the emitted headers is the only other witness: a
-manifest that was edited alone is found to the digits that stand there.
+Traces are in no build, so that an operator's figures can only be compared with the text of the emitted headers: a
+manifest that was edited alone differs from the digits there.
 """
 
 import re
@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _TWO_DIGITS, _THREE_DIGITS = 0.051, 0.0051  # relative: what they round away
 _ZERO_PERCENT = 0.0005  # what is printed as 0
 _LEVEL_PERCENT = 90.0  # of scans, which a header states beside the distance
-_MOST_CHANGE, _LEAST_BETA = 2.0, 0.01  # of a branch between the line's stroke and the one that is played
+_MOST_CHANGE, _LEAST_BETA = 2.0, 0.01  # bounds of the change of a branch between the line's stroke and the played one
 
 
 def wrong_mismatch(axis: ManifestAxis) -> list[str]:
@@ -50,8 +50,8 @@ def wrong_mismatch(axis: ManifestAxis) -> list[str]:
             wrong.append(f"certificate.expected.stroke.{side}.beta is {here:g}, and that of the line {of_line:g}")
     turn, x = axis.drive.turn, np.linspace(*axis.fourier.window, _POINTS)
     there, back = ((at(target, t) - low) / (high - low) for t in (turn * x, turn + (1.0 - turn) * (1.0 - x)))
-    apart = forward.inverse(there) - (1.0 - backward.inverse(1.0 - back))
-    figures: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(apart)))}
+    mismatch = forward.inverse(there) - (1.0 - backward.inverse(1.0 - back))
+    figures: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(mismatch)))}
     stated: dict[str, float | int | None] = {"value": expected.mismatch_percent.value}
     return wrong + different_figures(stated, figures, True, "expected.mismatch_percent.")
 

@@ -1,9 +1,9 @@
-"""Why nothing could be played."""
+"""The errors of a playback that did not happen."""
 
 
 class ToolMissing(Exception):
-    """A simulator or a compiler, or the Python side of one, is not installed; says what to install."""
+    """A missing simulator or compiler, or the Python side of one; the message has what to install."""
 
 
 class SimulationFailed(Exception):
-    """What plays did not compile, or ended without results; carries the end of the log."""
+    """The failure of a playback to compile or to end with results; carries the end of the log."""

@@ -1,4 +1,4 @@
-"""A build without a sequencer, or one whose files alone are to be checked: nothing is played."""
+"""A target for builds without a sequencer, and for a check of the files alone: nothing is played."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,16 +9,16 @@ from tablegen.verification.build_report import Outcome, PlayJob
 
 @dataclass(frozen=True)
 class FilesTarget:
-    """The files of every format against the manifest."""
+    """The files of every format, compared with the manifest."""
 
     format_name: None = None
 
     def require(self) -> None:
-        """Nothing is needed."""
+        """Accept every machine: no tool is needed."""
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
-        """No build is refused."""
+        """Accept every build."""
 
     def play(self, job: PlayJob) -> Outcome:
-        """Nothing is played."""
+        """Return an outcome without playback."""
         return Outcome([])

@@ -10,9 +10,9 @@ _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit(name: str, checks: Sequence[Check], seconds: float = 0.0, manifest_sha256: str = "") -> str:
-    """One test case a check; the message of a failure is its first line, the text all of it.
+    """Write one test case a check; the message of a failure is its first line, the text all of it.
 
-    With the digest of the manifest, which says which build was verified.
+    ``manifest_sha256`` is the digest of the manifest, which identifies the build.
     """
     failures = sum(check.failure is not None for check in checks)
     skipped = sum(check.failure is None and not check.exercised for check in checks)

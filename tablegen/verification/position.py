@@ -1,8 +1,8 @@
-"""The position of an unshaped axis behind its response once more, tick by tick, from the words of a manifest.
+"""The position of an unshaped axis behind its response, computed again tick by tick from the words of a manifest.
 
 A second-order response is followed in time, from the state with which a period begins as it ends. A measured one is
-known at frequencies alone: there images of the codes at multiples of the update rate are added. Wanted is what the
-manifest states that arrives, in the middle of every tick.
+known at frequencies alone: there images of the codes at multiples of the update rate are added. The target is the
+series that the manifest states, in the middle of every tick.
 """
 
 from math import ceil, isfinite, pi
@@ -22,15 +22,15 @@ _TERMS = 24  # of the exponential of a matrix below 1/4
 
 
 def is_judged(axis: ManifestAxis) -> bool:
-    """Whether a certificate has errors of the position of this axis."""
-    judged = axis.drive.resonance is not None and not axis.resting and axis.output.shaping is None
-    return judged and axis.line.hold_ticks == 1 and axis.line.ticks <= MOST_TICKS
+    """Return True if a certificate has errors of the position of this axis."""
+    measured = axis.drive.resonance is not None and not axis.resting and axis.output.shaping is None
+    return measured and axis.line.hold_ticks == 1 and axis.line.ticks <= MOST_TICKS
 
 
 def wrong_position(
     axis: ManifestAxis, period: PlayedPeriod, rate_hz: float, scaling_known: bool
 ) -> tuple[int, list[str]]:
-    """How many figures of the position there are, and those that the words make otherwise.
+    """Return how many figures of the position there are, and those that differ from the words.
 
     The passage was compared with that of the axis before.
     """
@@ -58,7 +58,13 @@ def wrong_position(
 
 
 def position_errors(axis: ManifestAxis, period: PlayedPeriod, passage: ManifestPassage, rate_hz: float) -> Floats:
-    """Position less the one that is to arrive, in the middle of each tick, in LSB of the drive, shape (ticks,)."""
+    """Return the position less the one that is to arrive, in the middle of each tick.
+
+    Returns
+    -------
+    Floats
+        LSB of the converter, shape (ticks,).
+    """
     ticks, per_unit = axis.line.ticks, period.codes_per_unit
     output, drive = axis.output, axis.drive
     middle = (drive.v_offset - output.v_zero) / output.v_per_code
@@ -104,7 +110,7 @@ def _stepped(passage: ManifestPassage, w: Floats, update_hz: float) -> Floats:
 
 
 def _exponential(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """By Taylor's series of a part of it, squared as often."""
+    """Return the exponential of a matrix: Taylor's series of a part of it, squared as often."""
     size = float(np.max(np.abs(matrix)))
     halvings = max(0, ceil(np.log2(max(size, 1e-300))) + 3)
     small, term = np.eye(2), np.eye(2)

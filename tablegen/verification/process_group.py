@@ -1,4 +1,4 @@
-"""Playing in a process group of its own, so that an interruption ends simulator, compiler and program with it.
+"""A process group for a playback, so that an interruption ends simulator, compiler and program with it.
 
 ``run_all`` starts this module as processes and waits for them; what it does and finds is passed in files of its folder.
 """
@@ -37,7 +37,8 @@ def run_all(module: str, jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> list
     """Run several jobs at once, each in a folder of its own; raise the exception of the first that fails."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
-        with defer_signals(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
+        # A signal inside Popen would leave its child running.
+        with defer_signals(signal.SIGINT, signal.SIGTERM) as came:
             for folder, job in jobs:
                 processes.append(_started(folder, module, job))
         deliver(came)

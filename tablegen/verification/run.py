@@ -68,10 +68,10 @@ def verify(
     []
     """
     folder = Path(folder)
-    chosen, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
+    player, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
         most = most_ticks if ticks is None else ticks
-        return verify_build(whole, work, chosen, most, seed, progress, other_version=other_version)
+        return verify_build(whole, work, player, most, seed, progress, other_version=other_version)
 
 
 def default_target(folder: Path) -> TargetName:
@@ -123,14 +123,14 @@ def _target(
     from tablegen.verification.verilog.target import VerilogTarget
 
     placement = Placement(axis, fourier)
-    apart = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual
+    separate_frame = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual
     tick_clocks = placement.playing(read_build(folder).program).tick_clocks
-    return VerilogTarget(simulator, placement, apart), DEFAULT_TICKS[simulator] // tick_clocks
+    return VerilogTarget(simulator, placement, separate_frame), DEFAULT_TICKS[simulator] // tick_clocks
 
 
 @contextmanager
 def _work_folder(keep: Path | None) -> Iterator[Path]:
-    """Where things are played: removed again, whatever happens, unless it is to be kept."""
+    """Yield the directory of the playback, which is removed at the end unless it is to be kept."""
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
         yield keep.resolve()

@@ -18,7 +18,18 @@ class SweepMoments(Protocol):
     """A branch with moments in closed form."""
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
-        """Return real and imaginary part of the moments at y, each of the shape of ``y``."""
+        """Return int_0^1 u(s) exp(-2 pi i y s) ds.
+
+        Parameters
+        ----------
+        y
+            Periods of the kernel in the sweep, shape (n,).
+
+        Returns
+        -------
+        real, imaginary
+            Each of the shape of ``y``.
+        """
 
 
 class TwoSweeps(Protocol):

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.waveform.series import FourierSeries
 
 
@@ -31,4 +31,4 @@ def extreme_ticks(w: Floats, slope_and_bend: Callable[[Floats], Sequence[Floats]
         step = slope / np.where(bend == 0.0, np.inf, bend)
         t = t - np.clip(step, -1.0 / points, 1.0 / points)
     before = np.floor(t * ticks).astype(np.int64)
-    return merged(before % ticks, (before + 1) % ticks)
+    return union_sorted(before % ticks, (before + 1) % ticks)

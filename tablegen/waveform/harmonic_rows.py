@@ -29,10 +29,21 @@ class HarmonicRows:
         self._factor = np.concatenate([[1.0 if derivative == 0 else 0.0], over])
         order = np.arange(harmonics + 1)
         minus = order[:, None] - order[None, :]
-        self._apart, self._sign, self._together = np.abs(minus), np.sign(minus), order[:, None] + order[None, :]
+        self._difference, self._sign, self._sum = np.abs(minus), np.sign(minus), order[:, None] + order[None, :]
 
     def times(self, y: Floats) -> Floats:
-        """Return the rows applied to unknowns: y of shape (2 H + 1,), the result (m,)."""
+        """Return the rows applied to unknowns.
+
+        Parameters
+        ----------
+        y
+            Unknowns, shape (2 H + 1,).
+
+        Returns
+        -------
+        Floats
+            Shape (m,).
+        """
         c, s = self._by_time
         h = self._harmonics
         p = self._factor * y[: h + 1]
@@ -43,7 +54,18 @@ class HarmonicRows:
         return sign * self._weight * folded_sum(c * p + s * q)
 
     def transposed(self, z: Floats) -> Floats:
-        """Return the transposed rows applied to z: z of shape (m,), the result (2 H + 1,)."""
+        """Return the transposed rows applied to z.
+
+        Parameters
+        ----------
+        z
+            One value a row, shape (m,).
+
+        Returns
+        -------
+        Floats
+            Shape (2 H + 1,).
+        """
         low = slice(0, self._harmonics + 1)
         z = self._weight * z
         cosines, sines = folded_sum(self._c[low] * z), folded_sum(self._s[low] * z)
@@ -54,12 +76,23 @@ class HarmonicRows:
         return np.concatenate([self._factor * cosines, (self._factor * sines)[1:]])
 
     def gram(self, diagonal: Floats) -> Floats:
-        """Return the matrix B^T diag(diagonal) B: ``diagonal`` of shape (m,), the result (2 H + 1, 2 H + 1)."""
+        """Return the matrix B^T diag(diagonal) B of the rows B.
+
+        Parameters
+        ----------
+        diagonal
+            One weight a row, shape (m,).
+
+        Returns
+        -------
+        Floats
+            Shape (2 H + 1, 2 H + 1), symmetric.
+        """
         weight = diagonal * self._weight * self._weight
         cosines, sines = folded_sum(self._c * weight), folded_sum(self._s * weight)
-        near, far = cosines[self._apart], cosines[self._together]
+        near, far = cosines[self._difference], cosines[self._sum]
         cos_cos, sin_sin = 0.5 * (near + far), 0.5 * (near - far)
-        sin_cos = 0.5 * (sines[self._together] + self._sign * sines[self._apart])  # sine of the row
+        sin_cos = 0.5 * (sines[self._sum] + self._sign * sines[self._difference])  # sine of the row
         if self._derivative == 1:
             cos_cos, sin_sin, sin_cos = sin_sin, cos_cos, -sin_cos.T
         scale = self._factor[:, None] * self._factor[None, :]
@@ -74,13 +107,30 @@ class HarmonicRows:
 
 
 def unknowns(series: FourierSeries) -> Floats:
-    """Return the unknowns y of a series, shape (2 H + 1,)."""
+    """Return the unknowns y of a series.
+
+    Returns
+    -------
+    Floats
+        Shape (2 H + 1,).
+    """
     rate = tau * np.arange(1, series.harmonics + 1)
     return np.concatenate([[series.a0], rate * rate * series.a, rate * rate * series.b])
 
 
 def series_of(y: Floats) -> FourierSeries:
-    """Return the series of unknowns y, shape (2 H + 1,)."""
+    """Return the series of unknowns, the inverse of ``unknowns``.
+
+    Parameters
+    ----------
+    y
+        Shape (2 H + 1,).
+
+    Returns
+    -------
+    FourierSeries
+        Of H harmonics.
+    """
     harmonics = len(y) // 2
     rate = tau * np.arange(1, harmonics + 1)
     return FourierSeries(float(y[0]), y[1 : harmonics + 1] / (rate * rate), y[harmonics + 1 :] / (rate * rate))

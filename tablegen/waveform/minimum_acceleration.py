@@ -17,7 +17,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Floats
-from tablegen.numerics.interior_point import Bounded, Minimum, least_bound
+from tablegen.numerics.interior_point import BoundConstraint, Minimum, least_bound
 from tablegen.numerics.turns import cosine
 from tablegen.waveform.harmonic_rows import HarmonicRows, series_of, unknowns
 from tablegen.waveform.refined import WaveformShape
@@ -54,7 +54,18 @@ class Straightness:
         return self.window[0] <= 0.0 or self.window[1] >= 1.0
 
     def times(self, x: Floats) -> list[Floats]:
-        """Return when each direction that images passes places x of the window, 0..1; each of the shape of x."""
+        """Return when each direction that images passes places of the window.
+
+        Parameters
+        ----------
+        x
+            Places in the window, 0 at its lower end and 1 at its upper, any shape.
+
+        Returns
+        -------
+        list of Floats
+            Times in periods: forward, then backward if ``both``; each of the shape of ``x``.
+        """
         low, high = self.window
         place, turn = low + (high - low) * x, self.shape.turn
         forward = turn * place
@@ -204,23 +215,23 @@ class _Programme:
         place = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
         t = t[(place <= low) | (place >= high) | ((t > turn) & (not straight.both))]
         self._accelerations = HarmonicRows(t, np.ones(len(t)), harmonics, 2), np.zeros(len(t))
-        self._range: list[Bounded] = []
+        self._range: list[BoundConstraint] = []
         if hold_range:
             count = max(_RANGE_PER_WAVE * harmonics, _LEAST_RANGE)
             rows = HarmonicRows(np.arange(count) / count, np.ones(count), harmonics, 0)
-            self._range = [Bounded(rows, np.full(count, 0.5), 0.5 - _RANGE_MARGIN, 0.0)]
+            self._range = [BoundConstraint(rows, np.full(count, 0.5), 0.5 - _RANGE_MARGIN, 0.0)]
 
     def straightest(self, start: FourierSeries, percent: float) -> Minimum:
         """Return the least bound on slopes, or the first one for which ``percent`` can be promised."""
-        parts = [Bounded(*self._slopes, 0.0, 1.0), Bounded(*self._places, 0.0, POSITION), *self._range]
+        parts = [BoundConstraint(*self._slopes, 0.0, 1.0), BoundConstraint(*self._places, 0.0, POSITION), *self._range]
         return least_bound(parts, unknowns(start), _GAP, lambda bound: _promised(bound) <= percent)
 
     def minimise(self, start: FourierSeries, half: float) -> Minimum:
         """Return the least acceleration with slopes within ``half``."""
-        parts: Sequence[Bounded] = [
-            Bounded(*self._accelerations, 0.0, 1.0),
-            Bounded(*self._slopes, half, 0.0),
-            Bounded(*self._places, POSITION * half, 0.0),
+        parts: Sequence[BoundConstraint] = [
+            BoundConstraint(*self._accelerations, 0.0, 1.0),
+            BoundConstraint(*self._slopes, half, 0.0),
+            BoundConstraint(*self._places, POSITION * half, 0.0),
             *self._range,
         ]
         return least_bound(parts, unknowns(start), _GAP)

@@ -16,10 +16,32 @@ class WaveformShape(Protocol):
         """The time at which it turns, in periods."""
 
     def value(self, t: FloatsLike) -> Floats:
-        """Return w(t) with t in periods, of the shape of ``t``."""
+        """Return w(t).
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Dimensionless, shape of ``t``.
+        """
 
     def slope(self, t: FloatsLike) -> Floats:
-        """Return dw/dt per period, of the shape of ``t``."""
+        """Return dw/dt.
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Per period, shape of ``t``.
+        """
 
 
 class RefinedShape(Struct, frozen=True):
@@ -34,9 +56,31 @@ class RefinedShape(Struct, frozen=True):
         return self.model.turn
 
     def value(self, t: FloatsLike) -> Floats:
-        """Return w(t) with t in periods, of the shape of ``t``."""
+        """Return w(t).
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Dimensionless, shape of ``t``.
+        """
         return self.model.value(t) + self.layer.value(t)
 
     def slope(self, t: FloatsLike) -> Floats:
-        """Return dw/dt per period, of the shape of ``t``."""
+        """Return dw/dt.
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+
+        Returns
+        -------
+        Floats
+            Per period, shape of ``t``.
+        """
         return self.model.slope(t) + self.layer.value(t, 1)

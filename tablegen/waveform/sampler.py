@@ -30,9 +30,19 @@ Grid = Callable[[FourierSeries, int, int], Floats]
 
 
 def on_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
-    """Return w(k / count), or a derivative of it, for k in [0, count), by a transform; shape (count,).
+    """Return w(k / count), or a derivative of it, for k in [0, count), by a transform.
 
-    ``count`` has to be above twice the highest harmonic.
+    Parameters
+    ----------
+    count
+        Points of the period, above twice the highest harmonic.
+    derivative
+        Order of the derivative with respect to t in periods.
+
+    Returns
+    -------
+    Floats
+        Shape (count,).
     """
     spectrum = _spectrum(series)
     if derivative:
@@ -42,7 +52,20 @@ def on_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
 
 
 def slow_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
-    """Return ``on_grid`` from sums in a fixed order: the same bits on every machine."""
+    """Return ``on_grid`` from sums in a fixed order: the same bits on every machine.
+
+    Parameters
+    ----------
+    count
+        Points of the period.
+    derivative
+        Order of the derivative with respect to t in periods.
+
+    Returns
+    -------
+    Floats
+        Shape (count,).
+    """
     return series.on_grid(count, derivative)
 
 
@@ -64,7 +87,20 @@ class Expansion:
         self._terms: list[Floats] = list(np.fft.irfft(spectra, blocks))
 
     def at(self, t: Floats, *derivatives: int) -> list[Floats]:
-        """Return w, or these derivatives of it, at times in periods; each of the shape of ``t``."""
+        """Return w or derivatives of it.
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+        derivatives
+            Orders, 0 for w itself, up to 2.
+
+        Returns
+        -------
+        list of Floats
+            One of each order, of the shape of ``t``.
+        """
         nearest = np.rint(t * self._blocks)
         h = t - nearest / self._blocks
         block = nearest.astype(np.int64) & (self._blocks - 1)
@@ -99,7 +135,18 @@ class Sampler:
         self._terms = [grid(series, blocks, m) / factorial(m) for m in range(_TAYLOR_ORDER + 1)]
 
     def at(self, k: Ints) -> Floats:
-        """Return w(k / count) for any k in [0, count), of the shape of ``k``."""
+        """Return w(k / count).
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, count), shape (n,).
+
+        Returns
+        -------
+        Floats
+            Shape (n,).
+        """
         if not self._blocks:
             return self._samples[k]
         if len(k) <= _CHUNK_TICKS:

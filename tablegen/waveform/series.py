@@ -79,11 +79,37 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return len(self.a)
 
     def value(self, t: FloatsLike, derivative: int = 0) -> Floats:
-        """Return w, or its derivative with respect to t, at times in periods; of the shape of ``t``."""
+        """Return w, or its derivative with respect to t.
+
+        Parameters
+        ----------
+        t
+            Times in periods, any shape.
+        derivative
+            Order of the derivative.
+
+        Returns
+        -------
+        Floats
+            Shape of ``t``.
+        """
         return values(t, (self, derivative))[0]
 
     def on_grid(self, count: int, derivative: int = 0) -> Floats:
-        """Return ``value`` at k / count for k in [0, count), shape (count,), by one table of sines."""
+        """Return ``value`` at k / count for k in [0, count), by one table of sines.
+
+        Parameters
+        ----------
+        count
+            Points of the period.
+        derivative
+            Order of the derivative with respect to t in periods.
+
+        Returns
+        -------
+        Floats
+            Shape (count,).
+        """
         if count % 2:
             return self.on_grid(2 * count, derivative)[::2].copy()
         a, b = _differentiated(np.arange(1.0, self.harmonics + 1.0), self.a, self.b, derivative)
@@ -97,7 +123,22 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
-        """Return harmonic n, or its derivative, where sine and cosine of 2 pi n t are s and c; of their shape."""
+        """Return harmonic n, or its derivative with respect to t.
+
+        Parameters
+        ----------
+        n
+            Harmonic, 1..H.
+        derivative
+            Order of the derivative.
+        s, c
+            Sine and cosine of 2 pi n t, of one shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``s``.
+        """
         a, b = self._factors(n, derivative)
         return a * c + b * s
 
@@ -131,7 +172,18 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return self.plus(FourierSeries(-other.a0, -other.a, -other.b))
 
     def times(self, real: Floats, imaginary: Floats) -> "FourierSeries":
-        """Return the series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
+        """Return the series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays.
+
+        Parameters
+        ----------
+        real, imaginary
+            Both parts of the factors, shape (H,).
+
+        Returns
+        -------
+        FourierSeries
+            Of the same H harmonics.
+        """
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)
 
 

@@ -10,7 +10,7 @@ import pytest
 from editing import SCAN, SCANNER, edited, run
 
 from tablegen.certificate.certificate import certify
-from tablegen.certificate.expectation_checks import doubts
+from tablegen.certificate.expectation_checks import expectation_warnings
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.certificate.position_errors import arriving
 from tablegen.compensation.dynamics import SecondOrder
@@ -86,7 +86,7 @@ def test_a_resonance_that_is_driven_is_a_warning_with_remedies(tmp_path: Path) -
     assert certificate.position is not None
     side, percent = certificate.position.worst
     assert percent > 2.0 * certificate.scaling[side].total
-    (doubt,) = doubts(plan.x, certificate)
+    (doubt,) = expectation_warnings(plan.x, certificate)
     assert (doubt.code, doubt.percent) == ("resonance", percent)
     outcome = run("check", tmp_path / "scan.toml")
     assert "scan.toml:23: x.size_nm: the steps of the x codes drive the resonance at 40000 Hz: behind it" in outcome.err

@@ -11,7 +11,7 @@ from replacing import replace
 from tablegen.base.input_errors import Document, Unphysical
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.line_errors import EmittedPeriod
-from tablegen.certificate.shaped_periods import Changes, passed
+from tablegen.certificate.shaped_periods import Changes, errors_behind_response
 from tablegen.certificate.summary import certificate_lines
 from tablegen.config.load import load
 from tablegen.planning.line_plan import Plan, make_plan
@@ -41,7 +41,7 @@ Certified = dict[str, tuple[Plan, dict[str, Certificate]]]
 def test_a_tone_arrives_as_the_response_has_it(certified: Certified, f_hz: float) -> None:
     line = certified["scanner"][0].x
     t = np.arange(20000) / 500e3
-    arrived = passed(line, np.sin(2.0 * np.pi * f_hz * t))[10000:]
+    arrived = errors_behind_response(line, np.sin(2.0 * np.pi * f_hz * t))[10000:]
     r = f_hz / 40e3
     h = 1.0 / (1.0 - r * r + 1j * r / 20.0)
     wanted = np.imag(h * np.exp(2j * np.pi * f_hz * t[10000:]))
@@ -51,7 +51,7 @@ def test_a_tone_arrives_as_the_response_has_it(certified: Certified, f_hz: float
 def test_a_band_ends_at_the_highest_harmonic(tmp_path: Path) -> None:
     line = make_plan(load(write_variant(tmp_path, Variant({**SMALL, "dac.shaping": "first"})))).y
     t = np.arange(1 << 16) / 500e3
-    inside, outside = (passed(line, np.sin(2.0 * np.pi * f * t))[20000:40000] for f in (1000.0, 8000.0))
+    inside, outside = (errors_behind_response(line, np.sin(2.0 * np.pi * f * t))[20000:40000] for f in (1000.0, 8000.0))
     assert np.max(np.abs(inside - np.sin(2.0 * np.pi * 1000.0 * t[20000:40000]))) < 0.05
     assert np.max(np.abs(outside)) < 0.05
 

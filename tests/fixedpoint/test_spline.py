@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
-from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, SPLINE_UNIT, along, cubic
+from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, SPLINE_UNIT, cubic, evaluate_segment
 from tablegen.fixedpoint.spline_words import spline_factors
 from tablegen.waveform.series import FourierSeries
 
@@ -50,7 +50,7 @@ def test_extreme_words(bits: int) -> None:
     shift, half = SPLINE_FRACTION_BITS + 1, 1 << SPLINE_FRACTION_BITS
     fraction = np.arange(1 << SPLINE_FRACTION_BITS)
     for corner in product((low, high), repeat=4):
-        sample = along([np.full_like(fraction, word) for word in corner], fraction)
+        sample = evaluate_segment([np.full_like(fraction, word) for word in corner], fraction)
         assert SPLINE_UNIT * min(corner) <= sample.min()
         assert sample.max() <= SPLINE_UNIT * max(corner)
         c0, c1, c2, c3 = corner

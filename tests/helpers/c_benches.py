@@ -12,7 +12,7 @@ from limits import PATIENCE_S
 from stream_laws import steps_are_limited
 
 from tablegen.base.resources import c_runtime
-from tablegen.verification.c.bench import CUBIC, OWN_SOURCES, CBench, CPlayed, defines, macros, script_words, sine_of
+from tablegen.verification.c.bench import CUBIC, OWN_SOURCES, CBench, CRecord, defines, macros, script_words, sine_of
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script, compare
 
@@ -73,7 +73,7 @@ class Benches:
 
     def play(
         self, script: Script, shape: SequencerShape, compiler: str = "gcc", fill: int = 0, fourier: bool = False
-    ) -> CPlayed:
+    ) -> CRecord:
         """Play a script and hold it against the model: every tick, and the counts of faults."""
         played = self.compiled(shape, compiler, fill).run(words_of(script, shape, fourier), timeout=PATIENCE_S)
         expected = np.array(script.expected, dtype=np.uint64)

@@ -33,7 +33,7 @@ from limits import ENDED, limit, program_within
 from mutants import Verdict
 
 from tablegen.base.resources import c_runtime
-from tablegen.verification.c.bench import OWN_SOURCES, CPlayed, defines, macros
+from tablegen.verification.c.bench import OWN_SOURCES, CRecord, defines, macros
 from tablegen.verification.c.play import run
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -177,7 +177,7 @@ def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     for script, shape in playing:
         words = words_of(script, shape)
         try:
-            played = CPlayed.of(np.frombuffer(run(limited, words.encode("ascii")), dtype="<u8"), words)
+            played = CRecord.of(np.frombuffer(run(limited, words.encode("ascii")), dtype="<u8"), words)
         except SimulationFailed as error:
             return Verdict(True, str(error))
         expected = script.expected if not fill else [word & (1 << 56) - 1 for word in script.expected]

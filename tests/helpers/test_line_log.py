@@ -64,7 +64,7 @@ def _ask(player: SequencerPlayer | LinePlayer, request: str, number: int) -> Non
 
 def _played(steps: list[Step]) -> list[PlayedLine]:
     log = _Log()
-    player = SequencerPlayer(_BOOT, seen=log)
+    player = SequencerPlayer(_BOOT, on_tick=log)
     for number, (request, ticks) in enumerate([("wait", 60), *steps, ("park", 60)]):
         _ask(player, request, number)
         player.advance(ticks)

@@ -91,7 +91,7 @@ def test_a_device_that_is_broken_fails(monkeypatch: pytest.MonkeyPatch, broken: 
     elif broken == "nonce":
         monkeypatch.setattr(device, "_use_nonce", lambda self: self._nonce)
     elif broken == "words":
-        monkeypatch.setattr(bank, "_look_at_words", lambda self, held: None)
+        monkeypatch.setattr(bank, "_check_words", lambda self, incoming: None)
     else:
         monkeypatch.setattr(device, "_settle", lambda self: None)
     with pytest.raises((AssertionError, struct.error, IndexError, ValueError)):

@@ -16,7 +16,7 @@ from replacing import replace
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, OutOfTime
-from tablegen.link.flight import Flight, Sent
+from tablegen.link.flight import Flight, SentFrame
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import Request
 from tablegen.link.outcome import UploadResult
@@ -209,8 +209,8 @@ def test_a_buffer_that_is_too_small_for_the_window() -> None:
 # Broken on purpose
 
 
-def _deaf_to_late(self: Flight, key: tuple[int, int], now: float) -> Sent | None:
-    self.heard_at, self.in_vain = now, 0
+def _deaf_to_late(self: Flight, key: tuple[int, int], now: float) -> SentFrame | None:
+    self.last_answer_at, self.in_vain = now, 0
     return self._on_way.pop(key, None)
 
 
@@ -319,7 +319,7 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     flight = Flight(8, 0.0)
     for seq in range(8):
         assert flight.has_room()
-        flight.add(Sent(Request.DATA, seq, 0.0, 1.0))
+        flight.add(SentFrame(Request.DATA, seq, 0.0, 1.0))
     assert not flight.has_room()
     assert flight.take((Request.DATA, 3), 0.5) is not None
     assert [seq for seq in range(8) if flight.take((Request.DATA, seq), 0.6) is not None] == [0, 1, 2, 4, 5, 6, 7]
@@ -327,7 +327,7 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     flight.lost()
     for seq in range(2):
         assert flight.has_room()
-        flight.add(Sent(Request.DATA, seq, 1.0, 2.0))
+        flight.add(SentFrame(Request.DATA, seq, 1.0, 2.0))
     assert not flight.has_room()
     assert [sent.seq for sent in flight.overdue(5.0)] == [0, 1]
     assert flight.take((Request.DATA, 0), 6.0) is not None, "late, and it counts"
@@ -343,7 +343,7 @@ def test_the_window_grows_back_to_that_of_the_device_and_no_further() -> None:
         flight.clear(0.0)
         count = 0
         while flight.has_room() and count < 10:
-            flight.add(Sent(Request.DATA, count, 0.0, 1.0))
+            flight.add(SentFrame(Request.DATA, count, 0.0, 1.0))
             count += 1
         return count
 
@@ -359,7 +359,7 @@ def test_the_window_grows_back_to_that_of_the_device_and_no_further() -> None:
 def test_one_wait_in_vain_is_no_silence() -> None:
     flight = Flight(8, 0.0)
     for count in range(2):
-        flight.add(Sent(Request.STATUS, count, 10.0 * count, 10.0 * count + 0.1))
+        flight.add(SentFrame(Request.STATUS, count, 10.0 * count, 10.0 * count + 0.1))
         assert len(flight.overdue(10.0 * count + 9.0)) == 1
         assert flight.is_silent(10.0 * count + 9.0) == (count == 1)
 
@@ -368,11 +368,11 @@ def test_one_wait_in_vain_is_no_silence() -> None:
 def test_two_requests_stay_on_their_way_while_answers_come(tries_in_vain: int, left: int) -> None:
     flight = Flight(8, 0.0)
     for count in range(tries_in_vain):
-        flight.add(Sent(Request.STATUS, count, 10.0 * count, 10.0 * count + 1.0))
+        flight.add(SentFrame(Request.STATUS, count, 10.0 * count, 10.0 * count + 1.0))
         assert len(flight.overdue(10.0 * count + 9.0)) == 1
     for _ in range(5):
         flight.lost()
     for seq in range(left):
         assert flight.has_room()
-        flight.add(Sent(Request.DATA, seq, 1.0, 2.0))
+        flight.add(SentFrame(Request.DATA, seq, 1.0, 2.0))
     assert not flight.has_room()

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from tablegen.numerics.arrays import Floats, folded_sum
-from tablegen.numerics.interior_point import Bounded, least_bound
+from tablegen.numerics.interior_point import BoundConstraint, least_bound
 
 
 @dataclass
@@ -26,7 +26,7 @@ class Dense:
         return (self.matrix.T * diagonal) @ self.matrix
 
 
-def programme(parts: list[Bounded], size: int) -> float:
+def programme(parts: list[BoundConstraint], size: int) -> float:
     """The least v by HiGHS."""
     left, right = [], []
     for part in parts:
@@ -38,16 +38,16 @@ def programme(parts: list[Bounded], size: int) -> float:
     return float(linprog(objective, np.vstack(left), np.concatenate(right), bounds=(None, None), method="highs").fun)
 
 
-def random_parts(seed: int, size: int = 7) -> list[Bounded]:
+def random_parts(seed: int, size: int = 7) -> list[BoundConstraint]:
     """Three parts of random rows; ``inside(seed)`` keeps the fixed one."""
     random = np.random.default_rng(seed)
     solution = random.standard_normal(size)
     fixed = random.standard_normal((12, size))
     shared = random.standard_normal((40, size))
     return [
-        Bounded(Dense(shared), random.standard_normal(40), 0.0, 1.0),
-        Bounded(Dense(fixed), fixed @ solution + random.uniform(-0.5, 0.5, 12), 0.6, 0.0),
-        Bounded(Dense(random.standard_normal((5, size))), random.standard_normal(5), 0.3, 2.0),
+        BoundConstraint(Dense(shared), random.standard_normal(40), 0.0, 1.0),
+        BoundConstraint(Dense(fixed), fixed @ solution + random.uniform(-0.5, 0.5, 12), 0.6, 0.0),
+        BoundConstraint(Dense(random.standard_normal((5, size))), random.standard_normal(5), 0.3, 2.0),
     ]
 
 
@@ -83,9 +83,9 @@ def test_it_ends_early_where_enough_is_reached() -> None:
 def test_what_contradicts_itself_is_not_called_settled() -> None:
     one = Dense(np.array([[1.0]]))
     parts = [
-        Bounded(one, np.zeros(1), 0.0, 1.0),
-        Bounded(one, np.array([5.0]), 1.0, 0.0),
-        Bounded(one, -np.ones(1), 1.0, 0.0),
+        BoundConstraint(one, np.zeros(1), 0.0, 1.0),
+        BoundConstraint(one, np.array([5.0]), 1.0, 0.0),
+        BoundConstraint(one, -np.ones(1), 1.0, 0.0),
     ]
     assert not least_bound(parts, np.zeros(1), 0.02).settled
 

@@ -163,7 +163,7 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
     stored = read_build(tmp_path / "out")
     assert stored.own_hash == stored.manifest.hash
     k = np.arange(1250)
-    assert np.max(np.abs(stored.manifest.axes.x.asked(k) - refined.x.codes(0, 1250))) < 1.0
+    assert np.max(np.abs(stored.manifest.axes.x.unrounded_codes(k) - refined.x.codes(0, 1250))) < 1.0
 
 
 @pytest.mark.common

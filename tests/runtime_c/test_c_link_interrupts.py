@@ -59,7 +59,7 @@ class Landings:
         bench = folder / "link_landings.c"
         bench.write_text((REPOSITORY / "tests" / "helpers" / "link_landings.c").read_text("utf-8"), "utf-8")
         self.processor = Processor(
-            compile_bare(folder / "landings.elf", [*sources, bench, MEMORY], chosen={"DAC_LINK_RING": RING})
+            compile_bare(folder / "landings.elf", [*sources, bench, MEMORY], macro_values={"DAC_LINK_RING": RING})
         )
         self.script = script
         self.landed: set[int] = set()

@@ -20,7 +20,7 @@ from programs import random_dual
 from sets import long
 from stream_scripts import sweep
 
-from tablegen.verification.c.bench import OPTIONS, CBench, CPlayed, defines
+from tablegen.verification.c.bench import OPTIONS, CBench, CRecord, defines
 from tablegen.verification.c.emulate import CortexMBench, Processor, compile_bare
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -46,7 +46,7 @@ def options(level: str) -> tuple[str, ...]:
     return tuple(level if option == "-O2" else option for option in OPTIONS)
 
 
-def hold(played: CPlayed, script: Script, fill: int) -> None:
+def hold(played: CRecord, script: Script, fill: int) -> None:
     """Every tick and every count as the model has them; a fill tells faults at its end."""
     expected = [word & WITHOUT_FAULTS for word in script.expected] if fill else script.expected
     mismatch = compare(expected, played.capture)

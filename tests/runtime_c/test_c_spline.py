@@ -69,8 +69,10 @@ def test_without_splines_a_cubic_table_is_not_loaded(tmp_path: Path) -> None:
 def test_a_spline_is_shaped_as_lines_are(name: str, fill: int, long_multiply: int, tmp_path: Path) -> None:
     """Every order on splines, by runs where there are some and by steps."""
     shape, script = LONG[name][0], long_play(name, 60_000, order=3)
-    chosen = {**defines(shape, fill), "DAC_SHAPING": 3, "DAC_LONG_MULTIPLY": long_multiply}
-    played = CBench(shape, tmp_path, "gcc", (*SANITIZED, "-DDAC_WAIT=0"), chosen=chosen).run(words_of(script, shape))
+    macro_values = {**defines(shape, fill), "DAC_SHAPING": 3, "DAC_LONG_MULTIPLY": long_multiply}
+    played = CBench(shape, tmp_path, "gcc", (*SANITIZED, "-DDAC_WAIT=0"), macro_values=macro_values).run(
+        words_of(script, shape)
+    )
     kept = (1 << 56) - 1 if fill else (1 << 64) - 1  # a fill tells faults at its end
     assert compare([word & kept for word in script.expected], played.capture) is None
     assert played.counts[:2] == script.counts

@@ -45,7 +45,7 @@ from tablegen.verification.c.program import c_program
 from tablegen.verification.checks.played_checks import check_states
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.capture import make_capture
-from tablegen.verification.play.converter_words import codes_of, packed
+from tablegen.verification.play.converter_words import codes_of, pack_captures
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.session import make_session
@@ -154,11 +154,11 @@ def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     folder, stored = tmp_path_factory.mktemp("benches"), read_build(short.folder)
     program, absent = c_program(short.folder, folder, stored, fourier=False)
     assert not absent
-    sources, chosen = program.sources, program.defines
+    sources, macro_values = program.sources, program.defines
     shape = SequencerShape.of((stored.program.x, stored.program.y))
-    step = CBench(shape, folder / "step", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
-    chosen["BENCH_FILL"] = 600
-    fill = CBench(shape, folder / "fill", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
+    step = CBench(shape, folder / "step", options=["-std=c99", "-O2"], sources=sources, macro_values=macro_values)
+    macro_values["BENCH_FILL"] = 600
+    fill = CBench(shape, folder / "fill", options=["-std=c99", "-O2"], sources=sources, macro_values=macro_values)
     return Benches(stored, step, fill)
 
 
@@ -175,7 +175,7 @@ def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed:
     assert not np.any(wanted[own] >> np.uint64(56)), "the program of the build raises no fault"
     for bench, mask in ((benches.step, (1 << 64) - 1), (benches.fill, (1 << 56) - 1)):  # fills do not record faults
         played = bench.run(text)
-        assert np.array_equal(packed(played.capture, stored), wanted & np.uint64(mask))
+        assert np.array_equal(pack_captures(played.capture, stored), wanted & np.uint64(mask))
         assert played.counts == session.script.all_counts
         told = check_states(
             session.script.states, read_states(played.states), (1 << 32) - 1, ("armed", "running", OUTPUTS)

@@ -167,6 +167,18 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
         return series
 
     def dynamics(f_hz: Floats) -> tuple[Floats, Floats]:
+        """Return H(f) from the inverse of the response.
+
+        Parameters
+        ----------
+        f_hz
+            Frequencies in Hz, shape (n,).
+
+        Returns
+        -------
+        real, imaginary
+            Dimensionless, each of shape (n,).
+        """
         assert response is not None
         real, imaginary = response.inverse(f_hz)
         square = real * real + imaginary * imaginary

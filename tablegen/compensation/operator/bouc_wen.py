@@ -40,7 +40,22 @@ class BoucWen:
     bend: tuple[float, float]
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
-        """Return the part of the displacement at drives ``u`` of a settled line between two drives, shape of ``u``."""
+        """Return the part of the displacement on one branch of a settled line.
+
+        Parameters
+        ----------
+        u
+            Normalised drives, any shape.
+        low, high
+            Normalised drives at the ends of the line, low < high.
+        rising
+            True for the branch on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            In units of the displacement, shape of ``u``.
+        """
         first, last = (float(bent(at, *self.bend)) for at in (low, high))
         rise, fall = self._ends(last - first)
         v = bent(u, *self.bend)
@@ -120,7 +135,18 @@ class _Curve:
         return (i + x - _REACH) / _STEPS
 
     def along(self, t: Floats) -> Floats:
-        """Return the heights at t, of its shape."""
+        """Return the heights of the curve.
+
+        Parameters
+        ----------
+        t
+            Arguments, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``t``.
+        """
         x = t * _STEPS + _REACH
         i = np.clip(x, 0.0, 2 * _REACH - 1).astype(np.int64)
         x = x - i

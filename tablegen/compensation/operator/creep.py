@@ -32,7 +32,18 @@ class LogarithmicCreep(Struct, frozen=True):
         return replace(self, slowest_s=max(self.slowest_s, _PERIODS / rate_hz))
 
     def response(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Return real and imaginary part of C(f) / |C(reference)| at frequencies in Hz, of the shape of ``f_hz``."""
+        """Return C(f) / |C(reference)|.
+
+        Parameters
+        ----------
+        f_hz
+            Frequencies in Hz, shape (n,).
+
+        Returns
+        -------
+        real, imaginary
+            Dimensionless, each of shape (n,).
+        """
         real, imaginary = self._response(f_hz)
         at_real, at_imaginary = self._response(np.array([self.reference_hz]))
         size = float(np.sqrt(at_real * at_real + at_imaginary * at_imaginary)[0])

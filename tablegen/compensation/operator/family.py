@@ -17,9 +17,24 @@ class Family:
     bouc_wen: BoucWen | None = None
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
-        """Return the displacement at drives ``u`` of a settled line between two drives, up to a constant."""
-        moved = self.plays.branch(u, low, high, rising)
-        return moved if self.bouc_wen is None else moved + self.bouc_wen.branch(u, low, high, rising)
+        """Return the displacement on one branch of a settled line, up to a constant.
+
+        Parameters
+        ----------
+        u
+            Normalised drives, any shape.
+        low, high
+            Normalised drives at the ends of the line, low < high.
+        rising
+            True for the branch on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            In units of the displacement, shape of ``u``.
+        """
+        displacement = self.plays.branch(u, low, high, rising)
+        return displacement if self.bouc_wen is None else displacement + self.bouc_wen.branch(u, low, high, rising)
 
     def extent(self, stroke: float, centre: float) -> float:
         """Return the nm between the turns of a settled line."""
@@ -28,7 +43,18 @@ class Family:
         return float(ends[1] - ends[0])
 
     def over(self, reversible: Floats) -> "Family":
-        """Return the family over another polynomial."""
+        """Return the family over another polynomial.
+
+        Parameters
+        ----------
+        reversible
+            Coefficients of u, u^2, ..., shape (k,).
+
+        Returns
+        -------
+        Family
+            Its hysteresis is the same.
+        """
         return replace(self, plays=replace(self.plays, reversible=reversible))
 
     def weighted(self, share: float, other: "Family") -> "Family":

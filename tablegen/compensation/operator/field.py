@@ -33,9 +33,21 @@ class Lengths:
 
 
 def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool = False) -> Floats:
-    """Return the covariance, shape (n, m), of points (stroke, centre) of shapes (n, 2) and (m, 2).
+    """Return the covariance of points in the plane of stroke and centre.
 
     Without ``straight`` it is 1 where they coincide; with it the value at a stroke of 0 is nearly known to be 0.
+
+    Parameters
+    ----------
+    points, others
+        Rows (stroke, centre), normalised drives, shapes (n, 2) and (m, 2).
+    lengths
+        Correlation lengths in stroke and centre.
+
+    Returns
+    -------
+    Floats
+        Shape (n, m).
     """
     out = np.empty((len(points), len(others)))
     for i, (stroke, centre) in enumerate(points.tolist()):
@@ -66,7 +78,18 @@ class Field:
     straight: bool = False
 
     def at(self, stroke: float, centre: float) -> Floats:
-        """Return the interpolated row, shape (columns,)."""
+        """Return the row at a stroke and a centre.
+
+        Parameters
+        ----------
+        stroke, centre
+            Normalised drives.
+
+        Returns
+        -------
+        Floats
+            Interpolated values, shape (columns,).
+        """
         near = covariance(np.array([[stroke, centre]]), self.points, self.lengths, self.straight)[0]
         total = np.zeros(self.weights.shape[1])
         for weight, row in zip(near.tolist(), self.weights, strict=True):

@@ -218,8 +218,8 @@ def _floats(values: Sequence[float]) -> list[float]:
 
 
 def _float(value: float) -> str:
-    shown = f"{float(value):.9g}"
-    return shown if any(mark in shown for mark in ".en") else f"{shown}.0"
+    digits = f"{float(value):.9g}"
+    return digits if any(mark in digits for mark in ".en") else f"{digits}.0"
 
 
 def _text(value: str) -> str:

@@ -22,14 +22,40 @@ class Loop(Struct, frozen=True, eq=False):
     extent_nm: float
 
     def position(self, u: Floats, rising: bool) -> Floats:
-        """Return the positions at normalised drives, of the shape of ``u``."""
+        """Return the positions at normalised drives.
+
+        Parameters
+        ----------
+        u
+            Normalised drives, any shape.
+        rising
+            True for the branch on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            Positions, 0..1 between the ends of the loop, shape of ``u``.
+        """
         values = self.rising if rising else self.falling
         v = (u - self.low) * ((POINTS - 1) / (self.high - self.low))
         left = np.clip(v, 0.0, POINTS - 2).astype(np.int64)
         return values[left] + (v - left) * (values[left + 1] - values[left])
 
     def drive(self, position: FloatsLike, rising: bool) -> Floats:
-        """Return the normalised drives at positions: the inverse of ``position``."""
+        """Return the normalised drives at positions: the inverse of ``position``.
+
+        Parameters
+        ----------
+        position
+            Positions, 0..1 between the ends of the loop, any shape.
+        rising
+            True for the branch on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            Normalised drives, shape of ``position``.
+        """
         values = self.rising if rising else self.falling
         p = np.asarray(position, dtype=np.float64)
         left: Ints = np.clip(np.searchsorted(values, p, side="right") - 1, 0, POINTS - 2)

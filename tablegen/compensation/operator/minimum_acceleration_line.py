@@ -35,7 +35,7 @@ class MinimumAccelerationLine:
 def minimum_acceleration_waveform(
     operator: Operator,
     target: TargetLine,
-    learnt: LearntWaveform,
+    straight: LearntWaveform,
     percent: float,
     inverse: ThroughInverse,
     dynamics: Linear | None,
@@ -50,47 +50,47 @@ def minimum_acceleration_waveform(
         As ``learn_waveform``.
     """
     for _ in range(_ROUNDS):
-        share = percent - _scaling(target, learnt)
-        learnt = learn_waveform(
-            operator, target, _minimum_acceleration(target, learnt, share, percent), inverse, dynamics
+        share = percent - _scaling(target, straight)
+        straight = learn_waveform(
+            operator, target, _minimum_acceleration(target, straight, share, percent), inverse, dynamics
         )
-    share = percent - _scaling(target, learnt)
+    share = percent - _scaling(target, straight)
     for _ in range(_TRIALS):
         played = learn_waveform(
-            operator, target, _minimum_acceleration(target, learnt, share, percent), inverse, dynamics, learn=False
+            operator, target, _minimum_acceleration(target, straight, share, percent), inverse, dynamics, learn=False
         )
         beyond = _scaling(target, played) - percent
         if beyond <= 0.0:
-            return MinimumAccelerationLine(played, learnt.series, share)
+            return MinimumAccelerationLine(played, straight.series, share)
         share -= 1.5 * beyond
-    raise _unreachable(target, learnt)
+    raise _unreachable(target, straight)
 
 
-def _minimum_acceleration(target: TargetLine, learnt: LearntWaveform, share: float, percent: float) -> FourierSeries:
-    """Return the minimum-acceleration waveform within ``share`` of a learnt one, if that is enough of ``percent``."""
+def _minimum_acceleration(target: TargetLine, straight: LearntWaveform, share: float, percent: float) -> FourierSeries:
+    """Return the minimum-acceleration waveform within ``share`` of a straight one, if that is enough of ``percent``."""
     if share < _LEAST_SHARE * percent:
-        raise _unreachable(target, learnt)
+        raise _unreachable(target, straight)
     try:
-        return minimum_acceleration_series(_straightness(target, learnt), learnt.series.harmonics, share)
+        return minimum_acceleration_series(_straightness(target, straight), straight.series.harmonics, share)
     except Unreachable:
-        raise _unreachable(target, learnt) from None
+        raise _unreachable(target, straight) from None
 
 
-def _straightness(target: TargetLine, learnt: LearntWaveform) -> Straightness:
-    line = WholeLine.of(learnt.series, target.turn)
+def _straightness(target: TargetLine, straight: LearntWaveform) -> Straightness:
+    line = WholeLine.of(straight.series, target.turn)
     return Straightness(line, line, target.window, target.both)
 
 
-def _scaling(target: TargetLine, learnt: LearntWaveform) -> float:
+def _scaling(target: TargetLine, straight: LearntWaveform) -> float:
     """Return the worse of the imaging directions, percent, rounded up so that last bits do not change emitted words."""
-    worst = max(learnt.expected.scaling) if target.both else learnt.expected.scaling[0]
+    worst = max(straight.expected.scaling) if target.both else straight.expected.scaling[0]
     return ceil(worst * _ROUNDING) / _ROUNDING
 
 
-def _unreachable(target: TargetLine, learnt: LearntWaveform) -> Unreachable:
+def _unreachable(target: TargetLine, straight: LearntWaveform) -> Unreachable:
     """Return the error that can be had: that of the learnt waveform, and what the harmonics reach against it."""
-    remaining, harmonics = _scaling(target, learnt), learnt.series.harmonics
-    percent = _MARGIN * (remaining + max(remaining, least_percent(_straightness(target, learnt), harmonics)))
+    remaining, harmonics = _scaling(target, straight), straight.series.harmonics
+    percent = _MARGIN * (remaining + max(remaining, least_percent(_straightness(target, straight), harmonics)))
     allow = f"allow at least {at_least(percent, 2)} %, or " if percent <= 10.0 else ""
     why = f"{harmonics} harmonics do not keep this scaling error on the operator; {allow}take more harmonics"
     return Unreachable(why, percent)

@@ -115,7 +115,20 @@ def _monotonic_ends(branch: Floats) -> Floats:
 
 
 def chebyshev(coefficients: Floats, x: Floats) -> Floats:
-    """Return sum_k c_k T_k(x), by Clenshaw's recurrence, of the shape of ``x``; ``coefficients`` is (k,)."""
+    """Return sum_k c_k T_k(x), by Clenshaw's recurrence.
+
+    Parameters
+    ----------
+    coefficients
+        c_0, c_1, ..., shape (k,), k >= 1.
+    x
+        Arguments in -1..1, any shape.
+
+    Returns
+    -------
+    Floats
+        Shape of ``x``.
+    """
     one, two = np.zeros_like(x), np.zeros_like(x)
     for coefficient in coefficients[:0:-1]:
         one, two = float(coefficient) + 2.0 * x * one - two, one

@@ -17,14 +17,40 @@ FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0,
 
 
 def envelopes(u: FloatsLike, bend: Floats) -> tuple[Floats, Floats]:
-    """Return the lower and the upper envelope of a row of four bends, at normalised drives, each of their shape."""
+    """Return the lower and the upper envelope of plays.
+
+    Parameters
+    ----------
+    u
+        Normalised drives, any shape.
+    bend
+        Linear and cubic bend of one envelope, then of the other, shape (4,).
+
+    Returns
+    -------
+    lower, upper
+        Bent drives, each of the shape of ``u``.
+    """
     linear, cubic, other_linear, other_cubic = bend.tolist()
     one, two = bent(u, linear, cubic), bent(u, other_linear, other_cubic)
     return np.minimum(one, two), np.maximum(one, two)
 
 
 def bent(u: FloatsLike, linear: float, cubic: float) -> Floats:
-    """Return the bent drive, of the shape of ``u``."""
+    """Return the bent drive u + l u (1 - u) + s u (1 - u) (u - 1/2).
+
+    Parameters
+    ----------
+    u
+        Normalised drives, any shape.
+    linear, cubic
+        The bends l and s.
+
+    Returns
+    -------
+    Floats
+        Shape of ``u``.
+    """
     u = np.asarray(u, dtype=np.float64)
     bow = u * (1.0 - u)
     return u + linear * bow + cubic * (bow * (u - 0.5))
@@ -62,14 +88,29 @@ class Plays:
     bends: Floats = field(default_factory=lambda: FIXED_BENDS)
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
-        """Return the displacement at drives ``u`` of a settled line between two drives, up to a constant."""
+        """Return the displacement on one branch of a settled line, up to a constant.
+
+        Parameters
+        ----------
+        u
+            Normalised drives, any shape.
+        low, high
+            Normalised drives at the ends of the line, low < high.
+        rising
+            True for the branch on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            In units of the displacement, shape of ``u``.
+        """
         power = np.ones_like(u)
         total = np.zeros_like(u)
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
-        moved = plays(u, low, high, rising, self.thresholds, self.bends)
-        for transform, weights in zip(moved, self.weights, strict=True):
+        transforms = plays(u, low, high, rising, self.thresholds, self.bends)
+        for transform, weights in zip(transforms, self.weights, strict=True):
             for row, weight in zip(transform, weights, strict=True):
                 if weight:
                     total = total + float(weight) * row

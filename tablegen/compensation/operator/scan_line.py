@@ -195,7 +195,13 @@ class _Learner:
         return min((centre + _BEYOND) / -float(np.min(wave)), (1.0 - centre + _BEYOND) / float(np.max(wave)))
 
     def play(self, series: FourierSeries, amplitude: float) -> _Played:
-        """Play a waveform on the operator."""
+        """Play a waveform on the operator.
+
+        Raises
+        ------
+        Unphysical
+            If the drive leaves the range of the operator.
+        """
         target = self._target
         u = target.centre + amplitude * (self._inverse(series).on_grid(self._count) - 0.5)
         low, high = float(np.min(u)), float(np.max(u))
@@ -216,7 +222,18 @@ class _Learner:
         return _Played(u, mean, loop, rising, loop.extent_nm * place)
 
     def line_of(self, position: Floats) -> tuple[float, float]:
-        """Return slope in nm from x = 0 to 1, and position at x = 1/2, of the best common line through the windows."""
+        """Fit the best common line through the windows of both directions.
+
+        Parameters
+        ----------
+        position
+            Positions in nm at the times of the grid, shape (count,).
+
+        Returns
+        -------
+        slope, middle
+            Slope in nm from x = 0 to 1, and position in nm at x = 1/2.
+        """
         x, y, weight = self._x[self.imaged] - 0.5, position[self.imaged], self._weight
         mean_x, mean_y = float(tree_sum(weight * x)), float(tree_sum(weight * y))
         slope = float(tree_sum(weight * (x - mean_x) * y)) / float(tree_sum(weight * (x - mean_x) * x))
@@ -237,7 +254,18 @@ class _Learner:
         return FourierSeries(0.0, c[1 : self._harmonics + 1], c[self._harmonics + 1 :])
 
     def expected(self, position: Floats) -> ExpectedErrors:
-        """Return the errors of a position in nm; fast sums will do, since no emitted word depends on them."""
+        """Return the errors of a position; fast sums will do, since no emitted word depends on them.
+
+        Parameters
+        ----------
+        position
+            Positions in nm at the times of the grid, shape (count,).
+
+        Returns
+        -------
+        ExpectedErrors
+            In percent of the line.
+        """
         slope, middle = self.line_of(position)
         error = 100.0 * ((position - middle) / slope - (self._x - 0.5))
         grid = np.linspace(*self._target.window, 401)

@@ -35,5 +35,5 @@ def settled(
         linear = linear / (real + 1j * imaginary)
     spectrum = np.fft.rfft(place)
     spectrum[n] *= linear
-    moved: Floats = loop.extent_nm * np.fft.irfft(spectrum, count)
-    return moved
+    position: Floats = loop.extent_nm * np.fft.irfft(spectrum, count)
+    return position

@@ -18,7 +18,7 @@ from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.elementary import exp
 
 _POINTS = 65  # of the first sweep
-_MANY_PERIODS = 1e3  # a time constant as long as that knows the mean of a line alone
+_MANY_PERIODS = 1e3  # periods; of a longer time constant only the mean of a line counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def transient_between(operator: Operator, before: SettledLine, now: SettledLine,
         back = last if before.low <= now.low else settled
         until = back.extent_nm * (back.position(u, True) - back.position(np.array([before.high]), True))
         memory = np.where(u < before.high, until, further) - (low + settled.extent_nm * along)
-    else:  # the lower turn of the first period wipes out what was before
+    else:  # the lower turn of the first period erases the memory before it
         low = -_loop(operator, now.low, before.high).extent_nm
     scale = _at_rest(operator, 0.5 * (now.low + now.high)) / factor
     sweep_s = now.turn * now.period_s

@@ -21,22 +21,22 @@ _FEW = 3  # traces, below which all count
 _PLACES = 0.5  # share of what the family leaves that may be another one, for an offset that is v_max from all traces
 _WINDOW = 0.8  # of -1..1, where it counts; chords of a twentieth of the line
 _POINTS, _CHORD = 161, 10
-_FORMULAS = 0.15  # of what (1) and (23) say from the nearest trace to the scan, that may be wrong
+_FORMULAS = 0.15  # share of the factors (1) and (23) between the nearest trace and the scan that may be wrong
 
 
 def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> tuple[float, float, float, float]:
     """Return by how much rms, scaling error, mismatch and size may be off at a stroke and a centre, in percent."""
     points = np.array([(line.stroke, line.centre) for line in lines])
-    missed, noise = np.array([line.left_out for line in lines]), np.array([line.in_fit for line in lines])
+    left_out, noise = np.array([line.left_out for line in lines]), np.array([line.in_fit for line in lines])
     known = covariance(points, points, _ALIKE)
     factor = Cholesky(known + _ALIKE.noise * np.diag(np.diag(known)))
     without = [1.0 / float(factor.solve(row)[i]) for i, row in enumerate(np.eye(len(points)))]
     near = covariance(np.array([[stroke, centre]]), points, _ALIKE)[0]
     here = max(1.0 - _dot(near, factor.solve(near)), 0.0)
-    many = _deviations(0.5 * len(points))  # what neighbours are missed by goes together: half of it is independent
+    many = _deviations(0.5 * len(points))  # errors of neighbours are correlated: half of them count as independent
     out = []
-    for by, left in zip(missed.T, noise.T, strict=True):
-        square, rest = (by * by).tolist(), (left * left).tolist()
+    for by, in_fit in zip(left_out.T, noise.T, strict=True):
+        square, rest = (by * by).tolist(), (in_fit * in_fit).tolist()
         strength = _variance([max(a - b, 0.0) / v for a, b, v in zip(square, rest, without, strict=True)])
         out.append(sqrt(_mean(rest) + many * many * strength * here))
     return out[0], out[1], out[2], out[3]
@@ -83,7 +83,8 @@ def _variance(squares: Sequence[float]) -> float:
     count = len(squares)
     if count < _FEW:
         return _mean(squares)
-    return _mean(sorted(squares)[:-1]) / (1.0 - 1.15 / sqrt(count))  # about what is left of a normal's, or less
+    # About the share that remains of a normal distribution's, or less.
+    return _mean(sorted(squares)[:-1]) / (1.0 - 1.15 / sqrt(count))
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -1,6 +1,6 @@
 """The formats of a build: a module here has the name of its format and a ``FORMAT``; entry points add others.
 
-A package of somebody else adds one as an entry point of the group ``tablegen.formats``: its name is the format's, its
+A third-party package adds one as an entry point of the group ``tablegen.formats``: its name is the format's, its
 object an instance of ``tablegen.emit.format.Format``.
 """
 
@@ -23,15 +23,15 @@ GROUP = "tablegen.formats"
 
 
 class UnknownFormat(ValueError):
-    """There is no format of this name, or it cannot be used; the message says what there is, or why."""
+    """A format that does not exist or cannot be used; the message lists the formats, or has the reason."""
 
 
 class FormatFailed(UnknownFormat, PluginFailed):
-    """A format of another distribution failed, or gave something that cannot be written."""
+    """The failure of a format of another distribution, or a result of it that cannot be written."""
 
 
 def names() -> list[str]:
-    """All formats that a build can have, in order: those of tablegen, and those that other packages add."""
+    """List all formats of a build in order: those of tablegen, and those that other packages add."""
     return sorted({*_own(), *_others()})
 
 
@@ -42,28 +42,38 @@ def own_names() -> list[str]:
 
 @cache
 def get(name: str) -> Format:
-    """Return the format of a name. Raises ``UnknownFormat``."""
+    """Return the format of a name.
+
+    Raises
+    ------
+    UnknownFormat
+        If no format has that name, or an installed package has no ``Format`` under it.
+    """
     if name in _own():
-        format_found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
+        candidate: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
     elif name in _others():
-        format_found = _loaded(name, _others()[name])
+        candidate = _loaded(name, _others()[name])
     else:
         raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
-    if not isinstance(format_found, Format) or format_found.name != name:
+    if not isinstance(candidate, Format) or candidate.name != name:
         raise UnknownFormat(
             f"{name!r} of {distribution(_others()[name][0])} is no tablegen.emit.format.Format of that name"
         )
     for attribute in ("purpose", "file_names"):
-        if not isinstance(getattr(format_found, attribute, None), str):
+        if not isinstance(getattr(candidate, attribute, None), str):
             raise UnknownFormat(f"{name!r} of {distribution(_others()[name][0])}: its {attribute} is not a text")
-    return format_found
+    return candidate
 
 
 def files_of(one: Format, content: Content) -> dict[str, bytes]:
     """Render the files of a format by name, without its runtime.
 
-    Raises ``Unphysical`` for a build that it cannot hold, ``FormatFailed`` where a format of another distribution fails
-    or returns anything but names with bytes.
+    Raises
+    ------
+    Unphysical
+        If the format cannot hold the build.
+    FormatFailed
+        If a format of another distribution fails, or returns anything but names with bytes.
     """
     if one.name in _own():
         return one.files(content)
@@ -80,7 +90,13 @@ def files_of(one: Format, content: Content) -> dict[str, bytes]:
 
 @contextmanager
 def failing_as_format(one: Format) -> Iterator[None]:
-    """Turn what a format of another distribution raises inside into ``FormatFailed``; that of an own one is a fault."""
+    """Report an exception inside a format of another distribution; one of an own format is a fault of the program.
+
+    Raises
+    ------
+    FormatFailed
+        If the format raises anything but ``Unphysical`` and ``UnknownFormat``.
+    """
     if one.name in _own():
         yield
         return
@@ -105,13 +121,19 @@ def _kind(value: object) -> str:
 
 
 def chosen(names: Iterable[str]) -> list[Format]:
-    """Return the formats of these names, each once. Raises ``UnknownFormat``."""
+    """Return the formats of these names, each once.
+
+    Raises
+    ------
+    UnknownFormat
+        If a name is unknown.
+    """
     return [get(name) for name in dict.fromkeys(names)]
 
 
 @cache
 def _own() -> dict[str, str]:
-    """Modules of this folder by the names of their formats."""
+    """Return the modules of this folder by the names of their formats."""
     modules = (path.stem for path in Path(__file__).parent.glob("*.py"))
     return {module.replace("_", "-"): module for module in modules if module != "__init__"}
 

@@ -6,14 +6,14 @@ from tablegen.emit.memory import memories
 
 
 class Bin(Format):
-    """``NAME_x.bin`` and so on: words and nothing else."""
+    """The format bin: ``NAME_x.bin`` and so on, words and nothing else."""
 
     name = "bin"
     purpose = "raw bytes of each table: words of 1, 2 or 4 bytes, the least significant first"
     file_names = "NAME_*.bin"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file a table."""
+        """Render one file a table."""
         return {f"{content.name}_{memory.name}.bin": memory.raw() for memory in memories(content)}
 
 

@@ -26,13 +26,13 @@ from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 
-# Patterns of what is checked are compiled when it is: a build needs none.
+# Patterns of checks are compiled on first use, since a build needs none.
 _NUMBER = r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?"
 _ARRAY = r"(?s)\b(\w+)\[\w*\] = \{(.*?)\};"
 
 
 class C(Format):
-    """``NAME.h`` and ``NAME.c``, or the header alone."""
+    """The format c: ``NAME.h`` and ``NAME.c``, or the header alone."""
 
     name = "c"
     purpose = "C99 for firmware: tables, constants, and the sequencer dac_*.c that plays them"
@@ -51,7 +51,7 @@ class C(Format):
         return [*c_runtime(), *c_link()]
 
     def sources(self) -> list[Path]:
-        """With the templates."""
+        """Return the runtime and the templates."""
         return [*self.runtime(), *(resource_folder("firmware_templates") / "c").glob("*.j2")]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
@@ -77,12 +77,12 @@ def literal(value: int) -> str:
 
 
 def arrays_file(content: Content) -> str:
-    """Where the arrays stand: in the header if the build has no other C file of its own."""
+    """Return the file of the arrays: the header if the build has no other C file of its own."""
     return f"{content.name}.h" if content.header_only else f"{content.name}.c"
 
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
-    """How many constants the C header is to have, and those that it has not, or not so."""
+    """Return the number of constants of the C header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.h", _constants(content)
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
@@ -94,7 +94,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 
 def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
-    """How many words the arrays are to have, and in which of them the first wrong one stands."""
+    """Return the number of words of the arrays, and the first wrong word of each."""
     name, expected = arrays_file(content), _arrays(content)
     count = sum(map(len, expected.values()))
     try:
@@ -164,7 +164,7 @@ def _table(axis: AxisContent) -> Ints:
 
 
 def words_behind(program: Program) -> int:
-    """How many words stand behind the last one of a table."""
+    """Return the number of words behind the last one of a table."""
     return WORDS_BEHIND if program.mode == "cubic" else 1
 
 
@@ -189,7 +189,7 @@ def _sine_constants(content: Content, sine: Ints) -> dict[str, int]:
 
 
 def _constants(content: Content) -> dict[str, int | str]:
-    """Every constant of the header: numbers, and the hash."""
+    """Return every constant of the header: numbers, and the hash."""
     own: dict[str, int | str] = {
         "HASH": content.hash,
         **scan_constants(content),

@@ -6,7 +6,7 @@ from tablegen.emit.memory import Memory, memories
 
 
 class Coe(Format):
-    """``NAME_x.coe`` and so on: words as wide as the table, in hexadecimal."""
+    """The format coe: ``NAME_x.coe`` and so on, words as wide as the table, in hexadecimal."""
 
     name = "coe"
     purpose = "COE of each table for block memories of AMD (Xilinx): words in two's complement, radix 16"
@@ -14,7 +14,7 @@ class Coe(Format):
     comment = ";"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file a table."""
+        """Render one file a table."""
         return {f"{content.name}_{memory.name}.coe": _file(content, memory) for memory in memories(content)}
 
 

@@ -6,14 +6,14 @@ from tablegen.emit.waveforms import Waveform, waveforms
 
 
 class Csv(Format):
-    """``NAME_x.csv``, a line, and ``NAME_y.csv``, a frame."""
+    """The format csv: ``NAME_x.csv``, a line, and ``NAME_y.csv``, a frame."""
 
     name = "csv"
     purpose = "CSV of a line of x and a frame of y: time in s, volts at the piezo, code, markers as 0 and 1"
     file_names = "NAME_x.csv, NAME_y.csv"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file an axis."""
+        """Render one file an axis."""
         return {f"{content.name}_{waveform.axis}.csv": _file(waveform) for waveform in waveforms(content)}
 
 

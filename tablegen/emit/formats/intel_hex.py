@@ -11,14 +11,14 @@ _RECORD_BYTES = 16
 
 
 class IntelHex(Format):
-    """``NAME_x.hex`` and so on: every file begins at address 0."""
+    """The format hex: ``NAME_x.hex`` and so on, every file from address 0."""
 
     name = "intel-hex"
     purpose = "Intel HEX of each table: words of 1, 2 or 4 bytes, the least significant first"
     file_names = "NAME_*.hex"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file a table."""
+        """Render one file a table."""
         return {
             f"{content.name}_{memory.name}.hex": "".join(_records(memory.raw())).encode("ascii")
             for memory in memories(content)

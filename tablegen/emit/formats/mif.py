@@ -6,7 +6,7 @@ from tablegen.emit.memory import Memory, memories
 
 
 class Mif(Format):
-    """``NAME_x.mif`` and so on: words as wide as the table, in hexadecimal."""
+    """The format mif: ``NAME_x.mif`` and so on, words as wide as the table, in hexadecimal."""
 
     name = "mif"
     purpose = "MIF of each table for block memories of Intel (Altera): words in two's complement, radix 16"
@@ -14,7 +14,7 @@ class Mif(Format):
     comment = "--"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file a table."""
+        """Render one file a table."""
         return {f"{content.name}_{memory.name}.mif": _file(content, memory) for memory in memories(content)}
 
 

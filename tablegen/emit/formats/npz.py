@@ -12,14 +12,14 @@ from tablegen.emit.waveforms import waveforms
 
 
 class Npz(Format):
-    """``NAME.npz``."""
+    """The format npz: ``NAME.npz``."""
 
     name = "npz"
     purpose = "NumPy arrays of a line of x and a frame of y: x_time_s, x_volts, x_codes, x_start .. y_inside"
     file_names = "NAME.npz"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One archive."""
+        """Render one archive."""
         arrays: dict[str, npt.NDArray[np.generic]] = {}
         for waveform in waveforms(content):
             arrays[f"{waveform.axis}_time_s"] = waveform.time_s.astype("<f8")

@@ -1,4 +1,4 @@
-"""Piecewise linear sources for circuit simulators: what the converter makes of one period, at the piezo."""
+"""Piecewise linear sources for circuit simulators: the output of the converter over one period, at the piezo."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ _STEP_SHARE = 1e-3  # of a tick, which a step of the converter takes: a simulato
 
 
 class Pwl(Format):
-    """``NAME_x.pwl``, a line, and ``NAME_y.pwl``, a frame."""
+    """The format pwl: ``NAME_x.pwl``, a line, and ``NAME_y.pwl``, a frame."""
 
     name = "pwl"
     purpose = "SPICE: time in s and volts at the piezo of a line of x and a frame of y, held between ticks as by a DAC"
     file_names = "NAME_x.pwl, NAME_y.pwl"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file an axis; in LTspice ``PWL repeat forever (file=NAME_x.pwl) endrepeat``."""
+        """Render one file an axis; in LTspice ``PWL repeat forever (file=NAME_x.pwl) endrepeat``."""
         tick_s = float(1 / content.schedule.update_rate_hz)
         return {f"{content.name}_{waveform.axis}.pwl": _file(waveform, tick_s) for waveform in waveforms(content)}
 

@@ -49,7 +49,7 @@ ARRAYS = {
 
 
 class SystemVerilog(Format):
-    """``NAME_pkg.sv``."""
+    """The format systemverilog: ``NAME_pkg.sv``."""
 
     name = "systemverilog"
     purpose = "SystemVerilog package: constants, and tables as arrays"

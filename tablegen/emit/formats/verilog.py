@@ -13,13 +13,13 @@ from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
 
-# Patterns of what is checked are compiled when it is: a build needs none.
+# Patterns of checks are compiled on first use, since a build needs none.
 _LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"
 _NUMBER = r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)"
 
 
 class Verilog(Format):
-    """``NAME.vh`` and one ``.mem`` a table."""
+    """The format verilog: ``NAME.vh`` and one ``.mem`` a table."""
 
     name = "verilog"
     purpose = "Verilog-2005 for an FPGA: constants, memory files, and the sequencer dac_*.v that plays them"
@@ -35,7 +35,7 @@ class Verilog(Format):
         return verilog_runtime()
 
     def sources(self) -> list[Path]:
-        """With the template."""
+        """Return the runtime and the template."""
         return [*self.runtime(), *(resource_folder("firmware_templates") / "verilog").glob("*.j2")]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
@@ -67,7 +67,7 @@ def _width(value: int) -> int:
 
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
-    """How many constants the Verilog header is to have, and those that it has not, or not so."""
+    """Return the number of constants of the Verilog header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.vh", _constants(content)
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
@@ -78,7 +78,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 
 def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
-    """How many words the memory files are to have, and in which of them the first wrong one stands."""
+    """Return the number of words of the memory files, and the first wrong word of each."""
     count, wrong = 0, []
     for name, right in _memories(content).items():
         expected = right.decode("ascii").split()
@@ -130,7 +130,7 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
 
 
 def _constants(content: Content) -> dict[str, int | str]:
-    """Every localparam of the header: numbers, and names of files."""
+    """Return every localparam of the header: numbers, and names of files."""
     name = content.name
     own: dict[str, int | str] = {"HASH": int(content.hash, 16), **scan_constants(content)}
     own |= least_widths(content.schedule, content.y.program)

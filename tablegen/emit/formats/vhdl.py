@@ -62,7 +62,7 @@ _ARRAYS = {
 
 
 class Vhdl(Format):
-    """``NAME_pkg.vhd``."""
+    """The format vhdl: ``NAME_pkg.vhd``."""
 
     name = "vhdl"
     purpose = "VHDL-93 package: constants, and tables as arrays"

@@ -15,14 +15,14 @@ _CHANNELS = 2
 
 
 class Wav(Format):
-    """``NAME.wav``: PCM of 16 bits for converters of up to 16 bits, of 32 bits above."""
+    """The format wav: ``NAME.wav``, PCM of 16 bits for converters of up to 16 bits, of 32 bits above."""
 
     name = "wav"
     purpose = "WAV of one frame, x left and y right, at the update rate; 16-bit samples, 32-bit above 16 dac.bits"
     file_names = "NAME.wav"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """One file."""
+        """Render one file."""
         require_period(content)
         bits = 16 if max(axis.program.output.dac_bits for axis in content.axes) <= 16 else 32
         rate = _rate(content, bits // 8 * _CHANNELS)

@@ -1,4 +1,4 @@
-"""The C sequencer under the scripts of the Verilog one: compiled with a compiler of this machine, run as a process."""
+"""The C sequencer under the scripts of the Verilog one: compiled for this machine, run as a process."""
 
 import re
 import shlex
@@ -28,8 +28,8 @@ OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", 
 
 
 @dataclass(frozen=True)
-class CPlayed:
-    """What a script made: the ticks, how often each fault was seen, and the words of the states it asked for.
+class CRecord:
+    """The record of a script: the ticks, the count of each fault, and the words of the states.
 
     ``constants`` are those of an emitted header that was compiled into the bench.
     """
@@ -40,8 +40,23 @@ class CPlayed:
     constants: list[int] = field(default_factory=list)
 
     @classmethod
-    def of(cls, capture: Words, script: str, constants: int = 0) -> "CPlayed":
-        """Split what the bench wrote while it played a script: ticks, then counts, states, constants."""
+    def of(cls, capture: Words, script: str, constants: int = 0) -> "CRecord":
+        """Split what the bench wrote while it played a script: ticks, then counts, states, constants.
+
+        Parameters
+        ----------
+        capture
+            Words of 64 bits, shape (n,).
+        script
+            Text of the script.
+        constants
+            Number of the words of constants.
+
+        Returns
+        -------
+        CRecord
+            Its ``capture`` has the shape (ticks,).
+        """
         states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
         ticks = len(capture) - len(FAULTS) - states - constants
         tail = capture[ticks:].astype(np.int64).tolist()
@@ -50,30 +65,41 @@ class CPlayed:
 
 
 def storage_bits(bits: int) -> int:
-    """Bits in which the C runtime holds table or converter words of so many bits."""
+    """Return the bits in which the C runtime stores table or converter words of so many bits."""
     return 16 if bits <= 16 else 32
 
 
 def defines(shape: SequencerShape, fill: int = 0) -> dict[str, int]:
     """Return the macros of a firmware for programs of a shape; with ``fill``, at most that many ticks a call."""
-    chosen = {
+    macro_values = {
         "DAC_REQUESTS": 128,
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(shape.x_word_bits, shape.y_word_bits)),
         "DAC_OUTPUT_STORAGE_BITS": storage_bits(shape.dac_bits),
     }
     if CUBIC in (shape.x_interpolated, shape.y_interpolated):
-        chosen["DAC_SPLINE"] = 1
-    return chosen | ({"BENCH_FILL": fill} if fill else {})
+        macro_values["DAC_SPLINE"] = 1
+    return macro_values | ({"BENCH_FILL": fill} if fill else {})
 
 
-def constants_written(chosen: Mapping[str, int] | None) -> int:
-    """How many numbers a bench writes of the header that was compiled into it: its constants, and its hash."""
-    constants = (chosen or {}).get("BENCH_CONSTANTS")
+def constants_written(macro_values: Mapping[str, int] | None) -> int:
+    """Return how many numbers of its header a bench writes: its constants, and its hash."""
+    constants = (macro_values or {}).get("BENCH_CONSTANTS")
     return 0 if constants is None else constants + HASH_DIGITS
 
 
 def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None) -> str:
-    """Format a script for the C bench: shape, codes at power-up, the sine table if it is needed, commands."""
+    """Format a script for the C bench: shape, codes at power-up, the sine table if it is needed, commands.
+
+    Parameters
+    ----------
+    sine
+        Words with 30 fraction bits, shape (n,): see ``sine_periods``.
+
+    Returns
+    -------
+    str
+        A word of 16 hexadecimal digits a line.
+    """
     x_index, y_index = (
         getattr(shape, f"{axis}_index_bits") if getattr(shape, f"{axis}_interpolated") else 0 for axis in "xy"
     )
@@ -112,9 +138,9 @@ def require_compiler(compiler: str) -> list[str]:
     return command
 
 
-def macros(chosen: Mapping[str, int]) -> list[str]:
+def macros(macro_values: Mapping[str, int]) -> list[str]:
     """Return macros as words of a compiler's command."""
-    return [f"-D{name}={value}" for name, value in chosen.items()]
+    return [f"-D{name}={value}" for name, value in macro_values.items()]
 
 
 class CBench:
@@ -128,24 +154,24 @@ class CBench:
         options: Sequence[str] = OPTIONS,
         sources: Sequence[Path] | None = None,
         fill: int = 0,
-        chosen: Mapping[str, int] | None = None,
+        macro_values: Mapping[str, int] | None = None,
     ) -> None:
-        """Compile the bench; ``sources`` replace the shipped runtime, ``chosen`` the macros that suit the shape."""
+        """Compile the bench; ``sources`` replace the shipped runtime, ``macro_values`` those that suit the shape."""
         runtime = list(c_runtime() if sources is None else sources)
         folder.mkdir(parents=True, exist_ok=True)
         self.shape, self.program = shape, folder / "stream_bench"
-        self._constants = constants_written(chosen)
-        choices = macros(defines(shape, fill) if chosen is None else chosen)
+        self._constants = constants_written(macro_values)
+        choices = macros(defines(shape, fill) if macro_values is None else macro_values)
         places = [f"-I{place}" for place in sorted({str(path.parent.absolute()) for path in (*runtime, *BENCH)})]
         parts = [str(path.absolute()) for path in runtime if path.suffix == ".c"]
         line = [*require_compiler(compiler), *options, *choices, *places, *parts, *map(str, OWN_SOURCES)]
         compile_line([*line, "-o", str(self.program)])
 
-    def play(self, script: Script, fourier: bool = False) -> CPlayed:
+    def play(self, script: Script, fourier: bool = False) -> CRecord:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
         return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
 
-    def run(self, words: str, timeout: float | None = None) -> CPlayed:
+    def run(self, words: str, timeout: float | None = None) -> CRecord:
         """Play a script in the form of ``script_words``; a bench fails that takes longer than ``timeout`` seconds."""
         written = run(self.program, words.encode("ascii"), timeout)
-        return CPlayed.of(np.frombuffer(written, dtype="<u8"), words, self._constants)
+        return CRecord.of(np.frombuffer(written, dtype="<u8"), words, self._constants)

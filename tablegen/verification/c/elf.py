@@ -1,4 +1,4 @@
-"""What an emulator wants of an executable: the bytes of its segments, and the addresses of its symbols."""
+"""The parts of an executable that an emulator needs: its segments, and the addresses of its symbols."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Segment:
-    """Bytes and their place in memory; those after ``data`` up to ``size`` are 0.
+    """A segment: bytes and their place in memory; those after ``data`` up to ``size`` are 0.
 
     ``load_address`` is where they lie before start-up code has copied them.
     """

@@ -16,7 +16,7 @@ import numpy as np
 
 from tablegen.base.installation import install_advice
 from tablegen.base.resources import c_runtime
-from tablegen.verification.c.bench import BENCH, OPTIONS, CPlayed, constants_written, defines, script_words, sine_of
+from tablegen.verification.c.bench import BENCH, OPTIONS, CRecord, constants_written, defines, script_words, sine_of
 from tablegen.verification.c.elf import Executable, read_executable
 from tablegen.verification.failures import SimulationFailed, ToolMissing
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -27,15 +27,15 @@ MEMORY, LAYOUT = _HERE / "stream_bench_memory.c", _HERE / "emulated.ld"
 FREESTANDING = ("-ffreestanding", "-static", "-ffunction-sections", "-fdata-sections")
 _RAM, _RAM_SIZE, _STACK = 0x20000000, 1 << 24, 1 << 16
 _FLASH, _FLASH_SIZE = 0x00010000, 1 << 24
-TRAP = _FLASH + _FLASH_SIZE - 16  # where a called function returns to: nothing else is there
+TRAP = _FLASH + _FLASH_SIZE - 16  # return address of a called function, where no code is
 _STACK_PAINT = 0xA5
 _ARRAY_WORDS = 8192  # words of the arrays in stream_bench_memory.c
-_SLICE_US = 500_000  # so that an interruption is seen
+_SLICE_US = 500_000  # short enough that an interruption is noticed
 
 
 @dataclass(frozen=True)
 class Core:
-    """A processor, by the names that gcc and unicorn have for it: ``model`` is a model of Arm, a mode of RISC-V."""
+    """A processor by its names in gcc and unicorn; ``model`` is a model of Arm, a mode of RISC-V."""
 
     architecture: Literal["arm", "riscv"]
     options: tuple[str, ...]
@@ -85,12 +85,24 @@ def compile_bare(
     core: str = "cortex-m4",
     compiler: str | None = None,
     options: Sequence[str] = OPTIONS,
-    chosen: Mapping[str, int] | None = None,
+    macro_values: Mapping[str, int] | None = None,
     layout: Path = LAYOUT,
 ) -> Executable:
     """Compile and link for a bare processor; headers are found beside the sources, which may list them.
 
-    A ``compiler`` that is not gcc is told the processor in its own command.
+    Parameters
+    ----------
+    compiler
+        Command, by default gcc for the core; one that is not gcc has the processor in its own command.
+    macro_values
+        Macros by name, for ``-D``.
+
+    Raises
+    ------
+    SimulationFailed
+        If the compiler fails or warns.
+    ToolMissing
+        If the compiler or the emulator is not installed.
     """
     architecture = CORES[core].architecture
     command = require_emulator(compiler or COMPILERS[architecture])
@@ -101,7 +113,7 @@ def compile_bare(
         *(CORES[core].options if own else ()),
         *options,
         *FREESTANDING,
-        *(f"-D{name}={value}" for name, value in (chosen or {}).items()),
+        *(f"-D{name}={value}" for name, value in (macro_values or {}).items()),
         *(f"-I{place}" for place in sorted({str(path.parent) for path in sources})),
         *(str(path) for path in sources if path.suffix == ".c"),
         "-T",
@@ -111,15 +123,15 @@ def compile_bare(
         "-o",
         str(program),
     ]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode or done.stderr:
-        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+    process = subprocess.run(line, capture_output=True, text=True, check=False)
+    if process.returncode or process.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{process.stdout}{process.stderr}".strip())
     return read_executable(program)
 
 
 @dataclass(frozen=True)
-class Called:
-    """What a call of a function took; ``result`` is its first word."""
+class CallCost:
+    """The cost of a call of a function; ``result`` is its first word."""
 
     result: int
     instructions: int
@@ -133,7 +145,7 @@ class Processor:
         require_emulator(COMPILERS[CORES[core].architecture])
         self.executable, self.core = executable, CORES[core]
         self.uc = self._processor()
-        self.uc.mem_map(_RAM, _RAM_SIZE)  # as one region each: every further one makes all accesses slower
+        self.uc.mem_map(_RAM, _RAM_SIZE)  # one region each, since every further one slows down all accesses
         self.uc.mem_map(_FLASH, _FLASH_SIZE)
         for segment in executable.segments:
             self.uc.mem_write(segment.address, segment.data)
@@ -157,7 +169,13 @@ class Processor:
         return uc
 
     def symbol(self, name: str) -> int:
-        """Return the address of a symbol, without the Thumb bit."""
+        """Return the address of a symbol, without the Thumb bit.
+
+        Raises
+        ------
+        SimulationFailed
+            If the executable has no such symbol.
+        """
         try:
             address = self.executable.symbols[name]
         except KeyError:
@@ -174,7 +192,7 @@ class Processor:
         return bytes(self.uc.mem_read(address, 32)).split(b"\0")[0].decode("ascii", "replace")
 
     def write(self, name: str, data: bytes) -> None:
-        """Into a variable."""
+        """Write bytes into a variable."""
         self.uc.mem_write(self.symbol(name), data)
 
     def word(self, name: str) -> int:
@@ -182,7 +200,13 @@ class Processor:
         return int.from_bytes(self.read(name, 4), "little")
 
     def run(self, start: int, stop: int) -> None:
-        """Until the processor is about to execute what is at ``stop``."""
+        """Run until the processor is about to execute the instruction at ``stop``.
+
+        Raises
+        ------
+        SimulationFailed
+            If the processor stops before.
+        """
         from unicorn import UcError
 
         while True:
@@ -204,7 +228,7 @@ class Processor:
         """Return from the function at whose entry the processor stands, until the next one."""
         self.run(int(self.uc.reg_read(self._lr)) & ~self._thumb, self.symbol(stop))
 
-    def call(self, function: str, *arguments: int) -> Called:
+    def call(self, function: str, *arguments: int) -> CallCost:
         """Call a function; instructions are counted, and the stack that was written to, in bytes."""
         from unicorn import UC_HOOK_BLOCK
 
@@ -227,10 +251,10 @@ class Processor:
         used = bytes(self.uc.mem_read(floor, _STACK))
         untouched = len(used) - len(used.lstrip(bytes([_STACK_PAINT])))
         executed = sum(times * self._instructions(at, size) for (at, size), times in counts.items() if at != TRAP)
-        return Called(int(self.uc.reg_read(self._arguments[0])), executed, _STACK - untouched)
+        return CallCost(int(self.uc.reg_read(self._arguments[0])), executed, _STACK - untouched)
 
     def _instructions(self, address: int, size: int) -> int:
-        """How many a block has: the first half-word of each tells how long it is."""
+        """Count the instructions of a block, whose lengths their first half-words tell."""
         code = np.frombuffer(bytes(self.uc.mem_read(address, size)), dtype="<u2")
         count = at = 0
         while at < len(code):
@@ -243,7 +267,7 @@ class Processor:
 class CortexMBench:
     """The bench, compiled once for programs of one shape and a Cortex-M; ``core`` is one of ``CORES``.
 
-    ``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape.
+    ``sources`` in place of the shipped runtime; ``macro_values`` in place of those that suit the shape.
     """
 
     def __init__(
@@ -254,26 +278,26 @@ class CortexMBench:
         options: Sequence[str] = OPTIONS,
         sources: Sequence[Path] | None = None,
         fill: int = 0,
-        chosen: Mapping[str, int] | None = None,
+        macro_values: Mapping[str, int] | None = None,
         core: str = "cortex-m4",
     ) -> None:
         runtime = list(c_runtime() if sources is None else sources)
         self.shape, self.core = shape, core
-        self._constants = constants_written(chosen)
+        self._constants = constants_written(macro_values)
         self.executable = compile_bare(
             folder / "stream_bench.elf",
             [*runtime, *BENCH, MEMORY],
             core,
             compiler,
             options,
-            defines(shape, fill) if chosen is None else chosen,
+            defines(shape, fill) if macro_values is None else macro_values,
         )
 
-    def play(self, script: Script, fourier: bool = False) -> CPlayed:
+    def play(self, script: Script, fourier: bool = False) -> CRecord:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
         return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
 
-    def run(self, words: str) -> CPlayed:
+    def run(self, words: str) -> CRecord:
         """Play a script in the form of ``script_words``."""
         script = np.frombuffer(bytes.fromhex(words), dtype=">u8").astype("<u8")
         processor = Processor(self.executable, self.core)
@@ -294,7 +318,7 @@ class CortexMBench:
                 processor.write("bench_script_words", len(part).to_bytes(4, "little"))
             processor.resume("bench_exchange")
         capture = np.concatenate(captures).astype(np.uint64)
-        return CPlayed.of(capture, words, self._constants)
+        return CRecord.of(capture, words, self._constants)
 
     def _check(self, processor: Processor) -> None:
         at = int.from_bytes(processor.read("bench_refused"), "little")

@@ -8,7 +8,7 @@ import numpy as np
 
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.verification import process_group as worker
-from tablegen.verification.c.bench import CPlayed
+from tablegen.verification.c.bench import CRecord
 from tablegen.verification.c.program import MOST_FILLED, OPTIONS, CProgram
 from tablegen.verification.play.sequencer_shape import SCRIPT, SequencerShape
 
@@ -16,12 +16,12 @@ EMULATED = "arm-none-eabi-gcc, Cortex-M4"
 
 
 class EmulatedPlayer:
-    """Compiles a program and plays the script that stands in ``work``; each way of playing is a program of its own."""
+    """A player on an emulator: it compiles a program for each way of playing, and plays the script in ``work``."""
 
     def __init__(self, work: Path, program: CProgram, shape: SequencerShape) -> None:
         self._work, self._program, self._shape = work, program, shape
 
-    def played(self, fills: bool) -> CPlayed:
+    def played(self, fills: bool) -> CRecord:
         """Return what the bench captured, one tick or (``fills``) many ticks a call.
 
         Raises
@@ -38,7 +38,7 @@ class EmulatedPlayer:
         }
         status = worker.run(self._work, __name__, job)
         capture = np.frombuffer(read_bytes(self._work / _record(fill), BUILD_FILE), dtype="<u8")
-        return CPlayed(capture, **status)
+        return CRecord(capture, **status)
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:

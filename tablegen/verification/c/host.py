@@ -15,14 +15,14 @@ import numpy as np
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.verification import process_group as worker
 from tablegen.verification.c import play as c_play
-from tablegen.verification.c.bench import BENCH, OWN_SOURCES, CPlayed, constants_written, macros, require_compiler
+from tablegen.verification.c.bench import BENCH, OWN_SOURCES, CRecord, constants_written, macros, require_compiler
 from tablegen.verification.c.objects import Objects
 from tablegen.verification.c.program import MOST_FILLED, OPTIONS, CProgram
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import SCRIPT
 
-_LINK = "dac_link"  # how the names of the link's sources begin
-_MIN_TICKS_PER_SECOND = 5000  # a slower program is taken for hanging
+_LINK = "dac_link"  # prefix of the link's sources
+_MIN_TICKS_PER_SECOND = 5000  # a slower program counts as hanging
 _PROGRAM = "step/stream_bench"
 _STEP, _FILL = "step_capture.bin", "fill_capture.bin"
 
@@ -33,13 +33,13 @@ def host_compiler() -> str:
 
 
 class HostPlayer:
-    """Compiles a program, and plays the ``script`` of so many ticks, which stands in ``work``, in both ways."""
+    """A player on this machine: it compiles a program, and plays the script in ``work`` in both ways."""
 
     def __init__(self, work: Path, program: CProgram, script: str, ticks: int) -> None:
         self._compiler = host_compiler()
         self._work, self._program, self._script, self._ticks = work, program, script, ticks
 
-    def played(self, fills: bool) -> CPlayed:
+    def played(self, fills: bool) -> CRecord:
         """Return what the bench captured, one tick or (``fills``) many ticks a call.
 
         Raises
@@ -51,11 +51,11 @@ class HostPlayer:
         if record in self._failures:
             raise SimulationFailed(self._failures[record])
         capture = np.frombuffer(read_bytes(self._work / record, BUILD_FILE), dtype="<u8")
-        return CPlayed.of(capture, self._script, constants_written(self._program.bench))
+        return CRecord.of(capture, self._script, constants_written(self._program.bench))
 
     @cached_property
     def _failures(self) -> dict[str, str]:
-        """Why records are missing; both are played by one process."""
+        """The reasons for missing records; both are played by one process."""
         objects = self._objects()
         job = {
             "compiler": require_compiler(self._compiler),
@@ -64,7 +64,8 @@ class HostPlayer:
             "program": _PROGRAM,
             "script": SCRIPT,
             "plays": [(_STEP, ["steps"]), (_FILL, [])],
-            "most_bytes": 1_000_000 + 32 * self._ticks,  # twice what is right: a few too many are told as such
+            "most_bytes": 1_000_000
+            + 32 * self._ticks,  # twice the right size: a few ticks too many are reported as such
             "timeout": 60.0 + self._ticks / _MIN_TICKS_PER_SECOND,
         }
         failures: dict[str, str] = worker.run(self._work, c_play.__name__, job)
@@ -100,7 +101,7 @@ class HostPlayer:
 
 
 def _options() -> list[str]:
-    """Warnings are for whoever compiles the firmware: what counts here is what it does."""
+    """Return the options of the compiler, without warnings, which are for whoever compiles the firmware."""
     try:
         return [*OPTIONS, *shlex.split(os.environ.get("CFLAGS", "")), "-w"]
     except ValueError as error:

@@ -1,6 +1,6 @@
-"""Objects of C that are the same for most builds: kept in the user's cache by everything that they are made of.
+"""Objects of C that most builds share, cached in the user's folder by everything that decides their content.
 
-Where an object may depend on what nobody can tell here, such as files that options name, it is compiled every time.
+Where an object may depend on more than is known here, such as files that options name, it is compiled every time.
 """
 
 import os
@@ -15,7 +15,7 @@ from tablegen.base.reading import file_sha256
 from tablegen.base.user_cache import CachedFiles
 
 _CACHE = CachedFiles("objects", 300)
-# Settings by which compilers find or make something else.
+# Environment variables that change what compilers find or produce.
 _SETTINGS = (
     *("CFLAGS", "CPATH", "C_INCLUDE_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX", "CCC_OVERRIDE_OPTIONS"),
     *("SDKROOT", "MACOSX_DEPLOYMENT_TARGET"),
@@ -24,7 +24,7 @@ _SETTINGS = (
 
 @dataclass(frozen=True)
 class Objects:
-    """Sources that are compiled alike, with ``words`` of options and macros; ``files`` are all that they can include.
+    """Sources that are compiled alike, with ``words`` of options and macros; they can include all of ``files``.
 
     Paths are absolute; headers are found in the folders of ``files``.
     """
@@ -35,7 +35,7 @@ class Objects:
 
     @property
     def names(self) -> list[str]:
-        """What a compiler makes of them."""
+        """The file names of the objects."""
         return [f"{Path(source).stem}.o" for source in self.sources]
 
     def line(self, compiler: Sequence[str]) -> list[str]:
@@ -60,7 +60,7 @@ class Objects:
 
 
 def maker(compiler: Sequence[str]) -> str | None:
-    """All that tells a compiler from others; None where its objects may depend on more than that."""
+    """Return what tells a compiler from others; None where its objects may depend on more than that."""
     compiler_path = shutil.which(compiler[0])
     if compiler_path is None or len(compiler) > 1 or any(os.environ.get(name) for name in _SETTINGS):
         return None

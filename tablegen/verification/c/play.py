@@ -1,4 +1,4 @@
-"""Compile the C bench and run it: no more than a process of its own needs, which begins in little time."""
+"""Compile the C bench and run it; this module imports little, so that its process starts fast."""
 
 import resource
 import shutil
@@ -14,17 +14,29 @@ OBJECTS = "objects"
 
 
 def compile_line(line: Sequence[str], place: Path | None = None) -> None:
-    """Run a compiler, in a directory if one is given; raises ``SimulationFailed`` with all that it says."""
-    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
-    if done.returncode or done.stderr:
-        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+    """Run a compiler, in a directory if one is given.
+
+    Raises
+    ------
+    SimulationFailed
+        If it fails or warns, with all its output.
+    """
+    process = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
+    if process.returncode or process.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{process.stdout}{process.stderr}".strip())
 
 
 def require_headers(compiler: Sequence[str]) -> None:
-    """Raise ``ToolMissing`` if a compiler has no C library; Debian's gcc only recommends that package."""
+    """Check that a compiler has a C library; Debian's gcc only recommends that package.
+
+    Raises
+    ------
+    ToolMissing
+        If it has none.
+    """
     line = [*compiler, "-fsyntax-only", "-x", "c", "-"]
-    done = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
-    if done.returncode and "stdint.h" in done.stderr:
+    process = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
+    if process.returncode and "stdint.h" in process.stderr:
         raise ToolMissing(f"{compiler[0]} finds no headers of the C library: apt-get install libc6-dev")
 
 
@@ -45,21 +57,32 @@ def record(command: Sequence[str], script: bytes, place: Path, most: int, timeou
 
 def _ended(script: bytes, timeout: float | None, command: Sequence[str], **options: Any) -> bytes:
     try:
-        done = subprocess.run(command, input=script, stderr=subprocess.PIPE, check=False, timeout=timeout, **options)
+        process = subprocess.run(command, input=script, stderr=subprocess.PIPE, check=False, timeout=timeout, **options)
     except subprocess.TimeoutExpired:
         raise SimulationFailed(f"the bench did not end in {timeout:.0f} s") from None
-    if done.returncode:
+    if process.returncode:
         raise SimulationFailed(
-            done.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {done.returncode}"
+            process.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {process.returncode}"
         )
-    return done.stdout or b""
+    return process.stdout or b""
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Compile the ``objects`` of a job and its program, and play the script of ``folder`` in each of its ways.
 
     Places and files are named within ``folder``; a way of playing is a record, of ``most_bytes``, and arguments.
-    Returns what went wrong, by the record; nothing is played after that.
+
+    Returns
+    -------
+    dict of str to str
+        The message of the first playback that failed, by its record; nothing is played after that.
+
+    Raises
+    ------
+    SimulationFailed
+        If the compiler fails.
+    ToolMissing
+        If the compiler has no C library.
     """
     program = folder / job["program"]
     program.parent.mkdir(parents=True, exist_ok=True)

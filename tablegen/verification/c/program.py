@@ -1,4 +1,4 @@
-"""What is compiled to play the C of a build: its own files, its runtime, and the file that hands them to the bench."""
+"""The C program that plays a build: its own files, its runtime, and the file that gives them to the bench."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ MOST_FILLED = 600  # ticks a call of a fill
 
 @dataclass(frozen=True)
 class CProgram:
-    """Files and choices; the runtime has a folder of its own, so that it finds no header but its own.
+    """The files and macros of a program; the runtime has a folder of its own, so that it finds only its own headers.
 
     ``own`` are the header and the arrays of the build, with the file that hands them to the bench.
     """
@@ -30,12 +30,12 @@ class CProgram:
 
     @property
     def sources(self) -> list[Path]:
-        """All of them."""
+        """The C files of the program."""
         return [*self.own, *self.runtime]
 
     @property
     def defines(self) -> dict[str, int]:
-        """All choices."""
+        """The macros of the program."""
         return self.choices | self.bench
 
 
@@ -84,7 +84,7 @@ def _bench_choices(stored: StoredBuild, fourier: bool) -> dict[str, int]:
 
 
 def _variation_words(own: Program) -> int:
-    """Words that the table of a variation may have."""
+    """Return the words that the table of a variation may have."""
     return len(own.words) if own.mode != "direct" else max(len(own.words), 8)
 
 

@@ -1,4 +1,4 @@
-"""The C sequencer of a build: what a user would compile plays, on this machine or on an emulated Cortex-M.
+"""The C sequencer of a build on this machine or on an emulated Cortex-M: what a user would compile.
 
 The bench is compiled with the emitted header and arrays and with the ``dac_*.c`` of the directory. A session is played
 twice, a tick a call (``dac_sequencer_step``) and many ticks a call (``dac_sequencer_fill``).
@@ -13,7 +13,7 @@ import numpy as np
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification.build_report import Outcome, PlayJob, differing_check
-from tablegen.verification.c.bench import CPlayed, require_compiler, script_words
+from tablegen.verification.c.bench import CRecord, require_compiler, script_words
 from tablegen.verification.c.emulated import EMULATED, EmulatedPlayer
 from tablegen.verification.c.host import HostPlayer, host_compiler
 from tablegen.verification.c.program import c_program, header_constants
@@ -30,27 +30,27 @@ from tablegen.verification.checks.played_checks import (
 )
 from tablegen.verification.coverage import unplayed_c
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.play.capture import make_capture, recaptured
-from tablegen.verification.play.converter_words import packed
+from tablegen.verification.play.capture import make_capture, with_capture
+from tablegen.verification.play.converter_words import pack_captures
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SCRIPT, SequencerShape
 from tablegen.verification.play.session import make_session
 from tablegen.verification.play.stream import OUTPUTS, Script, read_states
 
-_UNTOLD = ("armed", "running", OUTPUTS)  # what the status of the C sequencer does not tell
+_UNTOLD = ("armed", "running", OUTPUTS)  # flags that the status of the C sequencer does not have
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
 
 
 @dataclass(frozen=True)
 class CTarget:
-    """Where the C sequencer plays, and whether it renders its tables from Fourier words."""
+    """The machine on which the C sequencer plays; with ``fourier`` it renders its tables from Fourier words."""
 
     machine: Literal["c", "cortex-m"]
     fourier: bool = False
     format_name: str = "c"
 
     def require(self) -> None:
-        """Require a compiler, and what runs its output."""
+        """Check that a compiler is installed, and the machine that runs its output."""
         if self.machine == "cortex-m":
             from tablegen.verification.c.emulate import require_emulator
 
@@ -59,7 +59,13 @@ class CTarget:
             require_compiler(host_compiler())
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
-        """``direct`` tables may be longer than the runtime takes, and are not rendered."""
+        """Check that the runtime can play the tables; direct ones may be longer than it takes, and are not rendered.
+
+        Raises
+        ------
+        NotABuild
+            If a table is too long, or Fourier words are to be rendered and both tables are direct.
+        """
         for name, axis in stored.axes:
             if axis.table.mode == "direct" and len(axis.table.words) > _MAX_TABLE_WORDS:
                 raise NotABuild(
@@ -72,7 +78,7 @@ class CTarget:
             )
 
     def play(self, job: PlayJob) -> Outcome:
-        """One session by steps, and the same by fills."""
+        """Play a session a tick a call, and the same session many ticks a call."""
         stored, work, progress = job.stored, job.work, job.progress
         program, absent = c_program(job.folder, work, stored, self.fourier)
         if absent:
@@ -95,7 +101,7 @@ class CTarget:
             step = player.played(fills=False)
         except (SimulationFailed, OSError, ValueError) as error:
             return Outcome([Check("program", self._name, f"{ticks} ticks", failure=f"program: {error}")])
-        capture = make_capture(stored, script, packed(step.capture, stored))
+        capture = make_capture(stored, script, pack_captures(step.capture, stored))
         sent = {"x": step.capture[::2] & np.uint64(0xFFFFFFFF), "y": step.capture[::2] >> np.uint64(32)}
         checks = [
             self._header(stored, step),
@@ -108,8 +114,8 @@ class CTarget:
         try:
             progress(f"compiling and playing {ticks} ticks, many a call")
             fill = player.played(fills=True)
-            codes = packed(fill.capture, stored)
-            filled = recaptured(capture, codes) or make_capture(stored, script, codes)
+            codes = pack_captures(fill.capture, stored)
+            filled = with_capture(capture, codes) or make_capture(stored, script, codes)
             checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
             checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))
@@ -118,11 +124,11 @@ class CTarget:
 
     @property
     def _name(self) -> str:
-        """What plays, as the table has it."""
+        """The name of the machine in the table of checks."""
         return host_compiler() if self.machine == "c" else EMULATED
 
     @staticmethod
-    def _header(stored: StoredBuild, step: CPlayed) -> Check:
+    def _header(stored: StoredBuild, step: CRecord) -> Check:
         """Check the constants of the header as the compiler reads them."""
         content = stored_content(stored)
         constants = header_constants(content)
@@ -134,5 +140,5 @@ class CTarget:
         return differing_check("c header", "manifest, by the compiler", f"{len(constants)} constants", wrong)
 
 
-def _states(script: Script, played: CPlayed) -> Check:
+def _states(script: Script, played: CRecord) -> Check:
     return check_states(script.states, read_states(played.states), (1 << 32) - 1, _UNTOLD)

@@ -1,1 +1,1 @@
-"""Check a build: its files, its certificate, and what was played."""
+"""Checks of a build: its files, its certificate, and the playback."""

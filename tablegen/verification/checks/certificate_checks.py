@@ -1,4 +1,4 @@
-"""The certificates of a build against what its words and its waveform make of them."""
+"""The certificates of a build, compared with its words and its waveform."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +23,12 @@ from tablegen.verification.checks.shaped import stated_shaping
 from tablegen.verification.expected_figures import header_texts, wrong_mismatch, wrong_texts
 from tablegen.verification.position import wrong_position
 
-_ROUNDED = 1.0 + 1e-9  # the target is worked out again from what is played
+_ROUNDED = 1.0 + 1e-9  # rounding, since the target is computed again from the series that is played
 
 
 @dataclass(frozen=True)
 class Certificates:
-    """A check of each axis, and the largest error of its codes in LSB, as it was found here."""
+    """A check of each axis, and the largest error of its codes in LSB, as computed here."""
 
     checks: list[Check]
     limits: dict[str, float]
@@ -36,7 +36,7 @@ class Certificates:
 
 
 def check_certificates(stored: StoredBuild, same_version: bool, folder: Path | None = None) -> Certificates:
-    """Every figure of both axes; those of scaling errors only of this version of tablegen and of its own models.
+    """Check every figure of both axes; scaling errors only of this version of tablegen and of its own models.
 
     What is expected on the scanner is compared with the text of the headers in ``folder``, where that is given.
     """
@@ -58,7 +58,7 @@ def check_certificates(stored: StoredBuild, same_version: bool, folder: Path | N
 
 
 def _wrong_rounded(stated: ManifestShaped, sides: dict[str, float] | None, exact: bool) -> list[str]:
-    """Scaling errors without shaping that are others; ``sides`` are None where they cannot be known."""
+    """List the differing scaling errors without shaping; ``sides`` are None where they cannot be known."""
     sides_stated, name = stated.rounded.scaling_error_percent, "shaped.rounded.scaling_error_percent"
     if sides is None:
         return []

@@ -1,4 +1,4 @@
-"""The figures of a certificate once more, from the words and the float waveform of the manifest alone.
+"""The figures of a certificate, computed again from the words and the float waveform of the manifest alone.
 
 Every code of a period comes from the integer arithmetic, and the waveform from numpy's inverse transform: in none of
 the ways in which the build measures itself.
@@ -11,18 +11,24 @@ import numpy as np
 
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.manifest.fields import ManifestAxis, ManifestSeries
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.verification.checks.shaped import MOST_TICKS, ShapedPlay, code_excess, step_excess
 
-_MOST_ADVANCES = 1 << 22  # of a period whose every advance is looked at
+_MOST_ADVANCES = 1 << 22  # advances of the longest period that is checked advance by advance
 _SLOPE_POINTS = 32  # per period of the highest harmonic
-_GRID = 1 << 21  # points of the waveform of a longer one, between which it is a cubic; of 1e-3 LSB at the very worst
+_GRID = 1 << 21  # points of a longer period, with cubics between them; errors below 1e-3 LSB
 _LEAST_POWER = 1e-30
 _SIX_DIGITS, _LONG_PERIOD = 1.1e-5, 1e-3  # relative: what six digits round away, also upwards
 
 
 def on_grid(series: ManifestSeries, count: int, derivative: int = 0) -> Floats:
-    """w, or its derivative with respect to t in periods, at k / count for k in [0, count)."""
+    """Return w, or its derivative with respect to t in periods, at k / count for k in [0, count).
+
+    Returns
+    -------
+    Floats
+        Shape (count,).
+    """
     n = np.arange(1, len(series.a) + 1)
     factor = (tau * n) ** derivative
     a, b = np.array(series.a), np.array(series.b)
@@ -63,7 +69,7 @@ def played_series(axis: ManifestAxis) -> ManifestSeries:
 
 
 class PlayedPeriod:
-    """The codes of a period, and how far they are from the waveform, at ticks."""
+    """The codes of a period, and their distance from the waveform, at ticks."""
 
     def __init__(self, axis: ManifestAxis) -> None:
         self.axis, self.program = axis, axis.program.rounded
@@ -84,16 +90,33 @@ class PlayedPeriod:
 
     @property
     def codes_per_unit(self) -> float:
-        """Codes that w = 0 and w = 1 are apart."""
+        """The distance in codes of w = 1 from w = 0."""
         return self.axis.drive.v_amplitude / self.axis.output.v_per_code
 
     @property
     def edges(self) -> Ints:
-        """Ticks at which a run of one code begins or ends."""
-        return merged(self.runs.starts, self.runs.lasts)
+        """The ticks at which a run of one code begins or ends.
+
+        Returns
+        -------
+        Ints
+            Ticks, ascending, shape (n,).
+        """
+        return union_sorted(self.runs.starts, self.runs.lasts)
 
     def errors(self, k: Ints) -> Floats:
-        """Code less the unrounded code of the waveform, at ticks k, of any period."""
+        """Return the code less the unrounded code of the waveform.
+
+        Parameters
+        ----------
+        k
+            Ticks of any period, shape (n,).
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (n,).
+        """
         advance = k % self.program.ticks // self.program.hold
         intended = self._intended[advance] if self.is_whole else self._between(advance)
         errors: Floats = self.runs.at(k % self.program.ticks) - intended
@@ -109,7 +132,7 @@ class PlayedPeriod:
         return intended
 
     def error_moments(self) -> tuple[float, float, float]:
-        """Largest magnitude, mean, and mean square, over every tick."""
+        """Return the largest magnitude, the mean and the mean square of the error over every tick, in LSB."""
         if self.is_whole:
             error = self.errors(np.arange(self.program.phase.ticks, dtype=np.int64) * self.program.hold)
             return float(np.max(np.abs(error))), float(np.mean(error)), float(np.mean(error * error))
@@ -122,7 +145,7 @@ class PlayedPeriod:
         return largest, float(np.sum(n * middle)) / ticks, float(np.sum(n * square)) / ticks
 
     def _extremes(self) -> Ints:
-        """Ticks on either side of every extreme of the waveform."""
+        """Return the ticks on either side of every extreme of the waveform."""
         slope, after = self._slope, np.roll(self._slope, -1)
         near = np.flatnonzero(slope * after <= 0.0)
         inside = slope[near] / np.where(slope[near] == after[near], 1.0, slope[near] - after[near])
@@ -130,7 +153,7 @@ class PlayedPeriod:
         return np.unique(np.concatenate([before, before + 1]) % self.program.ticks)
 
     def figures(self, rate_hz: float, shaped: ShapedPlay | None = None) -> dict[str, float | int | None]:
-        """All figures but those of the scaling error; where the position cannot be known, without its errors."""
+        """Return all figures but those of the scaling error; without those of a position that cannot be known."""
         axis, runs, output = self.axis, self.runs, self.axis.output
         codes, share = runs.codes, runs.lengths / runs.ticks
         largest, mean, square = self.error_moments()
@@ -165,7 +188,7 @@ class PlayedPeriod:
         return values
 
     def largest_code_error(self) -> float:
-        """No code of this axis is further from the waveform than this, in LSB, shaped or not."""
+        """Return the bound of the distance of a code from the waveform, in LSB, shaped or not."""
         shaped = 0.0 if self.axis.output.shaping is None else 0.5 + code_excess(self.axis)
         return self.error_moments()[0] + shaped
 
@@ -190,7 +213,7 @@ class PlayedPeriod:
 
 
 def agree(stated: float | int | None, figure: float | int | None, exact: bool, tiny: float) -> bool:
-    """Whether a figure of six digits is the one that was found; ``tiny`` is what nothing depends on."""
+    """Return True if a figure of six digits equals the computed one; ``tiny`` is a negligible difference."""
     if stated is None or figure is None:
         return stated is None and figure is None
     if isinstance(figure, int):

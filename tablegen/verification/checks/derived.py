@@ -1,4 +1,4 @@
-"""The numbers of a manifest that follow from others of it, worked out again."""
+"""The numbers of a manifest that follow from others of it, derived again."""
 
 from fractions import Fraction
 from math import ceil, floor, isclose
@@ -15,12 +15,12 @@ from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.manifest.read import StoredBuild
 
-_RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations
-_WINDOW_TICKS = 2  # a window of a line is placed to the tick, and not more than so far from where it was asked for
+_RELATIVE = 1e-9  # relative error of floats after JSON and a few operations
+_WINDOW_TICKS = 2  # ticks by which a window may be off the requested place
 
 
 def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:
-    """How many numbers follow from others, and those that do not."""
+    """Return how many numbers follow from others, and those that do not."""
     manifest = stored.manifest
     checks = _sequence(manifest)
     for name, axis in stored.axes:
@@ -44,8 +44,8 @@ def _hardware(x: ManifestAxis, y: ManifestAxis) -> Results:
     """Compare converter and amplifier of y with those of x, unless the manifest states that they differ."""
     pairs = [(key, getattr(y.output, key), getattr(x.output, key)) for key in CONVERTER_KEYS]
     if y.output.own_hardware:
-        apart = any(mine != other for _, mine, other in pairs)
-        results: Results = [("axes.y.output.own_hardware", apart, "stated, and nothing of it differs from that of x")]
+        differs = any(mine != other for _, mine, other in pairs)
+        results: Results = [("axes.y.output.own_hardware", differs, "stated, and nothing of it differs from that of x")]
     else:
         results = [(f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}") for key, mine, other in pairs]
     return [*results, ("axes.x.output.own_hardware", not x.output.own_hardware, "stated, and only y can")]
@@ -82,7 +82,7 @@ def _sequence(manifest: Manifest) -> Results:
 
 
 def _requested_window(axis: ManifestAxis, backward: bool) -> tuple[Fraction, Fraction]:
-    """Where a direction images, in periods; empty where it does not."""
+    """Return the window in which a direction images, in periods; empty where it does not."""
     turn, (low, high) = _exact(axis.drive.turn), (_exact(edge) for edge in axis.fourier.window)
     if not backward:
         return turn * low, turn * high

@@ -1,4 +1,4 @@
-"""The files of a build against its manifest: their digests; and words and copies for what plays them."""
+"""The files of a build, compared with its manifest: digests of all, words and copies of those of its sequencer."""
 
 import shutil
 from pathlib import Path

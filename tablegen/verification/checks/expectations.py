@@ -1,4 +1,4 @@
-"""What a manifest expects on the scanner: whether it hangs together; what it rests on is not in the directory.
+"""The consistency of what a manifest expects on the scanner; the operator behind it is not in the directory.
 
 The traces of an operator, and the laws of a scanner file, are in no build. So the figures themselves are statements.
 """
@@ -40,7 +40,8 @@ def _wrong(axis: ManifestAxis, expected: ManifestExpected) -> Iterator[str]:
             yield f"{name} is {'missing' if due else 'there, and nothing says it'}"
     if both and traces and expected.mismatch_percent is not None and sorted(expected.rms_percent) == sorted(sides):
         one, other = (figure.value for figure in expected.rms_percent.values())
-        if abs(one - other) > expected.mismatch_percent.value * (1.0 + 1e-5):  # of their difference the rms is less
+        # The rms of a difference is below its maximum.
+        if abs(one - other) > expected.mismatch_percent.value * (1.0 + 1e-5):
             yield "rms_percent of both directions differ by more than mismatch_percent"
     mismatch, size = expected.mismatch_percent, expected.size_percent
     if mismatch is not None and (mismatch.value < 0.0 or (mismatch.uncertainty or 0.0) < 0.0):

@@ -1,4 +1,4 @@
-"""The files that a build of such formats has, whatever its manifest lists, and how they are written here."""
+"""The files that a build of given formats has, whatever its manifest lists, and how they are written here."""
 
 from hashlib import sha256
 from pathlib import Path
@@ -10,7 +10,7 @@ from tablegen.emit.formats import UnknownFormat, files_of, get
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import StoredBuild
 
-_RUNTIME = ("dac_*.v", "dac_*.c", "dac_*.h")  # what a command line with a pattern takes in
+_RUNTIME = ("dac_*.v", "dac_*.c", "dac_*.h")  # patterns of command lines that take the runtime
 _REWRITTEN = ("c", "verilog")  # formats that are compared constant by constant and word by word, not as they stand
 
 
@@ -44,7 +44,7 @@ def written_files(content: Content, formats: list[Format]) -> Written:
 def listed_files(
     folder: Path, stored: StoredBuild, written: Written, same_version: bool, all_known: bool
 ) -> tuple[int, list[str]]:
-    """How many files such a build has, and those that the manifest does not list, or lists beyond them.
+    """Return how many files such a build has, and those that the manifest does not list, or lists beyond them.
 
     Which files the runtime has depends on the version: where that is another one, a runtime of any files will do.
     """
@@ -77,7 +77,7 @@ def _is_runtime(name: str) -> bool:
 
 
 def unlike_installed(folder: Path, written: Written) -> tuple[int, list[str]]:
-    """How many files are alike in every build of this version, or follow from the manifest, and which differ.
+    """Return how many files are alike in every build of this version, or follow from the manifest, and which differ.
 
     A comment at the beginning of a file that is made again is passed over: no manifest has its words.
     """
@@ -115,7 +115,7 @@ def _first_difference(text: bytes, right: bytes) -> int | None:
 
 
 def _after_comment(content: bytes) -> tuple[int, list[bytes]]:
-    """How many lines a file begins with that are a comment of C or Verilog, and those after it."""
+    """Return the number of the lines of comment with which a file of C or Verilog begins, and the lines after them."""
     lines = content.splitlines(keepends=True)
     at, inside = 0, False
     while at < len(lines):

@@ -1,4 +1,4 @@
-"""Whether the passage that a certificate states is that of its axis."""
+"""The check that the passage that a certificate states is that of its axis."""
 
 from math import isclose
 
@@ -45,7 +45,7 @@ def _wrong_response(axis: ManifestAxis, rate_hz: float) -> list[str]:
 
 
 def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bool:
-    """Whether what is played arrives as what the axis is to follow."""
+    """Return True if the waveform that is played arrives as the one that the axis is to follow."""
     program, played, target = axis.program, played_series(axis), reached(axis)
     real, imaginary = hold_response(axis.fourier.harmonics, program.phase.ticks, program.hold > 1)
     f_hz: Floats = rate_hz * np.arange(1, axis.fourier.harmonics + 1, dtype=np.float64)
@@ -58,7 +58,7 @@ def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bo
 
 
 def _is_resonance(axis: ManifestAxis, passage: ManifestPassage) -> bool:
-    """Whether its resonance, above the harmonics too, is the one of the axis."""
+    """Return True if the resonance of the passage, above the harmonics too, is that of the axis."""
     resonance = axis.drive.resonance
     assert resonance is not None
     if passage.response is not None:

@@ -1,4 +1,4 @@
-"""What was stored against the integer model, the float waveform, and the limits of the programs that played."""
+"""The record of a session, compared with the integer model, the float waveform, and the limits of its programs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,9 +18,9 @@ _FLOAT_TOLERANCE_LSB = 1e-6  # the last bits of two ways to evaluate the float w
 
 @dataclass(frozen=True)
 class Check:
-    """A row of the table: what was held against what, how much of it, the worst of it, its limit, and why it fails.
+    """A row of the table of checks: what is compared, how much of it, the worst of it, its limit, and the failure.
 
-    What was not ``exercised`` says nothing, though it did not fail. ``seconds`` is its part of the time.
+    A check that was not ``exercised`` means nothing, though it did not fail. ``seconds`` is its part of the time.
     """
 
     subject: str
@@ -34,7 +34,7 @@ class Check:
 
     @property
     def verdict(self) -> str:
-        """As the last column of the table has it."""
+        """The text of the last column of the table."""
         return "FAILED" if self.failure is not None else "ok" if self.exercised else "not exercised"
 
 
@@ -42,14 +42,29 @@ def first_difference(capture: Capture) -> str | None:
     """Describe the first tick at which anything differs, with all that was expected and captured."""
     differs = np.flatnonzero(capture.got != capture.expected)
     if not len(differs):
-        return f"{capture.lost} ticks are missing or too many at the end of the capture" if capture.lost else None
+        return (
+            f"{capture.length_error} ticks are missing or too many at the end of the capture"
+            if capture.length_error
+            else None
+        )
     at = int(differs[0])
     expected, got = _sample(capture.expected[at]), _sample(capture.got[at])
     return f"{_where(capture, at)}\n  expected  {expected}\n  got       {got}"
 
 
 def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints]) -> list[Check]:
-    """Codes against model and limits, converter words that were ``sent``, and markers against the model."""
+    """Compare codes with model and limits, converter words with the codes, and markers with the model.
+
+    Parameters
+    ----------
+    sent
+        Converter words of each axis, coded and aligned, each of shape (ticks,).
+
+    Returns
+    -------
+    list of Check
+        Those of x, of y, and of the markers.
+    """
     checks = []
     for axis, content in stored.axes:
         checks += [_model(capture, axis), _slew(capture, axis, content), _clamp(capture, axis)]
@@ -75,20 +90,20 @@ def _model(capture: Capture, subject: str) -> Check:
             f"{subject}: {len(differs)} of {len(capture.got)} ticks differ from the model, the first at "
             f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else actual}"
         )
-    elif capture.lost:
-        failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
+    elif capture.length_error:
+        failure = f"{subject}: {capture.length_error} ticks are missing or too many at the end of the capture"
     unit = "ticks" if subject == "markers" else "codes"
     return Check(subject, "integer model", f"{len(capture.got)} {unit}", worst, "0", failure)
 
 
 def check_waveform(capture: Capture, stored: StoredBuild, limits: Mapping[str, float]) -> list[Check]:
-    """Codes of the build's program against the float waveform; ``limits`` of x and y in LSB."""
+    """Compare the codes of the build's program with the float waveform; ``limits`` of x and y are in LSB."""
     checks = [_float(capture, axis, content, limits[axis]) for axis, content in stored.axes]
     return checks + [_shaped(capture, axis, content) for axis, content in stored.axes if content.output.shaping]
 
 
 def _shaped(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis) -> Check:
-    """Codes of the build's program against shaped ones that were worked out in another way than the model's."""
+    """Compare the codes of the build's program with shaped ones that were computed in another way than the model's."""
     at = np.flatnonzero(capture.own & capture.steady & capture.known)
     since = capture.since[at]
     expected = shaped_codes(content.program, int(np.max(since, initial=-1)) + 1)[since]
@@ -115,7 +130,7 @@ def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, lim
     if not len(at):
         why = f"{axis}: the output did not reach the waveform within {len(capture.got)} ticks; play more --ticks"
         return Check(axis, "float waveform", "no code", "", f"{limit:.3f} LSB", why)
-    error: Floats = part(axis, capture.got)[at] - content.asked(k)
+    error: Floats = part(axis, capture.got)[at] - content.unrounded_codes(k)
     largest = int(np.argmax(np.abs(error)))
     worst = float(np.abs(error[largest]))
     failure = None
@@ -146,7 +161,7 @@ def _slew(capture: Capture, axis: str, content: ManifestAxis) -> Check:
 
 
 def _clamp(capture: Capture, axis: str) -> Check:
-    """No code leaves the limits of its program; exercised where the model clamps on both sides."""
+    """Check that no code leaves the limits of its program; exercised where the model clamps on both sides."""
     codes, model = part(axis, capture.got), part(axis, capture.expected)
     low, high = capture.limits(axis, "code_min"), capture.limits(axis, "code_max")
     steady = capture.steady & capture.known
@@ -178,7 +193,7 @@ def check_no_faults(capture: Capture) -> Check:
 
 
 def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Check:
-    """Faults on purpose equal the model's, tick for tick, and so do their ``counted`` numbers at the end."""
+    """Check that faults on purpose equal the model's on every tick, and their ``counted`` numbers at the end."""
     expected, wrong = part("faults", capture.expected), differing("faults", capture)
     failure = None
     if len(wrong):
@@ -189,9 +204,9 @@ def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Che
         )
     elif counted != counts:
         failure = f"faults: expected are {_counts(counts)}; counted are {_counts(counted)}"
-    seen = [name for bit, name in enumerate(FAULTS) if np.any(expected & 1 << bit)]
+    names = [name for bit, name in enumerate(FAULTS) if np.any(expected & 1 << bit)]
     return Check(
-        "faults", "integer model", f"{len(expected)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
+        "faults", "integer model", f"{len(expected)} ticks: {', '.join(names)}", f"{len(wrong)} differ", "0", failure
     )
 
 
@@ -248,14 +263,15 @@ def coded(codes: Ints, content: ManifestAxis) -> Ints:
 
     Returns
     -------
-    Words of the same shape.
+    Ints
+        Converter words, shape of ``codes``.
     """
     output = content.program.output
     return output.word(codes)
 
 
 def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], least: int) -> Check:
-    """Words that a serial converter got, by the number of their sample, at least so many."""
+    """Check the words that a serial converter got, by the number of their sample; ``least`` is how many are needed."""
     x, y = (coded(part(axis, capture.expected), content) for axis, content in stored.axes)
     numbers = [number for number in sent if number < len(x)]
     wrong = [number for number in numbers if sent[number] != int(y[number]) << 32 | int(x[number])]
@@ -271,7 +287,7 @@ def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], 
     return Check("serial", "converter word", f"{len(numbers)} samples", f"{len(wrong)} differ", "0", failure)
 
 
-_BESIDE = {  # modules that stand beside the sequencer: what they are to do, and what of it is lost on purpose
+_BESIDE = {  # modules beside the sequencer: their tests, and what is lost on purpose
     "coding": ("dac_coding", "words", ""),
     "spi": ("dac_spi", "samples, 8 ways to wire two converters", "missed"),
     "axi_stream": ("dac_axi_stream", "beats, 2 widths", "missed"),
@@ -280,22 +296,22 @@ _BESIDE = {  # modules that stand beside the sequencer: what they are to do, and
 
 
 def check_outputs(results: Mapping[str, tuple[int, int, int]]) -> list[Check]:
-    """Modules beside the sequencer on random words, clock by clock against what their headers say."""
+    """Check the results of modules beside the sequencer on random words, each compared with its header's words."""
     checks = []
     for name, (module, unit, lost_name) in _BESIDE.items():
-        done, lost, errors = results.get(name, (0, 0, 0))
+        count, losses, errors = results.get(name, (0, 0, 0))
         failure = None
         if errors:
             failure = f"{module}: wrong on {errors} clocks of the bench of outputs (output_bench.v says how it is used)"
-        elif not done or (lost_name and not lost):
+        elif not count or (lost_name and not losses):
             failure = f"{module}: the bench of outputs did not come to its end"
-        compared = f"{done} {unit}" + (f", {lost} {lost_name}" if lost_name else "")
+        compared = f"{count} {unit}" + (f", {losses} {lost_name}" if lost_name else "")
         checks.append(Check(module, "its options", compared, f"{errors} clocks", "0", failure))
     return checks
 
 
 def check_whole(subject: str, capture: Capture, how: str) -> Check:
-    """Codes, markers and faults of all ticks at once."""
+    """Compare codes, markers and faults of all ticks with the model at once."""
     differs = np.flatnonzero(capture.got != capture.expected)
     failure = None
     if len(differs):
@@ -305,8 +321,8 @@ def check_whole(subject: str, capture: Capture, how: str) -> Check:
             f"{_where(capture, at)}:\n  expected  {_sample(capture.expected[at])}\n  got       "
             f"{_sample(capture.got[at])}"
         )
-    elif capture.lost:
-        failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
+    elif capture.length_error:
+        failure = f"{subject}: {capture.length_error} ticks are missing or too many at the end of the capture"
     compared = f"{len(capture.got)} ticks{how}"
     return Check(subject, "integer model", compared, f"{len(differs)} differ", "0", failure)
 
@@ -338,7 +354,7 @@ def check_timing(capture: Capture, status: Mapping[str, Any]) -> Check:
     """Check that every tick has a strobe, always as many clocks after it."""
     jitter, ticks, strobes = (int(status[key]) for key in ("jitter", "ticks", "strobes"))
     failure = None
-    if jitter or ticks != strobes or capture.lost:
+    if jitter or ticks != strobes or capture.length_error:
         failure = (
             f"timing: {ticks} ticks made {strobes} samples, {jitter} of them not {status['latency']} clocks after "
             f"their tick"

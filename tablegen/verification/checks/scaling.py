@@ -1,4 +1,4 @@
-"""The scaling errors of a certificate once more, through the shape that the manifest states, by chords of its words.
+"""The scaling errors of a certificate, computed again through the shape in the manifest, by chords of its words.
 
 The shape of a branch is u = lambda s + xi sin(pi s) + xi_gamma (cos(pi s) - 1), equations (15) and (17) to (21), from
 its beta and u_peak. An operator's waveform is its own shape: such a line has no other. docs/manifest.md says what each
@@ -13,12 +13,12 @@ import numpy as np
 
 from tablegen.base.input_errors import shortened
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
-from tablegen.numerics.arrays import Floats, Ints, merged
+from tablegen.numerics.arrays import Floats, Ints, union_sorted
 from tablegen.verification.checks.certified import PlayedPeriod, at, on_grid, played_series
 from tablegen.verification.checks.shaped import ShapedPlay
 
 CHORD = 0.05  # share of the line
-OPERATOR = "operator"  # the model whose waveform was found, not worked out of an equation
+OPERATOR = "operator"  # the model whose waveform follows from no equation
 _POINTS = 16, 513  # per harmonic, and beside them, over the window
 _ACCELERATION_POINTS = 32  # per harmonic
 _GRID = 4097  # points on which a branch is inverted first
@@ -33,12 +33,12 @@ class ModelBranch:
 
     @classmethod
     def of(cls, branch: ManifestBranch, model: str) -> "ModelBranch":
-        """From the peak of its residual, and where that is."""
+        """Return the branch of a residual with this peak at this place."""
         return _EQUATIONS[model](branch)
 
     @classmethod
     def harmonic(cls, branch: ManifestBranch) -> "ModelBranch":
-        """Equations (17) to (21)."""
+        """Return the branch of the harmonic model, equations (17) to (21)."""
         at_peak = branch.u_peak - branch.beta
         c, s = cos(0.5 * pi * 2.0 * at_peak), sin(pi * at_peak)
         # The residual is xi s + xi_gamma (c - 1 + 2 at_peak); it is beta at its peak, and flat there.
@@ -47,15 +47,48 @@ class ModelBranch:
         return cls(branch.beta * bend[1] / determinant, -branch.beta * bend[0] / determinant)
 
     def value(self, s: Floats) -> Floats:
-        """u(s)."""
+        """Return u(s), equation (17).
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``s``.
+        """
         return (1.0 + 2.0 * self.xi_gamma) * s + self.xi * np.sin(pi * s) + self.xi_gamma * (np.cos(pi * s) - 1.0)
 
     def slope(self, s: Floats) -> Floats:
-        """du/ds."""
+        """Return du/ds.
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``s``.
+        """
         return 1.0 + 2.0 * self.xi_gamma + pi * (self.xi * np.cos(pi * s) - self.xi_gamma * np.sin(pi * s))
 
     def inverse(self, u: Floats) -> Floats:
-        """s(u)."""
+        """Return s(u), the inverse of ``value``.
+
+        Parameters
+        ----------
+        u
+            Normalised drive, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Places in the sweep, shape (n,).
+        """
         return _inverse(self, u)
 
 
@@ -77,17 +110,50 @@ class WaveformBranch:
         return cls(waveform, axis.drive.turn, side == "forward")
 
     def value(self, s: Floats) -> Floats:
-        """u(s)."""
+        """Return u(s).
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Normalised drive, shape of ``s``.
+        """
         w = at(self.waveform, self._times(s))
         return w if self.forward else 1.0 - w
 
     def slope(self, s: Floats) -> Floats:
-        """du/ds."""
+        """Return du/ds.
+
+        Parameters
+        ----------
+        s
+            Places in the sweep, 0..1, any shape.
+
+        Returns
+        -------
+        Floats
+            Shape of ``s``.
+        """
         rise = at(self.waveform, self._times(s), 1)
         return self.turn * rise if self.forward else (self.turn - 1.0) * rise
 
     def inverse(self, u: Floats) -> Floats:
-        """s(u)."""
+        """Return s(u), the inverse of ``value``.
+
+        Parameters
+        ----------
+        u
+            Normalised drive, shape (n,).
+
+        Returns
+        -------
+        Floats
+            Places in the sweep, shape (n,).
+        """
         return _inverse(self, u)
 
     def _times(self, s: Floats) -> Floats:
@@ -102,7 +168,7 @@ def _inverse(branch: "ModelBranch | WaveformBranch", u: Floats) -> Floats:
     return s
 
 
-# Written once more, beside the build's own. Of models that are not here scaling errors are not compared.
+# Independent copies of the build's equations; scaling errors of other models are not compared.
 _EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
     "triangle": lambda branch: ModelBranch(0.0, 0.0),
     "sinusoidal": lambda branch: ModelBranch(branch.beta, 0.0),
@@ -111,9 +177,12 @@ _EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
 
 
 def knows(model: str) -> bool:
-    """Test whether the scaling errors of this model can be computed here; those of installed packages cannot.
+    """Return True if the scaling errors of this model can be computed here; those of installed packages cannot.
 
-    Raises ``ValueError`` for a model that nobody has: no build states it.
+    Raises
+    ------
+    ValueError
+        If neither tablegen nor an installed package has the model: no build states it.
     """
     if model in _EQUATIONS or model == OPERATOR:
         return True
@@ -136,9 +205,21 @@ def _branch(axis: ManifestAxis, side: str) -> ModelBranch | WaveformBranch:
 
 
 def hold_response(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Floats]:
-    """Real and imaginary part of what a converter makes of harmonics that it holds for an advance of ``advances``.
+    """Return the response of a zero-order hold to harmonics of a period of ``advances`` held values.
 
     Where an axis steps once a line, the phase alone counts: it is imaged at its codes.
+
+    Parameters
+    ----------
+    harmonics
+        H, the highest harmonic.
+    steps
+        True for an axis that steps once a line.
+
+    Returns
+    -------
+    real, imaginary
+        Dimensionless, for harmonics 1..H, shape (H,).
     """
     share = np.arange(1, harmonics + 1) / advances
     size = np.ones(harmonics) if steps else np.sinc(share)
@@ -218,7 +299,7 @@ def position_scaling(axis: ManifestAxis, period: PlayedPeriod, errors: Floats) -
 
 
 class PositionErrors:
-    """Errors of the position at every tick of a period."""
+    """The errors of the position at every tick of a period."""
 
     def __init__(self, period: PlayedPeriod, errors: Floats) -> None:
         self._errors = errors
@@ -226,7 +307,18 @@ class PositionErrors:
         self.edges = np.arange(len(errors), dtype=np.int64)
 
     def errors(self, k: Ints) -> Floats:
-        """At ticks k, in LSB."""
+        """Return the errors of the position.
+
+        Parameters
+        ----------
+        k
+            Ticks of the period, any shape.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape of ``k``.
+        """
         return self._errors[k]
 
 
@@ -239,10 +331,10 @@ def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None
     figures = {}
     for side in sides:
         branch, position, sweep, times = _sweep(axis, side)
-        moved = at(layer, times) / branch.slope(sweep)
+        shift = at(layer, times) / branch.slope(sweep)
         figures[side] = {
-            "position": 100.0 * float(np.max(np.abs(moved))),
-            "scaling": _peak_to_peak(np.gradient(moved, position)),
+            "position": 100.0 * float(np.max(np.abs(shift))),
+            "scaling": _peak_to_peak(np.gradient(shift, position)),
         }
     return figures
 
@@ -295,7 +387,7 @@ def _chords(
     deviation: Floats,
     steepness: Floats,
 ) -> tuple[Floats, Floats]:
-    """Slope errors of chords of 1/20 of the line: of the codes, and of their rounding alone.
+    """Return the slope errors of chords of 1/20 of the line: of the codes, and of their rounding alone.
 
     A code stands for the middle of its tick. Chords that begin or end where a run of one code does are enough.
     """
@@ -308,7 +400,7 @@ def _chords(
     length = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begins = merged(period.edges, period.edges - length)
+    begins = union_sorted(period.edges, period.edges - length)
     begins = begins[(begins >= first) & (begins + length < stop)]
     if not len(begins):
         begins = np.array([first], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Shaped codes once more, and what of their errors arrives: from the integers of a manifest, in ways of its own.
+"""Shaped codes, computed again from the integers of a manifest in another way, and the errors that arrive.
 
 Remainders of order 1 and 2 are sums of all values so far, modulo a code; those of order 3 are carried on one by one.
 docs/manifest.md says of which ticks the figures are, and behind what.
@@ -19,7 +19,7 @@ _CODE_AND_REMAINDER_BITS = 28
 
 
 def step_excess(axis: ManifestAxis) -> int:
-    """By how much shaping makes a step larger at most."""
+    """Return the bound of what shaping adds to a step, in codes."""
     shaping = axis.output.shaping
     if shaping is None:
         return 0
@@ -27,7 +27,7 @@ def step_excess(axis: ManifestAxis) -> int:
 
 
 def code_excess(axis: ManifestAxis) -> float:
-    """By how much a code is beyond its unrounded value at most."""
+    """Return the bound of the distance of a shaped code from its unrounded value, in codes."""
     shaping = axis.output.shaping
     if shaping is None:
         return 0.5
@@ -35,13 +35,24 @@ def code_excess(axis: ManifestAxis) -> float:
 
 
 def shaped_codes(program: Program, count: int) -> Ints:
-    """Return the first codes of a shaped program since it began, within its limits: shape (count,)."""
+    """Return the first codes of a shaped program since it began, within its limits.
+
+    Parameters
+    ----------
+    count
+        Number of ticks, which may be several periods.
+
+    Returns
+    -------
+    Ints
+        Codes, shape (count,).
+    """
     output = program.output
     bits = _CODE_AND_REMAINDER_BITS - output.dac_bits
     half = 1 << (bits - 1)
     ticks = np.arange(min(count, program.ticks), dtype=np.int64)
     exact = output.gain_word * program.samples(ticks) + output.offset_word
-    # The half of a code that rounds is taken off again: a remainder is about 0.
+    # Subtract the half code of the rounding again, so that remainders are centred on 0.
     value = np.resize(((exact + (1 << (output.gain_q - 1))) >> (output.gain_q - bits)) - half, count)
     order = output.shaping.order
     if order == 3:
@@ -52,8 +63,8 @@ def shaped_codes(program: Program, count: int) -> Ints:
             residue = np.cumsum(residue)  # wraps at 2^64, a multiple of every code
         residue = (residue + half & 2 * half - 1) - half
     e1, e2, e3 = (np.concatenate([np.zeros(by, dtype=np.int64), residue])[:count] for by in (1, 2, 3))
-    fed = {1: e1, 2: 2 * e1 - e2}.get(order, e1 - e2 + e3 + output.shaping.zero * (e1 - e2) // 64)
-    codes: Ints = np.clip((value + fed - residue) // (2 * half), output.code_min, output.code_max)
+    feedback = {1: e1, 2: 2 * e1 - e2}.get(order, e1 - e2 + e3 + output.shaping.zero * (e1 - e2) // 64)
+    codes: Ints = np.clip((value + feedback - residue) // (2 * half), output.code_min, output.code_max)
     return codes
 
 
@@ -61,8 +72,8 @@ def _carried(value: Ints, half: int, zero: int) -> Ints:
     past = [0, 0, 0]
     for one in value.tolist():
         change = past[-1] - past[-2]
-        fed = one + change + past[-3] + zero * change // 64
-        past.append((fed + half) % (2 * half) - half)
+        feedback = one + change + past[-3] + zero * change // 64
+        past.append((feedback + half) % (2 * half) - half)
     return np.array(past[3:], dtype=np.int64)
 
 
@@ -82,22 +93,46 @@ class ShapedPlay:
 
     @property
     def codes(self) -> Ints:
-        """Those that are judged, (ticks,)."""
+        """The codes of the judged periods.
+
+        Returns
+        -------
+        Ints
+            One period after another, shape (periods * ticks,).
+        """
         return self._shaped[self._first :].reshape(-1)
 
     @property
     def code_errors(self) -> Floats:
-        """Those of these codes, (ticks,)."""
+        """The codes less the unrounded codes of the judged periods.
+
+        Returns
+        -------
+        Floats
+            LSB of the converter, shape (periods * ticks,).
+        """
         return np.asarray((self._shaped - self._intended)[self._first :].reshape(-1))
 
     @cached_property
     def position_errors(self) -> Floats | None:
-        """Behind the passage, (periods, ticks); None where the manifest does not have it."""
+        """The errors of the position in the judged periods.
+
+        Returns
+        -------
+        Floats or None
+            LSB of the converter, shape (periods, ticks); None where the manifest states no passage.
+        """
         return self._behind(self._shaped)
 
     @cached_property
     def rounded_errors(self) -> Floats | None:
-        """The same without shaping."""
+        """The errors of the position in the judged periods if codes were rounded instead of shaped.
+
+        Returns
+        -------
+        Floats or None
+            LSB of the converter, shape (periods, ticks); None where the manifest states no passage.
+        """
         return self._behind(self._rounded)
 
     def _behind(self, codes: Ints) -> Floats | None:
@@ -137,8 +172,8 @@ class ShapedPlay:
 
 def _changes(codes: Ints) -> tuple[float, float]:
     steps = np.abs(codes[1:] - codes[:-1])
-    moved = steps[steps > 0]
-    return 100.0 * len(moved) / max(len(steps), 1), float(np.mean(moved)) if len(moved) else 0.0
+    changes = steps[steps > 0]
+    return 100.0 * len(changes) / max(len(steps), 1), float(np.mean(changes)) if len(changes) else 0.0
 
 
 def stated_shaping(stated: ManifestShaped | None) -> dict[str, float | int | None]:

@@ -1,4 +1,4 @@
-"""What was stored of a session beside what the model has, and where in which program each tick was."""
+"""The captured words of a session beside those of the model, and the place of each tick in its program."""
 
 from dataclasses import dataclass, replace
 
@@ -11,13 +11,13 @@ from tablegen.numerics.arrays import Bools, Ints
 from tablegen.verification.checks.shaped import shaped_codes
 from tablegen.verification.play.stream import FLAGS, Script, Words
 
-UNDEFINED = np.uint64((1 << 64) - 1)  # how a capture is read where the simulator has an unknown bit
+UNDEFINED = np.uint64((1 << 64) - 1)  # value of a captured word with an unknown bit
 _MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults": (56, 0xFF)}
 
 
 @dataclass(frozen=True, eq=False)
 class Capture:
-    """The words that left the device, those of the model, and where in its program the model was.
+    """The captured words of a session, those of the model, and the place of each tick in its program.
 
     ``place`` is the tick of the frame, -1 where nothing plays, and ``since`` the tick since the program began.
     ``which`` is the program in the bank, by its number in ``programs``; the first is none. ``steady`` says where the
@@ -32,11 +32,17 @@ class Capture:
     steady: Bools
     own: Bools
     programs: tuple[DualProgram | None, ...]
-    lost: int  # ticks that the model has and the capture has not, or the other way round
+    length_error: int  # ticks that the model has and the capture has not, or the other way round
 
     @property
     def known(self) -> Bools:
-        """Ticks of which the simulator knew every bit."""
+        """The ticks of which the simulator knew every bit.
+
+        Returns
+        -------
+        Bools
+            Shape (ticks,).
+        """
         known: Bools = self.got != UNDEFINED
         return known
 
@@ -45,37 +51,95 @@ class Capture:
 
         Returns
         -------
-        Shape (ticks,).
+        Ints
+            Shape (ticks,).
         """
         figures = [0 if one is None else int(getattr(getattr(one, axis).output, name)) for one in self.programs]
         return np.array(figures, dtype=np.int64)[self.which]
 
 
 def part(subject: str, words: Words) -> Ints:
-    """Return a field of captured words: x, y, markers, or faults, shape (ticks,)."""
+    """Return a field of captured words.
+
+    Parameters
+    ----------
+    subject
+        "x", "y", "markers" or "faults".
+    words
+        Captured words, shape (ticks,).
+
+    Returns
+    -------
+    Ints
+        Shape (ticks,).
+    """
     shift, mask = _MASK[subject]
     return (words >> np.uint64(shift) & np.uint64(mask)).view(np.int64)
 
 
 def differing(subject: str, capture: Capture) -> Ints:
-    """Return the ticks at which a field of the captured words differs from the model, shape (errors,)."""
+    """Return the ticks at which a field of the captured words differs from the model.
+
+    Parameters
+    ----------
+    subject
+        "x", "y", "markers" or "faults".
+
+    Returns
+    -------
+    Ints
+        Ticks, ascending, shape (errors,).
+    """
     shift, mask = _MASK[subject]
     return np.flatnonzero((capture.got ^ capture.expected) & np.uint64(mask << shift))
 
 
 def without_faults(words: Words) -> Words:
-    """Return captured words with their faults cleared, shape (ticks,)."""
+    """Return captured words with their faults cleared.
+
+    Parameters
+    ----------
+    words
+        Captured words, shape (ticks,).
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     cleared: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
     return cleared
 
 
-def recaptured(capture: Capture, got: Words) -> Capture | None:
-    """Return a second capture of the same session, if it has as many ticks as the first; else None."""
-    return None if capture.lost or len(got) != len(capture.got) else replace(capture, got=got)
+def with_capture(capture: Capture, got: Words) -> Capture | None:
+    """Return a second capture of the same session, if it has as many ticks as the first; else None.
+
+    Parameters
+    ----------
+    got
+        Words of the second capture, shape (ticks,).
+
+    Returns
+    -------
+    Capture or None
+        With the model of the first.
+    """
+    return None if capture.length_error or len(got) != len(capture.got) else replace(capture, got=got)
 
 
 def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
-    """Line capture and model up."""
+    """Align the captured words of a session with the model, up to the shorter of both.
+
+    Parameters
+    ----------
+    got
+        Captured words, shape (ticks,).
+
+    Returns
+    -------
+    Capture
+        Its arrays have one shape; ``lost`` is the difference of both lengths.
+    """
     model = np.array(script.expected, dtype=np.uint64)
     playing, frame = (model & np.uint64(1 << 48 + FLAGS.index(name)) != 0 for name in ("playing", "frame"))
     index = np.arange(len(model))
@@ -108,7 +172,7 @@ def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
 
 
 def _since_begin(program: DualProgram, place: Ints) -> Ints:
-    """Ticks since one program began, which nothing interrupts but rests and starts."""
+    """Return the ticks since one program began, which nothing interrupts but rests and starts."""
     # A scan begins where a frame does and the tick before was not the last of one.
     begins = (place == 0) & (np.concatenate([[-1], place[:-1]]) != program.schedule.frame_ticks - 1)
     index = np.arange(len(place))
@@ -116,12 +180,12 @@ def _since_begin(program: DualProgram, place: Ints) -> Ints:
 
 
 def _caught_up(program: DualProgram, place: Ints, since: Ints, model: Words) -> Bools:
-    """Where the codes of the model had caught up with one program."""
+    """Return True at ticks where the codes of the model have caught up with one program."""
     reached = place >= 0
     for axis, one in (("x", program.x), ("y", program.y)):
         reached[reached] = _codes(one, place[reached], since[reached]) == part(axis, model)[reached]
     index = np.arange(len(place))
-    # Caught up is for good: one right tick since the program began, this one included, is enough.
+    # An output that has caught up stays so: one right tick since the program began, this one included, is enough.
     return (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= index - since)
 
 

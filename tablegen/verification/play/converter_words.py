@@ -1,4 +1,4 @@
-"""Words as converters get them, turned back into codes."""
+"""Converter words, turned back into codes."""
 
 import numpy as np
 
@@ -9,8 +9,19 @@ from tablegen.verification.play.stream import Words
 _CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
 
 
-def packed(words: Words, stored: StoredBuild) -> Words:
-    """Pairs of captures as one word a tick, as models are stored: converter words turned back into codes."""
+def pack_captures(words: Words, stored: StoredBuild) -> Words:
+    """Return pairs of captured words as one word a tick, as models are stored: converter words turned back into codes.
+
+    Parameters
+    ----------
+    words
+        Converter words of both axes, then markers and faults, of each tick: shape (2 ticks,).
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     packed = np.empty(len(words) // 2, dtype=np.uint64)
     for first in range(0, len(packed), _CHUNK_TICKS):
         chunk = slice(2 * first, 2 * (first + _CHUNK_TICKS))
@@ -23,7 +34,18 @@ def packed(words: Words, stored: StoredBuild) -> Words:
 
 
 def codes_of(words: Words, output: Output) -> Words:
-    """Decode converter words by the manifest's coding; shape (ticks,) in and out."""
+    """Decode converter words by the manifest's coding.
+
+    Parameters
+    ----------
+    words
+        Words of one axis, shape (ticks,).
+
+    Returns
+    -------
+    Words
+        Codes of up to 24 bits, shape (ticks,).
+    """
     shift = output.word_bits - output.dac_bits if output.align == "left" else 0
     flip = 1 << (output.dac_bits - 1) if output.coding == "twos-complement" else 0
     codes: Words = (words >> np.uint64(shift) ^ np.uint64(flip)) & np.uint64(0xFFFFFF)

@@ -1,4 +1,4 @@
-"""Programs into the idle bank of a device that plays a script: that of the build as its files have it, and others."""
+"""Programs for the idle bank of a device that plays a script: that of the build as its files have it, and others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ VARIATION = 1  # as the argument of a commit, to a device that has the program o
 
 @dataclass(frozen=True)
 class Memories:
-    """The words of a bank as they stand in the memory files: of x and y the table, or what it is rendered from."""
+    """The words of a bank as in the memory files: of x and y the table, or the Fourier words to render it from."""
 
     program: Sequence[int]
     x: Sequence[int]
@@ -29,7 +29,7 @@ class Memories:
 
 @dataclass
 class Loader:
-    """Loads and commits programs; without ``memories`` the device has that of the build already."""
+    """A loader of programs, which commits them too; without ``memories`` the device has that of the build already."""
 
     script: Script
     own: DualProgram
@@ -38,7 +38,7 @@ class Loader:
 
     @property
     def own_commit_clocks(self) -> int:
-        """Clocks from a commit of the build's program to its committed bank."""
+        """The clocks from a commit of the build's program to its committed bank."""
         harmonics = (self.memories.x_harmonics, self.memories.y_harmonics) if self.memories else (0, 0)
         return self.placement.commit_clocks(
             (len(self.own.x.words), harmonics[0]), (len(self.own.y.words), harmonics[1])
@@ -90,7 +90,7 @@ class Loader:
         return wide.program
 
     def edges(self, words: list[int]) -> tuple[list[tuple[int, int]], list[dict[int, int]]]:
-        """Words about the edges of what fits the device, near those of a program: ``unfit.edges``, or those of C."""
+        """Return words about the edges of what fits the device, near those of a program."""
         shape = SequencerShape.of((self.own.x, self.own.y))
         if self.memories is None:
             return c_edges(shape, words, max(one.output.shaping.order for one in (self.own.x, self.own.y))), []
@@ -110,5 +110,5 @@ class Loader:
 
     @property
     def _bank(self) -> int:
-        """The bank that is idle once nothing waits: they take turns."""
+        """The bank that is idle once no program waits: they take turns."""
         return self.script.swaps % 2

@@ -1,4 +1,4 @@
-"""How a user places the sequencer: the kind of axis, and whether it renders its tables from Fourier words."""
+"""The placement of the sequencer: the kind of axis, and whether it renders its tables from Fourier words."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -15,7 +15,7 @@ _LATENCY, _SPLINE_LATENCY = 48, 76  # clocks: more than a sample takes, if it is
 
 @dataclass(frozen=True)
 class Placement:
-    """``axis``: a sample a clock in look-up tables or with multiplier blocks, or low area.
+    """A placement: ``axis`` is a sample a clock in look-up tables or with multiplier blocks, or low area.
 
     ``shaping`` is the highest order of shaping that it has, 0 to 3; ``spline``: it plays a cubic table.
     """
@@ -41,7 +41,7 @@ class Placement:
 
     @property
     def latency(self) -> int:
-        """Clocks from a tick to its sample."""
+        """The clocks from a tick to its sample."""
         if self.axis == "serial":
             return self.tick_clocks
         spline, plain = self.spline, self.axis == "blocks"
@@ -49,28 +49,28 @@ class Placement:
 
     @property
     def drain_clocks(self) -> int:
-        """Clocks after which a sample has left: more than it takes."""
+        """The clocks after which a sample has left: more than its latency."""
         return (_SPLINE_LATENCY if self.spline else _LATENCY) + self.tick_clocks
 
     def renders(self, program: Program) -> bool:
-        """Whether the device makes the table of this axis; a ``direct`` one is always uploaded."""
+        """Return True if the device renders the table of this axis; a ``direct`` one is always uploaded."""
         return self.fourier and program.mode != "direct"
 
     def parameters(self, harmonics: int, sine_file: str) -> dict[str, int | str]:
-        """As the sequencer has them; ``harmonics`` is the greatest of both axes."""
-        chosen: dict[str, int | str] = {
+        """Return the parameters of the sequencer; ``harmonics`` is the greatest of both axes."""
+        parameters: dict[str, int | str] = {
             "PLAIN_MULTIPLIER": int(self.axis == "blocks"),
             "LOW_AREA": int(self.axis == "serial"),
             "SHAPING": self.shaping,
         }
         if self.fourier:
-            chosen |= {"FOURIER": 1, "HARMONICS": harmonics, "SINE_FILE": sine_file}
-        return chosen
+            parameters |= {"FOURIER": 1, "HARMONICS": harmonics, "SINE_FILE": sine_file}
+        return parameters
 
     def commit_clocks(self, *tables: tuple[int, int]) -> int:
-        """Clocks from a commit to the committed bank, for the length of each table and its harmonics, 0 if uploaded.
+        """Return the clocks from a commit to the committed bank, for tables (length, harmonics or 0 if uploaded).
 
-        As dac_fourier.v and dac_render.v state them.
+        The numbers are those of dac_fourier.v and dac_render.v.
         """
         if not self.fourier:
             return 1

@@ -1,4 +1,4 @@
-"""What a host may ask of a device, and what goes wrong: played on short programs, so that all of it is soon over.
+"""The requests of a host and their faults, on short programs, so that all of them are soon played.
 
 Every part ends with what the device says of itself, which the bench stores.
 """
@@ -19,23 +19,23 @@ _MANY_FRAMES = 0x8001  # a counter of fewer bits would count one
 _UNUSED_PAGES = (48, 144, 272, 1040, 32784)  # one bit more than a used one, or two bits
 _LONGER = 6000  # ticks by which a line is longer where that costs nothing
 _SWAPS = 14
-_REFUSAL_CLOCKS = 2  # until a refusal is there
-_WIDE_TICKS = 44  # fewer than a line, a frame or a window of such a program has to the model
+_REFUSAL_CLOCKS = 2  # clocks until a refusal is visible
+_WIDE_TICKS = 44  # ticks, fewer than the model has in a line, a frame or a window of such a program
 _IN_TURN: tuple[Kind, ...] = ("clamped", "held", "free", "free", "held")
 
 
 class Requests:
-    """Plays them on a script that has just begun; the variations take turns in both banks."""
+    """The requests on a script that has just begun; the variations take turns in both banks."""
 
     def __init__(
         self, script: Script, loader: Loader, placement: Placement, in_c: bool, long_lines: bool = False
     ) -> None:
-        """``in_c``: a driver tells of overruns, and banks have no registers; ``long_lines``: ticks cost little."""
+        """Prepare for a device: ``in_c`` it has overruns and no registers; ``long_lines`` if ticks cost little."""
         self.script, self.loader, self.placement = script, loader, placement
         self._in_c, self._long = in_c, long_lines
 
     def play(self) -> None:
-        """All parts, one after the other."""
+        """Play all parts, one after the other."""
         self._without_a_program()
         self._starts_and_stops(self._first_program())
         self._refused_commits()
@@ -60,7 +60,7 @@ class Requests:
         self.script.pace(self.placement.tick_clocks, self.placement.tick_clocks)
 
     def _ramp(self) -> None:
-        """Until the codes have parked, and a little longer."""
+        """Play until the codes have parked, and a little longer."""
         played = 0
         while not self.script.model.parked and played < _LONGEST_RAMP:
             self._ticks(_RESTING_TICKS)
@@ -215,7 +215,7 @@ class Requests:
                 self._ticks(line)
 
     def _mid_line(self, line: int) -> None:
-        """On to the middle of a line, so that a commit waits for the next one."""
+        """Play to the middle of a line, so that a commit waits for the next one."""
         self._ticks((line // 2 - self.script.model.tick) % line + 1)
 
     def _clamps(self) -> None:
@@ -247,7 +247,7 @@ class Requests:
         self._rest("with faults cleared")
 
     def _swaps(self) -> None:
-        """One after the other: each register has to change with the first sample of its program, and not before."""
+        """Swap programs: each register has to change with the first sample of its program, and not before."""
         script = self.script
         script.request("arm", "trigger")
         self._ticks(2)
@@ -270,7 +270,7 @@ class Requests:
         self._rest("after many swaps")
 
     def _refused_commits(self) -> None:
-        """Programs with a word that does not fit: each word by itself, and what discards such a program."""
+        """Commit programs with a word that does not fit: each word by itself, and what discards such a program."""
         script, loader = self.script, self.loader
         script.request("park")
         self._ticks(1)
@@ -332,7 +332,7 @@ class Requests:
             script.write(region, [_NONSENSE] * 2)
 
     def _words_that_just_fit(self, program: DualProgram, words: list[int], inside: list[dict[int, int]]) -> None:
-        """They are committed, and withdrawn again."""
+        """Commit words that just fit, and withdraw them again."""
         script = self.script
         self.loader.fill_banks()
         for edge in inside:
@@ -345,7 +345,7 @@ class Requests:
         script.write(PROGRAM, words)
 
     def _wide_registers(self) -> None:
-        """Programs that fill their registers: too narrow ones would soon end a line, a frame or a window."""
+        """Play programs that fill their registers: too narrow ones would soon end a line, a frame or a window."""
         script = self.script
         for part in WIDE:
             program = self.loader.load_wide(part)
@@ -360,7 +360,7 @@ class Requests:
         self._rest("after programs that fill their registers")
 
     def _long_lines(self) -> None:
-        """Codes that change slowly, near their limits: a device that plays many ticks at a time does so here."""
+        """Play codes that change slowly, near their limits: a device that plays many ticks at a time does so here."""
         script = self.script
         script.request("arm", "trigger")
         self._ticks(2)
@@ -375,7 +375,7 @@ class Requests:
         self._rest("after long lines")
 
     def _write_too_soon(self, line: int) -> None:
-        """While the last samples of the program before are on their way: those registers come late in it."""
+        """Write while the last samples of the program before are on their way, to registers that come late in it."""
         script = self.script
         self._ticks((-script.model.tick) % line)
         for first, words in ((_FAR_REGISTERS[1] + 3, 8), (_FAR_REGISTERS[2] + 3, 8), (_FAR_REGISTERS[1] + 6, 2)):

@@ -10,7 +10,7 @@ SCRIPT, CAPTURE = "script.hex", "capture.hex"  # in the folder of a bench
 
 @dataclass(frozen=True)
 class SequencerShape:
-    """What a sequencer is synthesised for; the names are those of its parameters in lower case."""
+    """The shape for which a sequencer is synthesised; the names are those of its parameters in lower case."""
 
     dac_bits: int
     x_interpolated: int
@@ -30,7 +30,7 @@ class SequencerShape:
         )
 
     def parameters(self) -> dict[str, int | str]:
-        """As Verilog has them."""
+        """Return the parameters of the Verilog."""
         return {name.upper(): value for name, value in asdict(self).items()}
 
 

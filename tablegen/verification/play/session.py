@@ -1,4 +1,4 @@
-"""What is played to verify a build: requests and faults on short programs, then frames of the build's own.
+"""The session that verifies a build: requests and faults on short programs, then frames of the build's own.
 
 The own program follows a variation of it in mid-line, plays a frame and more, gives way to a variation in mid-frame,
 takes over again, and parks.
@@ -15,18 +15,18 @@ from tablegen.verification.play.requests import Requests
 from tablegen.verification.play.stream import Script
 from tablegen.verification.play.variation import variation
 
-_CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caught up
-_PARK_TICKS = 500  # in which most programs have parked, whatever the ticks are that were asked for
+_CATCH_UP_STRIDE = 64  # ticks between checks whether an output has caught up
+_PARK_TICKS = 500  # ticks in which most programs have parked
 _POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
 WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
 WIRED_CLOCKS = 240  # clocks between them
 _MANY_TICKS = 20_000  # of a session in C that has long lines too
-_TAKING_OVER_TICKS = 1500  # more than pass while its words are written
+_TAKING_OVER_TICKS = 1500  # more ticks than pass while the words of a program are written
 
 
 @dataclass(frozen=True)
 class BuildSession:
-    """A script, and how far it came with the ticks that it was given."""
+    """A script, and its extent within the ticks that it may take."""
 
     script: Script
     whole_frame: bool
@@ -35,7 +35,7 @@ class BuildSession:
 
 
 def needed_ticks(program: DualProgram) -> int:
-    """Ticks in which a session plays a whole frame of the build's program, and all that follows."""
+    """Return the ticks in which a session plays a whole frame of the build's program, and all that follows."""
     schedule = program.schedule
     ramp = max(
         -(-(axis.output.code_max - axis.output.code_min) // axis.output.max_step) for axis in (program.x, program.y)
@@ -50,7 +50,7 @@ def needed_ticks(program: DualProgram) -> int:
 
 
 def power_up_codes(program: DualProgram) -> tuple[int, int]:
-    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room.
+    """Return codes at power-up from which the first ramp leads up in x and down in y, where there is room.
 
     That of y takes longer, and ends with a step of one code.
     """
@@ -93,7 +93,7 @@ class _Own:
         script.wait_ticks(variation.schedule.ticks)  # a line start is among them
 
     def catch_up(self, until: int) -> None:
-        """Until the output is at the waveform, or so many ticks of the session are over."""
+        """Play until the output is at the waveform, or so many ticks of the session are over."""
         while self.script.model.catching_up and self.played < until:
             self.script.wait_ticks(min(_CATCH_UP_STRIDE, until - self.played))
 

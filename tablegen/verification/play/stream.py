@@ -1,7 +1,7 @@
-"""A script for the bench of the sequencer, and what the integer model makes of it, tick for tick.
+"""A script for the bench of the sequencer, and the ticks that the integer model makes of it.
 
-Every call adds commands to the script and lets the model live through the same clocks, so that a script needs no second
-description of what it does. ``stream_bench.v`` plays it and captures; ``compare`` holds capture against model.
+Every call adds commands to the script and advances the model by the same clocks, so that a script needs no second
+description of its effect. ``stream_bench.v`` plays it and captures; ``compare`` compares capture and model.
 """
 
 import re
@@ -48,7 +48,18 @@ def pack(tick: Tick) -> int:
 
 
 def pack_line(ticks: LineTicks, faults: Ints) -> Words:
-    """Pack the ticks of a line, all of which play, with the faults so far: shape (ticks,)."""
+    """Pack the ticks of a line, all of which play, with the faults so far.
+
+    Parameters
+    ----------
+    faults
+        Bits of the faults at each tick, shape (ticks,).
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     markers = {"line": ticks.line, "frame": ticks.frame, "pixel": ticks.pixel, "backward": ticks.backward}
     words = faults << _FAULTS_AT | 1 << 48 + FLAGS.index("playing") | ticks.y << 24 | ticks.x
     for name, marker in {**markers, "valid": ticks.valid}.items():
@@ -58,7 +69,7 @@ def pack_line(ticks: LineTicks, faults: Ints) -> Words:
 
 @dataclass(frozen=True)
 class Sample:
-    """A stored tick, taken apart again."""
+    """The fields of a stored tick."""
 
     x: int
     y: int
@@ -74,7 +85,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class StoredState:
-    """What a device says of itself while nothing is on its way: its flags, its faults, their counts, its outputs."""
+    """The state of a device while nothing is on its way: its flags, its faults, their counts, its outputs."""
 
     flags: tuple[bool, ...]  # in the order of STATES
     faults: int
@@ -89,7 +100,7 @@ class StoredState:
         return cls(flags, words[0] >> 8 & 0xF, counts, words[3] & ~(0xFF << _FAULTS_AT))
 
     def limited(self, most_counted: int, ignored: tuple[str, ...] = ()) -> "StoredState":
-        """As a device has it whose counters end at ``most_counted``, and that does not tell the ``ignored`` flags."""
+        """Return the state of a device whose counters end at ``most_counted``, and which has no ``ignored`` flags."""
         flags = tuple(flag and name not in ignored for name, flag in zip(STATES, self.flags, strict=True))
         outputs = 0 if OUTPUTS in ignored else self.outputs
         return StoredState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts), outputs)
@@ -97,7 +108,7 @@ class StoredState:
 
 @dataclass
 class Script:
-    """Commands, and the ticks that the model says they make.
+    """Commands, and the ticks that the model makes of them.
 
     ``drain`` clocks pass from a swap to the next write, ``commit_clocks`` from a commit to the bank that is committed.
     """
@@ -108,9 +119,9 @@ class Script:
     commands: list[int] = field(default_factory=list)
     expected: "array[int]" = field(default_factory=lambda: array("Q"))  # as wide as Words
     swapped_programs: list[DualProgram] = field(default_factory=list)  # programs, one a swap
-    refused: bool = False  # a write was to be refused, and nobody has cleared that
+    refused: bool = False  # a write was to be refused, and the flag has not been cleared
     states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
-    programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # from which tick on which one plays
+    programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # each after its first tick
 
     def __post_init__(self) -> None:
         self.model = Sequencer(None, codes=self.power_up)
@@ -123,12 +134,12 @@ class Script:
         self.programs.append((0, None))
 
     def tick_every(self, clocks: int) -> None:
-        """Ticks every so many clocks from the next clock on; 0 for none."""
+        """Request ticks every so many clocks from the next clock on; 0 for none."""
         self._command(_PERIOD | clocks)
         self._period, self._until = clocks, 0
 
     def pace(self, clocks: int, least: int) -> None:
-        """Ticks every so many clocks, if they do not come so already; none less than ``least`` after the last one."""
+        """Request ticks every so many clocks, unless they come so already; the first after ``least`` clocks or more."""
         if self._period == clocks:
             return
         if self._period:
@@ -154,7 +165,17 @@ class Script:
             self.wait(self._until + (ticks - 1) * self._period + 1)
 
     def write(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
-        """Write words to a region of the idle bank, from address ``first`` on, one a clock."""
+        """Write words to a region of the idle bank, from address ``first`` on, one a clock.
+
+        Parameters
+        ----------
+        region
+            Number of the region.
+        words
+            Integers of up to 32 bits, shape (n,).
+        first
+            Address of the first word.
+        """
         base = _WRITE | region << 48
         values = np.asarray(words, dtype=np.int64) & 0xFFFFFFFF
         at = np.arange(first, first + len(values), dtype=np.int64) << 32
@@ -162,7 +183,17 @@ class Script:
         self._pass(len(words))
 
     def write_refused(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
-        """Write words that must have no effect: a program is pending, or the last one is still leaving."""
+        """Write words that must have no effect: a program is pending, or the last one is still leaving.
+
+        Parameters
+        ----------
+        region
+            Number of the region.
+        words
+            Integers of up to 32 bits, shape (n,).
+        first
+            Address of the first word.
+        """
         assert not self.writable
         self.write(region, words, first)
         self.refused = True
@@ -183,7 +214,13 @@ class Script:
         self.refused = True
 
     def load(self, program: DualProgram, x: FourierWords | None = None, y: FourierWords | None = None) -> None:
-        """Write a whole program, once the idle bank can be written: tables, or Fourier words to render them from."""
+        """Write a whole program, once the idle bank can be written.
+
+        Parameters
+        ----------
+        x, y
+            Fourier words to render an axis from; without them its table is written.
+        """
         self.wait_writable()
         assert self.writable, "a program waits to be taken; withdraw it first"
         harmonics = (x.harmonics if x else 0, y.harmonics if y else 0)
@@ -198,16 +235,16 @@ class Script:
 
     @property
     def writable(self) -> bool:
-        """Whether the idle bank can be written now."""
+        """True if the idle bank can be written now."""
         return not self.waiting and self.clocks >= self._writable_at
 
     @property
     def waiting(self) -> bool:
-        """Whether a committed program was not taken yet."""
+        """True if a committed program waits to be swapped in."""
         return self.model.idle is not None or self._commits is not None
 
     def request(self, *names: str, program: DualProgram | None = None, frames: int = 0, commit_clocks: int = 0) -> None:
-        """One clock with requests; ``program`` is what a commit commits, ``commit_clocks`` later unless as always."""
+        """Play one clock with requests; ``program`` is what a commit commits, after ``commit_clocks`` or as always."""
         mask = sum(1 << _REQUESTS.index(name) for name in names)
         self.commands.append(_REQUEST | mask << 16 | frames)
         self._pass(1)
@@ -271,7 +308,7 @@ class Script:
 
     @property
     def _outputs(self) -> int:
-        """Codes and markers that the device holds."""
+        """The codes and markers that the device holds."""
         if not self.expected:
             return self.power_up[1] << 24 | self.power_up[0]
         output = self.expected[-1] & ~(0xFF << _FAULTS_AT)
@@ -346,17 +383,17 @@ class Script:
 
     @property
     def swaps(self) -> int:
-        """How many programs were taken."""
+        """The number of swaps so far."""
         return len(self.swapped_programs)
 
     @property
     def all_counts(self) -> list[int]:
-        """Counts of all faults, in the order of FAULTS."""
+        """The counts of all faults, in the order of FAULTS."""
         return [*self.counts, *self._reported.values()]
 
     @property
     def counts(self) -> list[int]:
-        """Counts of the faults of the model: slew, clamp."""
+        """The counts of the faults of the model: slew, clamp."""
         return [self.model.fault_counts[fault] for fault in (Fault.SLEW, Fault.CLAMP)]
 
 
@@ -366,7 +403,13 @@ def read_states(words: list[int]) -> list[StoredState]:
 
 
 def read_capture(path: Path) -> Words:
-    """Read the words of a capture, shape (ticks,); a word with unknown bits becomes all ones, which no tick is."""
+    """Read the words of a capture; a word with unknown bits becomes all ones, which no tick is.
+
+    Returns
+    -------
+    Words
+        Shape (ticks,).
+    """
     text = path.read_text("ascii").lower()
     if "x" in text or "z" in text:
         text = re.sub(r"^.*[xz].*$", "f" * 16, text, flags=re.MULTILINE)
@@ -383,7 +426,20 @@ class Mismatch:
 
 
 def compare(expected: Sequence[int], capture: Words) -> Mismatch | None:
-    """Every tick of a capture against the model, codes, markers and faults; None where all are equal."""
+    """Compare every tick of a capture with the model: codes, markers and faults.
+
+    Parameters
+    ----------
+    expected
+        Words of the model, of length n.
+    capture
+        Captured words, shape (m,).
+
+    Returns
+    -------
+    Mismatch or None
+        The first tick that differs or that only one of both has; None where all are equal.
+    """
     model = np.array(expected, dtype=np.uint64)
     length = min(len(model), len(capture))
     differs = np.flatnonzero(model[:length] != capture[:length])

@@ -20,7 +20,7 @@ Fits = Callable[[int, int], bool]  # address, word
 
 
 def device_widths(shape: SequencerShape, placement: Placement, harmonics: int) -> Widths:
-    """Widths of the sequencer in the bench of Verilog; ``harmonics`` are those of its renderer, if it has one."""
+    """Return the widths of the sequencer in the bench of Verilog; ``harmonics`` are those of its renderer, or 0."""
     x = AxisWidths(shape.x_interpolated != 0, shape.x_index_bits, shape.x_word_bits, TICK_BITS + 1)
     y = AxisWidths(shape.y_interpolated != 0, shape.y_index_bits, shape.y_word_bits, PERIOD_BITS)
     rendered = harmonics if placement.fourier else 0
@@ -28,7 +28,7 @@ def device_widths(shape: SequencerShape, placement: Placement, harmonics: int) -
 
 
 def c_edges(shape: SequencerShape, words: Sequence[int], shaping: int) -> list[tuple[int, int]]:
-    """Words that the C refuses beside the others of a program, as (address, word): it knows no widths but reason.
+    """Return the words that the C refuses beside the others of a program, as (address, word), whatever its widths.
 
     ``shaping`` is the highest order of the device.
     """
@@ -58,7 +58,7 @@ def c_edges(shape: SequencerShape, words: Sequence[int], shaping: int) -> list[t
 
 
 def edges(words: Sequence[int], widths: Widths) -> tuple[list[tuple[int, int]], list[dict[int, int]]]:
-    """Words at the edges of what fits a device, as (address, word); the last that fit are whole programs, by address.
+    """Return words at the edges of what fits a device, as (address, word), and the last that fit as whole programs.
 
     ``words`` are a program that fits.
     """
@@ -79,7 +79,7 @@ def edges(words: Sequence[int], widths: Widths) -> tuple[list[tuple[int, int]], 
 
 
 def _edges(address: int, fits: Fits) -> tuple[list[int], list[int]]:
-    """Of one word, those that do not fit, near those that do or with one bit more, and those that just fit."""
+    """Return values of a word that do not fit, near those that do or with one bit more, and those that just fit."""
     of_axis = AXIS_WORDS[address % PAGE_WORDS] if address >= PAGE_WORDS else ""
     if of_axis == "shaping":
         words = [0, 1, 2, 3, 4, 0x80, 0x100, 0x101, 0x102, *(zero << 8 | 3 for zero in _ZEROS), 1 << 16, 1 << 31]

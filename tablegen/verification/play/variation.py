@@ -60,19 +60,19 @@ def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualP
 
 
 def _shapings(highest: int, kind: Kind, bank: int) -> tuple[Shaping, Shaping]:
-    """Of x and y, on a device of this highest order: every order is some variation's, and so is none."""
+    """Return shapings of x and y on a device of this highest order: over all variations each order and none occur."""
     x = {"free": highest, "clamped": highest - 1, "held": highest - 2}[kind] - bank
     every = [OFF, Shaping(1), Shaping(2), Shaping(3, (MAXIMUM_ZERO, _ZERO)[bank])][: highest + 1]
     return every[x % len(every)], every[(x + 1) % len(every)]
 
 
 def _room(own: Program) -> int:
-    """How many advances a period may have: a word each in a direct table, which is as long as the device's memory."""
+    """Return how many advances a period may have: a word each in a direct table, as long as the device's memory."""
     return 1 << 16 if own.mode != "direct" else 1 << max(index_bits_of(len(own.words)), 3)
 
 
 def _schedule(kind: Kind, bank: int, ticks: int, lines: int) -> Schedule:
-    """Both sweeps image, on the last line and the one before it.
+    """Return a schedule whose sweeps both image, on the last line and the one before it.
 
     A ``free`` one of bank 0 settles for all lines but the last; of bank 1 it images at once, on its first tick, and all
     of it is the sweep back. Windows of a ``clamped`` one end with the line, a ``held`` one has empty windows.
@@ -103,7 +103,7 @@ def _schedule(kind: Kind, bank: int, ticks: int, lines: int) -> Schedule:
 def _axis(
     own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, shaping: Shaping, roomy: bool
 ) -> Program:
-    """One axis; the guard of a ``roomy`` one is far above its steps, as that of a build is."""
+    """Return the program of one axis; the guard of a ``roomy`` one is far above its steps, as that of a build is."""
     room = ceil(shaping.excess) if shaping.order else 0
     gain, middle = _gain(own.output, room)
     words, lifted = _words(own, phase.ticks, bank), bank == 1 and _is_lifted(own)
@@ -134,7 +134,7 @@ def _axis(
 
 
 def _words(own: Program, advances: int, bank: int) -> Ints:
-    """Two harmonics, a bank each has its own; over most of full scale, or about the words that lift the codes."""
+    """Return the words of two harmonics, other ones for each bank; over most of full scale, or about code edges."""
     length = len(own.words) if own.mode != "direct" else advances
     t = np.arange(length) / length
     shape = np.sin(2.0 * np.pi * t + 1.0 + bank) + 0.25 * np.sin(6.0 * np.pi * t + 0.3)

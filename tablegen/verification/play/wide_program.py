@@ -1,4 +1,4 @@
-"""Programs that fill registers of the Verilog: what a bit less would make of a program shows within a few ticks.
+"""Programs that fill registers of the Verilog: a register that is too narrow shows within a few ticks.
 
 The model plays a program of a few lines that begins in the same way, and ends after what is played of it.
 """
@@ -24,7 +24,7 @@ _TICK, _LINE = 1 << 23, 1 << 15  # the highest bits of counters of ticks and lin
 
 @dataclass(frozen=True)
 class WideProgram:
-    """What the model plays, and the words that a device gets."""
+    """A program of the model, and the words that a device gets."""
 
     program: DualProgram
     words: list[int]

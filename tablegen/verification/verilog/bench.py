@@ -172,7 +172,7 @@ def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, i
 
 
 def write_boot_files(folder: Path) -> None:
-    """Memory files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and twice 9 of 16."""
+    """Write the files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and twice 9 of 16."""
     random = np.random.default_rng(1)
     for name, (count, bits) in zip(BOOT.values(), ((48, 32), (9, 16), (9, 16)), strict=True):
         words = random.integers(0, 1 << bits, count)
@@ -202,6 +202,6 @@ def different_constants(folder: Path, content: Content) -> list[str]:
 
 
 def read_wires(folder: Path) -> Mapping[int, int]:
-    """Both words of every sample that came over the wires, x in the lower half, by the number of the sample."""
+    """Return both words of every sample that came over the wires, x in the lower half, by the number of the sample."""
     words: Words = read_capture(folder / WIRES)
     return dict(zip(map(int, words[::WIRE_WORDS]), map(int, words[1::WIRE_WORDS]), strict=False))

@@ -1,4 +1,4 @@
-"""The cocotb side of ``stream_bench.v``: waits for the end of the script and hands the bench's counters on."""
+"""The cocotb side of ``stream_bench.v``: it waits for the end of the script and passes the bench's counters on."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Compiled models of a simulator in the user's cache, in ``tablegen/models``, and what each depends on."""
+"""Compiled models of a simulator in the user's cache, in ``tablegen/models``, and the sources of each."""
 
 import os
 import subprocess

@@ -11,7 +11,7 @@ from tablegen.base.resources import verilog_runtime
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import CAPTURE, SCRIPT, SequencerShape
 from tablegen.verification.play.stream import Mismatch, Script, Words, compare, read_capture
-from tablegen.verification.verilog.simulate import Compiled, Design, compile_design
+from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
 
 TEST_MODULE = "tablegen.verification.verilog.cocotb_stream"
 STREAM_BENCH = Path(str(files("tablegen.verification.verilog"))) / "stream_bench.v"
@@ -19,7 +19,7 @@ STREAM_BENCH = Path(str(files("tablegen.verification.verilog"))) / "stream_bench
 
 @dataclass(frozen=True)
 class BenchRun:
-    """What came of a script: the first difference, if any, and the counters of the bench."""
+    """The result of a script: the first difference, if any, and the counters of the bench."""
 
     samples: int
     mismatch: Mismatch | None
@@ -32,12 +32,12 @@ class BenchRun:
 
     @property
     def equal(self) -> bool:
-        """Everything was as the model has it."""
+        """True if every tick equals the model's."""
         return self.mismatch is None and self.faults_counted and not self.refused and not self.jitter
 
 
 class SequencerBench:
-    """A compiled sequencer; ``sources`` are those of the runtime unless given.
+    """A compiled sequencer; ``sources`` are by default those of the runtime.
 
     Another ``top`` than the bench itself has an instance of it and passes its counters on.
     """
@@ -56,7 +56,7 @@ class SequencerBench:
         self._script, self._capture = self.folder / SCRIPT, self.folder / CAPTURE
         runtime = verilog_runtime() if sources is None else list(sources)
         self._most_counted = (1 << int((parameters or {}).get("COUNT_BITS", 32))) - 1
-        self._design: Compiled = compile_design(
+        self._design: CompiledDesign = compile_design(
             simulator,
             Design(
                 [*runtime, STREAM_BENCH],
@@ -93,8 +93,14 @@ class SequencerBench:
         return run_bench(self._design, self.folder, clocks)
 
 
-def run_bench(design: Compiled, folder: Path, clocks: int) -> dict[str, Any]:
-    """Play the script of so many clocks that a compiled bench reads; the counters of the bench by name."""
+def run_bench(design: CompiledDesign, folder: Path, clocks: int) -> dict[str, Any]:
+    """Play the script of so many clocks that a compiled bench reads, and return the counters of the bench by name.
+
+    Raises
+    ------
+    SimulationFailed
+        If the bench does not play its script to the end.
+    """
     status_file = folder / "status.json"
     status_file.unlink(missing_ok=True)
     timeout = (clocks + 1000) * 10 // 1000 + 10

@@ -43,8 +43,8 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Compiled:
-    """A design ready to run."""
+class CompiledDesign:
+    """A design that is ready to run."""
 
     simulator: str
     top: str
@@ -56,8 +56,24 @@ class Compiled:
     ) -> tuple[int, int]:
         """Run a cocotb test module (importable from ``sys.path``) in a process of its own.
 
-        ``settings`` go into its environment, ``arguments`` (``+name=value``) to the simulator; it runs in ``folder``,
-        and writes ``results.xml`` and ``simulation.log`` there. Returns how many tests there were and how many failed.
+        It runs in ``folder``, and writes ``results.xml`` and ``simulation.log`` there.
+
+        Parameters
+        ----------
+        settings
+            Variables of its environment.
+        arguments
+            Arguments of the simulator (``+name=value``).
+
+        Returns
+        -------
+        tests, failed
+            Number of the tests, and of those that failed.
+
+        Raises
+        ------
+        SimulationFailed
+            If the simulator ends without results.
         """
         from cocotb_tools.check_results import get_results
 
@@ -86,11 +102,21 @@ class Compiled:
             raise SimulationFailed(_tail(log)) from None
 
 
-def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool = False) -> Compiled:
-    """Compile into ``folder``, which is made; ``build.log`` is written there.
+def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool = False) -> CompiledDesign:
+    """Compile into ``folder``, which is created; ``build.log`` is written there.
 
-    With ``cached``, a model of Verilator is taken from the cache of compiled models, or put there. Its parameters then
-    must not name its folder.
+    Parameters
+    ----------
+    cached
+        True to take a model of Verilator from the cache of compiled models, or put it there; its parameters must not
+        name its folder then.
+
+    Raises
+    ------
+    ToolMissing
+        If the simulator is not installed.
+    SimulationFailed
+        If the design does not compile.
     """
     require(simulator)
     from cocotb_tools.runner import get_runner
@@ -104,7 +130,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool
             arguments = _BUILD_ARGUMENTS[simulator]
             key = model_key(design.sources, design.includes, design.parameters, design.top, *arguments)
             if MODELS.take(key, model):
-                return Compiled(simulator, design.top, folder, runner)
+                return CompiledDesign(simulator, design.top, folder, runner)
         try:
             runner.build(
                 sources=[path.resolve() for path in design.sources],
@@ -120,11 +146,17 @@ def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool
             raise SimulationFailed(_tail(log)) from None
     if key:
         MODELS.keep(key, model)
-    return Compiled(simulator, design.top, folder, runner)
+    return CompiledDesign(simulator, design.top, folder, runner)
 
 
 def require(simulator: str) -> None:
-    """Raise ``ToolMissing`` unless cocotb, the simulator and the shared library of Python are there."""
+    """Check that cocotb, the simulator and the shared library of Python are installed.
+
+    Raises
+    ------
+    ToolMissing
+        If one of them is not.
+    """
     try:
         runner_spec = find_spec("cocotb_tools.runner")  # to load it takes longer than to load this program
     except ImportError:

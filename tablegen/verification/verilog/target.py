@@ -63,19 +63,25 @@ _MAX_TABLE_WORDS = 1 << 16  # words of a table that the sequencer can address
 
 @dataclass(frozen=True)
 class VerilogTarget:
-    """A simulator, and how the sequencer is placed; a frame that takes long is played ``frame_apart``."""
+    """A simulator, and the placement of the sequencer; with ``separate_frame`` a long frame is played by itself."""
 
     simulator: str
     placement: Placement
-    frame_apart: bool = False
+    separate_frame: bool = False
     format_name: str = "verilog"
 
     def require(self) -> None:
-        """Require the simulator and cocotb."""
+        """Check that the simulator and cocotb are installed."""
         require(self.simulator)
 
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
-        """``direct`` tables may be longer than the sequencer's addresses."""
+        """Check that the sequencer can play the tables; direct ones may be longer than its addresses.
+
+        Raises
+        ------
+        NotABuild
+            If a table is too long, or Fourier words are to be rendered and both tables are direct.
+        """
         for name, axis in stored.axes:
             if len(axis.table.words) > _MAX_TABLE_WORDS:
                 raise NotABuild(
@@ -119,10 +125,10 @@ class VerilogTarget:
         """Return the session as it is placed, and a whole frame with multiplier blocks (twice as fast)."""
         program, seed = job.stored.program, job.seed
         placement = self.placement.playing(program)
-        apart = self.frame_apart and min(needed_ticks(program), job.most_ticks) > _SESSION_TICKS
-        most = _SESSION_TICKS if apart else job.most_ticks
+        separate_frame = self.separate_frame and min(needed_ticks(program), job.most_ticks) > _SESSION_TICKS
+        most = _SESSION_TICKS if separate_frame else job.most_ticks
         runs = [SimulatedRun(job.work, make_session(program, memories, most, seed, placement), placement, memories)]
-        if apart:
+        if separate_frame:
             (job.work / "frame").mkdir(exist_ok=True)
             blocks = Placement("blocks").playing(program)
             session = make_session(program, memories, job.most_ticks, seed, blocks, requests=False)
@@ -204,17 +210,17 @@ class SimulatedRun:
         }
 
     def progress(self, simulator: str) -> str:
-        """How far it is."""
+        """Return the progress in words."""
         ticks = len(self.session.script.expected)
         try:
-            done = (self.folder / CAPTURE).stat().st_size // _CAPTURED_TICK_BYTES
+            ticks_played = (self.folder / CAPTURE).stat().st_size // _CAPTURED_TICK_BYTES
         except OSError:
             return f"compiling for {simulator}"
-        return f"{simulator} has played {done} of {ticks} ticks"
+        return f"{simulator} has played {ticks_played} of {ticks} ticks"
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
-    """Compile and play the script that stands in ``folder``; in a process that can be ended. The bench's counters."""
+    """Compile and play the script in ``folder``, in a process that can be ended; return the bench's counters."""
     sources, includes = ([Path(path) for path in job[key]] for key in ("sources", "includes"))
     design = Design(sources, TOP, job["parameters"], includes)
     compiled = compile_design(job["simulator"], design, folder / job["simulator"], cached=True)
