@@ -225,7 +225,7 @@ class Build(Result):
         Rejected
             If a format cannot hold the scan.
         """
-        return render_scan(self.setup, self.plan, self.certificates, self.formats, given=self._explicit)
+        return render_scan(self.setup, self.plan, self.certificates, self.formats, explicit=self._explicit)
 
     @property
     def runtime(self) -> set[str]:
@@ -344,4 +344,4 @@ def _formats(setup: Setup, names: Sequence[str] | None) -> list[Format]:
     try:
         return chosen(setup.scan.emit.formats or DEFAULT_FORMATS if names is None else names)
     except UnknownFormat as error:
-        raise format_rejected(setup, str(error), given=names is not None) from None
+        raise format_rejected(setup, str(error), explicit=names is not None) from None

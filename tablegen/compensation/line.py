@@ -294,11 +294,11 @@ class SweptSeries(Sweep):
 class AccelerationTrade(Struct, frozen=True, eq=False):
     """The scaling error of a ``WholeLine`` that was allowed for the sake of less acceleration, in percent.
 
-    ``learnt`` is the waveform that the piezo follows straight, and ``beside_percent`` the scaling error against it.
+    The piezo follows ``straight_series`` straight; ``beside_percent`` is the scaling error against it.
     """
 
     percent: float
-    learnt: FourierSeries | None = None
+    straight_series: FourierSeries | None = None
     beside_percent: float | None = None
 
 
@@ -324,8 +324,8 @@ class WholeLine(LineShape, frozen=True, kw_only=True):
     @property
     def straight(self) -> "WholeLine":
         """The line that the piezo follows straight, before acceleration was traded for error."""
-        learnt = None if self.trade is None else self.trade.learnt
-        return self if learnt is None else WholeLine.of(learnt, self.turn)
+        straight = None if self.trade is None else self.trade.straight_series
+        return self if straight is None else WholeLine.of(straight, self.turn)
 
     def value(self, t: FloatsLike) -> Floats:
         """Return w(t).

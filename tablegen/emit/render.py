@@ -77,7 +77,7 @@ def render_scan(
     certificates: dict[str, Certificate],
     formats: Sequence[str] | None = None,
     *,
-    given: bool = False,
+    explicit: bool = False,
 ) -> dict[str, bytes]:
     """Render a planned scan, with a fault of a format at its key of the scan file.
 
@@ -87,7 +87,7 @@ def render_scan(
         The scan as it was planned and certified.
     formats
         Names of formats; those of the plan unless given.
-    given
+    explicit
         The formats stand beside the scan file, as those of ``--format`` do: a fault has no place in it.
 
     Returns
@@ -104,7 +104,7 @@ def render_scan(
         files = render(plan, certificates, formats)
         require_readable(files[MANIFEST])
     except (UnknownFormat, Unphysical) as error:
-        raise format_rejected(setup, str(error), given=given) from None
+        raise format_rejected(setup, str(error), explicit=explicit) from None
     except UnreadableManifest as error:
         raise Rejected([_unreadable(setup, plan, error)]) from None
     return files
@@ -120,9 +120,9 @@ def _unreadable(setup: Setup, plan: Plan, error: UnreadableManifest) -> Problem:
     return setup.scan_file.problem(key, why)
 
 
-def format_rejected(setup: Setup, why: str, *, given: bool) -> Rejected:
-    """Return the rejection of a format, at ``emit.formats`` or, for formats that were ``given``, without a place."""
-    return Rejected([Problem("formats", 0, "", why) if given else setup.scan_file.problem("emit.formats", why)])
+def format_rejected(setup: Setup, why: str, *, explicit: bool) -> Rejected:
+    """Return the rejection of a format, at ``emit.formats`` or, for formats that were ``explicit``, without a place."""
+    return Rejected([Problem("formats", 0, "", why) if explicit else setup.scan_file.problem("emit.formats", why)])
 
 
 def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) -> Content:

@@ -63,7 +63,7 @@ def make_index(
     if len(rates) > 1:
         few = ", ".join(f"{rate:g}" for rate in rates[:4])
         notes.append(f"programs of different update rates ({few} Hz): the timer of the firmware has to follow")
-    shown = {
+    record = {
         "tablegen": __version__,
         "library": library,
         "formats": list(formats),
@@ -72,7 +72,7 @@ def make_index(
         "programs": [{"number": number, **entry.described()} for number, entry in enumerate(entries)],
         "failed": list(failed),
     }
-    files[INDEX] = (json.dumps(shown, indent=1) + "\n").encode("ascii")
+    files[INDEX] = (json.dumps(record, indent=1) + "\n").encode("ascii")
     return Index(files, notes)
 
 

@@ -49,8 +49,8 @@ def _first_difference(entries: Sequence[Entry], kinds: dict[str, Callable[[AxisE
         for name, axis, other in (("x", first.x, entry.x), ("y", first.y, entry.y)):
             for key, value in kinds.items():
                 if value(axis) != value(other):
-                    shown = key if key.startswith("dac") else f"{name}.{key}"
-                    return _differ(first, entry, shown, value(axis), value(other))
+                    label = key if key.startswith("dac") else f"{name}.{key}"
+                    return _differ(first, entry, label, value(axis), value(other))
     return None
 
 

@@ -172,7 +172,7 @@ def run(
     jobs: int,
     strict: bool = False,
     only_check: bool = False,
-    progress: Callable[[int, int], object] = lambda _done, _all: None,
+    progress: Callable[[int, int], object] = lambda _count, _total: None,
 ) -> None:
     """Build programs that are missing or outdated, and write the index.
 

@@ -19,7 +19,7 @@ def sweep(
     jobs: int | None = None,
     strict: bool = False,
     only_check: bool = False,
-    progress: Callable[[int, int], object] = lambda _done, _all: None,
+    progress: Callable[[int, int], object] = lambda _count, _total: None,
 ) -> ScanLibrary:
     """Build many scans of one file as a library: a folder each, one runtime, and one index in JSON, C and Verilog.
 

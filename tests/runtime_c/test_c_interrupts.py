@@ -68,7 +68,7 @@ class Landings:
         source = folder / "landings.c"
         source.write_text((REPOSITORY / "tests" / "helpers" / "landings.c").read_text("utf-8"), "utf-8")
         support = folder / "support.c"  # the processor has no C library
-        memory = (REPOSITORY / "tablegen" / "verification" / "stream_bench_memory.c").read_text("utf-8")
+        memory = (REPOSITORY / "tablegen" / "verification" / "c" / "stream_bench_memory.c").read_text("utf-8")
         start = memory.index("/* The barriers")
         support.write_text("#include <stddef.h>\nvoid bench_main(void);\nvoid bench_main(void) { }\n" + memory[start:])
         self.programs = programs

@@ -83,7 +83,8 @@ def test_a_serial_output_that_is_tampered_with_is_found(folder: Path) -> None:
     substitute(folder / "dac_spi.v", r"(mosi_x *(?:<=|=) *)", r"\1!")
     make_right(folder, OTHER)
     assert failed(verify(folder, "--ticks", "2000", "--axis", "blocks", "--other-version")) == {
-        ("serial", "converter word")
+        ("serial", "converter word"),
+        ("dac_spi", "its options"),
     }
 
 

@@ -192,44 +192,44 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
 
     straight = LineShape(request.turn, BranchShape(), BranchShape())
     start = fit_window(straight, request.harmonics, request.window, request.both)
-    learnt = learn_waveform(operator, line, start, through, None if response is None else dynamics)
+    solution = learn_waveform(operator, line, start, through, None if response is None else dynamics)
     trade: AccelerationTrade | None = None
     if request.allowed is not None:
         try:
             traded = minimum_acceleration_waveform(
-                operator, line, learnt, request.allowed.percent, through, None if response is None else dynamics
+                operator, line, solution, request.allowed.percent, through, None if response is None else dynamics
             )
-            learnt = traded.waveform
-            trade = AccelerationTrade(request.allowed.percent, traded.learnt, traded.beside_percent)
+            solution = traded.waveform
+            trade = AccelerationTrade(request.allowed.percent, traded.straight_series, traded.beside_percent)
         except Unphysical as reason:
             if request.allowed.firm:
                 problems.add_to_scan("band_limit.max_scaling_error_percent", str(reason))
                 return None
-    factor *= with_mean(learnt.mean)
-    between = _BEND_UNKNOWN * learnt.grown
-    _check_reach(operator, learnt.stroke, learnt.centre, request.driver)
+    factor *= with_mean(solution.mean)
+    between = _BEND_UNKNOWN * solution.grown
+    _check_reach(operator, solution.stroke, solution.centre, request.driver)
     if not request.v_amplitude > 0.0:
         raise Unphysical(
-            f"the operator makes {request.size_nm:.6g} nm with {learnt.stroke * request.driver.span:.4g} V, and "
+            f"the operator makes {request.size_nm:.6g} nm with {solution.stroke * request.driver.span:.4g} V, and "
             f"[{request.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
             "size"
         )
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
-    scale = learnt.v_amplitude * request.driver.span / request.v_amplitude
+    scale = solution.v_amplitude * request.driver.span / request.v_amplitude
 
     def scaled(series: FourierSeries) -> FourierSeries:
         return FourierSeries(0.5 + scale * (series.a0 - 0.5), scale * series.a, scale * series.b)
 
-    series = scaled(learnt.series)
-    if trade is not None and trade.learnt is not None:
-        trade = structs.replace(trade, learnt=scaled(trade.learnt))
+    series = scaled(solution.series)
+    if trade is not None and trade.straight_series is not None:
+        trade = structs.replace(trade, straight_series=scaled(trade.straight_series))
     identification = OperatorIdentification(
         traces=operator.lines,
-        expectation=_expectation(operator, learnt, _uncertainty(operator, request, learnt)),
+        expectation=_expectation(operator, solution, _uncertainty(operator, request, solution)),
         transients=(
-            after_offset(late, learnt.stroke, learnt.centre, factor, request.turn, 1.0 / request.rate_hz),
-            after_size(late, learnt.stroke, learnt.centre, factor, request.turn, 1.0 / request.rate_hz),
+            after_offset(late, solution.stroke, solution.centre, factor, request.turn, 1.0 / request.rate_hz),
+            after_size(late, solution.stroke, solution.centre, factor, request.turn, 1.0 / request.rate_hz),
         ),
         operator=operator,
         factor=factor,
@@ -238,16 +238,16 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     return WholeLine.of(series, request.turn, trade=trade, identification=identification)
 
 
-def _expectation(operator: Operator, learnt: LearntWaveform, by: ExpectedErrors) -> Expectation:
+def _expectation(operator: Operator, solution: LearntWaveform, by: ExpectedErrors) -> Expectation:
     """Return the expected errors of a learnt waveform, uncertain by others, in percent."""
-    errors = learnt.expected
+    errors = solution.expected
     return Expectation(
         "traces",
         {side: Figure(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
         {side: Figure(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
         Figure(errors.mismatch, by.mismatch),
         Figure(errors.size, by.size),
-        100.0 * operator.distance(learnt.stroke, learnt.centre),
+        100.0 * operator.distance(solution.stroke, solution.centre),
     )
 
 
@@ -281,7 +281,7 @@ def _check_reach(operator: Operator, stroke: float, centre: float, driver: Drive
         )
 
 
-def _uncertainty(operator: Operator, request: LineRequest, learnt: LearntWaveform) -> ExpectedErrors:
+def _uncertainty(operator: Operator, request: LineRequest, solution: LearntWaveform) -> ExpectedErrors:
     """Return the possible errors besides the waveform's: departures of the piezo from the operator, more for the size.
 
     The shape of a stroke is that at other offsets, but for the family's part. The size depends on (1) from the nearest
@@ -289,15 +289,15 @@ def _uncertainty(operator: Operator, request: LineRequest, learnt: LearntWavefor
     trace only the bend tells what depends on the mean of the drive, and what on the middle between the turns.
     """
     lines = operator.lines
-    rms, scaling, mismatch, size = departures(lines, learnt.stroke, learnt.centre)
-    away = min(abs(line.centre - learnt.centre) for line in lines)
-    others = shape_uncertainty(operator.residual.at(learnt.stroke, learnt.centre), away)
+    rms, scaling, mismatch, size = departures(lines, solution.stroke, solution.centre)
+    away = min(abs(line.centre - solution.centre) for line in lines)
+    others = shape_uncertainty(operator.residual.at(solution.stroke, solution.centre), away)
     rms, scaling, mismatch = (sqrt(a * a + b * b) for a, b in zip((rms, scaling, mismatch), others, strict=True))
-    here = request.factor_at(learnt.mean)
+    here = request.factor_at(solution.mean)
     offset = min(abs(here / request.factor_at(line.centre) - 1.0) for line in lines)
     rate = min(abs(_rate_change(operator, request, line.rate_hz)) for line in lines)
     by = size_uncertainty((offset, rate))
-    size = sqrt(size * size + by * by + (100.0 * _BEND_UNKNOWN * learnt.grown) ** 2)
+    size = sqrt(size * size + by * by + (100.0 * _BEND_UNKNOWN * solution.grown) ** 2)
     return ExpectedErrors((rms, rms), (scaling, scaling), mismatch, size)
 
 

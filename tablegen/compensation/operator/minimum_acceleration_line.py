@@ -25,10 +25,10 @@ _MARGIN = 1.2  # on the error that a message promises to be enough: another wave
 
 @dataclass(frozen=True, eq=False)
 class MinimumAccelerationLine:
-    """The waveform, the ``learnt`` one from which it departs, and its scaling error against that, percent."""
+    """The waveform, the ``straight_series`` one from which it departs, and its scaling error against that, percent."""
 
     waveform: LearntWaveform
-    learnt: FourierSeries
+    straight_series: FourierSeries
     beside_percent: float
 
 
