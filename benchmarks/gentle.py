@@ -36,7 +36,7 @@ PERCENT = (0.05, 0.3, 1.0)
 
 def table() -> tuple[list[str], float]:
     """Rows of Markdown, and the largest ratio."""
-    rows = ["| directions, turn, window | H | allowed [%] | window, leaves | gentlest | optimum | ratio |"]
+    rows = ["| directions, turn, window | H | allowed [%] | window, leaves | minimum | optimum | ratio |"]
     rows.append("|---|---|---|---|---|---|---|")
     worst = 0.0
     for name, straight in LINES.items():

@@ -69,7 +69,7 @@ def _hold(line: LinePlan) -> str:
 
 def _method(line: LinePlan) -> str:
     low, high = line.band_limit.window
-    allowed = "" if line.kept_percent is None else f", gentlest at {line.kept_percent:.3g} %"
+    allowed = "" if line.kept_percent is None else f", minimum acceleration at {line.kept_percent:.3g} %"
     return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}{allowed}"
 
 

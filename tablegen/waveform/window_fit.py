@@ -1,4 +1,4 @@
-"""The band-limited waveform that is straight where the image is taken, and gentle where it is not.
+"""The band-limited waveform that is straight where the image is taken, and of low acceleration where it is not.
 
 Minimised over the coefficients c::
 

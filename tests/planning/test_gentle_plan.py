@@ -197,7 +197,7 @@ def test_what_an_operator_s_line_cannot_keep_says_what_it_can(tmp_path: Path, as
 def test_show_prints_the_ratio_to_the_optimum(tmp_path: Path) -> None:
     setup = setup_of(tmp_path, {E: "0.3"})
     shown = run("show", setup.scan_file.name, "--optimum", "--no-plot").out
-    assert "window 0.1..0.9 both, gentlest at 0.3 %" in shown
+    assert "window 0.1..0.9 both, minimum acceleration at 0.3 %" in shown
     ratios = re.findall(r"acceleration +at most (\S+) of the line a period squared, (\S+) of the optimum (\S+)", shown)
     assert len(ratios) == 2
     peak, ratio, optimum = map(float, ratios[0])
