@@ -76,12 +76,12 @@ static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uin
         track = dac_track_of(table, at, step);
 #endif
 
-    DAC_OPAQUE(half);
+    DAC_HIDE_FROM_OPTIMIZER(half);
     while (done < ticks) {
         const uint32_t length = dac_block_of(ticks - done);
         const int32_t base = code - bank->run_half;
         dac_output *stop = out + length * DAC_STRIDE;
-        uint32_t strayed = 0;
+        uint32_t out_of_window = 0;
 
         if (!dac_has_room(bank, base))
             break;
@@ -89,24 +89,24 @@ static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uin
             int32_t sample;
 #if DAC_SPLINE
             if (cubic) {
-                DAC_OPAQUE(gain);
-                sample = dac_track_on(&track);
+                DAC_HIDE_FROM_OPTIMIZER(gain);
+                sample = dac_track_next(&track);
             } else
 #endif
             {
                 const uint32_t high = (uint32_t)(at >> 32);
                 DAC_NEIGHBOURS(table, high >> 15, here, there);
-                sample = dac_between(here, there, high & 0x7fffu, guard, half);
+                sample = dac_lerp(here, there, high & 0x7fffu, guard, half);
             }
             code = (int32_t)((offset + (int64_t)gain * sample) >> 32);
-            strayed |= (uint32_t)(code - base);
+            out_of_window |= (uint32_t)(code - base);
             *out = (dac_output)code;
             if (!cubic)
                 at += step;
             out += DAC_STRIDE;
-            DAC_OPAQUE(out);
+            DAC_HIDE_FROM_OPTIMIZER(out);
         } while (out != stop);
-        if (strayed >> bank->run_bits != 0)
+        if (out_of_window >> bank->run_bits != 0)
             break;
         axis->code = code;
         done += length;
@@ -127,7 +127,7 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 #else
 
 #if DAC_SPLINE
-DAC_APART uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                                uint32_t ticks)
 {
     return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, true, NULL);

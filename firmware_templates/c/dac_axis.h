@@ -57,7 +57,7 @@ static inline void dac_advance(dac_position *at, const dac_position *step)
 
 /* The sample between two words: guard bits below the LSB of a word, rounded to nearest, ties up. `half` is DAC_HALF(guard). */
 #define DAC_HALF(guard) ((dac_wide)1 << (14u - (guard)))
-static inline int32_t dac_between(int32_t here, int32_t there, uint32_t fraction, unsigned guard, dac_wide half)
+static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard, dac_wide half)
 {
     const dac_wide rise = ((dac_wide)(there - here) * (dac_wide)fraction + half) >> (15u - guard);
     return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
@@ -122,14 +122,14 @@ static inline dac_segment dac_segment_of(const dac_word *words)
 }
 
 /* The sample at a fraction of 18 bits. */
-static inline int32_t dac_along(const dac_segment *s, uint32_t fraction)
+static inline int32_t dac_spline_eval(const dac_segment *s, uint32_t fraction)
 {
     const dac_factor by = DAC_FACTOR(fraction);
     return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, by), by), by);
 }
 #endif
 
-static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
+static inline dac_output dac_encode(const dac_axis *axis, int32_t code)
 {
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
 }

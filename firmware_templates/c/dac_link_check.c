@@ -306,11 +306,11 @@ static int32_t advance_code(const dac_link *l, const struct output *o, unsigned 
 #if DAC_SPLINE
     if (o->cubic) {
         const dac_segment segment = dac_segment_of(o->table + index);
-        return code(o, dac_along(&segment, phase << index_bits >> 14));
+        return code(o, dac_spline_eval(&segment, phase << index_bits >> 14));
     }
 #endif
     const int32_t here = o->table[index], there = o->table[(index + 1) & (o->length - 1)];
-    return code(o, dac_between(here, there, phase << index_bits >> 17, o->guard, DAC_HALF(o->guard)));
+    return code(o, dac_lerp(here, there, phase << index_bits >> 17, o->guard, DAC_HALF(o->guard)));
 }
 
 /* Every advance of a period that is not much longer than its table. */

@@ -18,9 +18,9 @@ struct dac_pair {
 
 /* Hides a value from the optimiser, so that the compiler neither computes it in advance nor computes it again. */
 #if defined(__GNUC__)
-#define DAC_OPAQUE(value) __asm__("" : "+r"(value))
+#define DAC_HIDE_FROM_OPTIMIZER(value) __asm__("" : "+r"(value))
 #else
-#define DAC_OPAQUE(value) (void)0
+#define DAC_HIDE_FROM_OPTIMIZER(value) (void)0
 #endif
 
 /* The sample at a position, of which it takes the upper word. */
@@ -29,12 +29,12 @@ static inline int32_t dac_sample_at(const dac_bank_axis *bank, uint32_t high)
 #if DAC_SPLINE
     if (bank->cubic) {
         const dac_segment segment = dac_segment_of(bank->table + (high >> 18));
-        return dac_along(&segment, high & 0x3ffffu);
+        return dac_spline_eval(&segment, high & 0x3ffffu);
     }
 #endif
     const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
     const unsigned guard = DAC_GUARD(bank);
-    return dac_between(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
+    return dac_lerp(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
 }
 
 #if DAC_SPLINE
@@ -60,14 +60,14 @@ static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_
 }
 
 /* Moves to the next tick, and returns its sample. */
-static inline int32_t dac_track_on(dac_track *track)
+static inline int32_t dac_track_next(dac_track *track)
 {
     const uint32_t before = (uint32_t)(track->way >> 32);
 
     track->way += track->step;
     if ((uint32_t)(track->way >> 32) < before) /* an overflow, since a step is below 2^63 */
         track->segment = dac_segment_of(track->next++);
-    return dac_along(&track->segment, (uint32_t)(track->way >> 46));
+    return dac_spline_eval(&track->segment, (uint32_t)(track->way >> 46));
 }
 
 #endif
@@ -86,11 +86,11 @@ static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 
 /* Copied to where the order is known, and the bits of a remainder. */
 #if defined(__GNUC__)
-#define DAC_COPIED static inline __attribute__((always_inline))
-#define DAC_APART static __attribute__((noinline)) /* a loop that gets all of the registers */
+#define DAC_ALWAYS_INLINE static inline __attribute__((always_inline))
+#define DAC_NOINLINE static __attribute__((noinline)) /* a loop that gets all of the registers */
 #else
-#define DAC_COPIED static inline
-#define DAC_APART static
+#define DAC_ALWAYS_INLINE static inline
+#define DAC_NOINLINE static
 #endif
 
 /* The remainders here have half a code more, so that none is negative. What is fed back has half a code more then too, since all
@@ -99,7 +99,7 @@ static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 #define DAC_WEIGHT(bank) ((bank)->zero + 64) /* of e1 - e2 in the third order, in 1/64: that of docs/sequencer.md and its zero */
 
 /* From a code with its remainder to what is fed back to the next one. */
-DAC_COPIED dac_shaper dac_followed(dac_shaper last, uint32_t fed, uint32_t mask, unsigned order, int32_t weight)
+DAC_ALWAYS_INLINE dac_shaper dac_shaper_next(dac_shaper last, uint32_t fed, uint32_t mask, unsigned order, int32_t weight)
 {
     dac_shaper next;
 

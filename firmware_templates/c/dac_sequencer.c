@@ -348,8 +348,8 @@ static void one_tick(dac_sequencer *s, dac_tick *out)
     out->markers = (uint8_t)((s->running ? play(s) : rest(s)) | swapped);
     s->markers = out->markers;
     out->faults = s->faults;
-    out->x = dac_coded(&s->x, s->x.code);
-    out->y = dac_coded(&s->y, s->y.code);
+    out->x = dac_encode(&s->x, s->x.code);
+    out->y = dac_encode(&s->y, s->y.code);
 }
 
 void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
@@ -408,7 +408,7 @@ static void encode(const dac_axis *axis, dac_output *out, uint32_t ticks)
     if (axis->flip == 0 && axis->shift == 0)
         return;
     for (; ticks != 0; ticks--, out += DAC_STRIDE)
-        *out = dac_coded(axis, (int32_t)*out);
+        *out = dac_encode(axis, (int32_t)*out);
 }
 
 void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks)

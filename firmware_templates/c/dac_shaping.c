@@ -10,7 +10,7 @@ int32_t dac_axis_shaped_code(dac_axis *axis, const dac_bank_axis *bank, int32_t 
     const int64_t sum = (int64_t)bank->gain * sample + bank->offset - ((int64_t)1 << (bank->gain_q - 1));
     const uint32_t fed = (uint32_t)(sum >> (bank->gain_q - bits)) + axis->shaper.back;
 
-    axis->shaper = dac_followed(axis->shaper, fed, (UINT32_C(1) << bits) - 1, bank->order, DAC_WEIGHT(bank));
+    axis->shaper = dac_shaper_next(axis->shaper, fed, (UINT32_C(1) << bits) - 1, bank->order, DAC_WEIGHT(bank));
     return (int32_t)fed >> bits;
 }
 
@@ -27,7 +27,7 @@ int32_t dac_axis_shaped_code(dac_axis *axis, const dac_bank_axis *bank, int32_t 
 #else
 #define CUT(rise) (rise) &= ~INT32_C(0x7ff)
 #endif
-DAC_COPIED int32_t sample_of(int32_t here, int32_t there, uint32_t fraction, int32_t half)
+DAC_ALWAYS_INLINE int32_t sample_of(int32_t here, int32_t there, uint32_t fraction, int32_t half)
 {
     int32_t rise = (there - here) * (int32_t)fraction + half;
     CUT(rise);
@@ -39,13 +39,13 @@ DAC_COPIED int32_t sample_of(int32_t here, int32_t there, uint32_t fraction, int
 
 #else
 
-#define SAMPLE(here, there, fraction) dac_between(here, there, fraction, guard, half)
+#define SAMPLE(here, there, fraction) dac_lerp(here, there, fraction, guard, half)
 #define OF_SPLINE(sample) (sample)
 #define BELOW (bank->gain_q - bits)
 
 #endif
 
-DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                      uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
 {
     const dac_word *const table = bank->table;
@@ -64,13 +64,13 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
     (void)cubic;
 #endif
 
-    DAC_OPAQUE(half);
+    DAC_HIDE_FROM_OPTIMIZER(half);
     while (done < ticks) {
         const uint32_t length = dac_block_of(ticks - done);
         const int32_t base = axis->code - bank->run_half;
         const volatile int64_t offset = bank->run_offset - (int64_t)base * ((int64_t)1 << (bits + BELOW));
         dac_output *stop = out + length * DAC_STRIDE;
-        uint32_t strayed = 0;
+        uint32_t out_of_window = 0;
 
         if (!dac_has_room(bank, base))
             break;
@@ -78,7 +78,7 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
             int32_t sample;
 #if DAC_SPLINE
             if (cubic)
-                sample = OF_SPLINE(dac_track_on(&track));
+                sample = OF_SPLINE(dac_track_next(&track));
             else
 #endif
             {
@@ -88,14 +88,14 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
             }
             const int64_t sum = offset + (int64_t)gain * sample;
             const uint32_t fed = (uint32_t)(sum >> BELOW) + shaper.back;
-            shaper = dac_followed(shaper, fed, mask, order, weight);
-            strayed |= fed;
+            shaper = dac_shaper_next(shaper, fed, mask, order, weight);
+            out_of_window |= fed;
             *out = (dac_output)((fed >> bits) + (uint32_t)base);
             at += step;
             out += DAC_STRIDE;
-            DAC_OPAQUE(out);
+            DAC_HIDE_FROM_OPTIMIZER(out);
         } while (out != stop);
-        if (strayed >> bits >> bank->run_bits != 0)
+        if (out_of_window >> bits >> bank->run_bits != 0)
             break;
         axis->shaper = shaper;
         axis->code = (int32_t)out[-DAC_STRIDE];
@@ -107,7 +107,7 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
 #else
 
 /* With 32 bits, feeding back in the same loop. */
-DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                      uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
 {
     return dac_play_short(axis, bank, at, step, out, ticks, true, order, bits, cubic, NULL);
@@ -123,21 +123,21 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
 /* From value k of this turn of the loop to its code. The hint keeps gcc from or-ing later, for which it has no registers. */
 #define FEED(k)                                                                                                       \
     fed = (values[k] >> DAC_BELOW) + shaper.back;                                                                     \
-    strayed |= fed;                                                                                                   \
-    DAC_AT_HAND(strayed);                                                                                             \
-    shaper = dac_followed(shaper, fed, mask, order, weight);                                                          \
+    out_of_window |= fed;                                                                                                   \
+    DAC_LOW_REGISTER(out_of_window);                                                                                             \
+    shaper = dac_shaper_next(shaper, fed, mask, order, weight);                                                          \
     out[(k) * DAC_STRIDE] = (dac_output)((fed >> bits) + base);
 #define TURN(ticks)                                                                                                   \
     values += (ticks);                                                                                                \
     out += (ticks) * DAC_STRIDE;                                                                                      \
-    DAC_OPAQUE(out);
+    DAC_HIDE_FROM_OPTIMIZER(out);
 
 /* With `fours` a whole block goes by four ticks a turn: remainders then need not move from register to register. */
-DAC_COPIED bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end, dac_output *out,
+DAC_ALWAYS_INLINE bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end, dac_output *out,
                      const unsigned order, const unsigned bits, const bool fours)
 {
     const uint32_t base = (uint32_t)(axis->code - bank->run_half), mask = (UINT32_C(1) << bits) - 1;
-    uint32_t strayed = 0, fed;
+    uint32_t out_of_window = 0, fed;
     int32_t weight = DAC_WEIGHT(bank);
     dac_shaper shaper = axis->shaper;
 
@@ -151,12 +151,12 @@ DAC_COPIED bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *
         } while (values != end);
     } else {
         do {
-            DAC_AT_HAND(weight);
+            DAC_LOW_REGISTER(weight);
             FEED(0)
             TURN(1)
         } while (values != end);
     }
-    if (strayed >> bits >> bank->run_bits != 0)
+    if (out_of_window >> bits >> bank->run_bits != 0)
         return false;
     axis->shaper = shaper;
     axis->code = (int32_t)out[-DAC_STRIDE];
@@ -192,20 +192,20 @@ static dac_feeder feeder_of(const dac_bank_axis *bank)
 }
 
 /* One remainder is fed back in the same loop. */
-DAC_APART uint32_t play_first(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_NOINLINE uint32_t play_first(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                               uint32_t ticks)
 {
     return play(axis, bank, at, step, out, ticks, 1, 12, false);
 }
 
-DAC_APART uint32_t play_lines(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_NOINLINE uint32_t play_lines(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                               uint32_t ticks)
 {
     return dac_play_short(axis, bank, at, step, out, ticks, true, 0, bank->remainder_bits, false, feeder_of(bank));
 }
 
 #if DAC_SPLINE
-DAC_APART uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                                uint32_t ticks)
 {
     return dac_play_short(axis, bank, at, step, out, ticks, true, 0, bank->remainder_bits, true, feeder_of(bank));

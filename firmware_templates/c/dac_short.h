@@ -13,16 +13,16 @@
 /* A Cortex-M0 adds and compares with all of its registers, and does everything else with eight: what is only added or compared is
  * put aside, and the step is read again for every sample. */
 #if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__) && !defined(__OPTIMIZE_SIZE__)
-#define DAC_ASIDE(value) __asm__("" : "+h"(value))
-#define DAC_AT_HAND(value) __asm__("" : "+l"(value))
-#define DAC_READ_AGAIN volatile
+#define DAC_HIGH_REGISTER(value) __asm__("" : "+h"(value))
+#define DAC_LOW_REGISTER(value) __asm__("" : "+l"(value))
+#define DAC_RELOAD volatile
 #ifndef DAC_FEW_REGISTERS
 #define DAC_FEW_REGISTERS 1
 #endif
 #else
-#define DAC_ASIDE(value) (void)0
-#define DAC_AT_HAND(value) (void)0
-#define DAC_READ_AGAIN
+#define DAC_HIGH_REGISTER(value) (void)0
+#define DAC_LOW_REGISTER(value) (void)0
+#define DAC_RELOAD
 #ifndef DAC_FEW_REGISTERS
 #define DAC_FEW_REGISTERS 0 /* 1 by a test of what it chooses */
 #endif
@@ -50,23 +50,23 @@ typedef bool (*dac_feeder)(dac_axis *axis, const dac_bank_axis *bank, const uint
 /* From `rise` to the output, or to the values for the feeder. */
 #define DAC_PUT_CODE                                                                                                  \
     value = gain * rise + rest;                                                                                       \
-    risen |= rise;                                                                                                    \
+    rise_or |= rise;                                                                                                    \
     if (later) {                                                                                                      \
         *place++ = value;                                                                                             \
     } else {                                                                                                          \
         DAC_FEED_BACK                                                                                                 \
-        strayed |= value;                                                                                             \
+        out_of_window |= value;                                                                                             \
         last = (value >> bits) + (uint32_t)base;                                                                      \
         *out = (dac_output)last;                                                                                      \
         out += DAC_STRIDE;                                                                                            \
-        DAC_OPAQUE(out);                                                                                              \
+        DAC_HIDE_FROM_OPTIMIZER(out);                                                                                              \
     }
 #define DAC_MORE (later ? place != end : out != stop)
 #if DAC_SHAPING
 #define DAC_FEED_BACK                                                                                                 \
     if (shaped) {                                                                                                     \
         value = (value >> DAC_BELOW) + shaper.back;                                                                   \
-        shaper = dac_followed(shaper, value, mask, order, weight);                                                      \
+        shaper = dac_shaper_next(shaper, value, mask, order, weight);                                                      \
     }
 #else
 #define DAC_FEED_BACK
@@ -74,12 +74,12 @@ typedef bool (*dac_feeder)(dac_axis *axis, const dac_bank_axis *bank, const uint
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. `bits` are those below a code: of a
  * shaped one its remainder's, else gain_q. With a feeder, that feeds back, and `order` is not used. */
-DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                                    uint32_t ticks, const bool shaped, const unsigned order, const unsigned bits,
                                    const bool cubic, const dac_feeder feeder)
 {
     const dac_word *const table = bank->table;
-    const DAC_READ_AGAIN uint64_t advance = step;
+    const DAC_RELOAD uint64_t advance = step;
 #if DAC_SHAPING
     const uint32_t gain = (uint32_t)(shaped ? bank->run_gain : bank->gain), mask = (UINT32_C(1) << bits) - 1;
     const int64_t offset = shaped ? bank->run_offset : bank->offset;
@@ -118,14 +118,14 @@ DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, ui
         dac_output *stop = out + length * DAC_STRIDE;
         uint32_t values[DAC_RUN], *place = values;
         const uint32_t *const end = values + length;
-        uint32_t strayed = 0, risen = 0, rise;
+        uint32_t out_of_window = 0, rise_or = 0, rise;
 
         if (!dac_has_room(bank, base))
             break;
 #if DAC_SPLINE
         if (cubic) {
             do {
-                rise = (uint32_t)dac_track_on(&track) - origin;
+                rise = (uint32_t)dac_track_next(&track) - origin;
                 DAC_PUT_CODE
             } while (DAC_MORE);
         } else
@@ -137,14 +137,14 @@ DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, ui
             low += (uint32_t)here << 15;
             do {
                 if (!shaped || later)
-                    DAC_ASIDE(low);
+                    DAC_HIGH_REGISTER(low);
                 if (!shaped) {
-                    DAC_ASIDE(base);
-                    DAC_ASIDE(stop);
+                    DAC_HIGH_REGISTER(base);
+                    DAC_HIGH_REGISTER(stop);
                 }
                 if (later) {
-                    DAC_AT_HAND(slope);
-                    DAC_AT_HAND(risen);
+                    DAC_LOW_REGISTER(slope);
+                    DAC_LOW_REGISTER(rise_or);
                 }
                 rise = (slope * ((uint32_t)(at >> 32) & 0x7fffu) + low) >> DAC_ABOVE;
                 at += advance;
@@ -155,10 +155,10 @@ DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, ui
         {
             do {
                 if (!shaped || later)
-                    DAC_ASIDE(low);
+                    DAC_HIGH_REGISTER(low);
                 if (!shaped) {
-                    DAC_ASIDE(base);
-                    DAC_ASIDE(stop);
+                    DAC_HIGH_REGISTER(base);
+                    DAC_HIGH_REGISTER(stop);
                 }
                 const uint32_t high = (uint32_t)(at >> 32);
                 DAC_NEIGHBOURS(table, high >> 15, here, there);
@@ -168,11 +168,11 @@ DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, ui
             } while (DAC_MORE);
         }
         if (later) {
-            if (risen > 2 * spread - 1 || !feeder(axis, bank, values, end, out))
+            if (rise_or > 2 * spread - 1 || !feeder(axis, bank, values, end, out))
                 break;
             out = stop;
         } else {
-            if (strayed >> bits >> bank->run_bits != 0 || risen > 2 * spread - 1)
+            if (out_of_window >> bits >> bank->run_bits != 0 || rise_or > 2 * spread - 1)
                 break;
 #if DAC_SHAPING
             if (shaped)

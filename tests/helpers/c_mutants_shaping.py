@@ -55,10 +55,10 @@ MUTANTS: tuple[Mutant, ...] = (
                 "fed, (UINT32_C(2) << bits) - 1, bank",
             ),
             "the window of a shaped run is twice as wide": (
-                "if (strayed >> bits >> bank->run_bits != 0)\n            break;",
-                "if (strayed >> bits >> bank->run_bits > 1)\n            break;",
+                "if (out_of_window >> bits >> bank->run_bits != 0)\n            break;",
+                "if (out_of_window >> bits >> bank->run_bits > 1)\n            break;",
             ),
-            "only the last code of a shaped run counts": ("            strayed |= fed;", "            strayed = fed;"),
+            "only the last code of a shaped run counts": ("            out_of_window |= fed;", "            out_of_window = fed;"),
         },
     ),
     *changed(
@@ -66,10 +66,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped few",
         {
             "few: a block is not held in its window": (
-                "    if (strayed >> bits >> bank->run_bits != 0)\n        return false;\n",
+                "    if (out_of_window >> bits >> bank->run_bits != 0)\n        return false;\n",
                 "",
             ),
-            "few: only the last code of a block counts": ("    strayed |= fed;  ", "    strayed = fed;  "),
+            "few: only the last code of a block counts": ("    out_of_window |= fed;  ", "    out_of_window = fed;  "),
             "few: a block forgets its remainders": ("    axis->shaper = shaper;\n    axis->code", "    axis->code"),
             "few: a block's codes are not followed": (
                 "    axis->code = (int32_t)out[-DAC_STRIDE];\n    return",
@@ -90,7 +90,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped few",
         {
             "few: blocks follow each other on the same place": ("            out = stop;\n", ""),
-            "few: a block that is refused is played": ("risen > 2 * spread - 1 || !feeder(axis", "feeder(axis"),
+            "few: a block that is refused is played": ("rise_or > 2 * spread - 1 || !feeder(axis", "feeder(axis"),
         },
     ),
     *changed(
@@ -98,8 +98,8 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped short",
         {
             "short: a shaped run is not held in its window": (
-                "strayed >> bits >> bank->run_bits != 0 || risen",
-                "risen",
+                "out_of_window >> bits >> bank->run_bits != 0 || rise_or",
+                "rise_or",
             ),
             "short: a shaped run may begin anywhere": (
                 "first + (half >> 1) >= half",
