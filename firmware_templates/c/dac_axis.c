@@ -130,7 +130,9 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                                uint32_t ticks)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, true, NULL);
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
 
@@ -141,7 +143,9 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
     if (bank->cubic)
         return play_spline(axis, bank, at, step, out, ticks);
 #endif
-    return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, false, NULL);
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #endif

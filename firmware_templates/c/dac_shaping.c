@@ -110,7 +110,9 @@ DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint6
 DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                      uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, true, order, bits, cubic, NULL);
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, cubic, order, bits, NULL};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #endif
@@ -201,14 +203,18 @@ DAC_NOINLINE uint32_t play_first(dac_axis *axis, const dac_bank_axis *bank, uint
 DAC_NOINLINE uint32_t play_lines(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                               uint32_t ticks)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, true, 0, bank->remainder_bits, false, feeder_of(bank));
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, false, 0, bank->remainder_bits, feeder_of(bank)};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #if DAC_SPLINE
 DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                                uint32_t ticks)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, true, 0, bank->remainder_bits, true, feeder_of(bank));
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, true, 0, bank->remainder_bits, feeder_of(bank)};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
 

@@ -151,15 +151,15 @@ MUTANTS: tuple[Mutant, ...] = (
         "cubic short",
         {
             "short: a run's spline begins a segment late": (
-                "track = dac_track_of(table, at, step)",
-                "track = dac_track_of(table + 1, at, step)",
+                "track = dac_track_of(table, at, s.step)",
+                "track = dac_track_of(table + 1, at, s.step)",
             ),
             "short: a run's spline rises by a unit more": (
                 "dac_track_next(&track) - origin",
                 "dac_track_next(&track) - origin + 1u",
             ),
             "short: a run of a spline is not held in its window": (
-                "            if (out_of_window >> bits >> bank->run_bits != 0 || ",
+                "            if (b.out_of_window >> kind.bits >> bank->run_bits != 0 || ",
                 "            if (",
             ),
         },
@@ -231,10 +231,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "short",
         {
-            "short: the slew guard is not heeded": "out_of_window >> bits >> bank->run_bits != 0 || ",
+            "short: the slew guard is not heeded": "b.out_of_window >> kind.bits >> bank->run_bits != 0 || ",
             "short: the first of two words is lost": "            low += (uint32_t)here << 15;\n",
             "short: codes follow no run": (
-                "            axis->code = shaped ? (int32_t)out[-DAC_STRIDE] : (int32_t)last;\n"
+                "            axis->code = kind.shaped ? (int32_t)b.out[-DAC_STRIDE] : (int32_t)b.last;\n"
             ),
         },
     ),
@@ -242,13 +242,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "short",
         {
-            "short: only the last code counts": ("    out_of_window |= value; ", "    out_of_window = value; "),
+            "short: only the last code counts": ("    b->out_of_window |= value;", "    b->out_of_window = value;"),
             "short: a window is twice as wide": (
-                "out_of_window >> bits >> bank->run_bits != 0",
-                "out_of_window >> bits >> bank->run_bits > 1",
+                "b.out_of_window >> kind.bits >> bank->run_bits != 0",
+                "b.out_of_window >> kind.bits >> bank->run_bits > 1",
             ),
-            "short: two words for all ticks": ("(at + (DAC_RUN - 1) * step) >> 47 == at >> 47", "true"),
-            "short: two words for too many ticks": ("(DAC_RUN - 1) * step", "DAC_RUN / 2 * step"),
+            "short: two words for all ticks": ("(at + (DAC_RUN - 1) * s.step) >> 47 == at >> 47", "true"),
+            "short: two words for too many ticks": ("(DAC_RUN - 1) * s.step", "DAC_RUN / 2 * s.step"),
             "short: the offset is lost": ("+ (uint32_t)offset - ", "- "),
         },
     ),
@@ -288,14 +288,14 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "checks short",
         {
-            "short: a wide rise is not seen": " || rise_or > 2 * spread - 1",
+            "short: a wide rise is not seen": " || b.rise_or > 2 * spread - 1",
         },
     ),
     *changed(
         "dac_short.h",
         "checks short",
         {
-            "short: only the last rise counts": ("    rise_or |= rise; ", "    rise_or = rise; "),
+            "short: only the last rise counts": ("    b->rise_or |= rise;", "    b->rise_or = rise;"),
             "short: a run may begin anywhere": (
                 "(first + half) >> bank->run_bits != 0",
                 "false",

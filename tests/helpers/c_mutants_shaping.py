@@ -89,8 +89,8 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "shaped few",
         {
-            "few: blocks follow each other on the same place": ("            out = stop;\n", ""),
-            "few: a block that is refused is played": ("rise_or > 2 * spread - 1 || !feeder(axis", "feeder(axis"),
+            "few: blocks follow each other on the same place": ("            b.out = b.stop;\n", ""),
+            "few: a block that is refused is played": ("b.rise_or > 2 * spread - 1 || !kind.feeder(axis", "kind.feeder(axis"),
         },
     ),
     *changed(
@@ -98,8 +98,8 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped short",
         {
             "short: a shaped run is not held in its window": (
-                "out_of_window >> bits >> bank->run_bits != 0 || rise_or",
-                "rise_or",
+                "b.out_of_window >> kind.bits >> bank->run_bits != 0 || b.rise_or",
+                "b.rise_or",
             ),
             "short: a shaped run may begin anywhere": (
                 "first + (half >> 1) >= half",
