@@ -1,5 +1,7 @@
 /* One axis: the code of one tick, and the fast path for many ticks at once. */
+#include "dac_axis.h"
 #include "dac_run.h"
+#include "dac_shaping.h"
 #include "dac_short.h"
 
 bool dac_axis_serves(const dac_converter *c)
@@ -26,7 +28,7 @@ static inline int32_t unclamped(dac_axis *axis, const dac_bank_axis *bank)
     const int32_t sample = dac_sample_at(bank, axis->at.high);
 #if DAC_SHAPING
     if (bank->order != 0)
-        return dac_axis_shaped_code(axis, bank, sample);
+        return dac_shaping_code(axis, bank, sample);
 #else
     (void)axis;
 #endif
@@ -47,19 +49,20 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 
 /* The fast path has one check of clamp and slew guard for DAC_RUN ticks.
  *
- * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most max_step + 1 wide and
- * inside the limits. If all codes of a run are in it, any two of them differ by max_step at most, and no limit is met:
- * clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has no bit above run_bits; the bits of all
- * codes are or-ed together, and looked at once.
+ * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most
+ * max_step + 1 wide and inside the limits. If all codes of a run are in it, any two of them differ by max_step at most,
+ * and no limit is met: clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has
+ * no bit above run_bits; the bits of all codes are or-ed together, and looked at once.
  *
- * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the exact one, and
- * every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which is 1 / period away or more. */
+ * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the
+ * exact one, and every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which
+ * is 1 / period away or more. */
 
 #if DAC_LONG_MULTIPLY
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
-static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                                  uint32_t ticks, bool cubic)
+static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks, bool cubic)
 {
     const dac_word *const table = bank->table;
     /* Read again for every sample: a constant would take two registers, which the loop does not have. */
@@ -127,8 +130,8 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 #else
 
 #if DAC_SPLINE
-DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                               uint32_t ticks)
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks)
 {
     const dac_stretch stretch = {at, step, out, ticks};
     const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL};
@@ -151,7 +154,7 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 #endif
 
 #if DAC_SHAPING
-#define PLAY(bank) ((bank)->order != 0 ? dac_axis_shaped_play : play)
+#define PLAY(bank) ((bank)->order != 0 ? dac_shaping_play : play)
 #else
 #define PLAY(bank) play
 #endif

@@ -1,4 +1,4 @@
-/* Private to the runtime: runs of an axis, shaped or not, where a product of 64 bits is dear. */
+/* Private to the runtime: runs of an axis, shaped or not, where 64-bit multiplication is slow. */
 #ifndef DAC_SHORT_H
 #define DAC_SHORT_H
 
@@ -10,8 +10,8 @@
 #define DAC_ABOVE (32 - (DAC_SAMPLE_BITS + 1)) /* where the sum of an interpolation has the LSB of the sample */
 #define DAC_BELOW 8 /* bits of a value below those that a remainder has */
 
-/* A Cortex-M0 adds and compares with all of its registers, and does everything else with eight: what is only added or compared is
- * put aside, and the step is read again for every sample. */
+/* A Cortex-M0 adds and compares with all of its registers, and does everything else with the lower eight: variables
+ * that are only added or compared go to the upper ones, and the step is read from memory for every sample. */
 #if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__) && !defined(__OPTIMIZE_SIZE__)
 #define DAC_HIGH_REGISTER(value) __asm__("" : "+h"(value))
 #define DAC_LOW_REGISTER(value) __asm__("" : "+l"(value))
@@ -28,19 +28,22 @@
 #endif
 #endif
 
-/* The fast path of dac_axis.c with 32 bits. Codes that are in the window differ from `base` so little that 32 bits hold them with
- * all their fraction bits; what matters is that a code outside is not taken for one inside, since 32 bits wrap.
+/* The fast path of dac_axis.c with 32 bits. Codes that are in the window differ from `base` so little that 32 bits hold
+ * them with all their fraction bits; what matters is that a code outside is not taken for one inside, since 32 bits
+ * wrap.
  *
- * Let s be a sample and s0 an earlier one whose value is in the window; rise = s - s0 + 2^spread, from 21 bits of a line and 32 of a
- * spline; and the exact value T(s) = gain s + offset - base 2^below, so that the code is in the window if 0 <= T < 2^(below + run_bits)
- * <= 2^31. Samples have 20 bits, so that `rise` is below 2^(spread + 1) only if |s - s0| <= 2^spread (spread <= 19). Then T(s) differs
- * from T(s0) by |gain| 2^spread <= 2^31 at most, and is within -2^31..2^32: its lower 32 bits are below 2^31 only if it is in 0..2^31.
+ * Let s be a sample and s0 an earlier one whose value is in the window; rise = s - s0 + 2^spread, from 21 bits of a
+ * line and 32 of a spline; and the exact value T(s) = gain s + offset - base 2^below, so that the code is in the window
+ * if 0 <= T < 2^(below + run_bits) <= 2^31. Samples have 20 bits, so that `rise` is below 2^(spread + 1) only if |s -
+ * s0| <= 2^spread (spread <= 19). Then T(s) differs from T(s0) by |gain| 2^spread <= 2^31 at most, and is within
+ * -2^31..2^32: its lower 32 bits are below 2^31 only if it is in 0..2^31.
  *
- * Shaped, `below` is 36 - dac_bits, 8 more than a remainder has, and what is checked is the code with what is fed back, which takes 3
- * codes away at most, of a window of 16 codes or more. So it may take a value for one inside only if its lower 32 bits are less than
- * 3 codes above 2^31. Where T is there, the code is right. Where it is 2^32 less, T(s0) would have to be less than 3 codes above the
- * lower end: but that of the first block is in the middle half of the window, and those of others are within 4 codes of its middle,
- * since a code differs from its unrounded value by 4 at most. */
+ * Shaped, `below` is 36 - dac_bits, 8 more than a remainder has, and what is checked is the code with what is fed back,
+ * which takes 3 codes away at most, of a window of 16 codes or more. So it may take a value for one inside only if its
+ * lower 32 bits are less than 3 codes above 2^31. Where T is there, the code is right. Where it is 2^32 less, T(s0)
+ * would have to be less than 3 codes above the lower end: but that of the first block is in the middle half of the
+ * window, and those of others are within 4 codes of its middle, since a code differs from its unrounded value by 4 at
+ * most. */
 
 /* Feeds back the remainders of a block of values, up to `end`, and writes its codes to `out`. Returns false, and leaves
  * the axis as it was, if a code is outside the window. */

@@ -4,7 +4,7 @@ from c_faults import Mutant, changed, removed
 
 MUTANTS: tuple[Mutant, ...] = (
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "fill",
         {
             "the carry of the position is lost": ("(low < step->low ? 1u : 0u)", "0u"),
@@ -18,7 +18,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "wide",
         {
             "wide words have narrow guard bits": (
@@ -28,7 +28,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "checks",
         {
             "a carry too many": ("low < step->low", "low <= step->low"),
@@ -111,7 +111,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "cubic",
         {
             "a spline's sums are rounded down": (" + (int32_t)((uint32_t)product >> 31);", ";"),
@@ -126,7 +126,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "cubic short",
         {
             "short: a spline's sums are rounded down": ("((sum + 512) >> 10)", "(sum >> 10)"),

@@ -58,7 +58,10 @@ MUTANTS: tuple[Mutant, ...] = (
                 "if (out_of_window >> bits >> bank->run_bits != 0)\n            break;",
                 "if (out_of_window >> bits >> bank->run_bits > 1)\n            break;",
             ),
-            "only the last code of a shaped run counts": ("            out_of_window |= fed;", "            out_of_window = fed;"),
+            "only the last code of a shaped run counts": (
+                "            out_of_window |= fed;",
+                "            out_of_window = fed;",
+            ),
         },
     ),
     *changed(
@@ -90,7 +93,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped few",
         {
             "few: blocks follow each other on the same place": ("            b.out = b.stop;\n", ""),
-            "few: a block that is refused is played": ("b.rise_or > 2 * spread - 1 || !kind.feeder(axis", "kind.feeder(axis"),
+            "few: a block that is refused is played": (
+                "b.rise_or > 2 * spread - 1 || !kind.feeder(axis",
+                "kind.feeder(axis",
+            ),
         },
     ),
     *changed(
