@@ -73,14 +73,6 @@ static inline int32_t dac_track_next(dac_track *track)
 
 #endif
 
-/* The stretch of a waveform that is played: a position, cut to 64 bits and rounded up, the step of a tick, and the
- * place of the first code. */
-typedef struct {
-    uint64_t at, step;
-    dac_output *out;
-    uint32_t ticks;
-} dac_stretch;
-
 /* Returns the ticks of the next block, which one check covers. */
 static inline uint32_t dac_block_of(uint32_t ticks)
 {

@@ -50,6 +50,14 @@
 typedef bool (*dac_feeder)(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,
                            dac_output *out);
 
+/* The stretch of a waveform that is played: a position, cut to 64 bits and rounded up, the step of a tick, and the
+ * place of the first code. */
+typedef struct {
+    uint64_t at, step;
+    dac_output *out;
+    uint32_t ticks;
+} dac_stretch;
+
 /* How a run is played. Callers pass constants, so that the compiler makes a loop of its own for each of them. */
 typedef struct {
     bool shaped, cubic;
