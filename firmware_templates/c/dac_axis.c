@@ -1,5 +1,7 @@
 /* One axis: the code of one tick, and the fast path for many ticks at once. */
+#include "dac_axis.h"
 #include "dac_run.h"
+#include "dac_shaping.h"
 #include "dac_short.h"
 
 bool dac_axis_serves(const dac_converter *c)
@@ -26,7 +28,7 @@ static inline int32_t unclamped(dac_axis *axis, const dac_bank_axis *bank)
     const int32_t sample = dac_sample_at(bank, axis->at.high);
 #if DAC_SHAPING
     if (bank->order != 0)
-        return dac_axis_shaped_code(axis, bank, sample);
+        return dac_shaping_code(axis, bank, sample);
 #else
     (void)axis;
 #endif
@@ -47,19 +49,20 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 
 /* The fast path has one check of clamp and slew guard for DAC_RUN ticks.
  *
- * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most max_step + 1 wide and
- * inside the limits. If all codes of a run are in it, any two of them differ by max_step at most, and no limit is met:
- * clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has no bit above run_bits; the bits of all
- * codes are or-ed together, and looked at once.
+ * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most
+ * max_step + 1 wide and inside the limits. If all codes of a run are in it, any two of them differ by max_step at most,
+ * and no limit is met: clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has
+ * no bit above run_bits; the bits of all codes are or-ed together, and looked at once.
  *
- * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the exact one, and
- * every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which is 1 / period away or more. */
+ * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the
+ * exact one, and every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which
+ * is 1 / period away or more. */
 
 #if DAC_LONG_MULTIPLY
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
-static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                                  uint32_t ticks, bool cubic)
+static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks, bool cubic)
 {
     const dac_word *const table = bank->table;
     /* Read again for every sample: a constant would take two registers, which the loop does not have. */
@@ -76,12 +79,12 @@ static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uin
         track = dac_track_of(table, at, step);
 #endif
 
-    DAC_OPAQUE(half);
+    DAC_HIDE_FROM_OPTIMIZER(half);
     while (done < ticks) {
         const uint32_t length = dac_block_of(ticks - done);
         const int32_t base = code - bank->run_half;
         dac_output *stop = out + length * DAC_STRIDE;
-        uint32_t strayed = 0;
+        uint32_t out_of_window = 0;
 
         if (!dac_has_room(bank, base))
             break;
@@ -89,24 +92,24 @@ static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uin
             int32_t sample;
 #if DAC_SPLINE
             if (cubic) {
-                DAC_OPAQUE(gain);
-                sample = dac_track_on(&track);
+                DAC_HIDE_FROM_OPTIMIZER(gain);
+                sample = dac_track_next(&track);
             } else
 #endif
             {
                 const uint32_t high = (uint32_t)(at >> 32);
                 DAC_NEIGHBOURS(table, high >> 15, here, there);
-                sample = dac_between(here, there, high & 0x7fffu, guard, half);
+                sample = dac_lerp(here, there, high & 0x7fffu, guard, half);
             }
             code = (int32_t)((offset + (int64_t)gain * sample) >> 32);
-            strayed |= (uint32_t)(code - base);
+            out_of_window |= (uint32_t)(code - base);
             *out = (dac_output)code;
             if (!cubic)
                 at += step;
             out += DAC_STRIDE;
-            DAC_OPAQUE(out);
+            DAC_HIDE_FROM_OPTIMIZER(out);
         } while (out != stop);
-        if (strayed >> bank->run_bits != 0)
+        if (out_of_window >> bank->run_bits != 0)
             break;
         axis->code = code;
         done += length;
@@ -127,10 +130,12 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 #else
 
 #if DAC_SPLINE
-DAC_APART uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                               uint32_t ticks)
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, true, NULL);
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
 
@@ -141,13 +146,15 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
     if (bank->cubic)
         return play_spline(axis, bank, at, step, out, ticks);
 #endif
-    return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, false, NULL);
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #endif
 
 #if DAC_SHAPING
-#define PLAY(bank) ((bank)->order != 0 ? dac_axis_shaped_play : play)
+#define PLAY(bank) ((bank)->order != 0 ? dac_shaping_play : play)
 #else
 #define PLAY(bank) play
 #endif

@@ -1,7 +1,7 @@
-/* Tables from Fourier words: s(k) = a0 + sum_n a_n cos(n k) + b_n sin(n k), angles in units of 2 pi / length, in exact integer
- * sums, so that neither the order of the terms nor the use of their symmetries matters.
+/* Tables from Fourier words: s(k) = a0 + sum_n a_n cos(n k) + b_n sin(n k), angles in units of 2 pi / length, in exact
+ * integer sums, so that neither the order of the terms nor the use of their symmetries matters.
  */
-#include "dac_axis.h"
+#include "dac_sequencer.h"
 
 #ifndef DAC_SMALL
 #if defined(__OPTIMIZE_SIZE__)
@@ -52,8 +52,8 @@ static void render(const struct renderer *r, unsigned shift)
 
 #else
 
-/* The terms are summed by n modulo 4, since these sums, with other signs, also belong to length/4 - k, and each of these two k
- * serves length/2 - k, length/2 + k and length - k too: eight words for one walk through the sine table. */
+/* The terms are summed by n modulo 4, since these sums, with other signs, also belong to length/4 - k, and each of
+ * these two k serves length/2 - k, length/2 + k and length - k too: eight words for one walk through the sine table. */
 
 /* Two terms per iteration, for speed. */
 #if defined(__GNUC__) && __GNUC__ >= 8 && !defined(__clang__)
@@ -126,8 +126,8 @@ static inline void put_four(const struct renderer *r, uint32_t k, int64_t cos_ev
     put(r, (r->length - k) & (r->length - 1), same - sum);
 }
 
-/* The words of k and of length/4 - k. There the cosine of n k becomes the sine and the other way round if n is odd, and signs change
- * with n modulo 4. */
+/* The words of k and of length/4 - k. There the cosine of n k becomes the sine and the other way round if n is odd, and
+ * signs change with n modulo 4. */
 static void put_eight(const struct renderer *r, uint32_t k, uint32_t angle)
 {
     struct products n0, n2, odd = {0, 0, 0, 0};
@@ -165,7 +165,8 @@ bool dac_synthesize(dac_word *table, uint32_t room, unsigned index_bits, unsigne
     struct renderer r;
 
     if (index_bits < 3 || index_bits > 16 || room < DAC_TABLE_ROOM(index_bits) || sine_index_bits < index_bits
-        || sine_index_bits > 16 || bits < 8 || bits > 24 || bits > DAC_TABLE_STORAGE_BITS || harmonics < 1 || harmonics > 4096 || !fits(words, 2 * harmonics + 1))
+        || sine_index_bits > 16 || bits < 8 || bits > 24 || bits > DAC_TABLE_STORAGE_BITS || harmonics < 1
+        || harmonics > 4096 || !fits(words, 2 * harmonics + 1))
         return false;
     r.table = table;
     r.sine = sine;

@@ -2,6 +2,7 @@
 #include "dac_link.h"
 
 #include "dac_axis.h"
+#include "dac_barriers.h"
 #include "dac_link_parts.h"
 
 enum { VERSION = 1, MOST_READ = 240, LIMITS = 32 };
@@ -144,7 +145,8 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
     return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
 }
 
-/* Checks the tag of a request that acts, except COMMIT, whose tag covers the image. Uses up the challenge, right or wrong. */
+/* Checks the tag of a request that acts, except COMMIT, whose tag covers the image. Uses up the challenge, right or
+ * wrong. */
 static bool good_tag(dac_link *l, const uint8_t *frame, uint8_t length)
 {
     const uint8_t bytes = (uint8_t)(DAC_LINK_HEADER + plain_bytes(frame[0], length));

@@ -75,8 +75,8 @@ typedef struct {
     const uint8_t *hash;      /* 32 bytes: hash of the program in the firmware, or NULL: unknown */
     bool (*permits)(void);    /* the interlock, or NULL: no interlock */
 
-    /* With a key; docs/protocol.md, "The key", says what it protects from. A request that was recorded must never be right
-     * again: each challenge is made of the identity, the boot count, a counter and random numbers. */
+    /* With a key; docs/protocol.md, "The key", says what it protects from. A request that was recorded must never be
+     * right again: each challenge is made of the identity, the boot count, a counter and random numbers. */
     const uint8_t *identity;  /* what no other device with this key has, such as the serial number of the processor */
     uint8_t identity_bytes;   /* 4..32 */
     bool boot_persists;       /* the boot count is kept without power, and never comes twice */
@@ -187,8 +187,8 @@ typedef struct {
     volatile uint8_t ring[DAC_LINK_RING];
 } dac_link;
 
-/* Call it after dac_sequencer_init(), and before the interrupt of the UART is enabled. `boot` should differ from start to
- * start. The application loads and commits the program of the firmware. A link that was not started is silent. */
+/* Call it after dac_sequencer_init(), and before the interrupt of the UART is enabled. `boot` should differ from start
+ * to start. The application loads and commits the program of the firmware. A link that was not started is silent. */
 dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot);
 
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */
@@ -197,7 +197,8 @@ bool dac_link_receive(dac_link *l, uint8_t byte);
 /* Does a bounded piece of work; the main loop calls it repeatedly. Returns true if there may be more to do. */
 bool dac_link_work(dac_link *l);
 
-/* Returns the next byte to send, or -1. Called by the main loop, or by the interrupt of a UART that is ready to send. */
+/* Returns the next byte to send, or -1. Called by the main loop, or by the interrupt of a UART that is ready to
+ * send. */
 int dac_link_transmit(dac_link *l);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
 /* Answers: refusals, repeated answers, and how they are sent. */
-#include "dac_axis.h"
+#include "dac_barriers.h"
 #include "dac_link_parts.h"
 
 void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why)

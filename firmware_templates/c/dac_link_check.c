@@ -1,5 +1,5 @@
 /* The checks of a program before it is loaded, in slices. tablegen/link/acceptance.py has the same for hosts. */
-#include "dac_axis.h"
+#include "dac_arithmetic.h"
 #include "dac_link_parts.h"
 
 enum { CRC, PROGRAM, FOURIER, RENDER, WORD, RANGE, SLEW, JUMP };
@@ -257,7 +257,8 @@ static void render(const dac_link *l, unsigned axis)
     const uint8_t *const shape = dac_link_shape(&l->image[l->idle], axis);
 
     if (part_of(l, axis)->harmonics != 0)
-        (void)dac_synthesize(here->table[l->idle], here->room, dac_link_index_bits(&l->image[l->idle], axis), shape[1], here->fourier, part_of(l, axis)->harmonics,
+        (void)dac_synthesize(here->table[l->idle], here->room, dac_link_index_bits(&l->image[l->idle], axis), shape[1],
+                             here->fourier, part_of(l, axis)->harmonics,
                              l->config->sine, l->config->sine_index_bits);
 }
 
@@ -306,11 +307,11 @@ static int32_t advance_code(const dac_link *l, const struct output *o, unsigned 
 #if DAC_SPLINE
     if (o->cubic) {
         const dac_segment segment = dac_segment_of(o->table + index);
-        return code(o, dac_along(&segment, phase << index_bits >> 14));
+        return code(o, dac_spline_eval(&segment, phase << index_bits >> 14));
     }
 #endif
     const int32_t here = o->table[index], there = o->table[(index + 1) & (o->length - 1)];
-    return code(o, dac_between(here, there, phase << index_bits >> 17, o->guard, DAC_HALF(o->guard)));
+    return code(o, dac_lerp(here, there, phase << index_bits >> 17, o->guard, DAC_HALF(o->guard)));
 }
 
 /* Every advance of a period that is not much longer than its table. */
@@ -340,7 +341,8 @@ static dac_link_finding check_advances(dac_link *l, unsigned axis, uint32_t adva
         }
     }
     *done = c->at == advances;
-    return *done && distance(c->first, c->before) + excess > max_step ? finding(DAC_LINK_SLEW, axis, advances - 1) : nothing;
+    return *done && distance(c->first, c->before) + excess > max_step ? finding(DAC_LINK_SLEW, axis, advances - 1)
+                                                                      : nothing;
 }
 
 /* For a longer period: the steepest segment. */

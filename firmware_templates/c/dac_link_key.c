@@ -16,8 +16,8 @@ dac_link_started dac_link_judge_key(const dac_link_config *c)
     return c->milliseconds == NULL ? DAC_LINK_NO_CLOCK : DAC_LINK_STARTED;
 }
 
-/* Nobody without the key knows the next nonce. None comes twice if no boot count does, or by chance of the random numbers; none
- * of this device comes from another one, whatever their boot counts and random numbers are. */
+/* Nobody without the key knows the next nonce. None comes twice if no boot count does, or by chance of the random
+ * numbers; none of this device comes from another one, whatever their boot counts and random numbers are. */
 dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a)
 {
     const dac_link_config *const c = l->config;

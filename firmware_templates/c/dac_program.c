@@ -1,5 +1,5 @@
 /* Loads a program: checks it, and derives the values that the sequencer needs. */
-#include "dac_axis.h"
+#include "dac_arithmetic.h"
 
 static bool inside(const dac_window *window, uint32_t length)
 {
@@ -35,7 +35,8 @@ static bool good_length(const dac_axis_program *p)
     return INDEX_BITS(p) >= 3 && INDEX_BITS(p) <= (CUBIC(p) ? 14 : 16) && p->length == UINT32_C(1) << INDEX_BITS(p);
 }
 
-/* Every tick reads a word and the next one, of a cubic table the next three: behind the last one have to stand the first ones again. */
+/* Every tick reads a word and the next one, of a cubic table the next three: behind the last one have to stand the
+ * first ones again. */
 static bool good_table(const dac_axis_program *p)
 {
     return p->table != NULL && p->bits >= 8 && p->bits <= (CUBIC(p) ? 21 : 24) && good_length(p)
@@ -43,7 +44,8 @@ static bool good_table(const dac_axis_program *p)
         && (!CUBIC(p) || (p->table[p->length + 1] == p->table[1] && p->table[p->length + 2] == p->table[2]));
 }
 
-/* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a line. */
+/* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a
+ * line. */
 static bool good_periods(const dac_program *p)
 {
     const uint32_t ticks = p->schedule.line_ticks, lines = p->schedule.frame_lines;
@@ -71,7 +73,8 @@ static bool good_output(const dac_axis_program *p)
 #if DAC_SHAPING
 static bool good_shaping(const dac_axis_program *p)
 {
-    return (p->shaping_zero == 0 || (p->shaping_order == 3 && p->shaping_zero <= 128)) && p->shaping_order <= DAC_SHAPING;
+    return (p->shaping_zero == 0 || (p->shaping_order == 3 && p->shaping_zero <= 128))
+        && p->shaping_order <= DAC_SHAPING;
 }
 #endif
 
@@ -119,8 +122,8 @@ static dac_position power_divided(unsigned zeros, uint32_t divisor)
 }
 
 #if DAC_SHAPING
-/* Gain and offset as dac_axis_shaped_play() needs them: the offset without the half of the rounding, which is fed back. Returns
- * whether they fit. */
+/* Gain and offset as dac_shaping_play() needs them: the offset without the half of the rounding, which is fed back.
+ * Returns whether they fit. */
 static bool scale_shaped(dac_bank_axis *b, const dac_axis_program *p)
 {
 #if DAC_TABLE_STORAGE_BITS != 16

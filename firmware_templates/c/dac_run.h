@@ -1,8 +1,8 @@
-/* Private to the runtime: what the loops share that play many ticks with one check. */
+/* Private to the runtime: shared by the loops that play many ticks with one check. */
 #ifndef DAC_RUN_H
 #define DAC_RUN_H
 
-#include "dac_axis.h"
+#include "dac_arithmetic.h"
 
 #if defined(__ARM_FEATURE_UNALIGNED) && !defined(__ARM_BIG_ENDIAN) && DAC_TABLE_STORAGE_BITS == 16
 /* Reads two neighbouring words with one load. */
@@ -18,34 +18,35 @@ struct dac_pair {
 
 /* Hides a value from the optimiser, so that the compiler neither computes it in advance nor computes it again. */
 #if defined(__GNUC__)
-#define DAC_OPAQUE(value) __asm__("" : "+r"(value))
+#define DAC_HIDE_FROM_OPTIMIZER(value) __asm__("" : "+r"(value))
 #else
-#define DAC_OPAQUE(value) (void)0
+#define DAC_HIDE_FROM_OPTIMIZER(value) (void)0
 #endif
 
-/* The sample at a position, of which it takes the upper word. */
+/* Returns the sample at a position, given by its upper word. */
 static inline int32_t dac_sample_at(const dac_bank_axis *bank, uint32_t high)
 {
 #if DAC_SPLINE
     if (bank->cubic) {
         const dac_segment segment = dac_segment_of(bank->table + (high >> 18));
-        return dac_along(&segment, high & 0x3ffffu);
+        return dac_spline_eval(&segment, high & 0x3ffffu);
     }
 #endif
     const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
     const unsigned guard = DAC_GUARD(bank);
-    return dac_between(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
+    return dac_lerp(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
 }
 
 #if DAC_SPLINE
-/* The way of a run along a spline, with less than half a segment between two ticks: a segment is worked out once. */
+/* Position of a run along a spline. Two ticks are less than half a segment apart; a segment is computed once for all
+ * of its ticks. */
 typedef struct {
     dac_segment segment;
     const dac_word *next; /* the words of the next segment */
-    uint64_t way, step;   /* into the segment, and from tick to tick, in 2^-64 of it */
+    uint64_t way, step;   /* distance into the segment, and from tick to tick, in 2^-64 of a segment */
 } dac_track;
 
-/* Before the first tick, which is at position `at`. */
+/* Returns the track as it is one tick before position `at`. */
 static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_t step)
 {
     const dac_word *const words = table + (at >> 50);
@@ -60,46 +61,48 @@ static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_
 }
 
 /* Moves to the next tick, and returns its sample. */
-static inline int32_t dac_track_on(dac_track *track)
+static inline int32_t dac_track_next(dac_track *track)
 {
     const uint32_t before = (uint32_t)(track->way >> 32);
 
     track->way += track->step;
     if ((uint32_t)(track->way >> 32) < before) /* an overflow, since a step is below 2^63 */
         track->segment = dac_segment_of(track->next++);
-    return dac_along(&track->segment, (uint32_t)(track->way >> 46));
+    return dac_spline_eval(&track->segment, (uint32_t)(track->way >> 46));
 }
 
 #endif
 
-/* Ticks of the next block: one check covers it. */
+/* Returns the ticks of the next block, which one check covers. */
 static inline uint32_t dac_block_of(uint32_t ticks)
 {
     return ticks < DAC_RUN ? ticks : DAC_RUN;
 }
 
-/* Whether a window with this lower end is inside the limits. */
+/* Returns true if a window with this lower end is inside the limits. */
 static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 {
     return (uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room;
 }
 
-/* Copied to where the order is known, and the bits of a remainder. */
+/* For functions that take constants, such as the order of the shaping: each caller gets a copy made for its own. */
 #if defined(__GNUC__)
-#define DAC_COPIED static inline __attribute__((always_inline))
-#define DAC_APART static __attribute__((noinline)) /* a loop that gets all of the registers */
+#define DAC_ALWAYS_INLINE static inline __attribute__((always_inline))
+#define DAC_NOINLINE static __attribute__((noinline)) /* a loop that shares no registers with its caller */
 #else
-#define DAC_COPIED static inline
-#define DAC_APART static
+#define DAC_ALWAYS_INLINE static inline
+#define DAC_NOINLINE static
 #endif
 
-/* The remainders here have half a code more, so that none is negative. What is fed back has half a code more then too, since all
- * orders have a zero at DC: it is the half of the rounding, which need not be added. */
+/* The remainders here have half a code more, so that none is negative. What is fed back has half a code more then too,
+ * since all orders have a zero at DC: it is the half of the rounding, which need not be added. */
 
-#define DAC_WEIGHT(bank) ((bank)->zero + 64) /* of e1 - e2 in the third order, in 1/64: that of docs/sequencer.md and its zero */
+/* Weight of e1 - e2 in the third order, in 1/64: what docs/sequencer.md has of it without a zero, and the zero. */
+#define DAC_WEIGHT(bank) ((bank)->zero + 64)
 
-/* From a code with its remainder to what is fed back to the next one. */
-DAC_COPIED dac_shaper dac_followed(dac_shaper last, uint32_t fed, uint32_t mask, unsigned order, int32_t weight)
+/* Returns what is fed back to the code after `fed`, which is a code with its remainder. */
+DAC_ALWAYS_INLINE dac_shaper dac_shaper_next(dac_shaper last, uint32_t fed, uint32_t mask, unsigned order,
+                                             int32_t weight)
 {
     dac_shaper next;
 

@@ -1,5 +1,11 @@
 /* Requests, program changes, ticks, markers and faults. The arithmetic is in dac_axis.c. */
+#include "dac_arithmetic.h"
 #include "dac_axis.h"
+#include "dac_barriers.h"
+
+#ifndef DAC_WAIT
+#define DAC_WAIT 8 /* ticks that are played one by one after a refused run, before the next run is tried */
+#endif
 
 enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
 enum { NOTHING = 2 };         /* value of `playing` before the first program */
@@ -250,8 +256,8 @@ static uint32_t until_edge(const dac_schedule *plan, uint32_t tick, uint32_t mos
     return most;
 }
 
-/* Of the ticks from s->tick on, up to `most` of them and to the next at which more than pixels changes; returns how many. `clean`:
- * nothing that this tick or an earlier one did spoils the image. */
+/* Of the ticks from s->tick on, up to `most` of them and to the next at which more than pixels changes; returns how
+ * many. `clean`: nothing that this tick or an earlier one did spoils the image. */
 static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *markers, uint32_t most)
 {
     const dac_schedule *const plan = &s->now->schedule;
@@ -348,8 +354,8 @@ static void one_tick(dac_sequencer *s, dac_tick *out)
     out->markers = (uint8_t)((s->running ? play(s) : rest(s)) | swapped);
     s->markers = out->markers;
     out->faults = s->faults;
-    out->x = dac_coded(&s->x, s->x.code);
-    out->y = dac_coded(&s->y, s->y.code);
+    out->x = dac_encode(&s->x, s->x.code);
+    out->y = dac_encode(&s->y, s->y.code);
 }
 
 void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
@@ -408,7 +414,7 @@ static void encode(const dac_axis *axis, dac_output *out, uint32_t ticks)
     if (axis->flip == 0 && axis->shift == 0)
         return;
     for (; ticks != 0; ticks--, out += DAC_STRIDE)
-        *out = dac_coded(axis, (int32_t)*out);
+        *out = dac_encode(axis, (int32_t)*out);
 }
 
 void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks)

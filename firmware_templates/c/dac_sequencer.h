@@ -1,8 +1,8 @@
 /* Plays compensated scan lines on a microcontroller: two axes from one counter, markers, slew guard, two banks.
  *
  * docs/sequencer.md of tablegen defines the arithmetic and what happens on which tick; every code, marker and fault
- * equals its integer model. C99, no heap, no C library. The compiler must provide int64_t, and an arithmetic >> of negative
- * numbers; C99 does not require these, but every compiler for such controllers has them.
+ * equals its integer model. C99, no heap, no C library. The compiler must provide int64_t, and an arithmetic >> of
+ * negative numbers; C99 does not require these, but every compiler for such controllers has them.
  *
  *     static const dac_program scan = DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm);
  *     static dac_sequencer sequencer;
@@ -20,9 +20,9 @@
  *
  * MEMORY ORDER. The producer writes a bank, then a request, then (DAC_RELEASE) the head of the queue of requests; the
  * consumer reads the head, then (DAC_ACQUIRE) the requests and the bank. The other way round the consumer stops to use
- * a bank, then (DAC_RELEASE) publishes what it waits for and the tail of the queue; the producer reads these, then (DAC_ACQUIRE)
- * writes. Each shared word has a single writer and is read and written at once. A bank is therefore never written while it plays,
- * and never played while it is written.
+ * a bank, then (DAC_RELEASE) publishes what it waits for and the tail of the queue; the producer reads these, then
+ * (DAC_ACQUIRE) writes. Each shared word has a single writer and is read and written at once. A bank is therefore never
+ * written while it plays, and never played while it is written.
  */
 #ifndef DAC_SEQUENCER_H
 #define DAC_SEQUENCER_H
@@ -41,7 +41,7 @@ extern "C" {
 #define DAC_TABLE_STORAGE_BITS 16 /* bits of a table word in memory: 16, or 32 for tables of 17 to 24 bits */
 #endif
 #ifndef DAC_OUTPUT_STORAGE_BITS
-#define DAC_OUTPUT_STORAGE_BITS 16 /* bits of a converter word in memory: 16, or 32 for converters with more than 16 bits */
+#define DAC_OUTPUT_STORAGE_BITS 16 /* bits of a converter word in memory: 16, or 32 for converters of 17 to 24 bits */
 #endif
 
 #ifndef DAC_SPLINE
@@ -52,7 +52,7 @@ extern "C" {
 #define DAC_WORDS_BEHIND (DAC_SPLINE ? 3 : 1)
 
 #ifndef DAC_STRIDE
-#define DAC_STRIDE 2 /* distance of two words of an axis in a buffer: 2 if x and y alternate, 1 if each has its own buffer */
+#define DAC_STRIDE 2 /* distance of two words of an axis: 2 if x and y alternate in a buffer, 1 if each has its own */
 #endif
 
 #ifndef DAC_SHAPING
@@ -86,7 +86,7 @@ typedef struct {
 
 /* One axis. The table stays where it is, in flash or in memory of the application, until its bank is idle again. */
 typedef struct {
-    const dac_word *table; /* its words, and behind the last one the first one again; of a cubic table the first three */
+    const dac_word *table; /* its words, then its first one again; of a cubic table its first three */
     uint32_t length;       /* words without these: 2^index_bits, or phase_period if not interpolated */
     uint8_t storage_bits;  /* bits of a word in memory: DAC_STORAGE_BITS(table) */
     uint8_t bits;          /* bits of a word, 8..24; it has min(4, 25 - bits) guard bits */
@@ -137,15 +137,16 @@ typedef struct {
 #define DAC_AXIS_PROGRAM(AXIS, words)                                                                                 \
     {                                                                                                                 \
         words, AXIS##_TABLE_LENGTH, DAC_STORAGE_BITS(words), AXIS##_TABLE_BITS,                                       \
-        AXIS##_INDEX_BITS + (AXIS##_INTERPOLATED == 3 ? DAC_CUBIC : 0), AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,                          \
+        AXIS##_INDEX_BITS + (AXIS##_INTERPOLATED == 3 ? DAC_CUBIC : 0), AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,       \
         AXIS##_GAIN_WORD, AXIS##_OFFSET_WORD, AXIS##_GAIN_Q,                                                          \
         AXIS##_CODE_MIN, AXIS##_CODE_MAX, AXIS##_PARK_CODE, AXIS##_MAX_STEP, AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS,   \
         AXIS##_DAC_TWOS_COMPLEMENT,                                                                                   \
-        (AXIS##_DAC_LEFT_ALIGNED) + 0 * DAC_SHAPED_BY_RUNTIME(DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER)) \
+        (AXIS##_DAC_LEFT_ALIGNED)                                                                                     \
+            + 0 * DAC_SHAPED_BY_RUNTIME(DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER))                   \
         DAC_SHAPING_MEMBERS(AXIS)                                                                                     \
     }
-/* A value of shaping if a header has AXIS_SHAPING_ORDER, 0 if it has none, as that of a scan without shaping: only an order of 1
- * to 3 makes DAC_SHAPING_GIVEN_... two arguments of one. */
+/* A value of shaping if a header has AXIS_SHAPING_ORDER, 0 if it has none, as that of a scan without shaping: only an
+ * order of 1 to 3 makes DAC_SHAPING_GIVEN_... two arguments of one. */
 #define DAC_SHAPING_GIVEN_1 0,
 #define DAC_SHAPING_GIVEN_2 0,
 #define DAC_SHAPING_GIVEN_3 0,
@@ -162,19 +163,21 @@ typedef struct {
 #endif
 #if DAC_SHAPING
 #define DAC_SHAPING_MEMBERS(AXIS)                                                                                     \
-    , DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER), DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ZERO)
+    , DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER),                                                     \
+        DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ZERO)
 #else
 #define DAC_SHAPING_MEMBERS(AXIS)
 #endif
-/* Bits of a word of a table in memory. Does not compile if they are not DAC_TABLE_STORAGE_BITS: older compilers only warn of
- * the other pointer, and the runtime would read behind the table. (C++ refuses the other pointer by itself.) */
+/* Bits of a word of a table in memory. Does not compile if they are not DAC_TABLE_STORAGE_BITS: older compilers only
+ * warn of the other pointer, and the runtime would read behind the table. (C++ refuses the other pointer by itself.) */
 #ifdef __cplusplus
 #define DAC_STORAGE_BITS(words) ((uint8_t)(8 * sizeof *(words)))
 #else
 #define DAC_STORAGE_BITS(words)                                                                                       \
     ((uint8_t)(8 * sizeof *(words)                                                                                    \
                + 0 * sizeof(struct {                                                                                  \
-                     int compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table : sizeof *(words) == sizeof(dac_word) ? 1 : -1; \
+                     int compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table                                         \
+                         : sizeof *(words) == sizeof(dac_word) ? 1 : -1;                                              \
                  })))
 #endif
 
@@ -220,7 +223,7 @@ typedef enum {
     DAC_BAD_TABLE,       /* missing, length or width out of range, or the word behind the last one is not the first */
     DAC_BAD_PERIOD,      /* the period does not fit the schedule */
     DAC_BAD_OUTPUT,      /* gain, offset, codes or step out of range */
-    DAC_OTHER_STORAGE,   /* the runtime was compiled with another DAC_TABLE_STORAGE_BITS than the table, or too narrow a one */
+    DAC_OTHER_STORAGE,   /* DAC_TABLE_STORAGE_BITS of the runtime differs from that of the table, or is too narrow */
     DAC_BAD_SHAPING      /* an order above DAC_SHAPING, or no zero of that order */
 } dac_loaded;
 
@@ -245,7 +248,8 @@ typedef struct {
 #define DAC_REQUESTS 8 /* a power of two, at most 128 */
 #endif
 
-/* A place in a period: word index and 15 bits of fraction, of a cubic table 18 bits, in `high`, 64 more bits in `low`. */
+/* A place in a period: word index and 15 bits of fraction, of a cubic table 18 bits, in `high`, 64 more bits in
+ * `low`. */
 typedef struct {
     uint32_t high;
     uint64_t low;
@@ -278,7 +282,8 @@ typedef struct {
     dac_bank_axis x, y;
 } dac_bank;
 
-/* What is fed back to the next code, and the remainders of the last two ticks: all with half a code more than they are. */
+/* What is fed back to the next code, and the remainders of the last two ticks: all with half a code more than they
+ * are. */
 typedef struct {
     uint32_t back, newest, older;
 } dac_shaper;
@@ -316,38 +321,39 @@ typedef struct {
     dac_bank bank[2];
 } dac_sequencer;
 
-/* PRODUCER. Each request returns false, and changes nothing, if the queue of 8 is full, that is, if no samples are being requested.
- * Requests act in order before the next tick that is computed. Cost: less than 40 instructions. */
+/* PRODUCER. Each request returns false, and changes nothing, if the queue of 8 is full, that is, if no samples are
+ * being requested. Requests act in order before the next tick that is computed. Cost: less than 40 instructions. */
 
 /* Sets the power-up state: no program, not running, codes at the power-up codes of the converters. Call it before the
- * interrupt is enabled. Returns false for converters that it cannot serve: bits outside 8..24 or above word_bits, word_bits
- * above DAC_OUTPUT_STORAGE_BITS, a power_up_code of more bits. No program can be loaded then. */
+ * interrupt is enabled. Returns false for converters that it cannot serve: bits outside 8..24 or above word_bits,
+ * word_bits above DAC_OUTPUT_STORAGE_BITS, a power_up_code of more bits. No program can be loaded then. */
 bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y);
 
 /* Returns whether the idle bank may be written: it holds no committed program, and no commit is queued. */
 bool dac_sequencer_writable(const dac_sequencer *s);
 
-/* Returns which of two sets of tables the application may write, 0 or 1: the one that does not play. Valid while writable. Use the
- * set of this number for the program that is loaded next. */
+/* Returns which of two sets of tables the application may write, 0 or 1: the one that does not play. Valid while
+ * writable. Use the set of this number for the program that is loaded next. */
 unsigned dac_sequencer_idle(const dac_sequencer *s);
 
-/* Checks a program and puts it into the idle bank, where it stays until it is committed or another one is loaded. The descriptor
- * is copied, the tables are not. Cost: about 4000 instructions, independent of the length of the table. */
+/* Checks a program and puts it into the idle bank, where it stays until it is committed or another one is loaded. The
+ * descriptor is copied, the tables are not. Cost: about 4000 instructions, independent of the length of the table. */
 dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 
 /* Commits the program in the idle bank: it is taken at the next line start, or on the next tick while no scan runs. */
 bool dac_sequencer_commit(dac_sequencer *s);
 
-/* Withdraws a committed program, if it was not taken yet. Once dac_sequencer_writable() returns true, status.swaps tells whether
- * the program was taken before: it has then grown. A scan that was triggered for the first program does not start. */
+/* Withdraws a committed program, if it was not taken yet. Once dac_sequencer_writable() returns true, status.swaps
+ * tells whether the program was taken before: it has then grown. A scan that was triggered for the first program does
+ * not start. */
 bool dac_sequencer_withdraw(dac_sequencer *s);
 
-/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. Returns false for more. A running scan
- * keeps its own count. */
+/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. Returns false for more. A running
+ * scan keeps its own count. */
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames);
 
-/* Starts at line 0, if armed, not running, and with a program: one that was taken, or one that is committed by then, so that
- * commit, arm and trigger may follow each other at once. Otherwise does nothing. */
+/* Starts at line 0, if armed, not running, and with a program: one that was taken, or one that is committed by then, so
+ * that commit, arm and trigger may follow each other at once. Otherwise does nothing. */
 bool dac_sequencer_trigger(dac_sequencer *s);
 
 /* Disarms, stops, ramps to the park codes and holds them. */
@@ -367,9 +373,10 @@ dac_status dac_sequencer_status(const dac_sequencer *s);
 /* Plays one tick of both axes. */
 void dac_sequencer_step(dac_sequencer *s, dac_tick *tick);
 
-/* Plays `ticks` ticks, equal to as many steps: converter words of x to x[0], x[DAC_STRIDE], x[2 DAC_STRIDE].., of y alike; DAC_*
- * markers to markers[0], markers[1].., unless markers is NULL. For one buffer of both: fill(s, buffer, buffer + 1, NULL, n).
- * Requests act before the first tick. After a fill with markers NULL, DAC_PIXEL is not set before the next imaging window. */
+/* Plays `ticks` ticks, equal to as many steps: converter words of x to x[0], x[DAC_STRIDE], x[2 DAC_STRIDE].., of y
+ * alike; DAC_* markers to markers[0], markers[1].., unless markers is NULL. For one buffer of both: fill(s, buffer,
+ * buffer + 1, NULL, n). Requests act before the first tick. After a fill with markers NULL, DAC_PIXEL is not set before
+ * the next imaging window. */
 void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks);
 
 /* Acts on requests now. Needed only while a driver requests no samples: the two functions above do it as well. */
@@ -380,11 +387,12 @@ void dac_sequencer_report(dac_sequencer *s, uint8_t fault);
 
 /* ANY CALLER: no sequencer is involved. */
 
-/* Computes the 2^index_bits words of a table, index_bits 3..16, from Fourier words a0, a1..aH, b1..bH (Q2.30), equal to the table
- * of the build, and puts DAC_WORDS_BEHIND of the first ones behind the last. `room`: words that the table has room for, DAC_TABLE_ROOM(index_bits)
- * or more. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits, sine_index_bits >= index_bits.
- * Returns false, and writes nothing, if the accumulator could overflow (the magnitudes of the words sum to 4 or more) or a size is
- * out of range. Not re-entrant on the same table; the table must not be playing. */
+/* Computes the 2^index_bits words of a table, index_bits 3..16, from Fourier words a0, a1..aH, b1..bH (Q2.30), equal to
+ * the table of the build, and puts DAC_WORDS_BEHIND of the first ones behind the last. `room`: words that the table has
+ * room for, DAC_TABLE_ROOM(index_bits) or more. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits,
+ * sine_index_bits >= index_bits. Returns false, and writes nothing, if the accumulator could overflow (the magnitudes
+ * of the words sum to 4 or more) or a size is out of range. Not re-entrant on the same table; the table must not be
+ * playing. */
 bool dac_synthesize(dac_word *table, uint32_t room, unsigned index_bits, unsigned bits, const int32_t *words,
                     unsigned harmonics, const int32_t *sine, unsigned sine_index_bits);
 

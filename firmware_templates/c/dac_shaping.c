@@ -1,33 +1,36 @@
-/* Shaped output: the remainder of the rounding is fed back. docs/sequencer.md has the arithmetic, DAC_SHAPING the highest order. */
+/* Shaped output: the remainder of the rounding is fed back. docs/sequencer.md has the arithmetic, DAC_SHAPING the
+ * highest order. */
+#include "dac_shaping.h"
 #include "dac_run.h"
 #include "dac_short.h"
 
 #if DAC_SHAPING
 
-int32_t dac_axis_shaped_code(dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
+int32_t dac_shaping_code(dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
 {
     const unsigned bits = bank->remainder_bits;
     const int64_t sum = (int64_t)bank->gain * sample + bank->offset - ((int64_t)1 << (bank->gain_q - 1));
     const uint32_t fed = (uint32_t)(sum >> (bank->gain_q - bits)) + axis->shaper.back;
 
-    axis->shaper = dac_followed(axis->shaper, fed, (UINT32_C(1) << bits) - 1, bank->order, DAC_WEIGHT(bank));
+    axis->shaper = dac_shaper_next(axis->shaper, fed, (UINT32_C(1) << bits) - 1, bank->order, DAC_WEIGHT(bank));
     return (int32_t)fed >> bits;
 }
 
-/* The fast path, as in dac_axis.c: the codes that are checked are those that are put out, here as codes above `base` with their remainder
- * bits. What is fed back is stored behind each block; that of a block that is refused never is. */
+/* The fast path, as in dac_axis.c: the codes that are checked are those that are put out, here as codes above `base`
+ * with their remainder bits. What is fed back is stored behind each block; that of a block that is refused never is. */
 
 #if DAC_LONG_MULTIPLY
 
 #if DAC_TABLE_STORAGE_BITS == 16
 
-/* The sample with 11 bits more, which are 0: the upper word of its product with run_gain is the code with its remainder. */
+/* The sample with 11 bits more, which are 0: the upper word of its product with run_gain is the code with its
+ * remainder. */
 #if defined(__ARM_ARCH_7M__) || defined(__ARM_ARCH_7EM__) || defined(__ARM_ARCH_8M_MAIN__)
 #define CUT(rise) __asm__("bfc %0, #0, #11" : "+r"(rise))
 #else
 #define CUT(rise) (rise) &= ~INT32_C(0x7ff)
 #endif
-DAC_COPIED int32_t sample_of(int32_t here, int32_t there, uint32_t fraction, int32_t half)
+DAC_ALWAYS_INLINE int32_t sample_of(int32_t here, int32_t there, uint32_t fraction, int32_t half)
 {
     int32_t rise = (there - here) * (int32_t)fraction + half;
     CUT(rise);
@@ -39,14 +42,14 @@ DAC_COPIED int32_t sample_of(int32_t here, int32_t there, uint32_t fraction, int
 
 #else
 
-#define SAMPLE(here, there, fraction) dac_between(here, there, fraction, guard, half)
+#define SAMPLE(here, there, fraction) dac_lerp(here, there, fraction, guard, half)
 #define OF_SPLINE(sample) (sample)
 #define BELOW (bank->gain_q - bits)
 
 #endif
 
-DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                     uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
+DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                                uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
 {
     const dac_word *const table = bank->table;
     const int32_t gain = bank->run_gain, weight = DAC_WEIGHT(bank);
@@ -64,13 +67,13 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
     (void)cubic;
 #endif
 
-    DAC_OPAQUE(half);
+    DAC_HIDE_FROM_OPTIMIZER(half);
     while (done < ticks) {
         const uint32_t length = dac_block_of(ticks - done);
         const int32_t base = axis->code - bank->run_half;
         const volatile int64_t offset = bank->run_offset - (int64_t)base * ((int64_t)1 << (bits + BELOW));
         dac_output *stop = out + length * DAC_STRIDE;
-        uint32_t strayed = 0;
+        uint32_t out_of_window = 0;
 
         if (!dac_has_room(bank, base))
             break;
@@ -78,7 +81,7 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
             int32_t sample;
 #if DAC_SPLINE
             if (cubic)
-                sample = OF_SPLINE(dac_track_on(&track));
+                sample = OF_SPLINE(dac_track_next(&track));
             else
 #endif
             {
@@ -88,14 +91,14 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
             }
             const int64_t sum = offset + (int64_t)gain * sample;
             const uint32_t fed = (uint32_t)(sum >> BELOW) + shaper.back;
-            shaper = dac_followed(shaper, fed, mask, order, weight);
-            strayed |= fed;
+            shaper = dac_shaper_next(shaper, fed, mask, order, weight);
+            out_of_window |= fed;
             *out = (dac_output)((fed >> bits) + (uint32_t)base);
             at += step;
             out += DAC_STRIDE;
-            DAC_OPAQUE(out);
+            DAC_HIDE_FROM_OPTIMIZER(out);
         } while (out != stop);
-        if (strayed >> bits >> bank->run_bits != 0)
+        if (out_of_window >> bits >> bank->run_bits != 0)
             break;
         axis->shaper = shaper;
         axis->code = (int32_t)out[-DAC_STRIDE];
@@ -107,37 +110,45 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
 #else
 
 /* With 32 bits, feeding back in the same loop. */
-DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                     uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
+DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                                uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, true, order, bits, cubic, NULL);
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, cubic, order, bits, NULL};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #endif
 
 #if !DAC_LONG_MULTIPLY && DAC_FEW_REGISTERS
 
-/* A Cortex-M0 has not enough registers to feed back two remainders or three in the loop that computes the values. It feeds back
- * those of a block in a loop of its own, so that there is one loop of values for all orders and converters. */
+/* A Cortex-M0 has not enough registers to feed back two remainders or three in the loop that computes the values. It
+ * feeds back those of a block in a loop of its own, so that there is one loop of values for all orders and
+ * converters. */
 
-/* From value k of this turn of the loop to its code. The hint keeps gcc from or-ing later, for which it has no registers. */
+/* FEED and TURN are for feed() alone, and use its variables: with a structure and inline functions in their place, as
+ * in dac_short.h, gcc 12 takes half an instruction more for each tick of the third order.
+ *
+ * FEED makes a code of value k of this turn of the loop. The hint keeps gcc from combining the bits later, for which it
+ * has no registers. TURN moves on to the next turn. */
 #define FEED(k)                                                                                                       \
     fed = (values[k] >> DAC_BELOW) + shaper.back;                                                                     \
-    strayed |= fed;                                                                                                   \
-    DAC_AT_HAND(strayed);                                                                                             \
-    shaper = dac_followed(shaper, fed, mask, order, weight);                                                          \
+    out_of_window |= fed;                                                                                             \
+    DAC_LOW_REGISTER(out_of_window);                                                                                  \
+    shaper = dac_shaper_next(shaper, fed, mask, order, weight);                                                       \
     out[(k) * DAC_STRIDE] = (dac_output)((fed >> bits) + base);
 #define TURN(ticks)                                                                                                   \
     values += (ticks);                                                                                                \
     out += (ticks) * DAC_STRIDE;                                                                                      \
-    DAC_OPAQUE(out);
+    DAC_HIDE_FROM_OPTIMIZER(out);
 
-/* With `fours` a whole block goes by four ticks a turn: remainders then need not move from register to register. */
-DAC_COPIED bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end, dac_output *out,
-                     const unsigned order, const unsigned bits, const bool fours)
+/* Feeds back the remainders of a block, as dac_feeder says. With `fours` a whole block takes four ticks a turn, so that
+ * remainders need not move from register to register. */
+DAC_ALWAYS_INLINE bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,
+                            dac_output *out, const unsigned order, const unsigned bits, const bool fours)
 {
     const uint32_t base = (uint32_t)(axis->code - bank->run_half), mask = (UINT32_C(1) << bits) - 1;
-    uint32_t strayed = 0, fed;
+    uint32_t out_of_window = 0, fed;
     int32_t weight = DAC_WEIGHT(bank);
     dac_shaper shaper = axis->shaper;
 
@@ -151,12 +162,12 @@ DAC_COPIED bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *
         } while (values != end);
     } else {
         do {
-            DAC_AT_HAND(weight);
+            DAC_LOW_REGISTER(weight);
             FEED(0)
             TURN(1)
         } while (values != end);
     }
-    if (strayed >> bits >> bank->run_bits != 0)
+    if (out_of_window >> bits >> bank->run_bits != 0)
         return false;
     axis->shaper = shaper;
     axis->code = (int32_t)out[-DAC_STRIDE];
@@ -192,28 +203,32 @@ static dac_feeder feeder_of(const dac_bank_axis *bank)
 }
 
 /* One remainder is fed back in the same loop. */
-DAC_APART uint32_t play_first(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                              uint32_t ticks)
+DAC_NOINLINE uint32_t play_first(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                 dac_output *out, uint32_t ticks)
 {
     return play(axis, bank, at, step, out, ticks, 1, 12, false);
 }
 
-DAC_APART uint32_t play_lines(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                              uint32_t ticks)
+DAC_NOINLINE uint32_t play_lines(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                 dac_output *out, uint32_t ticks)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, true, 0, bank->remainder_bits, false, feeder_of(bank));
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, false, 0, bank->remainder_bits, feeder_of(bank)};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #if DAC_SPLINE
-DAC_APART uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                               uint32_t ticks)
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks)
 {
-    return dac_play_short(axis, bank, at, step, out, ticks, true, 0, bank->remainder_bits, true, feeder_of(bank));
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, true, 0, bank->remainder_bits, feeder_of(bank)};
+    return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
 
-uint32_t dac_axis_shaped_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                         uint32_t ticks)
+uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                          uint32_t ticks)
 {
 #if DAC_SPLINE
     if (bank->cubic)
@@ -233,8 +248,8 @@ uint32_t dac_axis_shaped_play(dac_axis *axis, const dac_bank_axis *bank, uint64_
 #define PLAY(order, bits) play(axis, bank, at, step, out, ticks, order, bits, false)
 #endif
 
-uint32_t dac_axis_shaped_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                         uint32_t ticks)
+uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                          uint32_t ticks)
 {
 #if !defined(__OPTIMIZE_SIZE__) /* what is small has one loop for all converters and orders */
     if (bank->remainder_bits == 12) {

@@ -93,6 +93,12 @@ def test_compiles_without_a_warning(built: Build, dialect: str) -> None:
     run_clean([*DIALECTS[dialect], *WARNINGS, "-fsyntax-only", f"-I{built.folder}", PLAYER, *two_units(built)])
 
 
+def test_lines_of_the_header_have_at_most_120_characters(built: Build) -> None:
+    """But for the warnings at its head, as the build words them, and for rows of numbers."""
+    lines = built.files[f"{NAME}.h"].decode("ascii").partition("#ifndef ")[2].splitlines()
+    assert [line for line in lines if len(line) > 120 and line.strip("-0123456789, ")] == []
+
+
 @pytest.mark.parametrize("name", ["example", "header_only"])
 @pytest.mark.parametrize("dialect", by_tool(DIALECTS))
 def test_two_units_that_include_the_header_link(tmp_path: Path, name: str, dialect: str) -> None:

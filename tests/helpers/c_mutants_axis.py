@@ -4,7 +4,7 @@ from c_faults import Mutant, changed, removed
 
 MUTANTS: tuple[Mutant, ...] = (
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "fill",
         {
             "the carry of the position is lost": ("(low < step->low ? 1u : 0u)", "0u"),
@@ -18,7 +18,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "wide",
         {
             "wide words have narrow guard bits": (
@@ -28,7 +28,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "checks",
         {
             "a carry too many": ("low < step->low", "low <= step->low"),
@@ -86,14 +86,14 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_axis.c",
         "fill",
         {
-            "runs do not heed the slew guard": ("if (strayed >> bank->run_bits != 0)", "if (false)"),
+            "runs do not heed the slew guard": ("if (out_of_window >> bank->run_bits != 0)", "if (false)"),
             "a run's window is twice as wide": (
-                "if (strayed >> bank->run_bits != 0)",
-                "if (strayed >> (bank->run_bits + 1) != 0)",
+                "if (out_of_window >> bank->run_bits != 0)",
+                "if (out_of_window >> (bank->run_bits + 1) != 0)",
             ),
             "only the last code of a run counts": (
-                "strayed |= (uint32_t)(code - base)",
-                "strayed = (uint32_t)(code - base)",
+                "out_of_window |= (uint32_t)(code - base)",
+                "out_of_window = (uint32_t)(code - base)",
             ),
             "a run begins where the last one was refused": (
                 "axis->code = code;\n        done += length;",
@@ -111,7 +111,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "cubic",
         {
             "a spline's sums are rounded down": (" + (int32_t)((uint32_t)product >> 31);", ";"),
@@ -126,7 +126,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.h",
+        "dac_arithmetic.h",
         "cubic short",
         {
             "short: a spline's sums are rounded down": ("((sum + 512) >> 10)", "(sum >> 10)"),
@@ -151,15 +151,15 @@ MUTANTS: tuple[Mutant, ...] = (
         "cubic short",
         {
             "short: a run's spline begins a segment late": (
-                "track = dac_track_of(table, at, step)",
-                "track = dac_track_of(table + 1, at, step)",
+                "track = dac_track_of(table, at, s.step)",
+                "track = dac_track_of(table + 1, at, s.step)",
             ),
             "short: a run's spline rises by a unit more": (
-                "dac_track_on(&track) - origin",
-                "dac_track_on(&track) - origin + 1u",
+                "dac_track_next(&track) - origin",
+                "dac_track_next(&track) - origin + 1u",
             ),
             "short: a run of a spline is not held in its window": (
-                "            if (strayed >> bits >> bank->run_bits != 0 || ",
+                "            if (b.out_of_window >> kind.bits >> bank->run_bits != 0 || ",
                 "            if (",
             ),
         },
@@ -231,10 +231,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "short",
         {
-            "short: the slew guard is not heeded": "strayed >> bits >> bank->run_bits != 0 || ",
+            "short: the slew guard is not heeded": "b.out_of_window >> kind.bits >> bank->run_bits != 0 || ",
             "short: the first of two words is lost": "            low += (uint32_t)here << 15;\n",
             "short: codes follow no run": (
-                "            axis->code = shaped ? (int32_t)out[-DAC_STRIDE] : (int32_t)last;\n"
+                "            axis->code = kind.shaped ? (int32_t)b.out[-DAC_STRIDE] : (int32_t)b.last;\n"
             ),
         },
     ),
@@ -242,13 +242,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "short",
         {
-            "short: only the last code counts": ("    strayed |= value; ", "    strayed = value; "),
+            "short: only the last code counts": ("    b->out_of_window |= value;", "    b->out_of_window = value;"),
             "short: a window is twice as wide": (
-                "strayed >> bits >> bank->run_bits != 0",
-                "strayed >> bits >> bank->run_bits > 1",
+                "b.out_of_window >> kind.bits >> bank->run_bits != 0",
+                "b.out_of_window >> kind.bits >> bank->run_bits > 1",
             ),
-            "short: two words for all ticks": ("(at + (DAC_RUN - 1) * step) >> 47 == at >> 47", "true"),
-            "short: two words for too many ticks": ("(DAC_RUN - 1) * step", "DAC_RUN / 2 * step"),
+            "short: two words for all ticks": ("(at + (DAC_RUN - 1) * s.step) >> 47 == at >> 47", "true"),
+            "short: two words for too many ticks": ("(DAC_RUN - 1) * s.step", "DAC_RUN / 2 * s.step"),
             "short: the offset is lost": ("+ (uint32_t)offset - ", "- "),
         },
     ),
@@ -288,14 +288,14 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "checks short",
         {
-            "short: a wide rise is not seen": " || risen > 2 * spread - 1",
+            "short: a wide rise is not seen": " || b.rise_or > 2 * spread - 1",
         },
     ),
     *changed(
         "dac_short.h",
         "checks short",
         {
-            "short: only the last rise counts": ("    risen |= rise; ", "    risen = rise; "),
+            "short: only the last rise counts": ("    b->rise_or |= rise;", "    b->rise_or = rise;"),
             "short: a run may begin anywhere": (
                 "(first + half) >> bank->run_bits != 0",
                 "false",

@@ -55,10 +55,13 @@ MUTANTS: tuple[Mutant, ...] = (
                 "fed, (UINT32_C(2) << bits) - 1, bank",
             ),
             "the window of a shaped run is twice as wide": (
-                "if (strayed >> bits >> bank->run_bits != 0)\n            break;",
-                "if (strayed >> bits >> bank->run_bits > 1)\n            break;",
+                "if (out_of_window >> bits >> bank->run_bits != 0)\n            break;",
+                "if (out_of_window >> bits >> bank->run_bits > 1)\n            break;",
             ),
-            "only the last code of a shaped run counts": ("            strayed |= fed;", "            strayed = fed;"),
+            "only the last code of a shaped run counts": (
+                "            out_of_window |= fed;",
+                "            out_of_window = fed;",
+            ),
         },
     ),
     *changed(
@@ -66,10 +69,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped few",
         {
             "few: a block is not held in its window": (
-                "    if (strayed >> bits >> bank->run_bits != 0)\n        return false;\n",
+                "    if (out_of_window >> bits >> bank->run_bits != 0)\n        return false;\n",
                 "",
             ),
-            "few: only the last code of a block counts": ("    strayed |= fed;  ", "    strayed = fed;  "),
+            "few: only the last code of a block counts": ("    out_of_window |= fed;  ", "    out_of_window = fed;  "),
             "few: a block forgets its remainders": ("    axis->shaper = shaper;\n    axis->code", "    axis->code"),
             "few: a block's codes are not followed": (
                 "    axis->code = (int32_t)out[-DAC_STRIDE];\n    return",
@@ -89,8 +92,11 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_short.h",
         "shaped few",
         {
-            "few: blocks follow each other on the same place": ("            out = stop;\n", ""),
-            "few: a block that is refused is played": ("risen > 2 * spread - 1 || !feeder(axis", "feeder(axis"),
+            "few: blocks follow each other on the same place": ("            b.out = b.stop;\n", ""),
+            "few: a block that is refused is played": (
+                "b.rise_or > 2 * spread - 1 || !kind.feeder(axis",
+                "kind.feeder(axis",
+            ),
         },
     ),
     *changed(
@@ -98,8 +104,8 @@ MUTANTS: tuple[Mutant, ...] = (
         "shaped short",
         {
             "short: a shaped run is not held in its window": (
-                "strayed >> bits >> bank->run_bits != 0 || risen",
-                "risen",
+                "b.out_of_window >> kind.bits >> bank->run_bits != 0 || b.rise_or",
+                "b.rise_or",
             ),
             "short: a shaped run may begin anywhere": (
                 "first + (half >> 1) >= half",
@@ -109,7 +115,7 @@ MUTANTS: tuple[Mutant, ...] = (
                 "(UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE)",
                 "0u - (origin << DAC_ABOVE)",
             ),
-            "short: a shaped run loses its offset": ("shaped ? bank->run_offset : bank->offset", "bank->offset"),
+            "short: a shaped run loses its offset": ("kind.shaped ? bank->run_offset : bank->offset", "bank->offset"),
         },
     ),
     *changed(

@@ -1,5 +1,6 @@
 /* What the tests cannot reach of the C sequencer from outside: sizes, many steps in one call, positions and runs of an
  * axis. */
+#include "dac_arithmetic.h"
 #include "dac_axis.h"
 
 size_t probe_size(unsigned which)

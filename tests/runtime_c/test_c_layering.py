@@ -11,6 +11,7 @@ from building import run_clean
 from tablegen.base.resources import c_link, c_runtime
 
 EVERYTHING = [*c_runtime(), *c_link()]
+PUBLIC = {"dac_sequencer.h", "dac_link.h"}  # their types stand below everything, the functions that they declare above
 Graph = Mapping[str, set[str]]
 # What these compile makes other calls.
 CHOICES = {
@@ -49,6 +50,15 @@ def includes(paths: Iterable[Path]) -> Graph:
     return {path.name: set(pattern.findall(path.read_text("utf-8"))) for path in paths}
 
 
+def modules(graph: Graph, public: Iterable[str] = PUBLIC) -> Graph:
+    """Join each private header with the source of its name, in a graph of what files include."""
+    of_file = {name: name if name in public else name.rpartition(".")[0] for name in graph}
+    joined: dict[str, set[str]] = {module: set() for module in of_file.values()}
+    for name, included in graph.items():
+        joined[of_file[name]] |= {of_file[other] for other in included} - {of_file[name]}
+    return joined
+
+
 @pytest.mark.parametrize("choice", CHOICES)
 def test_files_do_not_call_each_other_in_a_circle(choice: str, tmp_path: Path) -> None:
     found = calls(EVERYTHING, tmp_path, *CHOICES[choice])
@@ -63,6 +73,14 @@ def test_files_do_not_include_each_other_in_a_circle() -> None:
     assert circle(found) == []
     assert found["dac_link_parts.h"] == {"dac_link.h"}
     assert set().union(*found.values()) == {path.name for path in EVERYTHING if path.suffix == ".h"}
+
+
+def test_modules_do_not_include_each_other_in_a_circle() -> None:
+    """What a source includes does not include its header: inline arithmetic stands below the functions of an axis."""
+    graph = modules(includes(EVERYTHING))
+    assert circle(graph) == []
+    assert graph["dac_axis"] >= {"dac_run", "dac_short", "dac_shaping"}
+    assert graph["dac_arithmetic"] == {"dac_sequencer.h"}
 
 
 def test_a_circle_of_calls_is_found(tmp_path: Path) -> None:
@@ -88,3 +106,17 @@ def test_a_circle_of_includes_is_found(tmp_path: Path) -> None:
     assert set(circle(includes([one, other]))) == {"other.h"}
     other.write_text("#include <one.h>\n")
     assert circle(includes([one, other])) == []
+
+
+def test_a_circle_of_modules_is_found(tmp_path: Path) -> None:
+    """The control: a header without a circle of its own, included by what the source of its name includes."""
+    source, header, loops = tmp_path / "axis.c", tmp_path / "axis.h", tmp_path / "run.h"
+    source.write_text('#include "axis.h"\n#include "run.h"\n')
+    header.write_text("")
+    loops.write_text('#include "axis.h"\n')
+    graph = includes([source, header, loops])
+    assert circle(graph) == []
+    assert set(circle(modules(graph))) == {"axis", "run"}
+    assert circle(modules(graph, public=["axis.h"])) == []
+    loops.write_text("")
+    assert circle(modules(includes([source, header, loops]))) == []

@@ -1,6 +1,6 @@
 """Positions in a period: 96 bits and no division are exact for every period, 64 bits for as long as a run takes.
 
-``dac_axis.h`` claims that with step = ceil(2^(79 + P) / N) the position after k < N advances, floored to 2^64, is
+``dac_arithmetic.h`` claims that with step = ceil(2^(79 + P) / N) the position after k < N advances, floored to 2^64, is
 floor(k 2^(15 + P) / N): index and fraction of the model. Here the step is what a load derived, the position is moved by
 the runtime's own addition and multiplication, and Python's integers say what is right.
 """

@@ -1,0 +1,123 @@
+/* Private to the runtime: positions, samples between the words of a table, and the coding of a converter. */
+#ifndef DAC_ARITHMETIC_H
+#define DAC_ARITHMETIC_H
+
+#include "dac_sequencer.h"
+
+/* 1: runs add products of 64 bits. 0: they use 32 bits, for processors where such a sum takes a call or several
+ * instructions. Words of more than 16 bits need 64 bits everywhere. */
+#if DAC_TABLE_STORAGE_BITS != 16
+#undef DAC_LONG_MULTIPLY
+#define DAC_LONG_MULTIPLY 1
+#elif !defined(DAC_LONG_MULTIPLY)
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__) \
+    || (defined(__riscv) && __riscv_xlen == 32)
+#define DAC_LONG_MULTIPLY 0
+#else
+#define DAC_LONG_MULTIPLY 1
+#endif
+#endif
+
+#if DAC_TABLE_STORAGE_BITS == 16
+typedef int32_t dac_wide; /* holds the difference of two words times a fraction */
+#define DAC_GUARD(bank) 4
+#else
+typedef int64_t dac_wide;
+#define DAC_GUARD(bank) ((bank)->guard)
+#endif
+
+#define DAC_RUN 16 /* ticks of a run that share one check of clamp and slew guard */
+
+/* One advance: 96-bit addition. The step is ceil(2^n / period), n = 79 + index bits, or 82 + index bits of a cubic
+ * table, so that after k < period advances the position exceeds the exact k 2^n / period by less than k, and
+ * k < 2^64 / period: floors to 2^64 are exact. */
+static inline void dac_advance(dac_position *at, const dac_position *step)
+{
+    const uint64_t low = at->low + step->low;
+    at->high += step->high + (low < step->low ? 1u : 0u);
+    at->low = low;
+}
+
+/* The sample between two words: guard bits below the LSB of a word, rounded to nearest, ties up. `half` is
+ * DAC_HALF(guard). */
+#define DAC_HALF(guard) ((dac_wide)1 << (14u - (guard)))
+static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard, dac_wide half)
+{
+    const dac_wide rise = ((dac_wide)(there - here) * (dac_wide)fraction + half) >> (15u - guard);
+    return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
+}
+
+#if DAC_SPLINE
+/* Horner's rule: lower + value * fraction / 2^19, to nearest, ties up. The fraction has 18 bits; |value| <= 2^27, of
+ * words of 16 bits 2^22. The fraction is passed as a dac_factor, which is the same for all three steps. */
+#if DAC_LONG_MULTIPLY || defined(__riscv_mul)
+typedef int32_t dac_factor; /* the fraction times 2^13, so that the upper word of a product is the sum's */
+#define DAC_FACTOR(fraction) (int32_t)((fraction) << 13)
+static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor half)
+{
+    /* Compilers do not use these instructions here: they know too much about the factors. */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FEATURE_DSP)
+    int32_t sum;
+    __asm__("smmlar %0, %1, %2, %3" : "=r"(sum) : "r"(value), "r"(half), "r"(lower));
+    return sum;
+#elif defined(__GNUC__) && defined(__thumb2__)
+    uint32_t below = UINT32_C(0x80000000);
+    __asm__("smlal %0, %1, %2, %3" : "+r"(below), "+r"(lower) : "r"(value), "r"(half));
+    return lower;
+#else
+    const int64_t product = (int64_t)value * half;
+    return lower + (int32_t)(product >> 32) + (int32_t)((uint32_t)product >> 31);
+#endif
+}
+#else
+typedef struct {
+    int32_t upper, lower; /* 9 bits each: products with a value, and their sum, stay below 2^31 */
+} dac_factor;
+#define DAC_FACTOR(fraction) {(int32_t)((fraction) >> 9), (int32_t)((fraction) & 0x1ffu)}
+static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor by)
+{
+    int32_t sum = value * by.upper + (value * by.lower >> 9);
+#if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__)
+    /* The carry of the shift rounds. */
+    __asm__(".syntax unified\n\tasrs %0, %0, #10\n\tadcs %0, %1" : "+l"(sum) : "l"(lower) : "cc");
+#else
+    sum = lower + ((sum + 512) >> 10);
+#endif
+    return sum;
+}
+#endif
+
+#define DAC_SPLINE_UNIT 12 /* units of a sample for the LSB of a word */
+
+/* The segment of a cubic spline that begins at a word, by powers of half of the fraction. */
+typedef struct {
+    int32_t b0, b1, b2, b3;
+} dac_segment;
+
+static inline dac_segment dac_segment_of(const dac_word *words)
+{
+    const int32_t first = words[0], second = words[1], third = words[2], fourth = words[3], ends = first + third;
+    const dac_segment s = {
+        2 * ends + 8 * second,
+        12 * (third - first),
+        24 * (ends - 2 * second),
+        16 * (fourth - first + 3 * (second - third)),
+    };
+    return s;
+}
+
+/* Returns the sample at a fraction of 18 bits. */
+static inline int32_t dac_spline_eval(const dac_segment *s, uint32_t fraction)
+{
+    const dac_factor by = DAC_FACTOR(fraction);
+    return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, by), by), by);
+}
+#endif
+
+/* Returns the word that the converter takes for a code. */
+static inline dac_output dac_encode(const dac_axis *axis, int32_t code)
+{
+    return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
+}
+
+#endif
