@@ -77,7 +77,7 @@ def _traces(fit: HysteresisFit) -> list[str]:
     images = isinstance(fit.branches[0].traces[0], ImageFit)
     offsets = any(branch.offsets_v for branch in fit.branches)
     at = ("offset [V]",) if offsets else ()
-    head = (*at, *(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "residual [% p-p]")
+    head = (*at, *(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "error [% p-p]")
     rows: list[tuple[str, ...]] = [head]
     for branch in fit.branches:
         for trace in branch.traces:

@@ -64,7 +64,7 @@ def test_weights_are_the_best_that_are_not_negative(problem_of: type[PlaysProble
     problem = problem_of(lines, 0.5, lambda loss: LogarithmicCreep(loss, 1e-4, 10.0, 100.0))
     for start in problem.starts:
         best = problem.best_weights(start)
-        columns = problem._moved(tuple(start[:-1].tolist()))
+        columns = problem._displacements(tuple(start[:-1].tolist()))
         slopes = np.vstack([*columns, problem.penalty]).T @ best.residual
         assert np.min(best.weights) == 0.0 < np.max(best.weights)
         assert np.min(slopes) > -1e-10

@@ -179,7 +179,7 @@ def test_a_remedy_that_changes_little_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: float, said: str
 ) -> None:
     one = remedies.Remedy("a = 1", left, low=False, within_limits=True)
-    monkeypatch.setattr(remedies, "tried", lambda *_: [one])
+    monkeypatch.setattr(remedies, "excess_remedies", lambda *_: [one])
     assert all(text.endswith(said) for text in warned(setup_of(tmp_path, {**FREE, **SMALL})))
 
 

@@ -110,7 +110,7 @@ def test_a_sample_without_a_period(folder: Path) -> None:
     assert "refinement" not in (folder / "scan.toml").read_text("utf-8")
     learnt = refining(folder, files, "--mismatch", "--write")
     assert learnt.status == 0, learnt.err
-    assert "note: only what trace and retrace differ by was seen" in learnt.out
+    assert "note: only the mismatch of trace and retrace was measured" in learnt.out
     text = (folder / "scan.toml").read_text("utf-8")
     assert tomllib.loads(text)["x"]["refinement"]["before_of"] == "mismatch"
     assert "trace against retrace, residual" in text

@@ -12,7 +12,7 @@ from tablegen.verification.play.unfit_words import c_edges, device_widths, edges
 from tablegen.verification.play.variation import Kind, variation
 from tablegen.verification.play.wide_program import Part, wide_program
 
-_LOADING_PACE, _LOADING_TICKS = 7, 500  # clocks between ticks while words are written, at least, and how many at most
+_LOADING_PACE, _LOADING_TICKS = 7, 60  # clocks between ticks while words are written, at least, and how many at most
 VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
 
 
