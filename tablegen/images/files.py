@@ -66,6 +66,8 @@ class ScanImage:
     frame: int = 0  # counted from 0
     frames: int = 1  # images of a movie
     angle_deg: float | None = None  # of the fast axis against the scanner's x
+    turn: float | None = None  # share of the line period that is forward
+    window: tuple[float, float] | None = None  # part of each sweep that the columns span
 
 
 def read_image(
@@ -243,6 +245,8 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         frame=frame_number,
         frames=channel.frames,
         angle_deg=channel.angle_deg,
+        turn=channel.turn,
+        window=channel.window,
     )
 
 

@@ -44,6 +44,8 @@ class Channel:
     first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
     frames: int = 1
     angle_deg: float | None = None  # of the fast axis against the scanner's x; None where the file does not say
+    turn: float | None = None  # share of the line period that is forward; None where the file does not say
+    window: tuple[float, float] | None = None  # part of each sweep that the columns span, likewise
 
 
 def channel_of_array(number: int, title: str, matrix: Matrix) -> Channel:
@@ -93,15 +95,30 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
         or _of_direction([one for one in channels if one.signal == name], direction)
         or [one for one in channels if str(one.number) == name]
     )
-    if len(matches) != 1:
-        raise ValueError(f"has {'no' if not matches else 'more than one'} channel {quote(name)}; there is {there}")
+    if not matches:
+        raise ValueError(f"has no channel {quote(name)}; there is {there}")
+    if len(matches) > 1:
+        of_name = channel_list(matches)
+        raise ValueError(f"has more than one channel {quote(name)}: {of_name}; choose one by its number")
     return matches[0]
 
 
 def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
-    """Return the retrace of the same signal; None if there is none, or more than one."""
-    retraces = [one for one in channels if one.signal == trace.signal and one.direction == "retrace"]
-    return retraces[0] if trace.direction == "trace" and len(retraces) == 1 else None
+    """Return the retrace of the same signal; None if there is none.
+
+    Of a signal that a file has several times, the traces and the retraces belong together in their order.
+    """
+    if trace.direction != "trace":
+        return None
+    traces, retraces = (
+        [one for one in channels if one.signal == trace.signal and one.direction == direction]
+        for direction in ("trace", "retrace")
+    )
+    if len(retraces) == 1:
+        return retraces[0]
+    if len(traces) == len(retraces) and trace in traces:
+        return retraces[traces.index(trace)]
+    return None
 
 
 def _of_direction(channels: Sequence[Channel], direction: Direction | None) -> list[Channel]:
