@@ -88,7 +88,7 @@ FILES = {
 
 @pytest.mark.parametrize("name", [name for name in THERE if name in FILES])
 def test_what_is_in_a_real_file(name: str) -> None:
-    assert FOLDER is not None
+    assert FOLDER is not None, "TABLEGEN_REAL names no folder"
     facts = FILES[name]
     channels = channels_of(FOLDER / name)
     assert tuple(one.title for one in channels) == facts.channels
@@ -114,7 +114,7 @@ def test_what_is_in_a_real_file(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in THERE if name in FILES and name.endswith(".ibw")])
 def test_real_waves_by_igor2(name: str) -> None:
     """Each pixel; and the step of the columns, of which N - 1 make the width."""
-    assert FOLDER is not None
+    assert FOLDER is not None, "TABLEGEN_REAL names no folder"
     wave = binarywave.load(str(FOLDER / name))["wave"]
     values, steps = wave["wData"], wave["wave_header"]["sfA"] * 1e9
     planned = 256
@@ -127,7 +127,7 @@ def test_real_waves_by_igor2(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in THERE if name in FILES and name.endswith(".sxm")])
 def test_real_scans_by_nanonispy2(name: str) -> None:
-    assert FOLDER is not None
+    assert FOLDER is not None, "TABLEGEN_REAL names no folder"
     scan = Scan(str(FOLDER / name))
     for one in channels_of(FOLDER / name):
         way = "forward" if one.direction == "trace" else "backward"
@@ -140,7 +140,7 @@ def test_real_scans_by_nanonispy2(name: str) -> None:
 
 def test_every_other_image_of_the_folder_is_read() -> None:
     """What this table does not know, as in a folder that the environment names, has at least channels and pixels."""
-    assert FOLDER is not None
+    assert FOLDER is not None, "TABLEGEN_REAL names no folder"
     for name in THERE:
         if name not in FILES:
             for one in channels_of(FOLDER / name):
