@@ -16,6 +16,7 @@ from image_writers import gwy, npy
 from instrument_files import asd, createc, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
 from mutating import damaged
 
+from tablegen.api.image_input import sample_image
 from tablegen.base.input_errors import Rejected
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
@@ -84,6 +85,14 @@ def test_trace_and_retrace_of_one_file(name: str, tmp_path: Path) -> None:
         assert np.array_equal(read_image(path, image.channel).heights, image.heights)
         assert np.array_equal(read_image(path, str(image.number)).heights, image.heights)
         assert np.array_equal(read_image(path, signal, image.direction).heights, image.heights)
+
+
+def test_a_retrace_alone_is_the_mirror_image_of_the_sample_and_said(tmp_path: Path) -> None:
+    path = put(tmp_path, "r.ibw", ibw({"HeightRetrace": ASYLUM["HeightRetrace"]}, NOTE))
+    sample, _ = sample_image(50.0, None, path, None, {})
+    assert np.array_equal(sample.trace, ASYLUM["HeightRetrace"][:, ::-1].astype("f4"))
+    assert sample.retrace is None
+    assert sample.name.endswith("r.ibw (the retrace alone, mirrored)")
 
 
 @pytest.mark.parametrize("version", [0, 1, 2])
