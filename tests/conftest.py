@@ -8,11 +8,14 @@ import kept_objects
 import pytest
 from hypothesis import settings
 from installing import install, make_wheel, told_pythons
+from real_files import VARIABLE, real_folder
 from tool_paths import pytest_runtest_setup, pytest_unconfigure  # noqa: F401
 
 # Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
 settings.register_profile("tablegen", settings(), deadline=None)
 settings.load_profile("tablegen")
+
+collect_ignore = [] if real_folder() else ["calibration/test_real_files.py"]  # the run says so at its end
 
 # A shell that starts the tests in the background has SIGINT ignored, and nohup SIGHUP. Whatever the tests start would
 # ignore it too, but for a handler, which is not handed on.
@@ -57,3 +60,5 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say which other Pythons were at hand, since tests for those that were not are not there to be skipped."""
     terminalreporter.write_line(told_pythons())
+    if real_folder() is None:
+        terminalreporter.write_line(f"no folder of real files: {VARIABLE} does not name one, so that none was read")

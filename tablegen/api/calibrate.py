@@ -56,6 +56,7 @@ from tablegen.charts.picture_file import PlottedCharts
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate, Fit
 from tablegen.images.files import ScanImage
+from tablegen.images.line_timing import timing_remarks
 from tablegen.images.scan_angle import angle_remarks, require_fast_axis
 from tablegen.numerics.driver import Driver
 
@@ -166,7 +167,7 @@ def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], prior: KnownScanne
             fit = replace(size, images=sizes.images, remarks=sizes.remarks + size.remarks)
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
-    return Calibrated(_with_angles(fit, files, prior.axis), prior.axis, files)
+    return Calibrated(_with_scan_remarks(fit, files, prior.axis, how), prior.axis, files)
 
 
 def known_scanner(scanner: str | Path | None, axis: str, v_max: float | None, v_min: float) -> KnownScanner:
@@ -244,12 +245,13 @@ def calibrate_images(
         fit = fit_images(scans, driver, **{name: how[name] for name in _IMAGE_FIT if name in how})
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(dict.fromkeys(one.file for one in files))}: {reason}") from None
-    return Calibrated(_with_angles(fit, files, axis), axis, files, points)
+    return Calibrated(_with_scan_remarks(fit, files, axis, how), axis, files, points)
 
 
-def _with_angles(fit: Fit, images: Sequence[ScanImage], axis: str) -> Fit:
-    """Return the fit with remarks on the scan angles of its images before its own."""
+def _with_scan_remarks(fit: Fit, images: Sequence[ScanImage], axis: str, how: dict[str, Any]) -> Fit:
+    """Return the fit with remarks on scan angle, turn and window of its images before its own."""
     remarks = angle_remarks(images, axis)
+    remarks += timing_remarks(images, how.get("turn", 0.5), how.get("window", (0.0, 1.0)))
     return replace(fit, remarks=(*remarks, *fit.remarks)) if remarks else fit
 
 

@@ -167,4 +167,7 @@ def sample_image(
         ratio = first.height_nm / (first.width_nm / (high - low))
     name = " and ".join(dict.fromkeys(one.file for one in images))
     heights = [one.heights for one in images]
+    if len(images) == 1 and first.direction == "retrace":  # a way back is a way forward over the mirror image
+        heights = [np.ascontiguousarray(first.heights[:, ::-1])]
+        name = f"{name} (the retrace alone, mirrored)"
     return SampleImage(name, v_scan, v_offset, heights[0], heights[1] if len(images) > 1 else None, ratio), images

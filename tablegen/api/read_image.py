@@ -1,6 +1,6 @@
 """Read image files of instruments: their channels, and an image with its retrace."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
@@ -15,7 +15,8 @@ from tablegen.images.files import read_image as read_one
 from tablegen.images.formats.channel import Channel, choose, partner
 from tablegen.numerics.arrays import Floats
 
-_ANGLE = "angle [deg]"
+_ANGLE, _TURN, _WINDOW = "angle [deg]", "turn", "window"
+_EVEN = 5e-4  # of the line period: forward and backward take the same time
 _HEAD = ("", "channel", "direction", "pixels", "size [nm]", "unit", "lines [Hz]", "frames", "first row")
 
 
@@ -31,8 +32,8 @@ def channels(path: str | Path) -> "Channels":
     -------
     Channels
         A sequence. Each has ``number``, ``title``, ``direction``, ``shape`` (rows, columns), ``width_nm``,
-        ``height_nm``, ``unit``, ``line_rate_hz``, ``frames`` and ``angle_deg`` (of the scan), None or empty where the
-        file does not say.
+        ``height_nm``, ``unit``, ``line_rate_hz``, ``frames``, ``angle_deg`` (of the scan), ``turn`` (forward share of
+        the line period) and ``window`` (part of the sweep that is imaged), None or empty where the file does not say.
 
     Raises
     ------
@@ -166,6 +167,8 @@ class Image(Result):
             "unit": one.unit,
             "line_rate_hz": one.line_rate_hz,
             "scan_angle_deg": one.angle_deg,
+            "turn": one.turn,
+            "window": None if one.window is None else list(one.window),
             "frame": one.frame,
             "retrace": None if self.retrace is None else self.retrace.record,
         }
@@ -234,11 +237,19 @@ class Channels(Result, Sequence[Channel]):
     def rows(self) -> list[str]:
         """Return the lines of the table: its head, then one line a channel."""
         rows = [_HEAD, *(_row(one) for one in self)]
-        if any(one.angle_deg for one in self):
-            angles = ["" if one.angle_deg is None else f"{one.angle_deg:.4g}" for one in self]
-            rows = [(*row, cell) for row, cell in zip(rows, [_ANGLE, *angles], strict=True)]
+        for head, cells in self._columns_of_some():
+            rows = [(*row, cell) for row, cell in zip(rows, [head, *cells], strict=True)]
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+    def _columns_of_some(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield head and cells of the columns that are shown only where they say something."""
+        if any(one.angle_deg for one in self):
+            yield _ANGLE, ["" if one.angle_deg is None else f"{one.angle_deg:.4g}" for one in self]
+        if any(one.turn is not None and abs(one.turn - 0.5) > _EVEN for one in self):
+            yield _TURN, ["" if one.turn is None else f"{one.turn:.4g}" for one in self]
+        if any(one.window is not None and one.window != (0.0, 1.0) for one in self):
+            yield _WINDOW, ["" if one.window is None else "{:.4g} to {:.4g}".format(*one.window) for one in self]
 
     def _lines(self) -> Sequence[str]:
         titles = ", ".join(shortened(one.title, 40) or "without a title" for one in self[:6])
@@ -276,6 +287,8 @@ def _record(channel: Channel) -> dict[str, Any]:
         "frames": channel.frames,
         "first_row": channel.first_row,
         "scan_angle_deg": channel.angle_deg,
+        "turn": channel.turn,
+        "window": None if channel.window is None else list(channel.window),
     }
 
 

@@ -68,6 +68,25 @@ def _agreement(scan: StraightScan) -> list[str]:
     return lines
 
 
+def _by_file(scan: StraightScan) -> list[Finding]:
+    """Return what the correction took from the image file: the timing of the line, and a retrace without its trace."""
+    record, notes = scan.record, []
+    if record.get("retrace_alone"):
+        text = "the file has the retrace alone; it was fitted as the trace of the mirror image, and turned back"
+        notes.append(Finding("note", 0.0, text))
+    used = record.get("x", record)
+    turn, window = record.get("file_turn"), record.get("file_window")
+    timing = []
+    if turn is not None and turn != 0.5 and used["turn"] == turn:
+        timing.append(f"turn {turn:.4g}")
+    if window is not None and tuple(window) != (0.0, 1.0) and tuple(used["window"]) == tuple(window):
+        timing.append("window {:.4g} to {:.4g}".format(*window))
+    if timing:
+        text = f"{' and '.join(timing)}, as the image file states; the drive is that of the whole sweep"
+        notes.append(Finding("note", 0.0, text))
+    return notes
+
+
 def _findings(scan: StraightScan, images: Images) -> list[Finding]:
     """Return the findings, the worst first; percentages are of the picture."""
     notes = [Finding("note", 0.0, f"left out: {text}") for text in images.left_out]
@@ -75,6 +94,7 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
     if angle is not None and not scan.record["by"].startswith("fit"):
         text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
         notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
+    notes += _by_file(scan)
     first, last = scan.distortion.left_out
     rows, columns = images.shape
     if first or last:

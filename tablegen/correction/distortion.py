@@ -6,7 +6,7 @@ inversions in one dimension each. Where creep lets an axis move back for a momen
 stretch are left out: the axis passes it again.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -96,6 +96,15 @@ class Distortion:
         first, last = self.y_range
         x = low + (high - low) * (np.arange(self.columns) + _HALF) / self.columns
         return x, first + (last - first) * (np.arange(self.rows) + _HALF) / self.rows
+
+    def mirrored(self) -> "Distortion":
+        """Return the distortion of the mirror image: left and right, and forward and backward, are exchanged."""
+        low, high = self.x_range
+        turned = [
+            None if one is None else Sweep1D(low + high - one.x[::-1], one.time[::-1])
+            for one in (self.backward, self.forward)
+        ]
+        return replace(self, forward=turned[0], backward=turned[1], drift=-self.drift)
 
     def check(self) -> None:
         """Check that the pixels follow each other.

@@ -26,18 +26,32 @@ from tablegen.planning.line_plan import LinePlan, make_plan
 
 _ALIKE = 0.3  # of the contrast: trace and retrace that differ by less are stored as declared
 _BETTER = 0.6  # times the difference: the agreement that shows mirrored or exchanged images
-_OLD_TURN = 0.5  # of the slow axis of an instrument that scans up, then down
+_OLD_TURN = 0.5  # of an instrument that scans forward and back, up and down, at one speed
+_WHOLE = 0.0, 1.0  # window of a whole sweep
 
 
 @dataclass(frozen=True, kw_only=True)
 class OldAxis:
-    """The drive of an axis of an existing image; a value of None is unknown, and replaced as ``OldScan`` says."""
+    """The drive of an axis of an existing image; a value of None is unknown, and replaced as ``OldScan`` says.
+
+    ``turn`` and ``window`` of x are then those of the file; where it does not say, 0.5 and the whole sweep.
+    """
 
     size_v: float | None = None
     size_nm: float | None = None
     offset_v: float | None = None
-    turn: float = 0.5
-    window: tuple[float, float] = (0.0, 1.0)
+    turn: float | None = None
+    window: tuple[float, float] | None = None
+
+    def with_defaults(self, turn: float | None = None, window: tuple[float, float] | None = None) -> "OldAxis":
+        """Return the axis with turn and window: its own, else these, else those of a symmetric triangle."""
+        turn = next((one for one in (self.turn, turn) if one is not None), _OLD_TURN)
+        return replace(self, turn=turn, window=self.window or window or _WHOLE)
+
+    @property
+    def timing(self) -> tuple[float, tuple[float, float]]:
+        """Turn and window, with those of a symmetric triangle where they are unknown."""
+        return _OLD_TURN if self.turn is None else self.turn, self.window or _WHOLE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +64,7 @@ class OldScan:
     """
 
     x: OldAxis = field(default_factory=OldAxis)
-    y: OldAxis = field(default_factory=lambda: OldAxis(turn=_OLD_TURN))
+    y: OldAxis = field(default_factory=OldAxis)
     rate_hz: float | None = None
     lines: int | None = None
     back: bool = False
@@ -118,6 +132,12 @@ class Images:
             {"file": source.name, "sha256": source.sha256}
             for source in dict.fromkeys(channel.source for channel in self.channels)
         ]
+
+    @property
+    def timing(self) -> dict[str, Any]:
+        """Turn and window of the fast axis by the file, for the record; what it does not say is left out."""
+        timing = {"file_turn": self.first.turn, "file_window": self.first.window}
+        return {name: value for name, value in timing.items() if value is not None}
 
     @property
     def angle(self) -> dict[str, float]:
@@ -240,6 +260,7 @@ def by_scanner(images: Images, scanner: Path, conditions: OldScan) -> StraightSc
     if rate_hz is None:
         raise Unphysical("the file does not say at which line rate it was taken; give --rate-hz")
     rows, _ = images.shape
+    conditions = _timed(images, conditions)
     x = _axis(model, "x", conditions.x, rate_hz)
     slow = conditions.y
     if slow.size_v is None and slow.size_nm is None:
@@ -314,7 +335,14 @@ def _axis(model: ScannerModel, axis: Literal["x", "y"], conditions: OldAxis, rat
             "the drive is not known; give --size-v, the scan voltage at the piezo, or --size-nm, or --scan"
         )
     offset_v = driver.middle if conditions.offset_v is None else conditions.offset_v
-    return AxisScan(triangle(size_v, offset_v, conditions.turn), rate_hz, conditions.turn, conditions.window)
+    turn, window = conditions.timing
+    return AxisScan(triangle(size_v, offset_v, turn), rate_hz, turn, window)
+
+
+def _timed(images: Images, conditions: OldScan) -> OldScan:
+    """Return the conditions with turn and window of the file where they are not given."""
+    first = images.first
+    return replace(conditions, x=conditions.x.with_defaults(first.turn, first.window))
 
 
 def _scanned(
@@ -329,6 +357,7 @@ def _scanned(
         "by": "scanner file",
         "sources": images.sources,
         **images.angle,
+        **images.timing,
         "scanner": {"file": path.name, "sha256": file_sha256(path, CONFIGURATION)},
         **how,
     }
@@ -364,19 +393,23 @@ def by_fit(
         If there is no fit, or the image does not support the correction: the cell is ambiguous, the displacement is too
         large, or trace and retrace do not agree better.
     """
-    if not images.forward[images.reference[0]]:
-        raise Unphysical("is a retrace by the file; a fit needs the trace")
+    conditions = _timed(images, conditions)
     trace, retrace = (*(images.channels[i].heights for i in images.reference), None)[:2]
-    if retrace is None and not all(images.forward):
+    retrace_alone = not any(images.forward)
+    if retrace is None and not all(images.forward) and not retrace_alone:
         raise Unphysical("has channels of the retrace, but none of the fitted signal; give --retrace-channel")
     assert trace is not None
-    fit = periodic_scan(
-        trace, retrace, conditions.x.turn, conditions.x.window, images.mirrored, conditions.delay_pixels
-    )
+    (turn, (low, high)), delay_pixels, mirrored = conditions.x.timing, conditions.delay_pixels, images.mirrored
+    if retrace_alone:  # a way back is a way forward over the mirror image of the sample
+        trace = np.ascontiguousarray(images.heights(images.reference[0])[:, ::-1])
+        fit = periodic_scan(trace, None, 1.0 - turn, (1.0 - high, 1.0 - low), False, delay_pixels)
+    else:
+        fit = periodic_scan(trace, retrace, turn, (low, high), mirrored, delay_pixels)
     first, (rows, columns) = images.first, images.shape
     size: tuple[float, float] | None = None
     distortion: Distortion = fit.distortion
-    record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources, **images.angle}
+    record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources}
+    record |= {**images.angle, **images.timing}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
             distortion = fit.of_lattice(lattice_nm)
@@ -394,15 +427,18 @@ def by_fit(
     elif first.width_nm is not None and first.height_nm is not None:
         size = first.width_nm, first.height_nm
     record |= {
-        "turn": conditions.x.turn,
-        "window": list(conditions.x.window),
+        "turn": turn,
+        "window": [low, high],
         "periods_in_the_line": [round(float(q), 4) for q in fit.waves[:, 0]],
         "explained": round(fit.explained, 6),
         "slow_axis": "fitted" if fit.tells_y else "as taken: a grating does not tell it",
     }
+    if retrace_alone:
+        distortion = distortion.mirrored()
+        record["retrace_alone"] = True
     scan = _corrected(images, distortion, size, record)
     check_moves(distortion)
-    check_cell(fit, images.heights(images.reference[0]), True)
+    check_cell(fit, trace if retrace_alone else images.heights(images.reference[0]), True)
     check_agreement(scan.agreement)
     return scan, fit
 

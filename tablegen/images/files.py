@@ -27,14 +27,20 @@ from tablegen.images.formats.channel import (
     partner,
     quote,
 )
+from tablegen.images.formats.createc import CREATEC_MAGICS, createc_channels
 from tablegen.images.formats.gwyddion import gwy_channels
 from tablegen.images.formats.igor import ibw_channels
+from tablegen.images.formats.iso28600 import ISO_MAGIC, iso_channels
 from tablegen.images.formats.jpk import jpk_channels
 from tablegen.images.formats.matrix import npy_channels, text_channels
 from tablegen.images.formats.nanonis import sxm_channels
 from tablegen.images.formats.nanoscope import spm_channels
+from tablegen.images.formats.nanosurf import nid_channels
+from tablegen.images.formats.ntmdt import mdt_channels
+from tablegen.images.formats.park import is_park, park_channels
 from tablegen.images.formats.picture import png_channels
 from tablegen.images.formats.tiff import tiff_channels
+from tablegen.images.formats.wsxm import wsxm_channels
 from tablegen.numerics.arrays import Floats
 
 _MIN_PIXELS = 32  # rows and columns
@@ -66,6 +72,8 @@ class ScanImage:
     frame: int = 0  # counted from 0
     frames: int = 1  # images of a movie
     angle_deg: float | None = None  # of the fast axis against the scanner's x
+    turn: float | None = None  # share of the line period that is forward
+    window: tuple[float, float] | None = None  # part of each sweep that the columns span
 
 
 def read_image(
@@ -243,19 +251,39 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         frame=frame_number,
         frames=channel.frames,
         angle_deg=channel.angle_deg,
+        turn=channel.turn,
+        window=channel.window,
     )
+
+
+def _spm(content: bytes, name: str) -> list[Channel]:
+    """Return the channels of a .spm file, which is of Nanoscope or of ISO 28600."""
+    return (iso_channels if content.startswith(ISO_MAGIC) else spm_channels)(content, name)
+
+
+def _dat(content: bytes, name: str) -> list[Channel]:
+    """Return the channels of a .dat file, which is of Createc or rows of numbers."""
+    return (createc_channels if content.startswith(CREATEC_MAGICS) else text_channels)(content, name)
+
+
+def _tiff(content: bytes, name: str) -> list[Channel]:
+    """Return the channels of a TIFF file, which may be of Park Systems."""
+    return (park_channels if is_park(content) else tiff_channels)(content, name)
 
 
 _READERS: dict[str, Callable[[bytes, str], list[Channel]]] = {
     ".npy": npy_channels,
-    ".tif": tiff_channels,
-    ".tiff": tiff_channels,
+    **dict.fromkeys((".tif", ".tiff"), _tiff),
     ".png": png_channels,
     ".gwy": gwy_channels,
-    **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), text_channels),
+    **dict.fromkeys((".txt", ".asc", ".csv"), text_channels),
+    ".dat": _dat,
     ".asd": asd_channels,
     ".ibw": ibw_channels,
-    ".spm": spm_channels,
+    ".spm": _spm,
+    **dict.fromkeys((".stp", ".top"), wsxm_channels),
+    ".nid": nid_channels,
+    ".mdt": mdt_channels,
     ".jpk": jpk_channels,
     ".jpk-qi-image": jpk_channels,
     ".sxm": sxm_channels,

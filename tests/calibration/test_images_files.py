@@ -116,7 +116,8 @@ def test_channels_by_title_and_by_number(tmp_path: Path) -> None:
         gwy_twice[f"/{number}/data/title"] = "Height"
         gwy_twice[f"/{number}/data"] = GwyDataField(HEIGHTS)
     gwy_twice.tofile(str(tmp_path / "b.gwy"))
-    assert "has more than one channel 'Height'; there is 0 (Height), 3 (Height)" in why(tmp_path / "b.gwy", "Height")
+    twice = "has more than one channel 'Height': 0 (Height), 3 (Height); choose one by its number"
+    assert twice in why(tmp_path / "b.gwy", "Height")
 
 
 # refused

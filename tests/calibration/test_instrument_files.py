@@ -13,17 +13,24 @@ import pytest
 from gwyfile.objects import GwyContainer, GwyDataField
 from igor2 import binarywave
 from image_writers import gwy, npy
-from instrument_files import asd, ibw, jpk, spm, sxm
+from instrument_files import asd, createc, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
 from mutating import damaged
 
+from tablegen.api.image_input import sample_image
 from tablegen.base.input_errors import Rejected
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
 from tablegen.images.formats.channel import Channel, split_direction
+from tablegen.images.formats.createc import createc_channels
 from tablegen.images.formats.igor import ibw_channels
+from tablegen.images.formats.iso28600 import iso_channels
 from tablegen.images.formats.jpk import jpk_channels
 from tablegen.images.formats.nanonis import sxm_channels
 from tablegen.images.formats.nanoscope import spm_channels
+from tablegen.images.formats.nanosurf import nid_channels
+from tablegen.images.formats.ntmdt import mdt_channels
+from tablegen.images.formats.park import park_channels
+from tablegen.images.formats.wsxm import wsxm_channels
 
 T, R, P, Q = np.random.default_rng(1).uniform(-20.0, 20.0, (4, 40, 48))  # nm
 NOTE = {"ScanSize": "5e-07", "FastScanSize": "5e-07", "SlowScanSize": "2.5e-07", "ScanRate": "2.5", "ScanDown": "0"}
@@ -78,6 +85,14 @@ def test_trace_and_retrace_of_one_file(name: str, tmp_path: Path) -> None:
         assert np.array_equal(read_image(path, image.channel).heights, image.heights)
         assert np.array_equal(read_image(path, str(image.number)).heights, image.heights)
         assert np.array_equal(read_image(path, signal, image.direction).heights, image.heights)
+
+
+def test_a_retrace_alone_is_the_mirror_image_of_the_sample_and_said(tmp_path: Path) -> None:
+    path = put(tmp_path, "r.ibw", ibw({"HeightRetrace": ASYLUM["HeightRetrace"]}, NOTE))
+    sample, _ = sample_image(50.0, None, path, None, {})
+    assert np.array_equal(sample.trace, ASYLUM["HeightRetrace"][:, ::-1].astype("f4"))
+    assert sample.retrace is None
+    assert sample.name.endswith("r.ibw (the retrace alone, mirrored)")
 
 
 @pytest.mark.parametrize("version", [0, 1, 2])
@@ -214,6 +229,11 @@ TURNED = {
     "scan.spm": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 90\r\n"),
     "image.001": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 0\r\n", of_image="\\Rotate Ang.: 90 deg\r\n"),
     "a.jpk": jpk({"Height": (T, R)}, angle_deg=90.0),
+    "iso.spm": iso28600({"Z": T}, angle_deg=90.0),
+    "a.stp": wsxm(T, angle_deg=90.0),
+    "a.dat": createc([T]),
+    "a.nid": nid({"Z-Axis": (T, R)}),
+    "a.tiff": park(T, angle_deg=90.0),
 }
 
 
@@ -308,6 +328,122 @@ def test_what_is_no_pair_is_said(tmp_path: Path) -> None:
     )  # of an image, either could be meant
 
 
+OTHERS: dict[str, tuple[bytes, str, float, float, str, str | None]] = {
+    # name: content of both directions or of the trace, signal, nm of a unit, the most in nm, unit, where row 0 is
+    "a.spm": (iso28600({"Z (Forward)": T * 1e-9, "Z (Backward)": R * 1e-9}, mode="MAP_MC"), "Z", 1e9, 1e-5, "m", "top"),
+    "up.spm": (iso28600({"Z forward": T * 1e-9}, slow="bottom to top"), "Z", 1e9, 1e-5, "m", None),
+    "a.stp": (wsxm(T - np.min(T)), "Topography", 1.0, 1e-3, "nm", "bottom"),
+    "down.TOP": (wsxm(T, "double", slow="Down"), "Topography", 1.0, 1e-9, "nm", "top"),
+    "a.nid": (nid({"Z-Axis": (T, R), "Phase": (P, Q)}), "Z-Axis", 1e9, 1e-6, "m", None),
+    "curves.nid": (nid({"Z-Axis": (T, R)}, bits=16, curves=True), "Z-Axis", 1e9, 2e-3, "m", None),
+    "a.mdt": (mdt({"1F:Height": T, "1B:Height": R, "2F:Phase": P}), "Height", 1.0, 6e-3, "nm", None),
+    "dots.mdt": (mdt({"1F:Height": T}, dots=2), "Height", 1.0, 6e-3, "nm", None),
+    "a.tiff": (park(T), "Height", 1.0, 6e-3, "nm", "bottom"),
+    "down.tif": (park(T, kind=2, up=False), "Height", 1.0, 1e-5, "nm", "top"),
+    "long.tif": (park(T, kind=1), "Height", 1.0, 6e-3, "nm", "bottom"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_further_formats(name: str, tmp_path: Path) -> None:
+    content, signal, nm, near, unit, first = OTHERS[name]
+    path = put(tmp_path, name, content)
+    ways = [(T, "trace")] + [(R, "retrace")] * (len({one.direction for one in channels_of(path)}) - 1)
+    for heights, direction in ways:
+        image = read_image(path, signal, direction)  # type: ignore[arg-type]
+        off = image.heights * nm - heights
+        assert np.max(np.abs(off - (np.mean(off) if name == "a.stp" else 0.0))) < near  # 16 bits begin anywhere
+        assert (image.signal, image.direction, image.unit, image.first_row) == (signal, direction, unit, first)
+        assert (image.width_nm, image.height_nm) == (pytest.approx(500.0), pytest.approx(250.0))
+        states_a_rate = path.suffix.lower() in (".spm", ".stp", ".top", ".tif", ".tiff")
+        assert image.line_rate_hz == (pytest.approx(2.5) if states_a_rate else None)
+
+
+@pytest.mark.parametrize("kind", ["Parameter", "Paramet32", "Paramco32"])
+def test_channels_of_createc_with_rows_that_were_not_scanned(kind: str, tmp_path: Path) -> None:
+    stopped = [np.where(np.arange(40)[:, None] < 33, heights, 0.0) for heights in (T, R)]
+    path = put(tmp_path, "a.dat", createc(stopped, kind))
+    for number, heights in enumerate((T, R)):
+        image = read_image(path, str(number))
+        assert np.max(np.abs(image.heights / 1000.0 - heights[:33])) < 6e-4
+        assert (image.unit, image.direction, image.angle_deg) == ("LSB", None, 90.0)
+        assert (image.width_nm, image.height_nm) == (pytest.approx(500.0), pytest.approx(250.0 * 33 / 40))
+
+
+@pytest.mark.parametrize(("times", "turn"), [((12.5, 2.5), 0.83333333), ((0.25, 0.25), 0.5), ((0.0, 2.5), None)])
+def test_the_turn_is_by_the_times_of_both_directions(
+    times: tuple[float, float], turn: float | None, tmp_path: Path
+) -> None:
+    (trace, _) = read_pair(put(tmp_path, "a.sxm", sxm(NANONIS, times_s=times)), channel="Z")
+    assert trace.turn == (None if turn is None else pytest.approx(turn))
+    assert trace.line_rate_hz == (None if turn is None else pytest.approx(1.0 / sum(times)))
+
+
+@pytest.mark.parametrize(
+    ("speed", "window"),
+    [("3.125e-06", (0.1, 0.9)), ("2.5e-06", (0.0, 1.0)), ("2e-06", None), ("1e-3", None), ("nan", None), (None, None)],
+)
+def test_the_window_is_by_the_speed_of_the_tip(
+    speed: str | None, window: tuple[float, float] | None, tmp_path: Path
+) -> None:
+    note = NOTE if speed is None else NOTE | {"ScanSpeed": speed}
+    image = read_image(put(tmp_path, "a.ibw", ibw(ASYLUM, note)), "HeightTrace")
+    assert image.window == (None if window is None else pytest.approx(window))
+
+
+def test_channels_of_one_name_are_chosen_by_number_and_pair_in_their_order(tmp_path: Path) -> None:
+    info = sxm({"Z": (T * 1e-9, R * 1e-9), "I": (P * 1e-9, Q * 1e-9)}).replace(b"\tI\t", b"\tZ\t")
+    path = put(tmp_path, "a.sxm", info)
+    assert "has more than one channel 'Z': 0 (Z forward), 2 (Z forward); choose one by its number" in why(
+        path, "Z", read=lambda path, channel: read_image(path, channel, "trace")
+    )
+    for number, heights in (("0", (T, R)), ("2", (P, Q))):
+        for image, one in zip(read_pair(path, channel=number), heights, strict=True):
+            assert np.max(np.abs(image.heights * 1e9 - one)) < 1e-5
+
+
+def test_files_of_an_electrochemical_cell(tmp_path: Path) -> None:
+    content = spm({"Height": (T, R)}, aspect="48:40").replace(b"\\*File list\r", b"\\*EC File list\r", 1)
+    content = content.replace(b"\x1a\0\0\0", b"\x1a", 1)  # the data stay where the header says
+    assert np.max(np.abs(read_image(put(tmp_path, "a.001", content), "Height", "trace").heights - T)) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("unit", "nm"), [("nm", 1.0), ("\\u00B5m", 1e3), ("micron", 1e3), ("µm", 1e3), ("pixel", None), ("inch", None)]
+)
+def test_the_pixel_of_imagej(unit: str, nm: float | None, tmp_path: Path) -> None:
+    import tifffile
+
+    text = f"ImageJ=1.53t\nimages=1\nunit={unit}\nmin=0\n"
+    tifffile.imwrite(
+        tmp_path / "a.tif", T.astype("f4"), description=text.encode("latin-1"), metadata=None, resolution=(4.0, 8.0)
+    )
+    image = read_image(tmp_path / "a.tif")
+    sides = (None, None) if nm is None else (pytest.approx(48 / 4.0 * nm), pytest.approx(40 / 8.0 * nm))
+    assert (image.width_nm, image.height_nm) == sides
+    tifffile.imwrite(tmp_path / "b.tif", T.astype("f4"), description="Other", metadata=None, resolution=(4.0, 8.0))
+    assert read_image(tmp_path / "b.tif").width_nm is None  # dots per inch of a printer
+
+
+def test_the_size_is_that_of_all_pixels_by_other_readers(tmp_path: Path) -> None:
+    """N pixels in the width. Igor has N - 1 steps in it; the range of Nanonis and Gwyddion's size are of N."""
+    igor = put(tmp_path, "a.ibw", ibw(ASYLUM, NOTE | {"ScanLines": "160"}, step_m=(5e-7 / 47, 2.5e-7 / 159)))
+    step = binarywave.load(str(igor))["wave"]["wave_header"]["sfA"] * 1e9
+    image = read_image(igor, "HeightTrace")
+    assert image.width_nm == pytest.approx(step[0] * 47, rel=1e-3)
+    assert image.height_nm == pytest.approx(40 * step[1] * 159 / 160, rel=1e-3)
+    nanonis = put(tmp_path, "a.sxm", sxm(NANONIS))
+    size = nanonispy2.read.Scan(str(nanonis)).header["scan_range"] * 1e9
+    image = read_image(nanonis, "Z", "trace")
+    assert (image.width_nm, image.height_nm) == pytest.approx(tuple(size), rel=1e-3)
+    container = GwyContainer()
+    container["/0/data"] = GwyDataField(T, xreal=5e-7, yreal=2.5e-7, si_unit_xy="m", si_unit_z="m")
+    container.tofile(str(tmp_path / "size.gwy"))
+    field = GwyContainer.fromfile(str(tmp_path / "size.gwy"))["/0/data"]
+    image = read_image(tmp_path / "size.gwy")
+    assert (image.width_nm, image.height_nm) == pytest.approx((field.xreal * 1e9, field.yreal * 1e9), rel=1e-3)
+
+
 # damaged
 
 SMALL = np.random.default_rng(2).uniform(-20.0, 20.0, (3, 4))
@@ -318,7 +454,16 @@ READERS: dict[str, tuple[bytes, Callable[[bytes, str], list[Channel]]]] = {
     "jpk": (jpk({"height": (SMALL, SMALL)}), jpk_channels),
     "asd0": (asd({"TP": np.stack([SMALL] * 2)}, 0), asd_channels),
     "asd1": (asd({"TP": np.stack([SMALL] * 2)}, 1), asd_channels),
+    "iso": (iso28600({"Z (Forward)": SMALL, "Z (Backward)": SMALL}, mode="MAP_MC"), iso_channels),
+    "stp": (wsxm(SMALL), wsxm_channels),
+    "top": (wsxm(SMALL, "double"), wsxm_channels),
+    "dat": (createc([SMALL, SMALL]), createc_channels),
+    "dat1": (createc([SMALL, SMALL], "Parameter"), createc_channels),
+    "nid": (nid({"Z-Axis": (SMALL, SMALL)}, curves=True), nid_channels),
+    "mdt": (mdt({"1F:Height": SMALL, "1B:Height": SMALL}), mdt_channels),
+    "park": (park(SMALL), park_channels),
 }
+NOT_NEEDED = {"iso": 1, "dat": 40, "dat1": 32, "mdt": 0}  # bytes behind the last pixel that may be missing
 
 
 def read_or_refused(reader: Callable[[bytes, str], list[Channel]], content: bytes) -> bool:
@@ -338,9 +483,10 @@ def read_or_refused(reader: Callable[[bytes, str], list[Channel]], content: byte
 def test_a_file_that_ends_early_is_refused_wherever_it_ends(kind: str) -> None:
     content, reader = READERS[kind]
     whole = len(content)
-    step = 7 if kind == "spm" else 1  # 4096 bytes of header, most of them empty
+    step = {"spm": 7, "dat": 41, "dat1": 41}.get(kind, 1)  # headers most of which is empty
     assert read_or_refused(reader, content)
-    assert [cut for cut in range(0, whole, step) if read_or_refused(reader, content[:cut])] == []
+    needed = whole - NOT_NEEDED.get(kind, 0)
+    assert [cut for cut in range(0, needed, step) if read_or_refused(reader, content[:cut])] == []
 
 
 @pytest.mark.parametrize("kind", READERS)
@@ -382,6 +528,26 @@ HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     "asd, pixels": ("asd1", lambda c: with_numbers(c, 48, WORLD, WORLD), "has frames of 2000000000 x"),
     "asd, header": ("asd1", lambda c: with_numbers(c, 4, -4), "frames behind -4 bytes of header"),
     "asd, name": ("asd0", lambda c: with_numbers(c, 16, WORLD), "ends in its header"),
+    "iso, pixels": ("iso", lambda c: c.replace(b"\n4\n3\n", b"\n999999\n999999\n"), "an image of 999999 x 999999"),
+    "iso, more": ("iso", lambda c: c.replace(b"\n4\n3\n", b"\n2\n2\n"), "more lines of numbers than its 4 pixels"),
+    "iso, word": ("iso", lambda c: c.replace(b"end of header\n", b"end of header\nx"), "something else than numbers"),
+    "iso, fewer": ("iso", lambda c: c.replace(b"\n4\n3\n", b"\n4\n4\n"), "has 24 numbers for 2 images of 16"),
+    "iso, lines": ("iso", lambda c: c.replace(b"MAP_MC\n", b"MAP_MC\n\n"), "has no header of 128 lines"),
+    "iso, fast": ("iso", lambda c: c.replace(b"\nX\n", b"\nY\n"), "has 'Y' as its fast axis"),
+    "iso, curves": ("iso", lambda c: c.replace(b"MAP_MC", b"SPEC_SC"), "holds 'SPEC_SC'"),
+    "stp": ("stp", lambda c: c.replace(b"columns: 4", b"columns: 99"), "in the middle of its image of 99 x 3"),
+    "stp, header": ("stp", lambda c: re.sub(rb"size: +\d+", b"size: 9999999", c), "has no end of its header"),
+    "stp, kind": ("stp", lambda c: c.replace(b"Type: short", b"Type: quad"), "numbers of the kind 'quad'"),
+    "dat": ("dat", lambda c: c.replace(b"Num.X=4", b"Num.X=9"), "in the middle of its 2 images of 9 x 3"),
+    "dat, packed": ("dat", lambda c: c[: 1 << 14] + b"abc", "cannot be unpacked"),
+    "dat, channels": ("dat", lambda c: c.replace(b"Channels=2", b"Channels=0"), "has 0 channels; 1 to 100"),
+    "nid": ("nid", lambda c: c.replace(b"Points=4", b"Points=9999"), "in the middle of its data set 'DataSet-1:0'"),
+    "nid, bits": ("nid", lambda c: c.replace(b"Bits=32", b"Bits=12"), "numbers of an unknown kind in 'DataSet-1:0'"),
+    "mdt": ("mdt", lambda c: c[:33] + struct.pack("<I", WORLD) + c[37:], "ends in its frame 0 of 3"),
+    "mdt, still": ("mdt", lambda c: c[:33] + struct.pack("<I", 0) + c[37:], "ends in its frame 0 of 3"),
+    "park": ("park", lambda c: c.replace(struct.pack("<2i", 4, 3), struct.pack("<2i", WORLD, 3)), "of 2000000000 x 3"),
+    "park, kind": ("park", lambda c: c[:-232] + b"\x07" + c[-231:], "pixels of the kind 7"),
+    "park, swapped": ("park", lambda _: park(SMALL, swapped=True), "was scanned with x and y exchanged"),
     "asd, version": ("asd1", lambda c: with_numbers(c, 0, 9), "of version 0, 1 or 2"),
 }  # fmt: skip
 

@@ -107,7 +107,19 @@ def test_the_same_as_data(lab: Path) -> None:
         "frames": 1,
         "first_row": "bottom",
         "scan_angle_deg": 0.0,
+        "turn": pytest.approx(0.8),
+        "window": None,
     }
+
+
+def test_a_turn_and_a_window_have_a_column_where_they_say_something(lab: Path) -> None:
+    rows = run("channels", "a.sxm").out.splitlines()
+    assert rows[1].endswith("first row  turn")
+    assert [row.split()[-2:] for row in rows[2:]] == [["bottom", "0.8"]] * 2
+    (lab / "over.ibw").write_bytes(ibw({"HeightTrace": np.eye(40)}, NOTE | {"ScanSpeed": "3.125e-06"}))
+    rows = run("channels", "over.ibw").out.splitlines()
+    assert rows[1].endswith("first row  window")
+    assert rows[2].endswith("bottom     0.1 to 0.9")
 
 
 def test_an_angle_other_than_0_has_a_column(lab: Path) -> None:

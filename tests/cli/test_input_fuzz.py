@@ -19,7 +19,7 @@ import pytest
 from editing import SCAN, SCANNER, Outcome, edited, run, write_pair
 from gwyfile.objects import GwyContainer, GwyDataField
 from image_writers import ascii_of, npy, png
-from instrument_files import asd, ibw, jpk, spm, sxm
+from instrument_files import asd, createc, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
 from limits import limit
 from mutating import damaged, damaged_json
 from PIL import Image as Pillow
@@ -62,6 +62,14 @@ def pictures() -> dict[str, bytes]:
     both = {"Height": (HEIGHTS / 3000.0, HEIGHTS / 3000.0)}  # -100 nm to 100 nm are the most of a writer
     made |= {"sxm": sxm(both), "spm": spm(both), "jpk": jpk(both), "asd": asd({"TP": HEIGHTS[np.newaxis] / 3000.0})}
     made["ibw"] = ibw({"HeightTrace": HEIGHTS}, {"ScanRate": "1"})
+    small = HEIGHTS / 3000.0
+    made |= {
+        "stp": wsxm(small),
+        "top": wsxm(small, "double"),
+        "nid": nid({"Z": (small, small)}),
+        "park.tiff": park(small),
+    }
+    made |= {"mdt": mdt({"1F:Height": small}), "dat": createc([small]), "iso.spm": iso28600({"Z": small})}
     return made
 
 

@@ -120,6 +120,23 @@ def test_a_trace_alone_by_a_fit(tmp_path: Path) -> None:
 
 
 @pytest.mark.common
+def test_a_retrace_alone_is_fitted_as_the_trace_of_the_mirror_image(tmp_path: Path) -> None:
+    """Each pixel of the retrace is where it was, with neither trace nor scanner file."""
+    frame = old_frame("bouc-wen", **DRIFT)
+    _, retrace = save_pair(frame, tmp_path)
+    both = read_scan(retrace, None, Choice())
+    alone = replace(both, channels=(replace(both.channels[0], direction="retrace"),), forward=(False,))
+    scan, fit = by_fit(alone, OldScan(), lattice_nm=60.0)
+    assert fit.tells_y
+    assert scan.record["retrace_alone"]
+    assert scan.distortion.forward is None
+    twice = replace(scan.distortion, forward=scan.distortion.backward)
+    found = off(twice, FrameImages(frame.retrace, frame.retrace))
+    assert found.x < REACH_PERCENT
+    assert found.y < REACH_PERCENT
+
+
+@pytest.mark.common
 def test_a_grating_tells_the_fast_axis_alone(tmp_path: Path) -> None:
     frame = old_frame("plays", surface=grating(50.0))
     scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), OldScan(), pitch_nm=50.0)

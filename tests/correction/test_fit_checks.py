@@ -208,7 +208,8 @@ def test_the_scan_angle_is_kept_and_said_where_an_axis_is_taken(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     frame = old_frame("paper", **SHAPE)
-    content = sxm({"Z": (frame.trace.heights, frame.retrace.heights)}, (1080.0, 1080.0), angle_deg=90.0)
+    both = frame.trace.heights, frame.retrace.heights
+    content = sxm({"Z": both}, (1080.0, 1080.0), angle_deg=90.0, times_s=(5e-3, 5e-3))
     (tmp_path / "a.sxm").write_bytes(content)
     (tmp_path / "scanner.toml").write_text(LAWS, "utf-8")
     fitted = run("correct", "a.sxm", "--fit", "--json")
@@ -217,3 +218,23 @@ def test_the_scan_angle_is_kept_and_said_where_an_axis_is_taken(
     drive = ("--scanner", "scanner.toml", "--size-v", "90", "--offset-v", "50", "--rate-hz", "100")
     text = "note: scan angle 90 degrees: the fast axis was y; the correction took [x] of the scanner file for the fast"
     assert text in run("correct", "a.sxm", *drive).out
+
+
+def test_the_turn_of_the_file_is_taken_and_said_unless_one_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """12.5 s forward and 2.5 s back are a turn of 0.833."""
+    monkeypatch.chdir(tmp_path)
+    frame = old_frame("paper", **SHAPE)
+    both = frame.trace.heights, frame.retrace.heights
+    (tmp_path / "a.sxm").write_bytes(sxm({"Z": both}, (1080.0, 1080.0), times_s=(12.5, 2.5)))
+    (tmp_path / "scanner.toml").write_text(LAWS.replace("turn = 0.5", "turn = 0.8", 1), "utf-8")
+    drive = ("correct", "a.sxm", "--scanner", "scanner.toml", "--size-v", "90", "--offset-v", "50")
+    record = json.loads(run(*drive, "--json").out)
+    assert record["x"]["turn"] == record["file_turn"] == pytest.approx(12.5 / 15.0)
+    assert record["x"]["rate_hz"] == pytest.approx(1.0 / 15.0)
+    assert record["y"]["turn"] == 0.5
+    assert "turn 0.8333, as the image file states" in run(*drive).out
+    given = run(*drive, "--turn", "0.8", "--json")
+    assert json.loads(given.out)["x"]["turn"] == 0.8
+    assert "as the image file states" not in run(*drive, "--turn", "0.8").out

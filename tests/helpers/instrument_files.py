@@ -5,7 +5,8 @@ writer stores them as the instrument does.
 """
 
 import struct
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,6 +21,7 @@ def sxm(
     scan_dir: str = "up",
     units: str = "m",
     angle_deg: float = 0.0,
+    times_s: tuple[float, float] = (0.4, 0.1),
 ) -> bytes:
     """Nanonis: big-endian floats in the order of time, so that backward lines begin at the right."""
     rows, columns = next(iter(signals.values()))[0].shape
@@ -28,7 +30,7 @@ def sxm(
         ":NANONIS_VERSION:\n2\n:SCANIT_TYPE:\n              FLOAT            MSBFIRST\n:REC_DATE:\n 22.11.2026\n"
         ":REC_TIME:\n12:34:56\n:REC_TEMP:\n      290.0000000000\n:ACQ_TIME:\n       128.2\n"
         f":SCAN_PIXELS:\n       {columns}       {rows}\n:SCAN_FILE:\nC:\\scan.sxm\n"
-        ":SCAN_TIME:\n             4.000E-1             1.000E-1\n"
+        f":SCAN_TIME:\n             {times_s[0]:.3E}             {times_s[1]:.3E}\n"
         f":SCAN_RANGE:\n           {nm[0] * 1e-9:.6E}           {nm[1] * 1e-9:.6E}\n"
         f":SCAN_OFFSET:\n             0.000000E+0         0.000000E+0\n:SCAN_ANGLE:\n            {angle_deg:.3E}\n"
         f":SCAN_DIR:\n{scan_dir}\n:BIAS:\n            1.000E+0\n:COMMENT:\nof a test\n"
@@ -197,3 +199,154 @@ def asd(
         at = 0
     head = head[:at] + struct.pack("<2i", 4 + len(head), 32) + head[at + 8 :]
     return struct.pack("<i", version) + head + body
+
+
+def iso28600(
+    channels: Mapping[str, Floats],
+    nm: tuple[float, float] = (500.0, 250.0),
+    mode: str = "MAP_SC",
+    slow: str = "top to bottom",
+    fast: str = "X",
+    angle_deg: float = 0.0,
+) -> bytes:
+    """ISO 28600: 128 lines, then the values of all channels of a pixel in a line."""
+    rows, columns = next(iter(channels.values())).shape
+    names = [line for title in channels for line in (title, "m", "")]
+    single = names[:3] if mode == "MAP_SC" else ["", "n", ""]
+    head = ["ISO/TC 201 SPM data transfer format", "general information", "", "", "", "", "of a test", mode]
+    head += ["-1"] * 7 + ["scan information", "REGULAR MAPPING", "open-loop scanner", "sample XYZ scan"]
+    head += [fast, "left to right", "Y", slow, f"{columns}", f"{rows}", "m", "um", f"{nm[0] * 1e-9:g}"]
+    head += [f"{nm[1] * 1e-3:g}", "m", "m", "0", "0", f"{angle_deg:g}", "m/s", "0.0", "Hz", "2.5", "", "sample biased"]
+    head += ["0.0", "0", "", "", "", "", "", "environment description", "software", "300", "1.0e5", "40", ""]
+    head += ["probe description", "", "", "0.0", "0.0", "0.0", "0", "0", "0", "", "sample description", "", "", ""]
+    head += ["single-channel mapping description", *single, "spectroscopy description", "", "REGULAR", "", "n"]
+    head += ["0.0"] * 4 + ["0", "0", "", "n", "0.0", "", "data treatment description", "raw data", "", "", "", ""]
+    head += ["multi-channel mapping description", f"{len(channels)}", *names]
+    head += [""] * (127 - len(head)) + ["end of header"]
+    values = np.stack([heights.ravel() for heights in channels.values()], axis=1)
+    body = [", ".join(f"{value:.9g}" for value in pixel) for pixel in values]
+    return "\n".join([*head, *body, "end of experiment", ""]).encode()
+
+
+def wsxm(
+    heights: Floats,
+    kind: str = "short",
+    direction: str = "Forward",
+    slow: str = "Up",
+    nm: tuple[float, float] = (500.0, 250.0),
+    angle_deg: float = 0.0,
+) -> bytes:
+    """WSxM: the last pixel of the picture first; 16 bits over the amplitude, or nm as they are."""
+    rows, columns = heights.shape
+    picture = (heights[::-1] if slow == "Up" else heights).ravel()[::-1]
+    span = float(np.ptp(picture))
+    levels = np.round((picture - picture.min()) / (span or 1.0) * 65535.0 - 32768.0)
+    body = levels.astype("<i2").tobytes() if kind == "short" else picture.astype("<f8").tobytes()
+    text = (
+        "WSxM file copyright Nanotec Electronica\r\nSxM Image file\r\nImage header size: {:5d}\r\n\r\n[Control]\r\n\r\n"
+        f"    Rotation: {angle_deg:g} Deg\r\n    X Amplitude: {nm[0]:g} nm\r\n    X-Frequency: 2.5 Hz\r\n"
+        f"    Y Amplitude: {nm[1] * 1e-3:g} um\r\n\r\n[General Info]\r\n\r\n    Acquisition channel: Topography\r\n"
+        f"    Image Data Type: {kind}\r\n    Number of columns: {columns}\r\n    Number of rows: {rows}\r\n"
+        f"    X scanning direction: {direction}\r\n    Y scanning direction: {slow}\r\n"
+        f"    Z Amplitude: {span:.9g} nm\r\n\r\n[Header end]\r\n"
+    )
+    return text.format(len(text.format(0))).encode("latin-1") + body
+
+
+def createc(channels: Sequence[Floats], kind: str = "Paramco32", nm: tuple[float, float] = (500.0, 250.0)) -> bytes:
+    """Createc: a header of 16 KiB, one number without use, then all channels; packed in the last version."""
+    rows, columns = channels[0].shape
+    header = (
+        f"[{kind}]\r\nTitel / Titel=\r\nNum.X / Num.X={columns}\r\nNum.Y / Num.Y={rows}\r\nDelta X / Delta X=4\r\n"
+        f"Rotation / Rotation=90\r\nChannels / Channels={len(channels)}\r\nDacto[A]z=0.005\r\n"
+        f"Length x[A]={nm[0] * 10.0:g}\r\nLength y[A]={nm[1] * 10.0:g}\r\nSec/Image:=12\r\n"
+    )
+    numbers = np.concatenate([[0.0], *[heights.ravel() for heights in channels], np.zeros(4 * columns)])
+    body = np.round(numbers * 1000.0).astype("<i2" if kind == "Parameter" else "<f4").tobytes()
+    return header.encode().ljust(1 << 14, b"\0") + (zlib.compress(body) if kind == "Paramco32" else body)
+
+
+def nid(signals: Both, nm: tuple[float, float] = (500.0, 250.0), bits: int = 32, curves: bool = False) -> bytes:
+    """Nanosurf: a group for each direction, the range of 200 nm about 0 over all levels; and curves before them."""
+    rows, columns = next(iter(signals.values()))[0].shape
+    text = f"[DataSet]\r\nVersion=2\r\nGroupCount={2 + curves}\r\n"
+    sets, body = "", b""
+    if curves:
+        text += "Gr0-Count=1\r\nGr0-Ch0=DataSet-9:0\r\n"
+        sets += (
+            "[DataSet-9:0]\r\nPoints=3\r\nLines=2\r\nFrame=Spec forward\r\nDim1Name=SpecPoint\r\nDim1Unit=\r\n"
+            "SaveMode=Binary\r\nSaveBits=16\r\nSaveSign=Signed\r\nSaveOrder=Intel\r\n"
+        )
+        body += bytes(12)
+    for way, frame in enumerate(("Scan forward", "Scan backward")):
+        group = way + curves
+        text += f"Gr{group}-Count={len(signals)}\r\n"
+        for at, (signal, both) in enumerate(signals.items()):
+            text += f"Gr{group}-Ch{at}=DataSet-{group}:{at}\r\n"
+            sets += (
+                f"[DataSet-{group}:{at}]\r\nVersion=2\r\nPoints={columns}\r\nLines={rows}\r\nFrame={frame}\r\n"
+                f"Dim0Name=X*\r\nDim0Unit=m\r\nDim0Range={nm[0] * 1e-9:g}\r\nDim0Min=0\r\n"
+                f"Dim1Name=Y*\r\nDim1Unit=m\r\nDim1Range={nm[1] * 1e-9:g}\r\nDim1Min=0\r\n"
+                f"Dim2Name={signal}\r\nDim2Unit=m\r\nDim2Range=2e-07\r\nDim2Min=-1e-07\r\n"
+                f"SaveMode=Binary\r\nSaveBits={bits}\r\nSaveSign=Signed\r\nSaveOrder=Intel\r\n\r\n"
+            )
+            body += np.round(both[way] / 200.0 * 2.0**bits).astype(f"<i{bits // 8}").tobytes()
+    text += "[DataSet-Info]\r\nRotation=90\u00b0\r\n"
+    return (text + sets).encode("latin-1") + b"#!" + body
+
+
+def mdt(channels: Mapping[str, Floats], nm: tuple[float, float] = (500.0, 250.0), dots: int = 0) -> bytes:
+    """NT-MDT: a frame of text, then frames of scanned data, 0.01 nm a step."""
+    text = struct.pack("<IH2B6HH", 22 + 8, 3, 1, 2, *[0] * 7) + bytes(8)
+    frames = [text]
+    for title, heights in channels.items():
+        rows, columns = heights.shape
+        scales = struct.pack("<ffh", 0.0, nm[0] / columns, -1) + struct.pack("<ffh", 0.0, nm[1] * 1e-3 / rows, -2)
+        variables = (scales + struct.pack("<ffh", 0.0, 0.01, -1) + bytes(2)).ljust(80, b"\0")
+        body = variables + struct.pack("<4H", 0, columns, rows, dots) + bytes(14 + 16 * dots if dots else 0)
+        body += np.round(heights / 0.01).astype("<i2").tobytes()
+        body += struct.pack("<I", len(title)) + title.encode() + struct.pack("<I", 0)
+        frames.append(struct.pack("<IH2B6HH", 22 + len(body), 0, 1, 2, *[0] * 6, len(variables)) + body)
+    head = b"\x01\xb0\x93\xff" + struct.pack("<I4xH", sum(map(len, frames)), len(frames) - 1)
+    return head.ljust(33, b"\0") + b"".join(frames)
+
+
+def park(
+    heights: Floats,
+    nm: tuple[float, float] = (500.0, 250.0),
+    kind: int = 0,
+    forward: bool = True,
+    up: bool = True,
+    swapped: bool = False,
+    angle_deg: float = 0.0,
+) -> bytes:
+    """Park Systems: a small picture in colour, and tags with a header and with heights, 0.01 nm a step."""
+    rows, columns = heights.shape
+    steps = (heights if up else heights[::-1]) / 0.01
+    data = (np.round(steps) if kind < 2 else steps).astype(("<i2", "<i4", "<f4")[kind]).tobytes()
+
+    def wide(text: str) -> bytes:
+        return text.encode("utf-16-le")
+
+    header = struct.pack("<i64s16sd2i", 0, wide("Height"), wide("NC-AFM"), 0.0, 0, 0)
+    header += struct.pack("<2idid3i", columns, rows, angle_deg, 0, 5.0, forward, up, swapped)
+    header += struct.pack("<5d", nm[0] * 1e-3, nm[1] * 1e-3, 0.0, 0.0, 2.5) + struct.pack("<d16s2d", 1.0, b"", 0.0, 0.0)
+    header += struct.pack("<3d16s", 0.01, 1.0, 0.0, wide("nm")).ljust(348 - len(header), b"\0") + struct.pack(
+        "<i", kind
+    )
+    own = {50432: (4, struct.pack("<I", 0x0E031301)), 50433: (4, struct.pack("<I", 0x01000002))}
+    own |= {50434: (7, data), 50435: (7, header.ljust(580, b"\0"))}
+    out = bytearray(b"II*\0" + struct.pack("<I", 8))
+    plain = {256: 8, 257: 8, 258: 8, 259: 1, 262: 2, 277: 3, 278: 8, 279: 192}
+    beyond = 8 + 2 + 12 * (len(plain) + len(own) + 1) + 4
+    entries = {code: struct.pack("<HHII", code, 4, 1, value) for code, value in plain.items()}
+    entries[273] = struct.pack("<HHII", 273, 4, 1, beyond)
+    far = bytes(192)
+    for code, (tag_kind, value) in own.items():
+        if len(value) <= 4:
+            entries[code] = struct.pack("<HHI", code, tag_kind, 1) + value
+            continue
+        entries[code] = struct.pack("<HHII", code, tag_kind, len(value), beyond + len(far))
+        far += value
+    out += struct.pack("<H", len(entries)) + b"".join(entries[code] for code in sorted(entries)) + bytes(4) + far
+    return bytes(out)

@@ -19,11 +19,13 @@ def channels(files: tuple[Path, ...], as_json: bool) -> int:
 
     \b
     Files: .asd, .ibw, .spm and .000 to .999, .jpk, .jpk-qi-image, .sxm, .gwy,
+           .stp, .top, .nid, .mdt,
            .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
 
     The options --channel and --retrace-channel of other commands take the number, or the name. A name without the
     direction, such as Height, selects trace and retrace. A column is empty if the file does not have the value. A scan
-    angle other than 0 has a column of its own: at 90 degrees the fast axis is the other piezo.
+    angle other than 0 has a column of its own: at 90 degrees the fast axis is the other piezo. So have the turn, the
+    share of the line period that is forward, and the window, the part of each sweep that is imaged.
 
     \b
     Example:

@@ -77,18 +77,14 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @_number(
     "--turn",
     "FRACTION",
-    "Turn of the fast axis: forward fraction of the line.",
+    "Turn of the fast axis: forward fraction of the line.  [default: that of the file, else 0.5]",
     click.FloatRange(0.0, 1.0, min_open=True),
-    default=0.5,
-    show_default=True,
 )
 @click.option(
     "--window",
     type=(float, float),
-    default=(0.0, 1.0),
-    show_default=True,
     metavar="LOW HIGH",
-    help="Part of each sweep that the columns span.",
+    help="Part of each sweep that the columns span.  [default: that of the file, else 0 1]",
 )
 @_number("--slow-size-v", "V", "Scan voltage of the slow axis.  [default: as the fast axis]")
 @_number("--slow-size-nm", "NM", "Instead of --slow-size-v: its size by the size calibration.")

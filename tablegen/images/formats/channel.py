@@ -16,6 +16,10 @@ Direction = Literal["trace", "retrace"]
 FirstRow = Literal["top", "bottom"]
 
 MAX_PIXELS = 1 << 25  # 5792 x 5792; more than that in floating point would be most of a computer's memory
+LENGTHS_NM = {  # spellings of units of length
+    **{"m": 1e9, "cm": 1e7, "mm": 1e6, "um": 1e3, "µm": 1e3, "\u03bcm": 1e3, "micron": 1e3, "microns": 1e3, "nm": 1.0},
+    **{"pm": 1e-3, "Å": 0.1, "A": 0.1, "Angstrom": 0.1},
+}
 _MAX_LISTED = 12  # channels in a message
 _MAX_TITLE = 60  # characters of a channel in a message
 _MAX_SPLIT = 1000  # characters of a title that is searched for a direction
@@ -44,6 +48,8 @@ class Channel:
     first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
     frames: int = 1
     angle_deg: float | None = None  # of the fast axis against the scanner's x; None where the file does not say
+    turn: float | None = None  # share of the line period that is forward; None where the file does not say
+    window: tuple[float, float] | None = None  # part of each sweep that the columns span, likewise
 
 
 def channel_of_array(number: int, title: str, matrix: Matrix) -> Channel:
@@ -93,15 +99,30 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
         or _of_direction([one for one in channels if one.signal == name], direction)
         or [one for one in channels if str(one.number) == name]
     )
-    if len(matches) != 1:
-        raise ValueError(f"has {'no' if not matches else 'more than one'} channel {quote(name)}; there is {there}")
+    if not matches:
+        raise ValueError(f"has no channel {quote(name)}; there is {there}")
+    if len(matches) > 1:
+        of_name = channel_list(matches)
+        raise ValueError(f"has more than one channel {quote(name)}: {of_name}; choose one by its number")
     return matches[0]
 
 
 def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
-    """Return the retrace of the same signal; None if there is none, or more than one."""
-    retraces = [one for one in channels if one.signal == trace.signal and one.direction == "retrace"]
-    return retraces[0] if trace.direction == "trace" and len(retraces) == 1 else None
+    """Return the retrace of the same signal; None if there is none.
+
+    Of a signal that a file has several times, the traces and the retraces belong together in their order.
+    """
+    if trace.direction != "trace":
+        return None
+    traces, retraces = (
+        [one for one in channels if one.signal == trace.signal and one.direction == direction]
+        for direction in ("trace", "retrace")
+    )
+    if len(retraces) == 1:
+        return retraces[0]
+    if len(traces) == len(retraces) and trace in traces:
+        return retraces[traces.index(trace)]
+    return None
 
 
 def _of_direction(channels: Sequence[Channel], direction: Direction | None) -> list[Channel]:
@@ -128,6 +149,43 @@ def positive(value: object, unit: float = 1.0) -> float | None:
     """Convert a number, or the text of one, to another unit; None unless it is a positive number."""
     positive_number = number(value, unit)
     return positive_number if positive_number is not None and positive_number > 0.0 else None
+
+
+def length_nm(value: object, unit: str) -> float | None:
+    """Convert a positive number, or the text of one, in a unit of length to nm; None for anything else."""
+    return positive(value, LENGTHS_NM[unit]) if unit in LENGTHS_NM else None
+
+
+def quantity_nm(text: str) -> float | None:
+    """Convert a text such as ``5 um`` to nm; None unless it is a positive length."""
+    value, _, unit = text.strip().partition(" ")
+    return length_nm(value, unit.strip())
+
+
+def whole_number(text: str, what: str) -> int:
+    """Convert a text to a whole number that is not negative.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or has more than ten digits; the message has ``what`` it is.
+    """
+    word = text.strip()
+    if not (word.isascii() and word.isdecimal()) or len(word) > 10:
+        raise ValueError(f"has no whole number as {what}, but {quote(word)}")
+    return int(word)
+
+
+def check_pixels(columns: int, rows: int) -> None:
+    """Check the size of an image that a header states.
+
+    Raises
+    ------
+    ValueError
+        If a side is 0, or there are more pixels than are read.
+    """
+    if min(columns, rows) < 1 or columns * rows > MAX_PIXELS:
+        raise ValueError(f"has an image of {columns} x {rows} pixels by its header, at most 2^25 are read; damaged?")
 
 
 def number(value: object, unit: float = 1.0) -> float | None:

@@ -3,7 +3,8 @@
 A header of 64 bytes, one of the wave of 320, the values with x first, and texts: a note of ``key: value`` lines, and
 a label for each channel, such as HeightTrace. The first row is the bottom one; it is the last in time, and rows are
 turned, if the note has ``ScanDown: 1``. A scan that was stopped has fewer rows than its note says, or NaN in place of
-those that are missing; the sizes in the note are those of the whole scan.
+those that are missing; the sizes in the note are those of the whole scan. The columns span a part of the sweep, which
+the note states by the speed of the tip.
 """
 
 import re
@@ -29,6 +30,8 @@ _STEP_AT = 64 + 84  # bytes: the steps of all dimensions, in units of the wave
 _LABEL = 32  # bytes
 _MAX_NOTE = 1 << 20  # bytes; files have some ten thousand
 _MAX_CHANNELS = 1000
+_LEAST_IMAGED = 0.5  # of a sweep
+_ROUNDED = 1e-3  # of it: notes round sizes, rates and speeds
 _KINDS = {2: "f4", 4: "f8", 0x08: "i1", 0x10: "i2", 0x20: "i4", 0x48: "u1", 0x50: "u2", 0x60: "u4"}
 _UNITS = ((r"Height|ZSensor|Deflection|Amplitude\d?", "m"), (r"Phase\d?", "deg"), (r"Frequency", "Hz"))
 
@@ -98,6 +101,7 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
                 positive(note.get("ScanRate"), 1.0),
                 first,
                 angle_deg=number(note.get("ScanAngle")),
+                window=_window(note),
             )
         )
     return channels
@@ -116,6 +120,21 @@ def _planned_lines(note: dict[str, str], rows: int, height_nm: float | None, ste
         if abs(lines - rows) < 1.5:  # N or N - 1 steps in the height: a whole scan
             lines = None
     return max(lines or 0.0, float(rows))
+
+
+def _window(note: dict[str, str]) -> tuple[float, float] | None:
+    """Return the part of each sweep that is imaged; None where the note does not say, or says what no scan does.
+
+    The tip is faster than two widths in a line period where it goes beyond both ends of the image.
+    """
+    width, rate, speed = (positive(note.get(key)) for key in ("FastScanSize", "ScanRate", "ScanSpeed"))
+    if width is None or rate is None or speed is None:
+        return None
+    imaged = 2.0 * width * rate / speed
+    if not _LEAST_IMAGED < imaged < 1.0 + _ROUNDED:
+        return None
+    rest = round(max(0.0, 0.5 * (1.0 - imaged)), 4)
+    return rest, 1.0 - rest
 
 
 def _note(text: bytes) -> dict[str, str]:

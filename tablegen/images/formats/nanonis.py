@@ -67,7 +67,9 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
         np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns)
     )
     width, height = _lengths(tags, "SCAN_RANGE", 1e9)
-    times = _lengths(tags, "SCAN_TIME", 1.0)
+    forward_s, backward_s = _lengths(tags, "SCAN_TIME", 1.0)
+    period_s = None if forward_s is None or backward_s is None else forward_s + backward_s
+    turn = None if forward_s is None or period_s is None else forward_s / period_s
     angle = number(next(iter(_words(tags, "SCAN_ANGLE")), None))
     return [
         Channel(
@@ -80,9 +82,10 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
             unit,
             width,
             None if height is None else height * complete / rows,
-            None if None in times else 1.0 / sum(filter(None, times)),
+            None if period_s is None else 1.0 / period_s,
             _FIRST_ROW.get(" ".join(_words(tags, "SCAN_DIR"))),
             angle_deg=angle,
+            turn=turn,
         )
         for at, (signal, unit, direction) in enumerate(blocks)
     ]

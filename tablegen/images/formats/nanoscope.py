@@ -12,7 +12,8 @@ import numpy as np
 
 from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, number, positive
 
-_END = b"\\*File list end"
+_MAGICS = b"\\*File list", b"\\*EC File list"  # EC: of an electrochemical cell
+_END = b"File list end"
 _MAX_HEADER = 4 << 20  # bytes; files have some hundred thousand at most
 _MAX_IMAGES = 1000
 _IMAGES, _SCAN = "*Ciao image list", "*Ciao scan list"
@@ -32,7 +33,7 @@ def spm_channels(content: bytes, _: str) -> list[Channel]:
     ValueError
         If the content is damaged; the message has the reason.
     """
-    if not content.startswith(b"\\*File list"):
+    if not content.startswith(_MAGICS):
         what = "is a file of force curves, not images" if content.startswith(b"\\*Force file list") else ""
         raise ValueError(what or "does not begin as a Nanoscope file does")
     end = content.find(_END, 0, _MAX_HEADER)

@@ -17,14 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, Matrix, first_line
+from tablegen.images.formats.channel import Channel, Matrix, first_line, length_nm, positive
 
 _MAX_PAGES = 1000
 _MAX_TAGS = 100_000  # of all pages
 _MAX_TEXT = 256  # characters of a tag
-_TEXT = 2
-_KINDS = {1: "B", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d"}  # of a number in a tag
+_MAX_DESCRIPTION = 4096  # characters of the tag in which ImageJ has its unit
+_TEXT, _RATIONAL = 2, 5
+_DESCRIPTION, _PIXELS_ACROSS, _PIXELS_ALONG = 270, 282, 283
+_KINDS = {1: "B", 3: "H", 4: "I", 5: "2I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d"}  # of a number in a tag
 TiffTags = dict[int, int | float | str]
+_BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8}  # of a number of a kind
 _DEFLATE, _LZMA = (8, 32946), (34925,)  # values of the tag Compression
 
 
@@ -48,7 +51,31 @@ def tiff_channels(content: bytes, _: str) -> list[Channel]:
     for page in pages:
         if len(page.shape) == 3 and page.shape[-1] in (3, 4):
             raise ValueError("is in colour, not heights; export it in grey, 16 bits or floating point")
-    return [Channel(number, "", page.shape, partial(_of_frame, page)) for number, page in enumerate(pages)]
+    tags = tiff_tags(content)
+    across, along = _imagej_pixel(tags[0]) if tags else (None, None)
+    return [
+        Channel(
+            at,
+            "",
+            page.shape,
+            partial(_of_frame, page),
+            width_nm=None if across is None or len(page.shape) != 2 else across * page.shape[1],
+            height_nm=None if along is None or len(page.shape) != 2 else along * page.shape[0],
+        )
+        for at, page in enumerate(pages)
+    ]
+
+
+def _imagej_pixel(tags: TiffTags) -> tuple[float | None, float | None]:
+    """Return width and height of a pixel in nm as ImageJ writes them; None where it has no unit of length."""
+    text = tags.get(_DESCRIPTION)
+    if not isinstance(text, str) or not text.startswith("ImageJ="):
+        return None, None
+    unit = next((line[5:].strip() for line in text.splitlines() if line.startswith("unit=")), "")
+    unit = unit.replace("\\u00B5", "\u00b5").replace("\u00c2", "")  # as ImageJ, and as programs that take it for UTF-8
+    sides = [positive(tags.get(code)) for code in (_PIXELS_ACROSS, _PIXELS_ALONG)]
+    across, along = (None if side is None else length_nm(1.0 / side, unit) for side in sides)
+    return across, along
 
 
 def _of_frame(page: TiffImage, _: int) -> Matrix:
@@ -118,7 +145,8 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
         for entry in range(at, at + count * (20 if big else 12), 20 if big else 12):
             code, kind = struct.unpack_from(f"{order}HH", content, entry)
             length = _number(content, entry + 4, order + ("Q" if big else "I"))
-            layout = f"{length}s" if kind == _TEXT and length <= _MAX_TEXT else _KINDS.get(kind, "")
+            most = _MAX_DESCRIPTION if code == _DESCRIPTION else _MAX_TEXT
+            layout = f"{length}s" if kind == _TEXT and length <= most else _KINDS.get(kind, "")
             if not layout or (kind != _TEXT and length != 1):
                 continue
             place = entry + (12 if big else 8)
@@ -126,10 +154,36 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
                 place = _number(content, place, order + ("Q" if big else "I"))
             if place + struct.calcsize(layout) > len(content):
                 raise ValueError(f"ends before byte {place}, where a tag should be; copy it again")
-            (value,) = struct.unpack_from(order + layout, content, place)
-            tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
+            value, *divisor = struct.unpack_from(order + layout, content, place)
+            if kind == _RATIONAL:
+                tags[code] = value / divisor[0] if divisor[0] else 0.0
+            else:
+                tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
         pages.append(tags)
     return pages
+
+
+def tiff_block(content: bytes, code: int) -> bytes | None:
+    """Return the bytes of a tag of the first page; None if it has no such tag.
+
+    Raises
+    ------
+    ValueError
+        If the directories, or what this tag points at, do not end inside the file.
+    """
+    for order, big, at, count in _directories(content):
+        step, place, most, layout = (20, 12, 8, "Q") if big else (12, 8, 4, "I")
+        for entry in range(at, at + count * step, step):
+            own, kind = struct.unpack_from(f"{order}HH", content, entry)
+            if own != code:
+                continue
+            length = _number(content, entry + 4, order + layout) * _BYTES.get(kind, 1)
+            start = entry + place if length <= most else _number(content, entry + place, order + layout)
+            if start + length > len(content):
+                raise ValueError(f"ends before byte {start}, where a tag should be; copy it again")
+            return content[start : start + length]
+        return None
+    return None
 
 
 def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:
