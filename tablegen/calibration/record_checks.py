@@ -13,6 +13,7 @@ from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.warnings import FindingCode, Remark, spoils
 from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine, periodic_line
+from tablegen.calibration.spans import LEAST_SPAN
 from tablegen.calibration.tables.columns import ACTUAL, DRIVE, OFFSET, Column
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces
@@ -32,6 +33,7 @@ _SHARP = 0.01  # of the stroke that the drive is below its turn after 0.01 of th
 _MAINS_HZ = (50.0, 60.0)
 _HUM, _HUM_RATIO = 5e-4, 6.0  # of the displacement's span; of the spectrum beside the line
 _HARMONIC_HUM, _HARMONIC_RATIO = 2e-3, 5.0
+_LEAST_SAMPLES = 40
 _MOST_SAMPLES, _MOST_HARMONICS = 20_000, 40
 
 
@@ -70,7 +72,9 @@ def trace_remarks(tables: Sequence[MeasuredTable], known: Known, axis: str) -> t
     """
     remarks: list[Remark] = [remark for table in tables for remark in table.remarks]
     problems: list[Problem] = []
-    traces = [(table, trace) for table in tables for trace in split_traces(table)]
+    traces = [(table, trace) for table in tables for trace in split_traces(table) if _is_record(trace)]
+    if not traces:
+        return tuple(remarks)
     try:
         remarks += _voltages([trace.drive_v for _, trace in traces], _sensitivity([one for _, one in traces]), known)
     except WrongRecord as fault:
@@ -97,7 +101,8 @@ def table_remarks(table: MeasuredTable, known: Known) -> tuple[Remark, ...]:
     if column is None:
         return tuple(remarks)
     volts = table[column]
-    nm_per_v = float(np.median(table[ACTUAL] / volts)) if ACTUAL in table and np.all(volts > 0.0) else None
+    is_size = ACTUAL in table and float(np.min(volts)) > LEAST_SPAN
+    nm_per_v = float(np.median(table[ACTUAL] / volts)) if is_size else None
     try:
         remarks += _voltages([volts], nm_per_v, known)
         if nm_per_v is not None:
@@ -107,9 +112,15 @@ def table_remarks(table: MeasuredTable, known: Known) -> tuple[Remark, ...]:
     return tuple(remarks)
 
 
+def _is_record(trace: Trace) -> bool:
+    """Return True if times ascend and everything moves: the fits refuse any other trace, with the reason."""
+    columns = (trace.time_s, trace.drive_v, trace.displacement_nm)
+    if len(trace.time_s) < _LEAST_SAMPLES or not all(np.all(np.isfinite(values)) for values in columns):
+        return False
+    return bool(np.all(np.diff(trace.time_s) > 0.0)) and all(np.ptp(values) >= LEAST_SPAN for values in columns)
+
+
 def _of_trace(trace: Trace, known: Known) -> list[Remark]:
-    if len(trace.time_s) < 2 or not np.ptp(trace.drive_v) > 0.0 or not np.ptp(trace.displacement_nm) > 0.0:
-        return []  # the fits say that something does not move
     refuse_clipped(trace)
     remarks = _lengths(_sensitivity([trace]) or 0.0, known, "the sensor")
     try:
@@ -220,10 +231,7 @@ def refuse_clipped(trace: Trace) -> None:
 
 
 def _is_inverted(trace: Trace) -> bool:
-    x, drive = trace.displacement_nm, trace.drive_v
-    if len(x) < 2 or not np.ptp(x) > 0.0 or not np.ptp(drive) > 0.0:
-        return False
-    return bool(np.corrcoef(drive, x)[0, 1] < 0.0)
+    return bool(np.corrcoef(trace.drive_v, trace.displacement_nm)[0, 1] < 0.0)
 
 
 def _inverted(names: Sequence[str], signs: Sequence[bool]) -> Remark:

@@ -29,7 +29,7 @@ def test_real_traces_are_read_as_they_are(capsys: pytest.CaptureFixture[str]) ->
         assert table[DRIVE] == pytest.approx(GAIN * plain[:, 1], rel=1e-15)
         assert table[DISPLACEMENT] == pytest.approx(1e3 * plain[:, 2], rel=1e-15)
         assert 39e3 < np.ptp(table[DISPLACEMENT]) < 50e3  # nm, with the first loop from rest
-        assert np.ptp(table[DRIVE]) == pytest.approx(GAIN * 3.6, rel=0.02)
+        assert 60.0 < np.ptp(table[DRIVE]) <= 72.0  # V, of 0 to 3.6 V at the amplifier's input
         chosen = Recorder("time=1,drive=2,position=3:um", GAIN).read(path, [TIME, DRIVE, DISPLACEMENT])
         assert np.array_equal(chosen[DISPLACEMENT], table[DISPLACEMENT])
         assert trace_remarks([table], Known(Driver(100.0), states_gain=True, absolute=True), "x") == ()
