@@ -1,7 +1,7 @@
 """Calibrate an operator of the piezo by traces of a sensor, or by images, and write it beside the scanner file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
@@ -115,8 +115,8 @@ def calibrate_operator(
     prior = known_scanner(scanner, axis, v_max, v_min)
     sources: tuple[MeasuredTable | ScanImage, ...] = (*tables, *(one for _, files in pairs for one in files))
     known = prior.known(recorder, None if delay_s == "fit" else float(delay_s), absolute=True)
-    remarks = trace_remarks(tables, known, axis) if tables else ()
     response, offset_law = prior.axis_laws()
+    remarks = trace_remarks(tables, replace(known, response=response), axis) if tables else ()
     lines = _sensor_lines(tables, prior.driver)
     try:
         delay = fit_delay(lines, response) if delay_s == "fit" else Estimate(float(delay_s))

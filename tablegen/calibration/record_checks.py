@@ -17,6 +17,7 @@ from tablegen.calibration.spans import LEAST_SPAN
 from tablegen.calibration.tables.columns import ACTUAL, DRIVE, OFFSET, Column
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces
+from tablegen.compensation.dynamics import Response
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 
@@ -31,7 +32,8 @@ _DELAY = 0.007  # of the period, at both turns
 _TURN_NEAR, _TURN_FAR = 0.01, 0.10  # of the period: samples from which a turn is extrapolated
 _SHARP = 0.01  # of the stroke that the drive is below its turn after 0.01 of the period
 _MAINS_HZ = (50.0, 60.0)
-_HUM, _HUM_RATIO = 5e-4, 6.0  # of the displacement's span; of the spectrum beside the line
+_HUM, _HUM_RATIO, _HUM_NEAREST = 5e-4, 6.0, 2.5  # of the displacement's span; of median and most beside the line
+_LEAST_CYCLES = 10  # of the mains in a record
 _HARMONIC_HUM, _HARMONIC_RATIO = 2e-3, 5.0
 _LEAST_SAMPLES = 40
 _MOST_SAMPLES, _MOST_HARMONICS = 20_000, 40
@@ -43,6 +45,7 @@ class Known:
 
     ``states_gain`` is True if the user stated the gain between the recorder and the piezo, ``fits_delay`` if the delay
     of the sensor is fitted, ``delay_s`` is that which was given. ``absolute`` is True if the fit takes lengths in nm.
+    ``response`` are the dynamics that the fit removes.
     """
 
     driver: Driver
@@ -52,6 +55,7 @@ class Known:
     fits_delay: bool = False
     delay_s: float = 0.0
     absolute: bool = False
+    response: Response | None = None
 
 
 class WrongRecord(Unphysical):
@@ -249,7 +253,8 @@ def _inverted(names: Sequence[str], signs: Sequence[bool]) -> Remark:
 def _delay(line: PeriodicLine, known: Known) -> list[Remark]:
     if known.fits_delay:
         return []
-    delays = turn_delays(line.earlier(known.delay_s) if known.delay_s else line)
+    moved = line.earlier(known.delay_s) if known.delay_s else line
+    delays = turn_delays(moved if known.response is None else moved.without(known.response, None))
     sizes = [abs(delay) for delay in delays]
     one_sign = len({delay > 0.0 for delay in delays}) == 1
     if not one_sign or min(sizes) < _DELAY or max(sizes) > 3.0 * min(sizes):
@@ -261,8 +266,8 @@ def _delay(line: PeriodicLine, known: Known) -> list[Remark]:
     return [
         spoils(
             f"the displacement turns {abs(seconds):.3g} s {side} the drive: this looks like a delay of "
-            f"{100.0 * abs(share):.2g} % of the period{state}, of the sensor's filter or of the recorder. Give "
-            f"--delay-s fit, or --delay-s {known.delay_s + seconds:.3g}",
+            f"{100.0 * abs(share):.2g} % of the period{state}, of the sensor's filter, the recorder or the scanner's "
+            f"dynamics. Give --delay-s fit, or --delay-s {known.delay_s + seconds:.3g}",
             100.0 * abs(share),
             "sensor-delay",
         )
@@ -323,9 +328,12 @@ def hum_remarks(trace: Trace, line: PeriodicLine) -> list[Remark]:
     residual: Floats | None = None
     for mains in _MAINS_HZ:
         order = mains / line.rate_hz
-        if rate_hz < 2.5 * mains or seconds < 2.0 / mains:
+        if rate_hz < 2.5 * mains or seconds < _LEAST_CYCLES / mains:
             continue
-        if abs(order - round(order)) * line.rate_hz < 1.2 / seconds:
+        distance = abs(order - round(order)) * line.rate_hz * seconds
+        if distance >= 0.1 and distance < 2.5:
+            continue  # too near a harmonic to be told from it
+        if distance < 0.1:
             share = _harmonic_share(line, round(order)) if seconds * line.rate_hz >= 1.0 else 0.0
         else:
             residual = _beside_harmonics(time, x, line.rate_hz) if residual is None else residual
@@ -363,9 +371,10 @@ def _share_at(mains: float, time: Floats, residual: Floats) -> float:
 
     seconds = float(time[-1] - time[0])
     own = max(amplitude(mains + step) for step in np.linspace(-0.1, 0.1, 5))
-    beside = [mains + sign * n / seconds for n in range(3, 12) for sign in (-1.0, 1.0)]
-    floor = float(np.median([amplitude(hz) for hz in beside if hz > 0.0]))
-    return own if own > _HUM_RATIO * floor else 0.0
+    hz_beside = [mains + sign * n / seconds for n in range(3, 10) for sign in (-1.0, 1.0)]
+    beside = [amplitude(hz) for hz in hz_beside]
+    # Creep leaves a slope of low frequencies, the nearest of which is as high as the mains.
+    return own if own > max(_HUM_RATIO * float(np.median(beside)), _HUM_NEAREST * max(beside)) else 0.0
 
 
 def _harmonic_share(line: PeriodicLine, order: int) -> float:
