@@ -7,7 +7,17 @@ import pytest
 
 from tablegen.api.measured import table_of
 from tablegen.base.input_errors import Rejected
-from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, FREQUENCY, GAIN, OFFSET, PHASE, SIZE, TIME
+from tablegen.calibration.tables.columns import (
+    APPARENT,
+    DISPLACEMENT,
+    DRIVE,
+    FREQUENCY,
+    GAIN,
+    OFFSET,
+    PHASE,
+    SIZE,
+    TIME,
+)
 from tablegen.calibration.tables.recorder import Recorder
 from tablegen.calibration.tables.table import MeasuredTable
 
@@ -96,6 +106,13 @@ def test_what_is_ambiguous_is_refused_with_line_names_and_remedy(
     content: str, faults: list[str], tmp_path: Path
 ) -> None:
     assert refused(tmp_path, content) == faults
+
+
+def test_a_size_without_volts_is_no_scan_voltage(tmp_path: Path) -> None:
+    for cell, has_it in (("Size", False), ("Size (nm)", False), ("Scan size [V]", True)):
+        path = tmp_path / "offsets.csv"
+        path.write_text(f"Offset (V),apparent_nm,{cell}\n7,16,20\n", "utf-8")
+        assert (SIZE in Recorder().read(path, (OFFSET, APPARENT), (SIZE,))) == has_it
 
 
 def test_millihertz_are_not_guessed(tmp_path: Path) -> None:

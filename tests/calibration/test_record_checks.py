@@ -8,7 +8,7 @@ import pytest
 from calibrating import Scanner
 from foreign_plants import V_MAX, BoucWen, ForeignPlant, record
 
-from tablegen import Laboratory, calibrate
+from tablegen import Laboratory, calibrate, calibrate_operator
 from tablegen.api.measured import table_of
 from tablegen.base.input_errors import Rejected
 from tablegen.base.warnings import Remark
@@ -180,3 +180,12 @@ def test_traces_that_begin_after_a_rest_have_no_note(rate_hz: float, truth: str)
     """Settling and creep are below the mains, and above them."""
     trace = Laboratory(truth).trace("x", 30.0, 50.0, rate_hz, samples=200, turn=0.8)
     assert remarks(dict(trace), Known(DRIVER)) == ()
+
+
+def test_an_operator_is_not_fitted_to_a_wrong_record() -> None:
+    traces = [times("displacement_nm", 1e-3)(sound(v)) for v in (10.0, 60.0, 100.0)]
+    with pytest.raises(Rejected, match="micrometres called nanometres") as caught:
+        calibrate_operator(traces, axis="y", v_max=100.0)
+    assert {(one.code, one.axis) for one in caught.value.problems} == {("wrong-length-unit", "y")}
+    with pytest.raises(Rejected, match="'speed' is none of time, drive, displacement, trace"):
+        calibrate_operator(traces, axis="y", v_max=100.0, columns="speed=1")

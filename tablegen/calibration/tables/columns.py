@@ -36,7 +36,7 @@ class Column:
     """One quantity: its units, the first of which is what the fits take, and the open range of its values there.
 
     ``words`` are the names that the field has for it, one of which a header of another program has to have;
-    ``qualifiers`` may stand beside them.
+    ``qualifiers`` may stand beside them. ``needs_unit`` is True if such a name alone may be another quantity.
     """
 
     quantity: str
@@ -45,6 +45,7 @@ class Column:
     below: float = inf
     words: tuple[str, ...] = ()
     qualifiers: tuple[str, ...] = ()
+    needs_unit: bool = False
 
     @property
     def name(self) -> str:
@@ -60,7 +61,7 @@ _SIZES = ("size", "scan", "length", "width")
 _VOLTAGES = ("voltage", "volts", "volt", "piezo", "scan")
 
 OFFSET = Column("offset", _VOLTS, -1e6, 1e6, ("offset", "bias"), (*_VOLTAGES, "dc"))
-SIZE = Column("size", _VOLTS, _SMALLEST, 1e6, ("size",), (*_VOLTAGES, "pp", "peak", "to"))
+SIZE = Column("size", _VOLTS, _SMALLEST, 1e6, ("size",), (*_VOLTAGES, "pp", "peak", "to"), needs_unit=True)
 APPARENT = Column("apparent", _NANOMETRES, _SMALLEST, 1e12, ("apparent",), (*_SIZES, "lattice", "constant"))
 TRUE = Column("true", _NANOMETRES, _SMALLEST, 1e12, ("true",), (*_SIZES, "lattice", "constant"))
 NOMINAL = Column("nominal", _NANOMETRES, _SMALLEST, 1e12, ("nominal",), (*_SIZES, "set"))

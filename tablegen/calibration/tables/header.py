@@ -216,7 +216,8 @@ class _Search:
                 return self._with_unit(at, column)
             return at, column, column.units[spelt[cell]], cell
         usual = [at for at, label in enumerate(self._labels) if label.names(column)]
-        of_unit = [at for at in usual if self._unit(at) is None or self._unit(at) in column.units]
+        allowed = {*column.units, *([] if column.needs_unit else [None])}
+        of_unit = [at for at in usual if self._unit(at) in allowed]
         if not of_unit and not is_needed:
             return None
         if len(of_unit) > 1:
