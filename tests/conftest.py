@@ -15,7 +15,8 @@ from tool_paths import pytest_runtest_setup, pytest_unconfigure  # noqa: F401
 settings.register_profile("tablegen", settings(), deadline=None)
 settings.load_profile("tablegen")
 
-collect_ignore = [] if real_folder() else ["calibration/test_real_files.py"]  # the run says so at its end
+# The run says so at its end.
+collect_ignore = [] if real_folder() else ["calibration/test_real_files.py", "calibration/test_real_traces.py"]
 
 # A shell that starts the tests in the background has SIGINT ignored, and nohup SIGHUP. Whatever the tests start would
 # ignore it too, but for a handler, which is not handed on.

@@ -22,7 +22,7 @@ from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
-from tablegen.base.warnings import Finding
+from tablegen.base.warnings import Finding, Remark
 from tablegen.calibration.fit_checks import doubts
 from tablegen.calibration.fit_text import calibration_text
 from tablegen.calibration.fit_warnings import fit_findings
@@ -34,6 +34,7 @@ from tablegen.calibration.laws.offset import fit_offset
 from tablegen.calibration.laws.offset_sizes import fit_offset_sizes
 from tablegen.calibration.laws.resonance import ResonanceFit, fit_resonance
 from tablegen.calibration.laws.size import fit_size
+from tablegen.calibration.record_checks import table_remarks, trace_remarks
 from tablegen.calibration.scanner_file import new_file, updated
 from tablegen.calibration.summary import change, parameters, record
 from tablegen.calibration.tables.columns import (
@@ -49,6 +50,7 @@ from tablegen.calibration.tables.columns import (
     TIME,
     TRACE,
 )
+from tablegen.calibration.tables.recorder import Columns, Recorder
 from tablegen.calibration.tables.response_csv import MARK, response_csv
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces
@@ -85,6 +87,9 @@ def calibrate(
     v_max: float | None = None,
     v_min: float = 0.0,
     points: bool = False,
+    columns: Columns | None = None,
+    drive_gain: float | None = None,
+    drive_offset: float | None = None,
     **options: Any,
 ) -> "Calibrated":
     """Fit a law of the scanner to measurements: CSV files, or arrays by the names of their columns.
@@ -105,6 +110,10 @@ def calibrate(
         Scanner file, which has the range of the driver and other calibrations that a fit needs; or the range in V.
     points : bool
         True to write hysteresis, or a response, as measured, in place of a law.
+    columns : str or mapping, optional
+        Which column is which, by number from 1 or by name: ``"time=3,drive=2,position=1:um"``, or such a mapping.
+    drive_gain, drive_offset : float, optional
+        V at the piezo for a recorded V, and V at the piezo for 0 V: of a recorder at the controller's output.
     **options : optional
         ``base_nm``, ``threshold``, ``noise`` of sizes, ``size_v`` of offsets, ``reference_hz`` of frequency; ``rho``,
         ``settle_periods``, ``drift_order``, ``delay_s`` of hysteresis; of ``images`` those of ``calibrate_operator``.
@@ -134,15 +143,49 @@ def calibrate(
     if bool(measured) == bool(images):
         raise TypeError("give data, or images of a sample of known constant")
     if images:
+        if columns is not None or drive_gain is not None or drive_offset is not None:
+            raise TypeError("columns, drive_gain and drive_offset are for data; images have volts at the piezo")
         if kind not in _OF_IMAGES:
             raise TypeError(f"{kind} takes no images of a sample of known constant; calibrate_images fits hysteresis")
         check_names(options, (*IMAGE_OPTIONS, *_OF_IMAGES[kind]))
         return _of_images(kind, images, known_scanner(scanner, axis, v_max, v_min), options)
-    tables = [table_of(one, *_COLUMNS[kind]) for one in measured]
+    recorder = Recorder(columns, drive_gain, drive_offset)
+    tables = [table_of(one, *_COLUMNS[kind], recorder, peak_to_peak=kind == "size") for one in measured]
     if len(tables) > 1 and kind != "hysteresis":
         raise ValueError(f"{kind} takes one table; hysteresis alone takes several")
     prior = known_scanner(scanner, axis, v_max, v_min)
-    return Calibrated(_fit(kind, tables, prior, options), axis, tuple(tables), points)
+    remarks = measurement_remarks(kind, tables, prior, recorder, options.get("delay_s", 0.0))
+    return Calibrated(with_remarks(_fit(kind, tables, prior, options), remarks), axis, tuple(tables), points)
+
+
+def measurement_remarks(
+    kind: Kind, tables: Sequence[MeasuredTable], scanner: KnownScanner, recorder: Recorder, delay_s: float | None = 0.0
+) -> tuple[Remark, ...]:
+    """Return remarks on measurements that look wrong, and on what their headers leave open.
+
+    Raises
+    ------
+    Rejected
+        If a fit to them would be wrong.
+    """
+    if kind == "hysteresis":
+        return trace_remarks(tables, scanner.known(recorder, delay_s), scanner.axis)
+    if kind in ("size", "offset"):
+        return table_remarks(tables[0], scanner.known(recorder, own_size=kind != "size"))
+    return tables[0].remarks
+
+
+def with_remarks(fit: Fit, remarks: Sequence[Remark]) -> Fit:
+    """Return the fit with remarks on its measurements before its own."""
+    if not remarks:
+        return fit
+    own = [one for one in fit.remarks if not any(first.code and _same_cause(first, one) for first in remarks)]
+    return replace(fit, remarks=(*remarks, *own))
+
+
+def _same_cause(first: str, second: str) -> bool:
+    """Return True if both say that the sensor is inverted: the check of the record says it with the remedy."""
+    return all("its sign was inverted" in text for text in (first, second))
 
 
 def _of_images(kind: Kind, images: Sequence[tuple[Any, ...]], prior: KnownScanner, how: dict[str, Any]) -> "Calibrated":

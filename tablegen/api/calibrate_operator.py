@@ -1,7 +1,7 @@
 """Calibrate an operator of the piezo by traces of a sensor, or by images, and write it beside the scanner file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Unphysical
 from tablegen.base.reading import CONFIGURATION, read_text
-from tablegen.base.warnings import Finding, of_remarks, worst_first
+from tablegen.base.warnings import Finding, Remark, of_remarks, worst_first
 from tablegen.calibration.laws.image_sizes import SampleImage
 from tablegen.calibration.operator.advice import NextTrace, next_trace
 from tablegen.calibration.operator.delay import fit_delay
@@ -25,8 +25,10 @@ from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.loop_errors import LineErrors
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
 from tablegen.calibration.operator.units import check_size
+from tablegen.calibration.record_checks import trace_remarks
 from tablegen.calibration.scanner_file import Change, new_file, updated, with_own_hysteresis
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
+from tablegen.calibration.tables.recorder import Columns, Recorder
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces
 from tablegen.charts.picture_file import PlottedCharts
@@ -50,6 +52,9 @@ def calibrate_operator(
     v_max: float | None = None,
     v_min: float = 0.0,
     delay_s: float | Literal["fit"] = 0.0,
+    columns: Columns | None = None,
+    drive_gain: float | None = None,
+    drive_offset: float | None = None,
     progress: Callable[[str], object] = lambda _: None,
     **how: Any,
 ) -> "CalibratedOperator":
@@ -68,6 +73,10 @@ def calibrate_operator(
         Scanner file, whose resonance and offset laws are used; or the range of the driver in V.
     delay_s : float or "fit"
         Delay of the sensor against the drive in s.
+    columns : str or mapping, optional
+        Which column of ``traces`` is which, by number from 1 or by name: ``"time=3,drive=2,position=1:um"``.
+    drive_gain, drive_offset : float, optional
+        V at the piezo for a recorded V, and V at the piezo for 0 V: of a recorder at the controller's output.
     progress : callable
         Called with a text for each stage.
     **how : optional
@@ -100,11 +109,14 @@ def calibrate_operator(
         raise TypeError("give traces, or images of a sample of known constant")
     if not measured and delay_s == "fit":
         raise TypeError('delay_s="fit" is for traces of a sensor; images have delay_pixels')
-    tables = [table_of(one, _NEEDED, [TRACE]) for one in measured]
+    recorder = Recorder(columns, drive_gain, drive_offset)
+    tables = [table_of(one, _NEEDED, [TRACE], recorder) for one in measured]
     pairs = [sample_image(v, at, pair[0], pair[1] if pair[1:] else None, how) for v, at, _, *pair in images]
     prior = known_scanner(scanner, axis, v_max, v_min)
     sources: tuple[MeasuredTable | ScanImage, ...] = (*tables, *(one for _, files in pairs for one in files))
+    known = prior.known(recorder, None if delay_s == "fit" else float(delay_s), absolute=True)
     response, offset_law = prior.axis_laws()
+    remarks = trace_remarks(tables, replace(known, response=response), axis) if tables else ()
     lines = _sensor_lines(tables, prior.driver)
     try:
         delay = fit_delay(lines, response) if delay_s == "fit" else Estimate(float(delay_s))
@@ -119,7 +131,7 @@ def calibrate_operator(
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(one.file for one in sources)}: {reason}") from None
     return CalibratedOperator(
-        fit, axis, tuple(lines), prior.driver, delay, next_trace(fit, lines, prior.driver), sources
+        fit, axis, tuple(lines), prior.driver, delay, next_trace(fit, lines, prior.driver), sources, remarks
     )
 
 
@@ -165,6 +177,12 @@ class CalibratedOperator(Result):
     delay: Estimate
     next_trace: NextTrace
     measured: tuple[MeasuredTable | ScanImage, ...]
+    record_remarks: tuple[Remark, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Remarks on the scan angles of images, and on traces that look wrong."""
+        return (*angle_remarks(self.measured, self.axis), *self.record_remarks)
 
     @property
     def family(self) -> str:
@@ -218,14 +236,14 @@ class CalibratedOperator(Result):
             "creep_loss_per_decade": self.fit.operator.creep.loss_per_decade,
             "delay_s": {"value": self.delay.value, "standard_error": error if isfinite(error) else None},
             "traces": traces,
-            "remarks": list(angle_remarks(self.measured, self.axis)),
+            "remarks": list(self.remarks),
             "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
             "sources": [{"file": one.source.name, "sha256": one.source.sha256} for one in self.measured],
         }
 
     def findings(self) -> list[Finding]:
-        """Return warnings about the images to read before the operator is trusted, the worst first."""
-        return worst_first(of_remarks(angle_remarks(self.measured, self.axis)))
+        """Return warnings about traces and images to read before the operator is trusted, the worst first."""
+        return worst_first(of_remarks(self.remarks))
 
     def summary(self) -> str:
         """Return the parameters, the errors of every trace, the trace to measure next, and warnings."""

@@ -7,6 +7,8 @@ from typing import Any
 
 from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
 from tablegen.base.toml import read_toml
+from tablegen.calibration.record_checks import Known
+from tablegen.calibration.tables.recorder import Recorder
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
@@ -67,6 +69,41 @@ class KnownScanner:
         for name in (self.axis, kind, key):
             value = value.get(name) if isinstance(value, dict) else None
         return float(value) if isinstance(value, int | float) and value > 0.0 else None
+
+    @property
+    def amplifier_gain(self) -> float | None:
+        """The gain of the amplifier of this axis as the file has it, or None."""
+        own = self.values.get(self.axis)
+        for place in (own if isinstance(own, dict) else {}, self.values):
+            amplifier = place.get("amplifier")
+            gain = amplifier.get("gain") if isinstance(amplifier, dict) else None
+            if isinstance(gain, int | float) and not isinstance(gain, bool) and gain != 0.0:
+                return abs(float(gain))
+        return None
+
+    def known(
+        self, recorder: Recorder, delay_s: float | None = 0.0, absolute: bool = False, own_size: bool = True
+    ) -> Known:
+        """Return what the checks of a record take; ``delay_s`` is None if it is fitted.
+
+        Without ``own_size`` lengths are not compared with the size law of the file, which is calibrated anew.
+
+        Raises
+        ------
+        Rejected
+            If the file contradicts the range of the driver.
+        NoRange
+            If nothing gives the range.
+        """
+        return Known(
+            self.driver,
+            self.number("size", "k_nm_per_v") if own_size else None,
+            self.amplifier_gain,
+            recorder.states_gain,
+            delay_s is None,
+            delay_s or 0.0,
+            absolute,
+        )
 
     def size_law(self, source: str) -> SizeLaw:
         """Return the size law of the file, for the scan voltages that ``source`` gives.

@@ -9,8 +9,10 @@ from numpy.typing import ArrayLike
 
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.calibration.tables.columns import Column
-from tablegen.calibration.tables.table import MeasuredTable, read_table
+from tablegen.calibration.tables.columns import Column, Times
+from tablegen.calibration.tables.header import Header
+from tablegen.calibration.tables.recorder import AS_WRITTEN, Recorder
+from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.numerics.arrays import Floats
 
 Measured = str | Path | Mapping[str, ArrayLike]
@@ -22,8 +24,16 @@ def measured_list(data: Measured | Sequence[Measured]) -> list[Measured]:
     return list(data) if isinstance(data, Sequence) and not isinstance(data, str) else [data]
 
 
-def table_of(data: Measured, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
-    """Return the columns that are needed, and the optional ones that are there; of arrays in the first unit of each.
+def table_of(
+    data: Measured,
+    needed: Sequence[Column],
+    optional: Sequence[Column] = (),
+    recorder: Recorder = AS_WRITTEN,
+    peak_to_peak: bool = False,
+) -> MeasuredTable:
+    """Return the columns that are needed, and the optional ones that are there, with voltages at the piezo.
+
+    Arrays have the names of columns in a file, or those of ``recorder.columns``; drives may be peak to peak.
 
     Raises
     ------
@@ -31,16 +41,21 @@ def table_of(data: Measured, needed: Sequence[Column], optional: Sequence[Column
         If a column is missing, has another shape than (n,), or a value out of range.
     """
     if isinstance(data, str | Path):
-        return read_table(Path(data), needed, optional)
+        return recorder.read(Path(data), needed, optional, peak_to_peak)
+    names = list(data)
+    expected = [*needed, *optional]
+    places, remarks = Header(VALUES, 0, names).places(expected, needed, recorder.choice(expected))
     columns: dict[str, Floats] = {}
-    problems = [Problem(VALUES, 0, column.name, "missing") for column in needed if column.name not in data]
-    for column in [column for column in (*needed, *optional) if column.name in data]:
-        values = np.asarray(data[column.name], dtype=np.float64)
-        if values.ndim != 1 or not len(values):
-            problems.append(Problem(VALUES, 0, column.name, f"has the shape {values.shape}; it takes (n,)"))
-        elif not np.all((values > column.above) & (values < column.below)):
+    problems: list[Problem] = []
+    for at, column, convert, spelt in places:
+        written = np.asarray(data[names[at]], dtype=np.float64)
+        if written.ndim != 1 or not len(written):
+            problems.append(Problem(VALUES, 0, spelt, f"has the shape {written.shape}; it takes (n,)"))
+            continue
+        values = written * convert.factor if isinstance(convert, Times) else np.array([*map(convert, written.tolist())])
+        if not np.all((values > column.above) & (values < column.below)):
             wrong = int(np.argmin((values > column.above) & (values < column.below)))
-            problems.append(Problem(VALUES, 0, f"{column.name}[{wrong}]", f"{values[wrong]:g} is no {column.quantity}"))
+            problems.append(Problem(VALUES, 0, f"{spelt}[{wrong}]", f"{written[wrong]:g} is no {column.quantity}"))
         columns[column.name] = values
     lengths = {len(values) for values in columns.values()}
     if not problems and len(lengths) > 1:
@@ -49,4 +64,5 @@ def table_of(data: Measured, needed: Sequence[Column], optional: Sequence[Column
         raise Rejected(problems)
     content = b"".join(name.encode() + values.tobytes() for name, values in sorted(columns.items()))
     source = Source(VALUES, sha256(content).hexdigest()[:16])
-    return MeasuredTable(VALUES, source, columns, np.arange(1, max(lengths) + 1))
+    table = MeasuredTable(VALUES, source, columns, np.arange(1, max(lengths) + 1), tuple(remarks))
+    return recorder.at_piezo(table, peak_to_peak)

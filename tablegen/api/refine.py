@@ -15,7 +15,9 @@ from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.reading import CONFIGURATION, read_text
 from tablegen.base.warnings import Finding, of_remarks, worst_first
+from tablegen.calibration.record_checks import WrongRecord
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
+from tablegen.calibration.tables.recorder import AS_WRITTEN, Columns, Recorder
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.emit.write import write_files
@@ -38,6 +40,9 @@ def refine(
     images: Sequence[tuple[ImageSource, ...]] = (),
     triggered: bool = False,
     mismatch: bool = False,
+    columns: Columns | None = None,
+    drive_gain: float | None = None,
+    drive_offset: float | None = None,
     **how: Any,
 ) -> "RefinedScan":
     """Correct the remaining error of the scanner's model, from a trace or from images of the running scan.
@@ -56,6 +61,10 @@ def refine(
         True if time 0 of the trace is a line start, of y a frame start; ``drive_v`` is not needed then.
     mismatch : bool
         True if the sample of ``images`` has no period: only the difference of trace and retrace is corrected.
+    columns : str or mapping, optional
+        Which column of ``trace`` is which, by number from 1 or by name: ``"time=3,drive=2,position=1:um"``.
+    drive_gain, drive_offset : float, optional
+        V at the piezo for a recorded V, and V at the piezo for 0 V: of a recorder at the controller's output.
     **how : optional
         ``gain``, ``harmonics``; of a trace ``period_s``, ``delay_s``, ``settle_periods``, ``drift_order``; of images
         ``lattice_nm``, ``lattice``, ``cell``, ``pitch_nm``, ``angle_deg``, ``retrace_mirrored``, ``delay_pixels``,
@@ -87,17 +96,24 @@ def refine(
     path = None if isinstance(scan, Setup) else Path(scan)
     text = "" if path is None else read_text(path, CONFIGURATION)
     options = Options(**{name: how[name] for name in (*_LEARNING, *_OF_TRACES) if name in how})
+    recorder = Recorder(columns, drive_gain, drive_offset)
     if trace is None:
+        if recorder != AS_WRITTEN:
+            raise TypeError("columns, drive_gain and drive_offset are for trace")
         result, sources = _of_images(setup, axis, images, options, mismatch, how)
         return RefinedScan(result, sources, path, text)
     if axis == "y" and setup.scan.y.off:
         raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
-    table = table_of(trace, [TIME, DISPLACEMENT], [DRIVE])
+    table = table_of(trace, [TIME, DISPLACEMENT], [DRIVE], recorder)
     if DRIVE not in table and not triggered:
         why = "missing; or give --triggered if time 0 is a line start"
         raise Rejected([Problem(table.file, max(int(table.lines[0]) - 1, 0), DRIVE.name, why)])
     drive = None if triggered else table[DRIVE]
-    result = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
+    try:
+        result = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options, recorder.states_gain)
+    except WrongRecord as fault:
+        raise Rejected([Problem(table.file, 0, "", str(fault)).coded(fault.code, axis)]) from None
+    result = replace(result, remarks=(*table.remarks, *result.remarks))
     return RefinedScan(result, (table.source,), path, text)
 
 

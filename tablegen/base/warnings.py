@@ -12,7 +12,10 @@ from msgspec import Struct
 Weight = Literal["limit", "spoils", "expect", "note"]
 FindingCode = Literal[
     "",
+    "assumed-unit",
     "changed-file",
+    "clipped-sensor",
+    "controller-volts",
     "converter-error",
     "damaged-build",
     "expected-scaling-error",
@@ -20,6 +23,8 @@ FindingCode = Literal[
     "failed-check",
     "image-offset",
     "imaged-pixels",
+    "inverted-sensor",
+    "mains-hum",
     "model-mismatch",
     "offset-drift",
     "operator-distance",
@@ -27,11 +32,13 @@ FindingCode = Literal[
     "resonance",
     "rounded-pixels",
     "scaling-error",
+    "sensor-delay",
     "size-error",
     "standard-errors",
     "step-guard",
     "uncompared-inputs",
     "uncompensated-hysteresis",
+    "wrong-length-unit",
 ]
 Axis = Literal["", "x", "y"]
 Tone = Literal["", "good", "warn", "bad", "quiet"]
@@ -81,25 +88,26 @@ class Finding(Struct, frozen=True):
 
 
 class Remark(str):
-    """A warning of a fit: a text with a weight and a percentage of the scan."""
+    """A warning of a fit: a text with a weight, a percentage of the scan and the code of its finding."""
 
     weight: Weight
     percent: float
+    code: FindingCode
 
-    def __new__(cls, text: str, weight: Weight = "note", percent: float = 0.0) -> "Remark":
-        """Make a remark of a text, its weight and its percentage of the scan."""
+    def __new__(cls, text: str, weight: Weight = "note", percent: float = 0.0, code: FindingCode = "") -> "Remark":
+        """Make a remark of a text, its weight, its percentage of the scan and its code."""
         remark = super().__new__(cls, text)
-        remark.weight, remark.percent = weight, percent
+        remark.weight, remark.percent, remark.code = weight, percent, code
         return remark
 
     def under(self, name: str) -> "Remark":
         """Return the remark with the name of its subject before it; unchanged if that is empty."""
-        return Remark(f"{name}: {self}", self.weight, self.percent) if name else self
+        return Remark(f"{name}: {self}", self.weight, self.percent, self.code) if name else self
 
 
-def spoils(text: str, percent: float = 0.0) -> Remark:
+def spoils(text: str, percent: float = 0.0, code: FindingCode = "") -> Remark:
     """Return a remark on what makes the image worse, with the percentage of the scan where that is known."""
-    return Remark(text, "spoils", percent)
+    return Remark(text, "spoils", percent, code)
 
 
 def axis_name(axis: str) -> Axis:
@@ -119,4 +127,4 @@ def as_printed(percent: float) -> float:
 
 def of_remarks(remarks: Iterable[Remark]) -> list[Finding]:
     """Return remarks as findings, in their own order."""
-    return [Finding(one.weight, one.percent, str(one)) for one in remarks]
+    return [Finding(one.weight, one.percent, str(one), code=one.code) for one in remarks]

@@ -8,7 +8,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.base.warnings import Remark, spoils
+from tablegen.base.warnings import FindingCode, Remark, spoils
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.spans import check_spans
 from tablegen.certificate.line_errors import CHORD
 from tablegen.config.load import Setup
@@ -20,6 +21,7 @@ from tablegen.refinement.bound import Bound, bound
 from tablegen.refinement.displacement import Displacement, fit_displacement
 from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, LayerUpdate, learn
 from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
+from tablegen.refinement.trace_checks import refuse_wrong_trace, size_remark, trace_remarks
 
 _FINISHED_RATIO = 0.9  # predicted over measured residual; above it the rest is noise
 _CHORD_NOISES = 4.0  # of the largest and the least chord together: the rms noise of one, of some twenty in a window
@@ -90,6 +92,7 @@ def refine(
     displacement_nm: Floats,
     drive_v: Floats | None,
     options: Options,
+    states_gain: bool = False,
 ) -> TraceRound:
     """Learn from a trace of the running scan.
 
@@ -99,6 +102,8 @@ def refine(
         Times in s, ascending, and the displacement in nm, shape (samples,) each.
     drive_v
         Drive at the piezo in V, shape (samples,); without it time 0 is a line start, of y a frame start.
+    states_gain
+        True if the user stated that the drive is at the piezo, so that no check doubts it.
 
     Raises
     ------
@@ -110,6 +115,8 @@ def refine(
     check_spans(time_s, displacement_nm, drive_v)
     line: LinePlan = getattr(make_plan(setup), axis)
     limits = learning_bound(line, options)
+    trace = Trace("", time_s, np.zeros(0) if drive_v is None else drive_v, displacement_nm)
+    refuse_wrong_trace(line, trace, states_gain)
     if drive_v is None:
         phase = phase_by_trigger(line, time_s, options.period_s, options.delay_s)
     else:
@@ -127,7 +134,10 @@ def refine(
         setup=changed,
         worse=divergence_reason(setup, axis, update),
         **stop(setup, line, update),
-        remarks=_remarks(line, measured, update, phase, time_s),
+        remarks=(
+            *_remarks(line, measured, update, phase, time_s),
+            *trace_remarks(line, trace, phase, measured, update, options.delay_s),
+        ),
         phase=phase,
         displacement=measured,
     )
@@ -256,7 +266,9 @@ def _remarks(
     remarks: list[Remark] = []
     size = abs(update.before.size_nm)
     by = size / line.drive.size_nm - 1.0
-    if abs(by) > _SIZE_NOTE_LIMIT:
+    if (wrong_unit := size_remark(line, size)) is not None:
+        remarks.append(wrong_unit)
+    elif abs(by) > _SIZE_NOTE_LIMIT:
         remarks.append(
             spoils(
                 f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
@@ -267,7 +279,8 @@ def _remarks(
     if update.before.size_nm < 0.0:
         doubt = "; if the sensor counts upwards, time 0 is where the line turns, and this is not to be learnt"
         turned = "the displacement falls where the drive rises; its sign was inverted"
-        remarks.append(spoils(turned + doubt) if phase.drive is None else Remark(turned))
+        code: FindingCode = "inverted-sensor"
+        remarks.append(spoils(turned + doubt, code=code) if phase.drive is None else Remark(turned, code=code))
     if measured.stray is not None:
         at = float(time_s[measured.stray])
         remarks.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))

@@ -74,9 +74,10 @@ def test_faults_name_their_row_and_column(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("columns", "fault"),
     [
-        ({"time_s": TIMES}, ": displacement_nm: missing (or displacement_pm, displacement_um, displacement_mm); "
-                            "the header has time_s"),
-        ({}, ": time_s: missing (or time_ms, time_us); the header has "),
+        ({"time_s": TIMES}, ": displacement_nm: missing (or displacement_pm, displacement_um, displacement_mm, "
+                            "displacement_m); the header has time_s, or choose it: --columns displacement=NAME"),
+        ({}, ": time_s: missing (or time_ms, time_us, time_ns); the header has , "
+             "or choose it: --columns time=NAME"),
         ({"time_s": TIMES, "displacement_nm": MOVED[1:]},
          ": its columns have different numbers of rows: time_s 50, displacement_nm 49"),
         ({"time_s": TIMES[:0], "displacement_nm": MOVED[:0]}, ": has no numbers"),
@@ -87,7 +88,8 @@ def test_faults_name_their_row_and_column(tmp_path: Path) -> None:
         ({"time_s": TIMES, "displacement_nm": MOVED * 1j},
          ": displacement_nm: has elements of type complex128; real numbers are needed"),
         ({"time_s": TIMES, "time_ms": TIMES, "displacement_nm": MOVED},
-         ": time_ms: the header has both time_s and time_ms; keep one of them"),
+         ": time_ms: the header has both time_s and time_ms; keep one of them, "
+             "or choose it: --columns time=NAME"),
     ],
 )  # fmt: skip
 def test_columns_that_are_none(columns: dict[str, np.ndarray], fault: str, tmp_path: Path) -> None:

@@ -73,16 +73,25 @@ def test_rows_know_their_lines(tmp_path: Path) -> None:
         ("# nothing\n", ["data.csv: is empty; a header with offset_v, apparent_nm is needed"]),
         (
             "7,16.5\n",
-            ["data.csv:1: the first line has numbers; a header with offset_v, apparent_nm has to stand above them"],
+            [
+                "data.csv:1: the first line has numbers; a header with offset_v, apparent_nm has to stand above them, "
+                "or say which column is which: --columns offset=1,..."
+            ],
         ),
         ("offset_v,apparent_nm\n", ["data.csv:1: no numbers follow the header"]),
         (
-            "Offset [V],apparent_nm\n1,2\n",
-            ["data.csv:1: offset_v: missing (or offset_mv, offset_kv); the header has offset [v], apparent_nm"],
+            "Shift [V],apparent_nm\n1,2\n",
+            [
+                "data.csv:1: offset_v: missing (or offset_mv, offset_kv); the header has shift [v], apparent_nm, "
+                "or choose it: --columns offset=NAME"
+            ],
         ),
         (
             "offset_v,offset_mv,apparent_nm\n1,2,3\n",
-            ["data.csv:1: offset_mv: the header has both offset_v and offset_mv; keep one of them"],
+            [
+                "data.csv:1: offset_mv: the header has both offset_v and offset_mv; keep one of them, "
+                "or choose it: --columns offset=NAME"
+            ],
         ),
         (
             "offset_v,apparent_nm\n1,2\n1\n1,2,3\n",

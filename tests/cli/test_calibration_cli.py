@@ -484,3 +484,54 @@ def test_traces_at_several_offsets_make_points_of_each(lab: Path) -> None:
     assert run(*lows, "--points", "--write").status == 0
     (branch,) = tomllib.loads((lab / "scanner.toml").read_text("utf-8"))["x"]["hysteresis"]["branches"]
     assert not any("offset_v" in point for point in branch["forward"]["points"])
+
+
+def of_a_scope(lab: Path, gain: float = 20.0) -> list[Path]:
+    """The traces as a scope has them: the controller's volts, micrometres, other names and another order."""
+    paths = []
+    for name in TRACES:
+        t, v, x = np.loadtxt(lab / name, delimiter=",", skiprows=1, unpack=True)
+        path = lab / f"scope_{name}"
+        rows = [f"{1e-3 * nm:.9g};{volts / gain:.9g};{1e3 * s:.9g}" for s, volts, nm in zip(t, v, x, strict=True)]
+        text = "\n".join(["Position (\u00b5m);DAC out [V];Time / ms", *rows]).replace(".", ",")
+        path.write_text(f"\ufeff{text}\n", "utf-8")
+        paths.append(path)
+    return paths
+
+
+def numbers(tree: Any) -> list[float]:
+    """All numbers of a JSON tree, in order."""
+    if isinstance(tree, dict | list):
+        return [number for one in (tree.values() if isinstance(tree, dict) else tree) for number in numbers(one)]
+    return [float(tree)] if isinstance(tree, int | float) else []
+
+
+def test_traces_of_a_scope_give_what_traces_at_the_piezo_give(lab: Path) -> None:
+    def parameters(*arguments: str | Path) -> dict[str, Any]:
+        outcome = run("calibrate", "hysteresis", "--axis", "x", "--v-max", "100", "--json", *arguments)
+        assert outcome.status == 0, outcome.err
+        return json.loads(outcome.out)  # type: ignore[no-any-return]
+
+    plain = parameters(*TRACES)
+    scope = of_a_scope(lab)
+    for choice in ([], ["--columns", "time=3,drive=2,position=1"]):
+        by_gain = parameters(*scope, "--drive-gain", "20", *choice)
+        assert by_gain["remarks"] == plain["remarks"]
+        for own, other in zip(numbers(by_gain["branches"]), numbers(plain["branches"]), strict=True):
+            assert own == pytest.approx(other, rel=1e-4)
+    noted = parameters(*scope)
+    assert any("are these volts at the piezo? Give --drive-gain G" in remark for remark in noted["remarks"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--columns", "speed=1"], "--columns: 'speed' is none of time, drive, displacement, trace"),
+        (["--drive-gain", "0"], "--drive-gain, --drive-offset: a drive gain of 0 is not within"),
+        (["--columns", "drive=9"], "drive_v: --columns drive=9: the file has 3 columns"),
+    ],
+)
+def test_options_of_a_recorder_that_are_wrong(arguments: list[str], reason: str, lab: Path) -> None:
+    outcome = run("calibrate", "hysteresis", "--axis", "x", "--v-max", "100", TRACES[0], *arguments)
+    assert outcome.status == 2
+    assert reason in outcome.err

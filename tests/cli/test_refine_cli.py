@@ -275,3 +275,34 @@ def test_wrong_use(folder: Path) -> None:
     broken = refining(folder, trace)
     assert broken.status == 2
     assert "scan.toml:1: name: " in broken.err
+
+
+def changed(trace: Path, name: str, **factors: float) -> Path:
+    """The trace with columns that are multiplied, or moved in time."""
+    names = trace.read_text("ascii").split("\n")[0].split(",")
+    columns = dict(zip(names, np.loadtxt(trace, delimiter=",", skiprows=1, unpack=True), strict=True))
+    late = factors.pop("late", 0.0)
+    for column, factor in factors.items():
+        columns[column] = factor * columns[column]
+    if late:
+        columns["displacement_nm"] = np.interp(columns["time_s"] - late, columns["time_s"], columns["displacement_nm"])
+    path = trace.with_name(name)
+    np.savetxt(path, np.stack([*columns.values()], 1), fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+def test_a_wrong_trace_is_named_by_what_it_looks_like(folder: Path) -> None:
+    trace = record(folder)
+    sound = refining(folder, trace)
+    assert sound.status == 0
+    assert not re.search("looks like|Give --", sound.out)
+    volts = changed(trace, "volts.csv", drive_v=0.05)
+    outcome = refining(folder, volts)
+    assert outcome.status == 2
+    assert "looks like volts of the controller, before an amplifier of a gain near 20" in outcome.err
+    by_gain = refining(folder, volts, "--drive-gain", "20", "--columns", "time=1")
+    assert by_gain.status == 0
+    micrometres = refining(folder, changed(trace, "um.csv", displacement_nm=1e-3))
+    assert "this looks like micrometres called nanometres. Name the column displacement_um" in micrometres.out
+    late = refining(folder, changed(trace, "late.csv", late=2e-4))  # of a period of 10 ms
+    assert re.search(r"looks like a delay of [12]\.?\d* % of the period.*Give --delay-s 0\.000[12]", late.out), late.out

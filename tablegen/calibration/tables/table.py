@@ -4,6 +4,7 @@ import hashlib
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import isfinite
 from pathlib import Path
 
@@ -13,26 +14,28 @@ from tablegen.base.data_files import Source, file_content, file_text, lines_of, 
 from tablegen.base.figures import shown_path
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.reading import MEASUREMENT
+from tablegen.base.warnings import Remark
 from tablegen.calibration.tables.array_files import columns_of, is_array_file, numbers_of
 from tablegen.calibration.tables.columns import Column, Conversion, Times
 from tablegen.calibration.tables.csv_blocks import Block, blocks_of, plain_rows
+from tablegen.calibration.tables.header import NO_CHOICE, ColumnChoice, Header, Place, units_row
 from tablegen.numerics.arrays import Floats, Ints
 
 _MAX_PROBLEMS = 20
-_MAX_CELLS_SHOWN = 12
 
 
 @dataclass(frozen=True)
 class MeasuredTable:
     """Columns of numbers in the units of the fits, by name, and the line on which each row stands.
 
-    The lines of numpy's files are their rows, from 1.
+    The lines of numpy's files are their rows, from 1. ``remarks`` are on what the header leaves open.
     """
 
     file: str
     source: Source
     columns: dict[str, Floats]
     lines: Ints
+    remarks: tuple[Remark, ...] = ()
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -44,13 +47,16 @@ class MeasuredTable:
         return self.columns[column.name]
 
 
-def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
+def read_table(
+    path: Path, needed: Sequence[Column], optional: Sequence[Column] = (), choice: ColumnChoice = NO_CHOICE
+) -> MeasuredTable:
     """Read the columns that are needed, and the optional ones that are there; others are skipped.
 
     ``.npz`` and ``.npy`` are numpy's, with an array or a field a column; everything else is CSV with a header.
 
     Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
-    Lines that are blank or begin with # are skipped.
+    Lines that are blank or begin with # are skipped; the last of them before the numbers may be the header. A row of
+    units may follow the header. With ``choice`` of columns by their numbers there need be no header.
 
     Raises
     ------
@@ -60,19 +66,23 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     name = shown_path(path)
     expected = [*needed, *optional]
     if is_array_file(path):
-        return _array_table(path, name, expected, needed)
+        return _array_table(path, name, expected, needed, choice)
     digest = hashlib.sha256()
     reader: _Reader | None = None
     header_line = 0
+    remarks: list[Remark] = []
     for block in _blocks(path, name):
         digest.update(block.content)
         if reader is None:
-            rows = _rows(file_text(block.content, name, block.line), name, block.line)
-            header_line, header = next(rows, (0, ""))
+            text = file_text(block.content, name, block.line)
+            rows = _rows(text, name, block.line)
+            header_line, first = next(rows, (0, ""))
             if header_line:
-                separator = next((mark for mark in (";", "\t") if mark in header), ",")
-                cells = _cells(header, separator)
-                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, expected, needed))
+                separator = next((mark for mark in (";", "\t") if mark in first), ",")
+                header, rows = _header(name, text, block.line, (header_line, first), rows, separator, needed, choice)
+                header_line = header.line
+                places, remarks = header.places(expected, needed, choice)
+                reader = _Reader(name, separator, len(header.cells), places)
                 reader.add_rows(rows)
         elif not reader.full:
             reader.add(block)
@@ -81,15 +91,56 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     columns, lines = reader.columns()
     if not len(lines):
         raise Rejected([Problem(name, header_line, "", "no numbers follow the header")])
-    return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines)
+    return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines, tuple(remarks))
 
 
-def _array_table(path: Path, name: str, expected: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
+_Rows = Iterator[tuple[int, str]]
+
+
+def _header(
+    name: str,
+    text: str,
+    first_line: int,
+    first: tuple[int, str],
+    rows: _Rows,
+    separator: str,
+    needed: Sequence[Column],
+    choice: ColumnChoice,
+) -> tuple[Header, _Rows]:
+    """Return the header, and the rows of numbers after it and after its units."""
+    line, row = first
+    cells = _cells(row, separator)
+    if all(_is_number(cell) for cell in cells):
+        comments = [(n, one.strip()) for n, one in lines_of(text, name, first_line) if n < line]
+        comments = [(n, one.lstrip("# \t")) for n, one in comments if one.startswith("#")]
+        if comments and len(_cells(comments[-1][1], separator)) == len(cells) > 1:
+            header = Header(name, comments[-1][0], _cells(comments[-1][1], separator))
+        elif choice.by_number:
+            header = Header(name, line, [str(n + 1) for n in range(len(cells))])
+        else:
+            why = (
+                f"the first line has numbers; a header with {_list(needed)} has to stand above them, or say which "
+                f"column is which: --columns {needed[0].quantity}=1,..."
+                if needed
+                else "the first line has numbers; a header has to stand above them"
+            )
+            raise Rejected([Problem(name, line, "", why)])
+        return header, chain([first], rows)
+    second = next(rows, None)
+    units = None if second is None else units_row(_cells(second[1], separator))
+    if units is not None and len(units) == len(cells):
+        return Header(name, line, cells, units), rows
+    return Header(name, line, cells), rows if second is None else chain([second], rows)
+
+
+def _array_table(
+    path: Path, name: str, expected: Sequence[Column], needed: Sequence[Column], choice: ColumnChoice
+) -> MeasuredTable:
     content = file_content(path, name)
     source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
     arrays = columns_of(content, name)
     del content  # an archive is in memory a second time
-    places = _places(name, 0, list(arrays), expected, needed)
+    places, remarks = Header(name, 0, list(arrays)).places(expected, needed, choice)
     written = [numbers_of(list(arrays.values())[place[0]], name, place[3]) for place in places]
     if len({len(column) for column in written}) > 1:
         lengths = ", ".join(f"{place[3]} {len(column)}" for place, column in zip(places, written, strict=True))
@@ -100,16 +151,13 @@ def _array_table(path: Path, name: str, expected: Sequence[Column], needed: Sequ
     columns = {place[1].name: reader.values(column, place) for place, column in zip(places, written, strict=True)}
     reader.refuse()
     lines = np.arange(1, len(written[0]) + 1, dtype=np.int64)
-    return MeasuredTable(name, source, columns, lines)
-
-
-_Place = tuple[int, Column, Conversion, str]  # index in the header, column, conversion, name in the file
+    return MeasuredTable(name, source, columns, lines, tuple(remarks))
 
 
 class _Reader:
     """Parser of rows of text to columns of numbers; notes faults and goes on."""
 
-    def __init__(self, name: str, separator: str, width: int, places: list[_Place]) -> None:
+    def __init__(self, name: str, separator: str, width: int, places: list[Place]) -> None:
         self.problems: list[Problem] = []
         self._name, self._separator, self._width, self._places = name, separator, width, places
         self._values = [array("d") for _ in places]
@@ -141,7 +189,7 @@ class _Reader:
             if self.full:
                 return
 
-    def values(self, written: Floats, place: _Place) -> Floats:
+    def values(self, written: Floats, place: Place) -> Floats:
         """Convert a column to the unit of the fits: at once if all are in range, otherwise one by one.
 
         Parameters
@@ -230,43 +278,13 @@ class _Reader:
         return value
 
 
-def _converted(written: Floats, place: _Place) -> Floats | None:
+def _converted(written: Floats, place: Place) -> Floats | None:
     """Convert a column to the unit of the fits; None if that is no plain factor, or a value is out of range."""
     _, column, convert, _ = place
     if not isinstance(convert, Times):
         return None
     numbers: Floats = written * convert.factor
     return numbers if bool(np.all((column.above < numbers) & (numbers < column.below))) else None
-
-
-def _places(
-    name: str, line: int, header: list[str], expected: Sequence[Column], needed: Sequence[Column]
-) -> list[_Place]:
-    header = [cell.lower() for cell in header]
-    if header and all(_is_number(cell) for cell in header):
-        why = f"the first line has numbers; a header with {_list(needed)} has to stand above them"
-        raise Rejected([Problem(name, line, "", why)])
-    places: list[_Place] = []
-    problems: list[Problem] = []
-    for column in expected:
-        spelt = {column.spelt(unit): convert for unit, convert in column.units.items()}
-        cells = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
-        if len(cells) > 1:
-            both = " and ".join(cell for _, cell in cells[:2])
-            problems.append(Problem(name, line, cells[1][1], f"the header has both {both}; keep one of them"))
-        elif cells:
-            at, cell = cells[0]
-            places.append((at, column, spelt[cell], cell))
-        elif column in needed:
-            others = [cell for cell in spelt if cell != column.name]
-            columns_text = ", ".join(cell[:40] for cell in header[:_MAX_CELLS_SHOWN])
-            columns_text += ", ..." if len(header) > _MAX_CELLS_SHOWN else ""
-            instead = f" (or {', '.join(others)})" if others else ""
-            why = f"missing{instead}; the header has {columns_text}"
-            problems.append(Problem(name, line, column.name, why))
-    if problems:
-        raise Rejected(problems)
-    return places
 
 
 def _blocks(path: Path, name: str) -> Iterator[Block]:

@@ -1,16 +1,21 @@
 """``tablegen calibrate hysteresis``: fit (17)-(22) to sensor traces."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.calibrate.options import delay_of, delay_option, points_option, rho_option
-from tablegen.cli.calibrate.run import Common, driver_of, finish, read_columns, shared_options
+from tablegen.cli.calibrate.options import delay_of, delay_option, points_option, recorder_options, rho_option
+from tablegen.cli.calibrate.run import Common, check_measurements, driver_of, finish, read_columns, shared_options
 from tablegen.cli.shared.plot import PlottingCommand
+
+if TYPE_CHECKING:
+    from tablegen.calibration.tables.recorder import Recorder
 
 
 @click.command(cls=PlottingCommand, short_help="Fit beta_max, rho, u_peak to sensor traces.")
 @shared_options
+@recorder_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
 @rho_option
 @click.option(
@@ -29,6 +34,7 @@ from tablegen.cli.shared.plot import PlottingCommand
 @points_option
 def hysteresis(
     common: Common,
+    recorder: "Recorder",
     data: tuple[Path, ...],
     rho: float,
     settle: int | None,
@@ -55,7 +61,8 @@ def hysteresis(
     from tablegen.calibration.tables.traces import split_traces
 
     delay = delay_of(delay_s)
-    tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
+    tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE], recorder) for path in data]
     driver = driver_of(common)
+    remarks = check_measurements("hysteresis", common, tables, recorder, delay)
     traces = [trace for table in tables for trace in split_traces(table)]
-    return finish(common, tables, lambda: fit_hysteresis(traces, driver, rho, settle, drift, delay), points)
+    return finish(common, tables, lambda: fit_hysteresis(traces, driver, rho, settle, drift, delay), points, remarks)

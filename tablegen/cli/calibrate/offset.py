@@ -1,13 +1,14 @@
 """``tablegen calibrate offset``: fit (1)-(4) to apparent sizes at several offsets, or to images."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from tablegen.cli.calibrate.options import optional_data
+from tablegen.cli.calibrate.options import optional_data, recorder_options, refuse_recorder
 from tablegen.cli.calibrate.run import (
     Common,
+    check_measurements,
     driver_of,
     finish,
     of_sample_images,
@@ -24,9 +25,13 @@ from tablegen.cli.images.samples import (
 from tablegen.cli.shared.common import fail
 from tablegen.cli.shared.exit_status import ExitStatus
 
+if TYPE_CHECKING:
+    from tablegen.calibration.tables.recorder import Recorder
+
 
 @click.command(cls=CommandOfOffsetImages, short_help="Fit m_minus, m_plus to apparent sizes at several offsets.")
 @shared_options
+@recorder_options
 @optional_data
 @image_option(
     "VOLTS OFFSET_V",
@@ -45,6 +50,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 )
 def offset(
     common: Common,
+    recorder: "Recorder",
     data: Path | None,
     images: tuple[tuple[float, float, Path, Path], ...],
     size_v: float | None,
@@ -77,22 +83,29 @@ def offset(
     if images:
         if data is not None or size_v is not None:
             raise click.UsageError("DATA.CSV and --size-v are for sizes in a table, and --image for images")
+        refuse_recorder(recorder)
         return of_sample_images("offset", common, images, sample)
     if data is None:
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS OFFSET_V TRACE [RETRACE]")
     refuse_sample(sample)
-    table = read_columns(data, [OFFSET, APPARENT], [SIZE])
+    table = read_columns(data, [OFFSET, APPARENT], [SIZE], recorder)
     driver = driver_of(common)
+    remarks = check_measurements("offset", common, [table], recorder)
     if SIZE in table:
         if size_v is not None:
             raise click.UsageError(f"--size-v is for files without the column size_v; {table.file} has it")
         law = size_law(common, f"the column size_v of {table.file}")
         return finish(
-            common, [table], lambda: fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], driver, law)
+            common,
+            [table],
+            lambda: fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], driver, law),
+            remarks=remarks,
         )
     of_file = None
     if size_v is not None:
         of_file = size_law(common, "--size-v")
         if not size_v <= driver.span:
             fail([f"--size-v {size_v:g} is above {driver.full_scale}"], ExitStatus.WRONG_INPUT)
-    return finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], driver, of_file, size_v))
+    return finish(
+        common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], driver, of_file, size_v), remarks=remarks
+    )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tablegen.base.reading import CONFIGURATION, read_text
-from tablegen.cli.calibrate.options import delay_of, delay_option
+from tablegen.cli.calibrate.options import delay_of, delay_option, recorder_options, refuse_recorder
 from tablegen.cli.calibrate.run import Common, ended_by_input, plot_fit, scanner_options, shared_options
 from tablegen.cli.images.samples import (
     PAIR_NAME,
@@ -23,10 +23,12 @@ from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.api.calibrate_operator import CalibratedOperator
+    from tablegen.calibration.tables.recorder import Recorder
 
 
 @click.command(cls=CommandOfOperatorPairs, short_help="Fit an operator of the piezo to sensor traces or images.")
 @shared_options
+@recorder_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="[DATA.CSV]...", nargs=-1)
 @delay_option
 @image_option(
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 @sample_options
 def operator(
     common: Common,
+    recorder: "Recorder",
     data: tuple[Path, ...],
     delay_s: str,
     images: tuple[tuple[float, float, float, Path, Path], ...],
@@ -72,6 +75,8 @@ def operator(
     delay = delay_of(delay_s)
     if not data and not images:
         raise click.UsageError("give traces, DATA.CSV..., or images with --pair VOLTS OFFSET_V RATE_HZ TRACE RETRACE")
+    if not data:
+        refuse_recorder(recorder)
     if not data and delay is None:
         raise click.UsageError("--delay-s fit is for traces of a sensor; images have --delay-pixels")
     if images:
@@ -86,6 +91,9 @@ def operator(
             axis=common.axis,
             images=rows,
             delay_s="fit" if delay is None else delay,
+            columns=recorder.columns,
+            drive_gain=recorder.drive_gain,
+            drive_offset=recorder.drive_offset,
             progress=progress.now,
             **scanner_options(common),
             **sample,

@@ -1,9 +1,20 @@
 """Options that several calibrations share."""
 
+from collections.abc import Callable
+from functools import wraps
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from tablegen.cli.shared.common import fail, finite
+from tablegen.cli.shared.exit_status import ExitStatus
+
+if TYPE_CHECKING:
+    from tablegen.calibration.tables.recorder import Recorder
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 RHO_HELP = "Exponent rho of (22); used if all data have the same amplitude, otherwise fitted."
 
@@ -52,6 +63,78 @@ delay_pixels_option = click.option(
     metavar="N",
     help="Delay of the images relative to the drive in pixels.",
 )
+
+columns_option = click.option(
+    "--columns",
+    metavar="QUANTITY=COLUMN,...",
+    help="Which column is which: a number from 1 or a name in the header, and perhaps a unit, such as "
+    "time=3,drive=2,position=1:um. Without a header, the numbers are in s, V and nm unless a unit is given.",
+)
+_drive_options = (
+    click.option(
+        "--drive-gain",
+        type=float,
+        callback=finite,
+        metavar="V/V",
+        help="Gain of the amplifier between the voltage that was recorded and the piezo. Scopes often record the "
+        "controller's output, before the amplifier; all other voltages are at the piezo. 1 says that the columns are "
+        "at the piezo.  [default: 1, and the data are checked]",
+    ),
+    click.option(
+        "--drive-offset",
+        type=float,
+        callback=finite,
+        metavar="V",
+        help="Voltage at the piezo in volts where the recorded one is 0.  [default: 0]",
+    ),
+)
+
+
+def recorder_options(command: F) -> F:
+    """Add the options on the columns of a recorder and on where its voltages were measured, as ``recorder``."""
+
+    @wraps(command)
+    def run(columns: str | None, drive_gain: float | None, drive_offset: float | None, **rest: Any) -> Any:
+        return command(recorder=recorder_of(columns, drive_gain, drive_offset), **rest)
+
+    for option in reversed((columns_option, *_drive_options)):
+        run = option(run)
+    return run  # type: ignore[return-value]
+
+
+def columns_only(command: F) -> F:
+    """Add the option on the columns of a table without voltages, as ``recorder``."""
+
+    @wraps(command)
+    def run(columns: str | None, **rest: Any) -> Any:
+        return command(recorder=recorder_of(columns), **rest)
+
+    return columns_option(run)  # type: ignore[return-value]
+
+
+def recorder_of(columns: str | None, drive_gain: float | None = None, drive_offset: float | None = None) -> "Recorder":
+    """Return the recorder that the options describe; a gain or an offset of none ends the command."""
+    from tablegen.calibration.tables.recorder import Recorder
+
+    try:
+        return Recorder(columns, drive_gain, drive_offset)
+    except ValueError as error:
+        fail([f"--drive-gain, --drive-offset: {error}"], ExitStatus.WRONG_INPUT)
+
+
+def refuse_recorder(recorder: "Recorder") -> None:
+    """Check that no option on the columns of a file is given where there is no file of columns.
+
+    Raises
+    ------
+    click.UsageError
+        If one is.
+    """
+    from tablegen.calibration.tables.recorder import AS_WRITTEN
+
+    if recorder != AS_WRITTEN:
+        raise click.UsageError("--columns, --drive-gain and --drive-offset are for files of columns, not for images")
+
 
 delay_option = click.option(
     "--delay-s",

@@ -18,9 +18,11 @@ from tablegen.cli.shared.progress import Progress
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from tablegen.api.calibrate import Calibrated
+    from tablegen.api.calibrate import Calibrated, Kind
     from tablegen.api.known_scanner import KnownScanner
+    from tablegen.base.warnings import Remark
     from tablegen.calibration.tables.columns import Column
+    from tablegen.calibration.tables.recorder import Recorder
     from tablegen.calibration.tables.table import MeasuredTable
     from tablegen.charts.picture_file import PlottedCharts
     from tablegen.compensation.size import SizeLaw
@@ -131,17 +133,38 @@ def shared_options(command: F) -> F:
     return run  # type: ignore[return-value]
 
 
-def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "MeasuredTable":
-    """Read a CSV with these columns; a fault ends the command."""
+def read_columns(
+    path: Path,
+    needed: "Sequence[Column]",
+    optional: "Sequence[Column]" = (),
+    recorder: "Recorder | None" = None,
+    peak_to_peak: bool = False,
+) -> "MeasuredTable":
+    """Read a CSV with these columns, voltages at the piezo; a fault ends the command."""
     from tablegen.base.input_errors import Rejected
-    from tablegen.calibration.tables.table import read_table
+    from tablegen.calibration.tables.recorder import AS_WRITTEN
 
     try:
         with Progress() as progress:
             progress.now("reading the measurements")
-            return read_table(path, needed, optional)
+            return (recorder or AS_WRITTEN).read(path, needed, optional, peak_to_peak)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
+
+
+def check_measurements(
+    kind: "Kind",
+    common: Common,
+    tables: "Sequence[MeasuredTable]",
+    recorder: "Recorder",
+    delay_s: float | None = 0.0,
+) -> "tuple[Remark, ...]":
+    """Return remarks on measurements that look wrong; one that would make the fit wrong ends the command."""
+    from tablegen.api.calibrate import measurement_remarks
+
+    scanner_file = known_scanner(common)
+    with ended_by_input():
+        return measurement_remarks(kind, tables, scanner_file, recorder, delay_s)
 
 
 def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTable":
@@ -225,16 +248,23 @@ def size_law(common: Common, source: str) -> "SizeLaw":
 
 
 def finish(
-    common: Common, tables: "Sequence[MeasuredTable | ScanImage]", run: "Callable[[], Fit]", points: bool = False
+    common: Common,
+    tables: "Sequence[MeasuredTable | ScanImage]",
+    run: "Callable[[], Fit]",
+    points: bool = False,
+    remarks: "Sequence[Remark]" = (),
 ) -> int:
-    """Fit, print, draw and write; with ``points`` hysteresis, or a response, as measured."""
-    from tablegen.api.calibrate import Calibrated
+    """Fit, print, draw and write; with ``points`` hysteresis, or a response, as measured.
+
+    ``remarks`` are on the measurements, and come before those of the fit.
+    """
+    from tablegen.api.calibrate import Calibrated, with_remarks
     from tablegen.base.input_errors import Unphysical
 
     try:
         with Progress() as progress:
             progress.now("fitting")
-            fit = run()
+            fit = with_remarks(run(), remarks)
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
     return output_fit(common, Calibrated(fit, common.axis, tuple(tables), points))

@@ -1,13 +1,14 @@
 """``tablegen calibrate size``: fit (6)-(12) to actual and set scan sizes, or to images."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from tablegen.cli.calibrate.options import optional_data
+from tablegen.cli.calibrate.options import optional_data, recorder_options, refuse_recorder
 from tablegen.cli.calibrate.run import (
     Common,
+    check_measurements,
     driver_of,
     finish,
     in_file,
@@ -24,9 +25,13 @@ from tablegen.cli.images.samples import (
 from tablegen.cli.shared.common import fail
 from tablegen.cli.shared.exit_status import ExitStatus
 
+if TYPE_CHECKING:
+    from tablegen.calibration.tables.recorder import Recorder
+
 
 @click.command(cls=CommandOfImages, short_help="Fit k_nm_per_v, beta, v_threshold to actual scan sizes.")
 @shared_options
+@recorder_options
 @optional_data
 @image_option(
     "VOLTS",
@@ -63,6 +68,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 )
 def size(
     common: Common,
+    recorder: "Recorder",
     data: Path | None,
     images: tuple[tuple[float, Path, Path], ...],
     k: float | None,
@@ -94,11 +100,12 @@ def size(
     if images:
         if data is not None or k is not None or noise != "relative":
             raise click.UsageError("DATA.CSV, --k and --noise are for sizes in a table, and --image for images")
+        refuse_recorder(recorder)
         return of_sample_images("size", common, images, {**sample, "base_nm": base_nm, "threshold": threshold})
     if data is None:
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS TRACE [RETRACE]")
     refuse_sample(sample)
-    table = read_columns(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE])
+    table = read_columns(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE], recorder, peak_to_peak=True)
     if DRIVE not in table and (NOMINAL not in table or k is None):
         fail([f"{table.file}: drive_v is missing; or give nominal_nm, and --k NM/V"], ExitStatus.WRONG_INPUT)
     if DRIVE in table and k is not None:
@@ -110,5 +117,6 @@ def size(
     actual = table[ACTUAL] if ACTUAL in table else table[NOMINAL] * table[TRUE] / table[APPARENT]
     drive = table[DRIVE] if DRIVE in table else table[NOMINAL] / (k or 1.0)
     driver = driver_of(common)
+    remarks = check_measurements("size", common, [table], recorder)
     base = base_nm or in_file(common, "size", "base_nm") or 200.0
-    return finish(common, [table], lambda: fit_size(drive, actual, driver, base, threshold, noise))
+    return finish(common, [table], lambda: fit_size(drive, actual, driver, base, threshold, noise), remarks=remarks)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from tablegen.cli.calibrate.options import recorder_options, refuse_recorder
 from tablegen.cli.images.refine_images import ImageArguments, image_options
 from tablegen.cli.images.samples import CommandOfRunningImages
 from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
@@ -15,6 +16,7 @@ from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.api.refine import RefinedScan
+    from tablegen.calibration.tables.recorder import Recorder
 
 
 @click.command(
@@ -32,6 +34,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 @click.argument("trace", type=click.Path(path_type=Path), metavar="[TRACE.CSV]", required=False)
 @click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured.")
 @image_options
+@recorder_options
 @click.option("--write", is_flag=True, help="Write the correction to SCAN.TOML.")
 @click.option(
     "--gain",
@@ -95,6 +98,7 @@ def refine(
     trace: Path | None,
     axis: Literal["x", "y"],
     images: "ImageArguments",
+    recorder: "Recorder",
     write: bool,
     gain: float,
     harmonics: int | None,
@@ -139,10 +143,12 @@ def refine(
     with Progress() as progress:
         progress.now("reading and learning")
         if trace is None:
+            refuse_recorder(recorder)
             refined = _learn(scan, files, axis=axis, gain=gain, harmonics=harmonics, **images.keywords())
         else:
-            recorder = {"period_s": period_s, "delay_s": delay_s, "settle_periods": settle, "drift_order": drift}
-            how = {"trace": trace, "gain": gain, "harmonics": harmonics, **recorder}
+            times = {"period_s": period_s, "delay_s": delay_s, "settle_periods": settle, "drift_order": drift}
+            volts = {"drive_gain": recorder.drive_gain, "drive_offset": recorder.drive_offset}
+            how = {"trace": trace, "gain": gain, "harmonics": harmonics, "columns": recorder.columns, **times, **volts}
             refined = _learn(scan, files, axis=axis, triggered=triggered, **how)
     if as_json:
         click.echo(refined.to_json())

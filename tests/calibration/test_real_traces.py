@@ -1,0 +1,33 @@
+"""Records of a piezo by somebody else are read as they are: micrometres, and volts at the amplifier's input."""
+
+import numpy as np
+import pytest
+from real_files import real_folder
+
+from tablegen.calibration.record_checks import Known, trace_remarks
+from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
+from tablegen.calibration.tables.recorder import Recorder
+from tablegen.numerics.driver import Driver
+
+NAMES = ("piezo_1hz_full.csv", "piezo_1hz_ramp.csv")
+GAIN = 20.0
+FOLDER = real_folder()  # conftest.py leaves this module out where there is none
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if FOLDER and (FOLDER / name).is_file()])
+def test_a_real_trace_is_read_as_it_is(name: str) -> None:
+    assert FOLDER is not None
+    path = FOLDER / name
+    table = Recorder(None, GAIN).read(path, [TIME, DRIVE, DISPLACEMENT])
+    plain = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert np.array_equal(table[TIME], plain[:, 0])
+    assert table[DRIVE] == pytest.approx(GAIN * plain[:, 1], rel=1e-15)
+    assert table[DISPLACEMENT] == pytest.approx(1e3 * plain[:, 2], rel=1e-15)
+    assert 39e3 < np.ptp(table[DISPLACEMENT]) < 50e3  # nm, with the first loop from rest
+    assert 60.0 < np.ptp(table[DRIVE]) <= 72.0  # V, of 0 to 3.6 V at the amplifier's input
+    chosen = Recorder("time=1,drive=2,position=3:um", GAIN).read(path, [TIME, DRIVE, DISPLACEMENT])
+    assert np.array_equal(chosen[DISPLACEMENT], table[DISPLACEMENT])
+    assert trace_remarks([table], Known(Driver(100.0), states_gain=True, absolute=True), "x") == ()
+    raw = Recorder().read(path, [TIME, DRIVE, DISPLACEMENT])
+    (remark,) = trace_remarks([raw], Known(Driver(100.0)), "x")
+    assert remark.code == "controller-volts"
