@@ -8,6 +8,7 @@ import kept_objects
 import pytest
 from hypothesis import settings
 from installing import install, make_wheel, told_pythons
+from lattice_images import real_files
 from tool_paths import pytest_runtest_setup, pytest_unconfigure  # noqa: F401
 
 # Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
@@ -55,5 +56,6 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say which other Pythons were at hand, since tests for those that were not are not there to be skipped."""
+    """Say which other Pythons and real files were at hand: tests for those that were not are not there."""
     terminalreporter.write_line(told_pythons())
+    terminalreporter.write_line(real_files())
