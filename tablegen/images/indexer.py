@@ -35,6 +35,7 @@ _CORRECTED = 0.05  # share: what spots may change of the sides that the maxima h
 _OWN_SHARE = 0.6  # of the spots that are near enough to 0
 _FAINT = 0.5  # of the contrast of a significant spot
 _NEAR_SPOT = 1.2  # periods in the image: spots of two views this near are one
+_ALONG = 0.5  # of a wave along the rows: slopes show it about as well as heights
 _STEEP = 0.12  # of a wave along the rows
 _PRIMES = (2, 3, 5, 7)
 _CLEARLY_LESS = 0.5  # of the autocorrelation at the cell's sides
@@ -214,7 +215,7 @@ def _chosen(correlation: Autocorrelation, views: list[_View], hum: Floats, expec
     if expected_area is None:
         _check_deciding(sure, strong, correlation)
         for view in views:
-            _check_fractions(sure, view.spots, hum)
+            _check_fractions(sure, view.spots, views, hum)
     return sure
 
 
@@ -233,12 +234,16 @@ def _check_deciding(vectors: Floats, spots: Spots, correlation: Autocorrelation)
                 raise Unphysical(_smaller(part))
 
 
-def _check_fractions(vectors: Floats, spots: Spots, hum: Floats) -> None:
+def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
     """Check that no spot of one view, which the other one does not show, is that of a larger cell."""
     explained, informative = explained_spots(vectors, spots)
     waves = spots.waves[informative & ~explained]
     waves = waves[~of_hum(waves, hum, vectors)]
     waves = waves[_fractional(waves @ vectors.T)]
+    for other in views:
+        if other.image.name == "slopes":  # where a wave along the rows shows, unless it is the edge of a terrace
+            steep = np.abs(waves[:, 0]) < _ALONG * np.hypot(*waves.T)
+            waves = waves[steep | _confirmed(waves, other)]
     if len(waves):
         direction = np.arctan2(waves[:, 1], waves[:, 0])
         beside = np.abs((direction[:, None] - direction[None] + np.pi / 2) % np.pi - np.pi / 2) < _PARALLEL
