@@ -52,9 +52,9 @@ def test_pixels_need_not_be_square() -> None:
 
 @pytest.mark.common
 def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
-    """No wrong cell is accepted, and most are."""
+    """No wrong cell is accepted, and two of three images are; of 40 it was 31."""
     accepted, wrong = 0, []
-    for seed in range(12):
+    for seed in range(24):
         heights, cell = three_sites(seed)
         try:
             result = find_cell(heights)
@@ -64,7 +64,7 @@ def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
         if not same_lattice(result.vectors, cell):
             wrong.append(seed)
     assert wrong == []
-    assert accepted >= 8
+    assert accepted >= 16
 
 
 @pytest.mark.common
@@ -127,3 +127,26 @@ if REAL.is_dir():  # else the run says so at its end
         assert result.cell.a.value == pytest.approx(17.6, abs=0.2)
         assert result.cell.b.value == pytest.approx(18.05, abs=0.3)
         assert result.cell.angle_deg.value == pytest.approx(62.0, abs=0.8)
+
+    @pytest.mark.parametrize("direction", ["forward", "backward"])
+    def test_a_moire_of_fewer_than_three_periods(direction: str) -> None:
+        result = tablegen.lattice(REAL / "moire_10nm.sxm", channel=f"Z {direction}")
+        assert result.cell.a.value == pytest.approx(3.78, abs=0.1)
+        assert result.cell.b.value == pytest.approx(4.02, abs=0.15)
+        assert result.cell.angle_deg.value == pytest.approx(62.7, abs=2.0)
+        assert 0.01 < result.cell.a.standard_error < 0.1
+
+    @pytest.mark.common
+    def test_graphite_needs_its_constant() -> None:
+        """Beside a step, graphite has a superstructure of three times the area."""
+        lines = (REAL / "hopg_11nm_iso28600.spm").read_text("latin-1").splitlines()
+        begin = lines.index("end of header") + 1
+        heights = np.array([float(line) for line in lines[begin : begin + 512 * 512]]).reshape(512, 512)
+        pixel = 11.4807 / 512
+        with pytest.raises(Unphysical):
+            find_cell(heights)
+        cell = find_cell(heights, None, 0.246**2 * 0.75**0.5 / pixel**2)
+        a, b, angle = sides_and_angle(cell.vectors * pixel)
+        assert 0.2 < a < 0.26
+        assert 0.2 < b < 0.26
+        assert 60.0 < angle < 75.0
