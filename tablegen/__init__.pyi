@@ -21,6 +21,7 @@ from tablegen.api.read_image import (
     channels as channels,
     read_image as read_image,
 )
+from tablegen.api.lattice import lattice as lattice
 from tablegen.api.refine import refine as refine
 from tablegen.api.correct import correct as correct
 from tablegen.api.simulate import simulate as simulate
@@ -47,6 +48,7 @@ from tablegen.api.read_image import (
     Image as Image,
     Channels as Channels,
 )
+from tablegen.api.lattice import ImageLattice as ImageLattice
 from tablegen.api.refine import RefinedScan as RefinedScan
 from tablegen.api.correct import Corrected as Corrected
 from tablegen.api.simulate import SimulatedScan as SimulatedScan

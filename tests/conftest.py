@@ -59,7 +59,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say which other Pythons were at hand, since tests for those that were not are not there to be skipped."""
+    """Say which other Pythons and real files were at hand: tests for those that were not are not there."""
     terminalreporter.write_line(told_pythons())
     if real_folder() is None:
         terminalreporter.write_line(f"no folder of real files: {VARIABLE} does not name one, so that none was read")

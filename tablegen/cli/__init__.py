@@ -32,6 +32,7 @@ _COMMANDS = {
     "compare": ("compare", "compare"),
     "calibrate": ("calibrate.group", "calibrate"),
     "channels": ("images.channels", "channels"),
+    "lattice": ("images.lattice", "lattice"),
     "simulate": ("simulate", "simulate"),
     "refine": ("images.refine", "refine"),
     "correct": ("images.correct", "correct"),

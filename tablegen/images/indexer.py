@@ -1,0 +1,429 @@
+"""Find the lattice of an image: the smallest cell that explains all significant spots of its spectrum.
+
+Candidates come from the autocorrelation, whose maxima do not depend on which spots are strong; the spectrum decides
+between them. What remains ambiguous is refused.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.images.autocorrelation import WEAKEST, Autocorrelation, Spots, autocorrelation, significant_spots
+from tablegen.images.cell_errors import fit_cell
+from tablegen.images.cell_vectors import area, lattices_of_index, reduced, sides_and_angle, sublattice_index
+from tablegen.images.hum import hum_waves, of_hum
+from tablegen.images.lattice_candidates import Candidate, candidates
+from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images, without_holes
+from tablegen.images.pair_checks import MIN_PIXELS
+from tablegen.numerics.arrays import Bools, Floats
+
+_CERTAINTY = 5.0  # exponent of e
+_STRONG = 1.25  # times the contrast of a significant spot
+_CLEAR = 1.3  # times that of a significant spot: the strongest one has to have it
+_OFF = 0.12  # of an index: largest distance of a spot from a whole number
+_STRAIN = 0.02  # share: what distortion may move a spot
+_INFORMATIVE = 0.25  # of an index: a spot with more uncertainty is not compared
+_ORDERS = (2, 4, 6, 10)  # indices up to which a cell is fitted to spots, one after the other
+_FRACTIONS = (2, 3, 4)  # of the waves of a cell, where a superstructure has its own
+_NEAR_FRACTION = 0.045
+_LONE_HARMONICS = 3  # of a wave that belongs to no lattice
+_OWN_PER_STRANGE = 4  # spots of the cell to one of no lattice
+_MOST_AREA_RATIO = 1.75  # of the measured cell and that of the sample by the size in the file
+_PARALLEL = 0.1  # radians
+_CORRECTED = 0.05  # share: what spots may change of the sides that the maxima have
+_OWN_SHARE = 0.6  # of the spots that are near enough to 0
+_FAINT = 0.5  # of the contrast of a significant spot
+_NEAR_SPOT = 1.2  # periods in the image: spots of two views this near are one
+_ALONG = 0.5  # of a wave along the rows: slopes show it about as well as heights
+_STEEP = 0.12  # of a wave along the rows
+_PRIMES = (2, 3, 5, 7)
+_CLEARLY_LESS = 0.5  # of the autocorrelation at the cell's sides
+_LEAST_DECIDING = 2  # spots
+_STREAK = 4  # spots in one direction: the edge of a terrace
+_NO_LATTICE = (
+    "no lattice stands out of the noise; image more periods, average frames with --frames, or choose another --channel"
+)
+_SUPERCELLS = (2, 3, 4, 5, 6, 7)
+_LEAST_CELLS = 4.0  # in the image
+_LEAST_PERIODS = 2.2  # of each side's rows in the image
+_MOST_ERROR = 0.05  # of a side
+_LEAST_VALID = 0.25  # share of the pixels
+_SAME_CELL = 0.12  # share
+_LEAST_LEVEL = 0.04  # of the variance, at the lattice points
+
+
+@dataclass(frozen=True, eq=False)
+class ImageCell:
+    """The cell of an image in pixels.
+
+    ``vectors`` are its reduced sides, shape (2, 2), x and y; ``covariance`` that of a_x, a_y, b_x, b_y; ``spots`` the
+    significant ones of the spectrum, ``explained`` those that the cell explains; ``filter_name`` how it was found.
+    """
+
+    vectors: Floats
+    covariance: Floats
+    spots: Spots
+    explained: Bools
+    level: float
+    shape: tuple[int, int]
+    filter_name: str
+
+    @property
+    def cells(self) -> float:
+        """Cells in the image."""
+        return self.shape[0] * self.shape[1] / area(self.vectors)
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A filtered image with its autocorrelation and spots."""
+
+    image: FilteredImage
+    correlation: Autocorrelation
+    spots: Spots
+    faint: Spots  # of less contrast and power: they confirm those of another view
+    least: float  # contrast of a significant spot
+
+
+def find_cell(heights: Floats, other: Floats | None = None, expected_area: float | None = None) -> ImageCell:
+    """Find the cell of a two-dimensional lattice.
+
+    Parameters
+    ----------
+    heights
+        Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
+    other
+        The image of the other direction, with its left end on the left: it tells hum from the sample.
+    expected_area
+        Area of the sample's cell in square pixels by the size in the file: it decides between cells of which one is a
+        multiple of the other.
+
+    Returns
+    -------
+    ImageCell
+        The reduced cell with its errors.
+
+    Raises
+    ------
+    Unphysical
+        If the image has no significant lattice, one direction only, too few periods, spots that no cell explains, or
+        several cells that explain them as well.
+    """
+    _check(heights)
+    region = complete_region(heights)
+    heights = without_holes(heights[region])
+    if min(heights.shape) < MIN_PIXELS:
+        size = " x ".join(map(str, heights.shape))
+        raise Unphysical(f"without missing rows the image has {size} pixels; crop it to a region without missing rows")
+    views = [_view(image) for image in filtered_images(heights)]
+    hum = np.zeros((0, 2))
+    if other is not None:
+        beside = np.concatenate([_view(image).faint.waves for image in filtered_images(without_holes(other[region]))])
+        hum = hum_waves(_together(views, 1.0).waves, beside, (heights.shape[0], heights.shape[1]))
+    cells: list[ImageCell] = []
+    reasons: list[Unphysical] = []
+    for view in views:
+        try:
+            cells.append(_cell_of(view, views, hum, expected_area))
+        except Unphysical as reason:
+            reasons.append(reason)
+    if not cells:
+        raise max(reasons, key=lambda reason: len(str(reason)))
+    if len(cells) == 2 and not same_lattice(cells[0].vectors, cells[1].vectors):
+        raise Unphysical(ambiguous(cells[0].vectors, cells[1].vectors))
+    return cells[0]
+
+
+def ambiguous(one: Floats, other: Floats) -> str:
+    """Return the text that refuses two cells, shape (2, 2) each, in pixels."""
+    sizes = " and ".join(
+        "{:.4g} x {:.4g} pixels at {:.3g} degrees".format(*sides_and_angle(cell)) for cell in (one, other)
+    )
+    return (
+        f"the lattice is ambiguous: cells of {sizes} explain the image about as well; give the sample's --lattice-nm, "
+        f"or image more periods with less noise"
+    )
+
+
+def _check(heights: Floats) -> None:
+    if heights.ndim != 2 or min(heights.shape) < MIN_PIXELS:
+        size = " x ".join(map(str, heights.shape))
+        raise Unphysical(f"{size} pixels are too few for a lattice; {MIN_PIXELS} rows and columns do")
+    valid = np.isfinite(heights)
+    valid &= (np.ptp(np.where(valid, heights, np.nanmin(heights) if valid.any() else 0.0), axis=1) > 0.0)[:, None]
+    share = float(np.mean(valid))
+    if share < _LEAST_VALID:
+        raise Unphysical(f"{100.0 * share:.2g} % of the pixels have heights; crop the image to what was scanned")
+
+
+def _view(image: FilteredImage) -> _View:
+    correlation = autocorrelation(image)
+    least = float(np.log(image.values.size) + _CERTAINTY)
+    faint = significant_spots(image, _FAINT * least, 0.3 * WEAKEST)
+    return _View(image, correlation, significant_spots(image, least), faint, least)
+
+
+def _cell_of(view: _View, views: list[_View], hum: Floats, expected_area: float | None) -> ImageCell:
+    spots, shape = view.spots, view.image.values.shape
+    if not len(spots.contrast) or spots.contrast[0] < _CLEAR * view.least:
+        raise Unphysical(_NO_LATTICE)
+    vectors = _chosen(view.correlation, views, hum, expected_area)
+    _check_periods(vectors, np.array([shape[1], shape[0]]))
+    fit = fit_cell(view.image, vectors)
+    if fit is None or fit.level < _LEAST_LEVEL or not same_lattice(fit.vectors, vectors):
+        raise Unphysical(
+            "the maxima of the autocorrelation are no lattice; is the sample one lattice? Crop to a region with "
+            "one, or choose another --channel"
+        )
+    errors = np.sqrt(np.array([np.trace(fit.covariance[:2, :2]), np.trace(fit.covariance[2:, 2:])]))
+    share = float(np.max(errors / np.array(sides_and_angle(vectors)[:2])))
+    if not share <= _MOST_ERROR:
+        raise Unphysical(
+            f"the cell differs between parts of the image by {100.0 * share:.2g} % of a side; is the sample one "
+            f"lattice? Crop to a region with one, or scan with less drift"
+        )
+    explained = explained_spots(fit.vectors, spots)[0]
+    return ImageCell(fit.vectors, fit.covariance, spots, explained, fit.level, (shape[0], shape[1]), view.image.name)
+
+
+def _chosen(correlation: Autocorrelation, views: list[_View], hum: Floats, expected_area: float | None) -> Floats:
+    """Return the smallest cell that explains all spots. Raise ``Unphysical`` if there is none, or more than one."""
+    strong, every = _together(views, _STRONG), _together(views, 1.0)
+    if len(strong.waves) < 2 or one_direction(strong.waves):
+        raise Unphysical(_why_none([], strong))
+    cells = candidates(correlation)
+    if expected_area is not None:
+        cells = [cell for cell in cells if abs(np.log(cell.area / expected_area)) < np.log(_MOST_AREA_RATIO)]
+        if not cells:
+            raise Unphysical(
+                "no cell of the autocorrelation has the area that the sample's constant and the size in the file give; "
+                "is the constant that of this sample, and the lattice of this kind?"
+            )
+    sure, all_of_them = (_smallest(cells, spots, hum, expected_area) for spots in (strong, every))
+    if sure is None:
+        raise Unphysical(_why_none(cells, strong))
+    if all_of_them is not None and not same_lattice(sure, all_of_them):
+        raise Unphysical(ambiguous(sure, all_of_them))
+    if all_of_them is None:
+        explained, informative = explained_spots(sure, every)
+        missing = int(np.sum(~of_hum(every.waves[informative & ~explained], hum, sure)))
+        if missing > 2 + len(explained) // 20:
+            raise Unphysical(_unexplained(missing, len(explained)))
+    explained, informative = explained_spots(sure, every)
+    _check_sublattice(sure, every.waves[informative & explained])
+    if expected_area is None:
+        _check_deciding(sure, strong, correlation)
+        for view in views:
+            _check_fractions(sure, view.spots, views, hum)
+    return sure
+
+
+def _check_deciding(vectors: Floats, spots: Spots, correlation: Autocorrelation) -> None:
+    """Check that a smaller cell leaves two spots or more, or is none of the autocorrelation: one may be an artefact."""
+    explained, informative = explained_spots(vectors, spots)
+    index = np.round(spots.waves[explained & informative] @ vectors.T).astype(np.int64)
+    index[(index[:, 0] < 0) | ((index[:, 0] == 0) & (index[:, 1] < 0))] *= -1
+    index = np.unique(index, axis=0)
+    for part in _PRIMES:
+        for u, v in [(1, k) for k in range(part)] + [(0, 1)]:
+            sides = np.arange(1, part)[:, None] * (np.array([[u, v]]) @ vectors) / part
+            if np.nanmin(correlation.at(sides)) < _CLEARLY_LESS * float(np.min(correlation.at(vectors))):
+                continue
+            if int(np.sum((index @ np.array([u, v])) % part != 0)) < _LEAST_DECIDING:
+                raise Unphysical(_smaller(part))
+
+
+def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
+    """Check that no spot of one view, which the other one does not show, is that of a larger cell."""
+    explained, informative = explained_spots(vectors, spots)
+    waves = spots.waves[informative & ~explained]
+    waves = waves[~of_hum(waves, hum, vectors)]
+    waves = waves[_fractional(waves @ vectors.T)]
+    for other in views:
+        if other.image.name == "slopes":  # where a wave along the rows shows, unless it is the edge of a terrace
+            steep = np.abs(waves[:, 0]) < _ALONG * np.hypot(*waves.T)
+            waves = waves[steep | _confirmed(waves, other)]
+    if len(waves):
+        direction = np.arctan2(waves[:, 1], waves[:, 0])
+        beside = np.abs((direction[:, None] - direction[None] + np.pi / 2) % np.pi - np.pi / 2) < _PARALLEL
+        if np.any(np.sum(beside, axis=1) < _STREAK):
+            raise Unphysical(
+                "the lattice is ambiguous: a weak spot is at a fraction of the cell's waves, so that the cell may be "
+                "larger; give the sample's --lattice-nm, or image more periods with less noise"
+            )
+
+
+def _together(views: list[_View], contrast: float) -> Spots:
+    """Return the spots of all views with this share of the contrast of significant ones.
+
+    A spot has to be in every view, or along the columns, to which slopes along the rows are blind: the edge of a
+    terrace makes spots in the heights alone.
+    """
+    parts = []
+    for view in views:
+        use = view.spots.contrast >= contrast * view.least
+        for other in views:
+            if other is not view:
+                use &= _confirmed(view.spots.waves, other)
+        parts.append(Spots(view.spots.waves[use], view.spots.contrast[use], view.spots.power[use]))
+    return Spots(
+        np.concatenate([part.waves for part in parts]),
+        np.concatenate([part.contrast for part in parts]),
+        np.concatenate([part.power for part in parts]),
+    )
+
+
+def _confirmed(waves: Floats, other: _View) -> Bools:
+    extent = np.array(other.image.values.shape[::-1])
+    steep = np.abs(waves[:, 0]) < _STEEP * np.hypot(*waves.T)
+    if not len(other.faint.waves):
+        return np.asarray(steep)
+    distance = np.hypot(*np.moveaxis((waves[:, None] - other.faint.waves[None]) * extent, -1, 0))
+    return np.asarray(steep | (np.min(distance, axis=1) <= _NEAR_SPOT + _STRAIN * np.hypot(*(waves * extent).T)))
+
+
+def explained_spots(vectors: Floats, spots: Spots) -> tuple[Bools, Bools]:
+    """Return which spots are at whole numbers of a cell's reciprocal, and which are near enough to 0 to tell.
+
+    Parameters
+    ----------
+    vectors
+        The cell in pixels, shape (2, 2).
+    """
+    index = spots.waves @ vectors.T
+    off = np.max(np.abs(index - np.round(index)), axis=1)
+    tolerance = _OFF + _STRAIN * np.max(np.abs(index), axis=1)
+    return np.asarray(off <= tolerance), np.asarray(tolerance <= _INFORMATIVE)
+
+
+def _smallest(cells: list[Candidate], spots: Spots, hum: Floats, expected_area: float | None) -> Floats | None:
+    """Return the smallest cell that explains all spots: a candidate, or a supercell of the smallest ones."""
+    for cell in cells:
+        vectors = fitted_to_spots(cell.vectors, spots)
+        if _explains(vectors, spots, hum, expected_area is not None):
+            return reduced(vectors)
+    if expected_area is not None:
+        return None
+    for cell in cells[:3]:
+        for index in _SUPERCELLS:
+            for basis in lattices_of_index(index):
+                vectors = fitted_to_spots(reduced(basis @ cell.vectors), spots)
+                if _explains(vectors, spots, hum):
+                    return reduced(vectors)
+    return None
+
+
+def fitted_to_spots(vectors: Floats, spots: Spots) -> Floats:
+    """Fit a cell, shape (2, 2) in pixels, to spots, from the low indices to the high ones."""
+    for most in _ORDERS:
+        index = spots.waves @ vectors.T
+        whole = np.round(index)
+        near = np.all(np.abs(index - whole) <= _OFF, axis=1) & (np.max(np.abs(whole), axis=1) <= most)
+        if np.linalg.matrix_rank(whole[near]) < 2:
+            continue
+        base = np.linalg.lstsq(whole[near], spots.waves[near], rcond=None)[0]
+        if np.max(np.abs(base @ vectors.T - np.eye(2))) > _CORRECTED:
+            return vectors
+        vectors = np.linalg.inv(base).T
+    return vectors
+
+
+def _explains(vectors: Floats, spots: Spots, hum: Floats, supercells_known: bool = False) -> bool:
+    """Return True if a cell explains all spots but for hum, or for one wave that belongs to no lattice.
+
+    A wave of a superstructure is at fractions of the cell's waves. With ``supercells_known`` the sample's constant
+    tells that the cell is not one of these.
+    """
+    explained, informative = explained_spots(vectors, spots)
+    own = informative & explained
+    if np.linalg.matrix_rank(np.round(spots.waves[own] @ vectors.T)) < 2:
+        return False
+    if np.sum(own) < _OWN_SHARE * np.sum(informative):
+        return False
+    strange = informative & ~explained
+    strange[strange] = ~of_hum(spots.waves[strange], hum, vectors)
+    if not np.any(strange):
+        return True
+    fractional = _fractional(spots.waves[strange] @ vectors.T)
+    if supercells_known:
+        strange[strange] = ~fractional
+        fractional = fractional[~fractional]
+    if np.any(fractional):
+        return False
+    if not np.any(strange):
+        return True
+    strongest = np.flatnonzero(strange)[np.argmax(spots.contrast[strange])]
+    alone = of_hum(spots.waves[strange], spots.waves[[strongest]], vectors, _LONE_HARMONICS)
+    return bool(np.all(alone) and np.sum(strange) <= np.sum(own) / _OWN_PER_STRANGE)
+
+
+def _fractional(index: Floats) -> Bools:
+    """Return True for indices, shape (n, 2), at small fractions."""
+    fractional = np.zeros(len(index), dtype=np.bool_)
+    for parts in _FRACTIONS:
+        fractional |= np.all(np.abs(parts * index - np.round(parts * index)) <= parts * _NEAR_FRACTION, axis=1)
+    return fractional
+
+
+def _why_none(cells: list[Candidate], spots: Spots) -> str:
+    waves = spots.waves
+    if not len(waves):
+        return _NO_LATTICE
+    if one_direction(waves):
+        return (
+            "the image is periodic in one direction only, as a grating; give --lattice grating, or choose another "
+            "--channel"
+        )
+    if not cells:
+        return (
+            "the autocorrelation has no maxima of a lattice; image more periods, average frames with --frames, or "
+            "choose another --channel"
+        )
+    return _unexplained(len(waves), len(waves))
+
+
+def one_direction(waves: Floats) -> bool:
+    """Return True if waves, shape (n, 2), are parallel."""
+    if not len(waves):
+        return False
+    unit = waves / np.hypot(*waves.T)[:, None]
+    return bool(np.linalg.svd(unit, compute_uv=False)[-1] < _PARALLEL * len(waves) ** 0.5) if len(waves) > 1 else True
+
+
+def _unexplained(count: int, total: int) -> str:
+    return (
+        f"no cell explains the spectrum: {count} of {total} significant spots remain; is the sample one lattice, and "
+        f"the image without hum? Crop to a region with one lattice, or choose another --channel"
+    )
+
+
+def _check_periods(vectors: Floats, extent: Floats) -> None:
+    cells = float(np.prod(extent)) / area(vectors)
+    waves = np.linalg.inv(vectors).T * extent  # periods of each base wave along x and y, summed over the image
+    periods = float(np.min(np.hypot(*waves.T)))
+    if cells < _LEAST_CELLS or periods < _LEAST_PERIODS:
+        raise Unphysical(
+            f"the image has {periods:.2g} periods of its lattice; at least {_LEAST_PERIODS:g} in each direction are "
+            f"needed: scan more of them"
+        )
+
+
+def _check_sublattice(vectors: Floats, waves: Floats) -> None:
+    index = sublattice_index(np.round(waves @ vectors.T).astype(np.int64))
+    if index != 1:
+        raise Unphysical(_smaller(index))
+
+
+def _smaller(part: int) -> str:
+    return (
+        f"the lattice is ambiguous: a cell of 1/{part} of the area explains the significant spots too; give the "
+        f"sample's --lattice-nm, or image more periods with less noise"
+    )
+
+
+def same_lattice(one: Floats, other: Floats) -> bool:
+    """Return True if two cells are bases of nearly one lattice."""
+    change = one @ np.linalg.inv(other)
+    whole = np.round(change)
+    return bool(abs(abs(np.linalg.det(whole)) - 1.0) < 1e-6 and np.max(np.abs(change - whole)) < _SAME_CELL)

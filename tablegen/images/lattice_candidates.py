@@ -1,0 +1,102 @@
+"""Candidate cells from the maxima of an autocorrelation: pairs of lags whose sums are maxima too."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from tablegen.images.autocorrelation import Autocorrelation, maxima
+from tablegen.images.cell_vectors import area, lattice_points, reduced, sides_and_angle
+from tablegen.numerics.arrays import Floats
+
+_LEAST_SIDE = 3.0  # pixels
+_LEAST_HEIGHT = 0.35  # of the highest maximum, and of the pair's for the sums
+_LEAST_CORRELATION = 0.05
+_NEAREST, _HIGHEST = 18, 10  # maxima that are paired
+_LEAST_SINE = 0.4  # of the angle of a pair
+_NEAR = 0.12  # of the shorter side: a maximum this near to a lattice point is its own
+_SAME = 0.08  # of the side: cells that differ by less are one
+_REACH = 3  # cells to either side that the refinement uses
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A reduced cell in pixels, shape (2, 2), the least maximum that it rests on, and the scatter of its maxima."""
+
+    vectors: Floats
+    level: float
+    scatter: float  # pixels
+
+    @property
+    def area(self) -> float:
+        """Area in square pixels."""
+        return area(self.vectors)
+
+
+def candidates(correlation: Autocorrelation) -> list[Candidate]:
+    """Return candidate cells, the smallest first."""
+    lags, heights = maxima(correlation, _LEAST_SIDE)
+    if not len(lags):
+        return []
+    high = heights >= max(_LEAST_HEIGHT * heights[0], _LEAST_CORRELATION)
+    near = np.argsort(np.hypot(*lags[high].T), kind="stable")[:_NEAREST]
+    chosen = np.union1d(near, np.arange(min(int(high.sum()), _HIGHEST)))
+    both, levels = np.concatenate([lags, -lags]), np.concatenate([heights, heights])
+    cells: list[Candidate] = []
+    for i, j in combinations(chosen.tolist(), 2):
+        pair = lags[[i, j]]
+        if area(pair) < _LEAST_SINE * float(np.prod(np.hypot(*pair.T))):
+            continue
+        vectors = reduced(pair)
+        if np.hypot(*vectors[0]) < _LEAST_SIDE or _known(vectors, cells):
+            continue
+        level = _sums(vectors, correlation, both, levels)
+        if level >= _LEAST_HEIGHT * min(heights[i], heights[j]):
+            cells.append(_refined(Candidate(vectors, level, np.inf), both, levels))
+    unique: list[Candidate] = []
+    for cell in sorted(cells, key=lambda one: one.area):
+        if not _known(cell.vectors, unique):
+            unique.append(cell)
+    return unique
+
+
+def _known(vectors: Floats, cells: list[Candidate]) -> bool:
+    side = abs(float(vectors[0, 0])) + abs(float(vectors[0, 1]))
+    return any(float(np.abs(vectors - cell.vectors).max()) < _SAME * side for cell in cells)
+
+
+def _sums(vectors: Floats, correlation: Autocorrelation, lags: Floats, heights: Floats) -> float:
+    """Return the least of the maxima at the sides of a cell, their difference, and their sum if the lags reach it."""
+    side = float(np.hypot(*vectors[0]))
+    a, b = vectors
+    level = np.inf
+    for point in (a, b, b - a, a + b):
+        if np.any(np.abs(point) > np.array(correlation.reach) - 2.0):
+            if point is a or point is b:
+                return 0.0
+            continue
+        near = np.hypot(*(lags - point).T) <= max(_NEAR * side, 1.5)
+        level = min(level, float(np.max(heights[near], initial=0.0)))
+    return level
+
+
+def _refined(cell: Candidate, lags: Floats, heights: Floats) -> Candidate:
+    """Fit a cell to the maxima at its lattice points, from the near ones to the far ones."""
+    vectors, scatter = cell.vectors, np.inf
+    for reach in range(1, _REACH + 1):
+        points = lattice_points(reach)
+        near = max(_NEAR * float(np.hypot(*vectors[0])), 1.5)
+        close = np.max(np.abs(lags), axis=1) <= near + np.max(np.abs(points @ vectors))
+        places, levels = lags[close], heights[close]
+        distance = np.hypot(*np.moveaxis(places[None] - (points @ vectors)[:, None], -1, 0))
+        nearest = np.argmin(distance, axis=1)
+        matched = distance[np.arange(len(points)), nearest] <= near
+        matched &= levels[nearest] > 0.0
+        if np.linalg.matrix_rank(points[matched]) < 2:
+            break
+        weight, places = levels[nearest[matched]], places[nearest[matched]]
+        fit = np.linalg.lstsq(points[matched] * weight[:, None], places * weight[:, None], rcond=None)[0]
+        vectors = fit
+        scatter = float(np.sqrt(np.mean(np.sum((points[matched] @ fit - places) ** 2, axis=1))))
+    a, _, _ = sides_and_angle(vectors)
+    return Candidate(reduced(vectors) if a > 0.0 else cell.vectors, cell.level, scatter)

@@ -1,0 +1,147 @@
+"""Prepare an image for the search of a lattice: rows that jump, terraces and outliers lose their weight.
+
+The plain filter keeps all that is periodic. The slopes along the rows are the second one: a row that jumps or a terrace
+leaves a few extreme slopes there, which are clipped.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.numerics.arrays import Bools, Floats
+
+_CLIPPED = 1.0  # percent of the heights at either end
+_SLOPE_LIMIT = 3.0  # times the usual slope: the edge of a terrace has more
+_COMPLETE = 0.8  # share of valid pixels: a row or column with fewer is missing
+_BOW_DEGREE = 2
+_WIDTH = 1.0  # pixels: standard deviation of the Gaussian that smooths slopes
+
+
+@dataclass(frozen=True, eq=False)
+class FilteredImage:
+    """Values without offset, and their weight, which is 0 where a pixel is missing; shape (rows, columns) each."""
+
+    name: str
+    values: Floats
+    weight: Floats
+
+
+def filtered_images(heights: Floats) -> list[FilteredImage]:
+    """Filter an image in each of the ways in which its lattice is searched.
+
+    Parameters
+    ----------
+    heights
+        Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
+
+    Returns
+    -------
+    list
+        The levelled heights, then their slopes along the rows.
+    """
+    valid = _valid(heights)
+    rows = np.where(valid, heights, 0.0)
+    level = _rows_levelled(rows, valid)
+    images = [_windowed("heights", _clipped(level, valid), valid)]
+    slopes, inside = _slopes(level, valid)
+    images.append(_windowed("slopes", slopes, inside))
+    return images
+
+
+def complete_region(heights: Floats) -> tuple[slice, slice]:
+    """Return the rows and columns of the largest part of an image without missing rows.
+
+    The edges of missing rows would make spots beside those of the lattice.
+
+    Parameters
+    ----------
+    heights
+        Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
+    """
+    valid = _valid(heights)
+    rows = _longest(np.mean(valid, axis=1) >= _COMPLETE)
+    return rows, _longest(np.mean(valid[rows], axis=0) >= _COMPLETE)
+
+
+def _longest(there: Bools) -> slice:
+    """Return the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
+    if not len(edges):
+        return slice(0, 0)
+    best = int(np.argmax(edges[1::2] - edges[::2]))
+    return slice(int(edges[2 * best]), int(edges[2 * best + 1]))
+
+
+def without_holes(heights: Floats) -> Floats:
+    """Interpolate missing pixels along the rows.
+
+    Parameters
+    ----------
+    heights
+        Heights in any unit, shape (rows, columns), a few of them NaN.
+    """
+    whole = heights.copy()
+    for row in np.flatnonzero(~np.isfinite(heights).all(axis=1)):
+        there = np.isfinite(heights[row])
+        whole[row, ~there] = np.interp(np.flatnonzero(~there), np.flatnonzero(there), heights[row, there])
+    return whole
+
+
+def _valid(heights: Floats) -> Bools:
+    """Return True for finite pixels of rows with contrast: a scan that was stopped leaves flat rows."""
+    valid = np.isfinite(heights)
+    low = np.min(np.where(valid, heights, np.inf), axis=1)
+    high = np.max(np.where(valid, heights, -np.inf), axis=1)
+    valid &= (high > low)[:, None]
+    return np.asarray(valid, dtype=np.bool_)
+
+
+def _rows_levelled(heights: Floats, valid: Bools) -> Floats:
+    """Subtract each row's median, and the bow that all rows share."""
+    level = np.zeros(heights.shape)
+    for row in np.flatnonzero(valid.any(axis=1)):
+        level[row] = np.where(valid[row], heights[row] - np.median(heights[row][valid[row]]), 0.0)
+    place = np.linspace(-1.0, 1.0, heights.shape[1])
+    usual = np.array([np.median(level[valid[:, i], i]) if valid[:, i].any() else 0.0 for i in range(len(place))])
+    bow = np.polynomial.Polynomial.fit(place, usual, _BOW_DEGREE, domain=(-1.0, 1.0))(place)
+    return np.where(valid, level - bow, 0.0)
+
+
+def _clipped(values: Floats, valid: Bools) -> Floats:
+    low, high = np.percentile(values[valid], (_CLIPPED, 100.0 - _CLIPPED))
+    return np.where(valid, np.clip(values, low, high), 0.0)
+
+
+def _slopes(level: Floats, valid: Bools) -> tuple[Floats, Bools]:
+    """Return clipped slopes along the rows, smoothed by a Gaussian, and where all pixels that they need are valid."""
+    steps = np.diff(level, axis=1, append=level[:, -1:])
+    inside = valid & np.roll(valid, -1, axis=1)
+    inside[:, -1] = False
+    usual = 1.4826 * float(np.median(np.abs(steps[inside])))
+    limit = _SLOPE_LIMIT * (usual or float(np.std(steps[inside])))
+    steps = np.where(inside, np.clip(steps, -limit, limit), 0.0)
+    return np.where(inside, _smoothed(steps, _WIDTH), 0.0), inside
+
+
+def _smoothed(values: Floats, width: float) -> Floats:
+    """Convolve with a Gaussian of this standard deviation in pixels, in both directions."""
+    reach = int(np.ceil(3.0 * width))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    kernel /= kernel.sum()
+    for axis in (0, 1):
+        edge = [(0, 0), (0, 0)]
+        edge[axis] = (reach, reach)
+        padded = np.pad(values, edge, mode="reflect")
+        count = values.shape[axis]
+        values = sum(
+            (share * np.take(padded, range(at, at + count), axis=axis) for at, share in enumerate(kernel.tolist())),
+            start=np.zeros(values.shape),
+        )
+    return values
+
+
+def _windowed(name: str, values: Floats, valid: Bools) -> FilteredImage:
+    rows, columns = values.shape
+    weight = np.hanning(rows + 2)[1:-1, None] * np.hanning(columns + 2)[1:-1] * valid
+    values = values - np.sum(values * weight) / np.sum(weight)
+    return FilteredImage(name, np.where(valid, values, 0.0), weight)

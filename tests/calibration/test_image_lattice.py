@@ -1,0 +1,155 @@
+"""The lattice of an image: of known cells, of none, and of files of real instruments."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from lattice_images import three_sites, without_lattice
+from real_files import real_folder
+
+import tablegen
+from tablegen.base.input_errors import Unphysical
+from tablegen.cli import cli
+from tablegen.images.cell_vectors import reduced, sides_and_angle
+from tablegen.images.indexer import find_cell, same_lattice
+from tablegen.images.measured_cell import measured_cell
+
+REAL = real_folder()
+
+
+def plain_lattice(side: float = 12.0, turn: float = 0.4, size: int = 128) -> tuple[np.ndarray, np.ndarray]:
+    """A hexagonal lattice of one site, with some noise, and its cell."""
+    cell = side * np.array([[np.cos(turn), np.sin(turn)], [np.cos(turn + np.pi / 3), np.sin(turn + np.pi / 3)]])
+    y, x = np.mgrid[:size, :size].astype(np.float64)
+    at = np.stack([x, y], axis=-1) @ np.linalg.inv(cell)
+    heights = np.cos(2 * np.pi * at[..., 0]) + np.cos(2 * np.pi * at[..., 1]) + np.cos(2 * np.pi * (at.sum(axis=-1)))
+    return heights + 0.3 * np.random.default_rng(1).normal(size=heights.shape), cell
+
+
+def test_a_plain_cell_is_right_within_its_errors() -> None:
+    heights, cell = plain_lattice()
+    result = find_cell(heights)
+    measured = measured_cell(result.vectors, result.covariance, (1.0, 1.0))
+    for estimate, truth in zip((measured.a, measured.b, measured.angle_deg), (12.0, 12.0, 60.0), strict=True):
+        assert abs(estimate.value - truth) < 4.0 * estimate.standard_error + 1e-3 * truth
+        assert estimate.standard_error < 0.01 * truth
+    assert same_lattice(result.vectors, cell)
+
+
+def test_missing_rows_and_pixels_do_not_matter() -> None:
+    heights, cell = plain_lattice()
+    heights[:12] = np.nan
+    heights[90:] = 0.0  # a scan that was stopped
+    heights[np.random.default_rng(2).random(heights.shape) < 0.02] = np.nan
+    assert same_lattice(find_cell(heights).vectors, cell)
+
+
+def test_pixels_need_not_be_square() -> None:
+    heights, cell = plain_lattice(16.0)
+    wide = find_cell(heights[:, ::2])
+    measured = measured_cell(wide.vectors, wide.covariance, (2.0, 1.0))
+    assert np.allclose(sides_and_angle(measured.vectors), sides_and_angle(reduced(cell)), rtol=0.01)
+
+
+@pytest.mark.common
+def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
+    """No wrong cell is accepted, and two of three images are; of 40 it was 31."""
+    accepted, wrong = 0, []
+    for seed in range(24):
+        heights, cell = three_sites(seed)
+        try:
+            result = find_cell(heights)
+        except Unphysical:
+            continue
+        accepted += 1
+        if not same_lattice(result.vectors, cell):
+            wrong.append(seed)
+    assert wrong == []
+    assert accepted >= 16
+
+
+@pytest.mark.common
+def test_images_without_a_lattice_are_refused() -> None:
+    accepted = []
+    for seed in range(40):
+        try:
+            find_cell(without_lattice(seed))
+        except Unphysical:
+            continue
+        accepted.append(seed)
+    assert accepted == []
+
+
+def test_a_grating_is_one_direction_and_has_a_pitch() -> None:
+    heights = without_lattice(2)
+    with pytest.raises(Unphysical, match="--lattice grating"):
+        find_cell(heights)
+    rng = np.random.default_rng(2)
+    rng.normal(size=(128, 128))
+    u, v = rng.uniform(0.05, 0.2), rng.uniform(0.0, 0.2)
+    pitch = tablegen.lattice(heights, lattice="grating").pitch
+    assert pitch.value == pytest.approx(1.0 / np.hypot(u, v), abs=5.0 * pitch.standard_error)
+    assert pitch.standard_error < 0.01 * pitch.value
+
+
+def test_too_few_periods_are_refused() -> None:
+    with pytest.raises(Unphysical):
+        find_cell(plain_lattice(90.0)[0])
+
+
+def test_the_command_prints_the_cell_and_the_shift_and_writes_nothing(tmp_path: Path) -> None:
+    heights, _ = plain_lattice(14.0)
+    np.save(tmp_path / "trace.npy", heights[:, 4:])
+    np.save(tmp_path / "retrace.npy", heights[:, 1:-3])
+    files = [str(tmp_path / "trace.npy"), str(tmp_path / "retrace.npy")]
+    text = CliRunner().invoke(cli, ["lattice", *files], catch_exceptions=False)
+    assert "size unknown" in text.output
+    assert "cell: 1" in text.output
+    record = json.loads(CliRunner().invoke(cli, ["lattice", *files, "--json"], catch_exceptions=False).output)
+    assert record["retrace_shift_pixels"]["value"] == pytest.approx([3.0, 0.0], abs=0.2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["retrace.npy", "trace.npy"]
+
+
+if REAL is not None:  # else the run says so at its end
+
+    @pytest.mark.common
+    def test_silicon_7x7_in_both_directions() -> None:
+        result = tablegen.lattice(REAL / "si7x7_50nm.sxm", channel="Z", lattice="hexagonal", lattice_nm=2.688)
+        for cell in (result.cell, result.retrace_cell):
+            assert cell is not None
+            assert 2.99 < cell.a.value < 3.02
+            assert 3.38 < cell.b.value < 3.56
+            assert 77.0 < cell.angle_deg.value < 79.0
+
+    @pytest.mark.common
+    def test_the_protein_of_a_movie_is_hexagonal() -> None:
+        """Neither its sides nor its angle are those of the cell whose strong spots alone are looked at."""
+        result = tablegen.lattice(REAL / "protein_lattice_100nm.asd", frames=(0, 8))
+        assert result.cell.a.value == pytest.approx(17.6, abs=0.2)
+        assert result.cell.b.value == pytest.approx(18.05, abs=0.3)
+        assert result.cell.angle_deg.value == pytest.approx(62.0, abs=0.8)
+
+    @pytest.mark.parametrize("direction", ["forward", "backward"])
+    def test_a_moire_of_fewer_than_three_periods(direction: str) -> None:
+        result = tablegen.lattice(REAL / "moire_10nm.sxm", channel=f"Z {direction}")
+        assert result.cell.a.value == pytest.approx(3.78, abs=0.1)
+        assert result.cell.b.value == pytest.approx(4.02, abs=0.15)
+        assert result.cell.angle_deg.value == pytest.approx(62.7, abs=2.0)
+        assert 0.01 < result.cell.a.standard_error < 0.1
+
+    @pytest.mark.common
+    def test_graphite_needs_its_constant() -> None:
+        """Beside a step, graphite has a superstructure of three times the area."""
+        lines = (REAL / "hopg_11nm_iso28600.spm").read_text("latin-1").splitlines()
+        begin = lines.index("end of header") + 1
+        heights = np.array([float(line) for line in lines[begin : begin + 512 * 512]]).reshape(512, 512)
+        pixel = 11.4807 / 512
+        with pytest.raises(Unphysical):
+            find_cell(heights)
+        cell = find_cell(heights, None, 0.246**2 * 0.75**0.5 / pixel**2)
+        a, b, angle = sides_and_angle(cell.vectors * pixel)
+        assert 0.2 < a < 0.26
+        assert 0.2 < b < 0.26
+        assert 60.0 < angle < 75.0

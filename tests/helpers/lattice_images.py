@@ -1,0 +1,66 @@
+"""Images with and without a lattice, from physics: three sites a cell, terraces, rows that jump, drift, noise."""
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats
+
+_SITES = np.array([[0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0], [2.0 / 3.0, 2.0 / 3.0]])
+
+
+def three_sites(seed: int, size: int = 128) -> tuple[Floats, Floats]:
+    """Return an image of a lattice whose lowest orders are weak, and its cell in pixels, shape (2, 2).
+
+    Three equal sites at thirds of the diagonal would have a cell of a third of the area. They are off by some 5 %, so
+    that the lowest orders have some 10 % of the strongest amplitude. Half of the images have a terrace, half have rows
+    that jump.
+    """
+    rng = np.random.default_rng(seed)
+    side = rng.uniform(13.0, 19.0)
+    angle = np.radians(rng.choice([60.0, 90.0, rng.uniform(65.0, 88.0)]))
+    other = side * (1.0 if angle in (np.radians(60.0), np.radians(90.0)) else rng.uniform(1.0, 1.25))
+    turn = rng.uniform(0.0, np.pi)
+    cell = np.array([[side, 0.0], [other * np.cos(angle), other * np.sin(angle)]])
+    cell = cell @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    y, x = np.mgrid[:size, :size].astype(np.float64)
+    bent = x + rng.uniform(-1.0, 1.0) * (y / size) ** 2
+    at = np.stack([bent, y], axis=-1) @ np.linalg.inv(cell)
+    offsets = 0.05 * np.array([[np.cos(t), np.sin(t)] for t in rng.uniform(0.0, 0.5) + np.array([0.0, 2.1, 4.2])])
+    heights = np.zeros((size, size))
+    for site in _SITES + offsets:
+        away = at - site
+        heights += np.exp(-np.sum(((away - np.round(away)) @ cell) ** 2, axis=-1) / (2.0 * (0.09 * side) ** 2))
+    noise = 0.15 * heights.std()
+    if rng.random() < 0.5:
+        normal = rng.normal(size=2)
+        heights += rng.uniform(1.0, 4.0) * ((x - size / 2) * normal[0] + (y - size / 2) * normal[1] > 0.0)
+    if rng.random() < 0.5:
+        heights += rng.uniform(0.2, 1.0) * rng.normal(size=(size, 1))
+    return heights + noise * rng.normal(size=heights.shape) + 0.01 * x - 0.01 * y, cell
+
+
+def without_lattice(seed: int, size: int = 128) -> Floats:
+    """Return noise, a rough surface, stripes, steps, or single molecules, by turns."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:size, :size].astype(np.float64)
+    noise = rng.normal(size=(size, size))
+    match seed % 5:
+        case 0:
+            return noise
+        case 1:
+            wave = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None]) + 1.0 / size
+            rough = np.fft.irfft2(np.fft.rfft2(noise) * wave ** -rng.uniform(1.0, 2.0), (size, size))
+            return np.asarray(rough / rough.std() + 0.05 * noise)
+        case 2:
+            return np.asarray(
+                np.cos(2.0 * np.pi * (x * rng.uniform(0.05, 0.2) + y * rng.uniform(0.0, 0.2))) + 0.3 * noise
+            )
+        case 3:
+            places = np.sort(rng.uniform(-size, 2 * size, 8))
+            along = x * np.cos(seed) + y * np.sin(seed)
+            return np.asarray(np.sum(along[..., None] > places, axis=-1) + 0.1 * noise)
+        case _:
+            heights = 0.05 * noise
+            for _ in range(int(rng.integers(3, 25))):
+                u, v, width = rng.uniform(0.0, size), rng.uniform(0.0, size), rng.uniform(2.0, 5.0)
+                heights += rng.uniform(0.5, 1.5) * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2.0 * width**2))
+            return heights
