@@ -28,6 +28,7 @@ ELSEWHERE = {
     "correct.md": "tests/docs/test_correct_page.py",
     "image_files.md": "tests/docs/test_image_files_page.py",
     "images.md": "tests/docs/test_images_page.py",
+    "lattice.md": "not run",
     "operator.md": "tests/docs/test_operator_page.py",
     "python.md": "tests/api/test_python_page.py",
     "report.md": "not run",

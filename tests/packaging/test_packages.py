@@ -95,8 +95,11 @@ def test_the_sdist_holds_the_repository_and_nothing_that_was_made(packed: tuple[
         assert known - held == set()
 
 
-def test_tests_of_the_sdist_are_collected(sdist: Path, installed: Path, tmp_path: Path) -> None:
+def test_tests_of_the_sdist_are_collected(
+    sdist: Path, installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """All that the repository has, with the package installed, not taken from the sdist or the checkout."""
+    monkeypatch.setenv("TABLEGEN_REAL", str(tmp_path))  # tests of real files are not collected without a folder
     source = unpack(sdist, tmp_path)
     files = {path.relative_to(source).as_posix() for path in source.glob("*tests/**/test_*.py")}
     assert collected(source, path=installed) == files
