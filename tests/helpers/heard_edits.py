@@ -333,7 +333,6 @@ SEQUENCER: tuple[Edit, ...] = (
         ("else if (1'b0)\n            spoilt <= 1'b0;"),
     ),
     Edit("spoilt is not empty", "dac_fit", "else if (discard && spoilt)", "else if (1'b0)"),
-    Edit("commits without a program", "dac_fit", "empty = 1'b1;", "empty = 1'b0;"),
     Edit("settle lines too many", "dac_fit", "is_short <= data[31:8] == 0;", "is_short <= data[31:9] == 0;"),
     Edit("windows of y unchecked", "dac_fit", "(of_line && !is_line)", "1'b0"),
     Edit(

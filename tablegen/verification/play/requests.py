@@ -256,6 +256,8 @@ class Requests:
             line = script.model.playing.schedule.ticks
             kind = _IN_TURN[number % len(_IN_TURN)]
             program = self.loader.load(kind)
+            if number == _SWAPS // 2 and not self._in_c:
+                self._unused_addresses()  # what they would change plays in the next lines
             self._mid_line(line)
             self.loader.commit(program)
             if number == _SWAPS // 2 and not self._in_c:
@@ -291,7 +293,6 @@ class Requests:
             script.write(PROGRAM, [words[address]], first=address)
         if not self._in_c:
             self._discards(words, *outside[0])
-            self._unused_addresses()
             self._words_that_just_fit(program, words, inside)
         script.request("arm", "trigger")
         self._ticks(program.schedule.ticks + 7)
