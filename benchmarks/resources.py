@@ -70,8 +70,8 @@ CASES = {
     "axis_serial": Case("one axis, low area", "dac_axis_serial", "HX8K", _AXIS, most_cells=900),
     "axis_cubic": Case("one axis, a sample in 11 clocks", "dac_axis", "HX8K", _CUBIC, most_cells=3000, least_mhz=110),
     "axis_serial_cubic": Case("one axis, low area", "dac_axis_serial", "HX8K", _CUBIC, most_cells=900),
-    # 120 MHz was the goal, and was met (122 and 126) until modules of other names were read beside these: the slowest of
-    # three seeds is 116 and 117 now, of the same Verilog.
+    # 120 MHz was the goal, and was met (122 and 126) until further modules were read beside these: the slowest of three
+    # seeds is 116 and 117 now, of the same Verilog.
     "axis_first": Case(
         "one axis, shaped: first", "dac_axis", "HX8K", {**_AXIS, "SHAPING": 1}, most_cells=2567, least_mhz=115
     ),
