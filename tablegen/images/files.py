@@ -221,6 +221,8 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
     frame_number = frame or 0
     if not 0 <= frame_number < channel.frames:
         raise ValueError(f"{what}has no frame {frame_number}; the last one is {channel.frames - 1}")
+    if channel.frames > 1:
+        what += f"frame {frame_number}: "
     with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
         matrix = channel.load(frame_number)
         if matrix.dtype.kind not in "iufb":

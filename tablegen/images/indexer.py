@@ -129,7 +129,8 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
         except Unphysical as reason:
             reasons.append(reason)
     if not cells:
-        raise max(reasons, key=lambda reason: len(str(reason)))
+        # A view that shows nothing explains less than one whose spots no cell explains.
+        raise next((reason for reason in reasons if str(reason) != _NO_LATTICE), reasons[0])
     if len(cells) == 2 and not same_lattice(cells[0].vectors, cells[1].vectors):
         raise Unphysical(ambiguous(cells[0].vectors, cells[1].vectors))
     return cells[0]

@@ -110,6 +110,12 @@ def test_frames_of_a_movie(version: int, tmp_path: Path) -> None:
     assert [one.frames for one in channels_of(path)] == [3, 3]
 
 
+def test_a_frame_without_contrast_is_named(tmp_path: Path) -> None:
+    path = put(tmp_path, "a.asd", asd({"TP": np.stack([T, np.zeros_like(T)])}, 1))
+    with pytest.raises(Rejected, match="frame 1: all pixels are"):
+        read_image(path, "TP", frame=1)
+
+
 def test_a_gwyddion_file_has_sizes_and_units(tmp_path: Path) -> None:
     gwy(tmp_path / "a.gwy", **{"Z (Forward)": T, "Z (Backward)": R})
     trace, retrace = read_pair(tmp_path / "a.gwy")
