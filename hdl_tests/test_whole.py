@@ -156,11 +156,11 @@ class WholeMutant(Mutant):
 SEQUENCER, COUNTS, TABLE = "dac_sequencer", "dac_whole", "dac_whole_table"
 MUTANTS = [
     WholeMutant("any part is whole", SEQUENCER, "words_fit && whole;", "words_fit;", "lines"),
-    WholeMutant("registers are not counted", COUNTS, "count == WORDS && x_whole", "x_whole", "lines"),
+    WholeMutant("registers are not counted", COUNTS, "count[6] && x_whole", "x_whole", "lines"),
     WholeMutant("x is not counted", COUNTS, "x_whole && y_whole", "y_whole", "lines"),
     WholeMutant("y is not counted", COUNTS, "x_whole && y_whole", "x_whole", "lines"),
-    WholeMutant("a register may be missing", COUNTS, "WORDS = 6'd38", "WORDS = 6'd37", "lines"),
-    WholeMutant("a register more is needed", COUNTS, "WORDS = 6'd38", "WORDS = 6'd39", "lines"),
+    WholeMutant("a register may be missing", COUNTS, "FIRST = 7'd26", "FIRST = 7'd27", "lines"),
+    WholeMutant("a register more is needed", COUNTS, "FIRST = 7'd26", "FIRST = 7'd25", "lines"),
     WholeMutant("words that are none count", COUNTS, "address[3:0] < SCAN_WORDS", "1'b1", "lines"),
     WholeMutant("registers that were taken count", COUNTS, "if (take)", "if (1'b0)", "lines"),
     WholeMutant("a table that was taken counts", TABLE, "if (take)", "if (1'b0)", "lines"),

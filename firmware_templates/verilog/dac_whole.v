@@ -26,7 +26,8 @@ module dac_whole #(
     localparam [2:0] PROGRAM = 3'd0, X_TABLE = 3'd1, Y_TABLE = 3'd2, X_FOURIER = 3'd3, Y_FOURIER = 3'd4;
     localparam [11:0] SCAN_PAGE = 12'd0, X_PAGE = 12'd1, Y_PAGE = 12'd2;
     localparam [3:0] SCAN_WORDS = 4'd14, AXIS_WORDS = 4'd12;
-    localparam [5:0] WORDS = 6'd38;  // of the three pages
+    // The three pages have 38 words: a count from here to 64 shows in one bit whether they are there.
+    localparam [6:0] FIRST = 7'd26;
 
     wire [11:0] page = address[15:4];
     wire scan = page == SCAN_PAGE && address[3:0] < SCAN_WORDS;
@@ -34,12 +35,12 @@ module dac_whole #(
     wire y = page == Y_PAGE && address[3:0] < AXIS_WORDS;
     wire program_write = write && region == PROGRAM;
 
-    reg [5:0] count;
-    initial count = 0;
+    reg [6:0] count;
+    initial count = FIRST;
     wire counts = program_write && (scan || x || y);
     always @(posedge clock)
-        if (take) count <= 0;  // nothing is written on that clock
-        else if (counts && count != WORDS) count <= count + 1;
+        if (take) count <= FIRST;  // nothing is written on that clock
+        else if (counts && !count[6]) count <= count + 1;
 
     wire x_whole, y_whole;
     dac_whole_table #(.INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .HARMONICS(HARMONICS)) x_table (
@@ -52,7 +53,7 @@ module dac_whole #(
         .write_table(write && region == Y_TABLE), .write_fourier(write && region == Y_FOURIER),
         .address(address[3:0]), .data(data), .whole(y_whole)
     );
-    assign whole = count == WORDS && x_whole && y_whole;
+    assign whole = count[6] && x_whole && y_whole;
 endmodule
 
 `default_nettype wire
