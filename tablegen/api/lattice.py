@@ -315,7 +315,7 @@ class ImageLattice(Result):
         reach = (values.shape[1] * self.pixel[0], values.shape[0] * self.pixel[1]) if size else None
         around = height_chart("autocorrelation", picture, reach, "autocorrelation, with the cell")
         if around.raster is not None:
-            around = replace(around, raster=replace(around.raster, label="correlation"))
+            around = replace(around, raster=replace(around.raster, label="correlation, levelled by lines [1]"))
         return PlottedCharts(self._title(), (self._with_cell(heights, bottom), self._with_cell(around, bottom)))
 
     def _with_cell(self, chart: Chart, bottom: bool) -> Chart:

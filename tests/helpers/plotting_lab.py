@@ -27,6 +27,7 @@ PLOTTING: dict[str, tuple[str, ...]] = {
     "simulate own": ("simulate", "own/scan.toml"),
     "compare": ("compare", "scan.toml", "scan.toml"),
     "refine": ("refine", "scan.toml", "trace.csv", "--axis", "x"),
+    "lattice": ("lattice", "trace.npy", "retrace.npy"),
     "correct": ("correct", "trace.npy", "retrace.npy", "--fit", "--lattice-nm", "60"),
     "calibrate offset": ("calibrate", "offset", *_AXIS, "offset.csv"),
     "calibrate size": ("calibrate", "size", *_AXIS, "size.csv"),

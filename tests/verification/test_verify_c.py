@@ -440,8 +440,8 @@ MUTANTS = [
         ("markers", "integer model"),
     ),
     ("unsticky faults", "sequencer.c", r"s->faults = [^;]*\| \(?fault\b[^;]*;", ";", ("faults", "integer model")),
-    ("no coding", "axis.h", r"\(uint32_t\)code \^ axis->flip", "(uint32_t)code", ("x", "converter word")),
-    ("other alignment", "axis.h", r"<< axis->shift\)", "<< axis->shift | 1u)", ("y", "converter word")),
+    ("no coding", "arithmetic.h", r"\(uint32_t\)code \^ axis->flip", "(uint32_t)code", ("x", "converter word")),
+    ("other alignment", "arithmetic.h", r"<< axis->shift\)", "<< axis->shift | 1u)", ("y", "converter word")),
     ("fills", "sequencer.c", r"(void dac_sequencer_fill\([^)]*\)\n{\n)", r"\1    dac_sequencer_report(s, 2);\n", FILL),
     (
         "no program taken",
