@@ -11,6 +11,7 @@ from tablegen.base.warnings import Finding
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.certificate import certify as certify_plan
 from tablegen.certificate.certified_scan import certify_scan
+from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers
 from tablegen.certificate.scan_notes import scan_findings
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import summary as summary_of
@@ -255,9 +256,24 @@ class Build(Result):
         pairs = [(drive_of(line), modelled_error(line)) for line in self.plan.moving]
         return PlottedCharts(self.name, tuple(chart for pair in pairs for chart in pair))
 
+    @property
+    def answers(self) -> list[ErrorAnswer]:
+        """The error of each axis in percent, nm and pixels, where it is from, and the next step; x is the first."""
+        return error_answers(self.setup, self.plan, self.certificates)
+
+    @property
+    def duration(self) -> str:
+        """The time of an image, such as ``9 min 28 s an image``."""
+        return duration(self.plan.schedule)
+
+    def brief(self) -> list[str]:
+        """Return the lines that every output of the scan begins with: the error of each axis, and the time."""
+        return [*map(str, self.answers), self.duration]
+
     def summary(self) -> str:
-        """Return drive and certificate of both axes as text."""
-        return "\n".join(summary_of(self.plan, self.certificates))
+        """Return the error of each axis, and drive and certificate of both axes, as text."""
+        title = f"{self.plan.name} on {self.plan.scanner!r}"
+        return "\n".join([*self.brief(), "", title, *summary_of(self.plan, self.certificates)])
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -318,12 +334,9 @@ class Build(Result):
 
     def _lines(self) -> Sequence[str]:
         first, *_ = repr(self.plan).splitlines()
-        worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
-        errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
-        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.moving)
         warnings = [f"warning: {text}" for text in brief_warnings(self.plan, self.certificates)]
         head = first.removeprefix("<tablegen plan")
-        return f"build{head}", f"{errors} peak to peak", *warnings, f"{volts}; formats {', '.join(self.formats)}"
+        return f"build{head}", *map(str, self.answers), *warnings
 
     def _repr_html_(self) -> str:
         """Return drive, error and certificate, for notebooks."""

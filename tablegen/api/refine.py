@@ -18,6 +18,7 @@ from tablegen.base.warnings import Finding, of_remarks, worst_first
 from tablegen.calibration.record_checks import WrongRecord
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
 from tablegen.calibration.tables.recorder import AS_WRITTEN, Columns, Recorder
+from tablegen.certificate.error_answer import ErrorAnswer
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.emit.write import write_files
@@ -27,7 +28,7 @@ from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.lattice_line import ImageOptions
 from tablegen.refinement.round import Options, Round, with_refinement
 from tablegen.refinement.round import refine as learn_from
-from tablegen.refinement.round_text import refine_record, refine_text
+from tablegen.refinement.round_text import refine_record, refine_text, round_answer
 from tablegen.refinement.scan_file import rounds_of, with_layer
 
 
@@ -258,6 +259,11 @@ class RefinedScan(Result):
         """Return warnings to read before the round is used, the worst first."""
         return worst_first(of_remarks(self.round.remarks))
 
+    @property
+    def answer(self) -> ErrorAnswer:
+        """The error of the axis that this measurement shows, in percent, nm and pixels, and the next step."""
+        return round_answer(self.round)
+
     def table(self) -> list[str]:
         """Return the lines of ``summary`` without the findings."""
         return refine_text(self.round, self._name, list(self.sources))
@@ -284,5 +290,6 @@ class RefinedScan(Result):
             third = f"not to be used: {self.refused}"
         elif self.stopped:
             third = f"stopped: {self.stopped}"
-        residual = f"residual {self.before_percent:.3g} % rms, {self.after_percent:.2g} % predicted after it"
-        return f"refinement of {self.round.line.axis} of {self._name!r}", residual, third
+        residual = f"{self.after_percent:.2g} % rms predicted after it"
+        title = f"refinement of {self.round.line.axis} of {self._name!r}"
+        return title, str(self.answer), f"{residual}, {third}"

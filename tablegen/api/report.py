@@ -10,7 +10,7 @@ from tablegen.base.warnings import Finding
 from tablegen.charts.chart import Chart
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.emit.write import write_files
-from tablegen.html_report.page import charts_of, page, sections
+from tablegen.html_report.page import answers, charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.ranking import ranked
 from tablegen.html_report.subject import Subject, of_directory
@@ -75,6 +75,11 @@ class ReportPage(Result):
         self.figures: dict[str, Chart] = charts_of(parts)
 
     @property
+    def answers(self) -> list[str]:
+        """The lines that the page begins with: the error of each axis, and the time; empty for a build."""
+        return answers(self.subject)
+
+    @property
     def findings(self) -> list[Finding]:
         """Warnings to read before the image is trusted, the worst first."""
         return ranked(self.subject)
@@ -98,7 +103,8 @@ class ReportPage(Result):
 
     def summary(self) -> str:
         """Return the findings of the page, the worst first."""
-        return "\n".join(one.line for one in self.findings) or "no findings"
+        findings = [one.line for one in self.findings] or ["no findings"]
+        return "\n".join([*answers(self.subject), *findings])
 
     def charts(self) -> PlottedCharts:
         """Return all charts of the page."""

@@ -11,8 +11,11 @@ from tablegen.api.laboratory import Laboratory
 from tablegen.api.result import Result
 from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.certificate.certificate import certify
+from tablegen.certificate.error_answer import duration, error_answers
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
+from tablegen.planning.line_plan import make_plan
 from tablegen.virtual import own_report, report
 from tablegen.virtual.own_run import OwnRun, own_axes, simulate_own
 from tablegen.virtual.parameters import Truth
@@ -78,7 +81,8 @@ def simulate(
     if truth == OWN and not operators:
         raise ValueError(f"{setup.scanner_file.name} has no operator; identify one with calibrate_operator")
     if truth == OWN or (truth is None and operators):
-        return SimulatedScan(setup.scan.name, None, (), tuple(simulate_own(setup, seed, progress)), tuple(operators))
+        own_runs = tuple(simulate_own(setup, seed, progress))
+        return SimulatedScan(setup.scan.name, None, (), own_runs, tuple(operators), _brief(setup))
     name = truth or DEFAULT
     laboratory = Laboratory(name, setup.scanner)
     model, scanner = laboratory.truth, laboratory.scanner
@@ -92,7 +96,17 @@ def simulate(
         raise Unphysical("\n".join(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)))
     if calibrated:
         stages.append(_calibrated(setup, scanner, str(name), noise_percent, seed, progress))
-    return SimulatedScan(setup.scan.name, model, tuple(stages))
+    return SimulatedScan(setup.scan.name, model, tuple(stages), brief=_brief(setup))
+
+
+def _brief(setup: Setup) -> tuple[str, ...]:
+    """Return the error of each axis, and the time of an image; empty where the scan itself cannot be played."""
+    try:
+        plan = make_plan(setup)
+        certificates = certify(plan)
+    except Rejected:  # the simulation says of each model why
+        return ()
+    return (*map(str, error_answers(setup, plan, certificates)), duration(plan.schedule))
 
 
 def _calibrated(
@@ -135,6 +149,7 @@ def _played(
 class SimulatedScan(Result):
     """A scan on a virtual scanner: ``stages`` of a built-in one or of a file, or ``own_runs`` on the own operator.
 
+    ``brief`` has the error of each axis and the time, as ``tablegen show`` prints them first.
     ``truth`` has the parameters of the virtual scanner, None on the own operator, whose axes are ``operators``.
     """
 
@@ -143,6 +158,7 @@ class SimulatedScan(Result):
     stages: tuple[SimulationStage, ...]
     own_runs: tuple[OwnRun, ...] = ()
     operators: tuple[str, ...] = ()
+    brief: tuple[str, ...] = ()
 
     @property
     def record(self) -> dict[str, Any]:
@@ -158,8 +174,10 @@ class SimulatedScan(Result):
     def summary(self) -> str:
         """Return what ``tablegen simulate`` prints: the errors that remain with each correction."""
         if self.truth is None:
-            return "\n".join(own_report.text(self.name, self.own_runs, self._without))
-        return "\n".join(report.text(self.name, self.truth, self.stages))
+            text = own_report.text(self.name, self.own_runs, self._without)
+        else:
+            text = report.text(self.name, self.truth, self.stages)
+        return "\n".join([*self.brief, *([""] if self.brief else []), *text])
 
     def charts(self) -> PlottedCharts:
         """Return residual and scaling error of each run."""

@@ -157,6 +157,7 @@ def _print_certificate(built: "Build") -> None:
     """Print the certificate, the findings that impair the image, and the choices of the build."""
     from tablegen.cli.certificate_text import certificate_table
 
+    click.echo("\n".join([*built.brief(), ""]))
     click.echo("\n".join(certificate_table(built.plan, built.certificates)))
     for finding in built.findings:
         if finding.weight == "spoils":  # `show` prints the small print too

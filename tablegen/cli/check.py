@@ -13,7 +13,8 @@ from tablegen.cli.shared.common import planned, scan_argument, strict_option
 def check(scan: Path, strict: bool) -> None:
     """Check a scan file and its scanner file: syntax, physical limits, and the limits of the certificate.
 
-    Prints nothing if both are correct. Otherwise it prints all errors to stderr, each as file:line: key: why. A
+    If both are correct it says so, with the error of each axis and the time of an image, as `tablegen show` does.
+    Otherwise it prints all errors to stderr, each as file:line: key: why. A
     scaling error above 1 %, or above that of the uncompensated line, is a warning, with remedies that were tried; so is
     a pixel whose positions in trace and retrace differ by more than a quarter of a pixel.
 
@@ -24,4 +25,5 @@ def check(scan: Path, strict: bool) -> None:
     Exit status: 0 correct, 2 wrong input, 3 a limit of the certificate is exceeded, or, with
     --strict, there is a warning.
     """
-    planned(scan, strict=strict)
+    built = planned(scan, strict=strict)
+    click.echo("\n".join([*built.brief(), f"{scan}: correct"]))

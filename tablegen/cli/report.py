@@ -82,6 +82,8 @@ def report(
     charts = _select_charts(page.figures, figures)
     written(output.parent, {output.name: page.content})
     _write_charts(charts, svg, png, pdf)
+    for answer in page.answers:
+        click.echo(answer)
     click.echo(f"{output}: {len(page.content) / 1000:.0f} kB")
     if page.broken:
         fail([f"{output}: the certificate exceeds a limit", *page.broken], ExitStatus.BROKEN_LIMIT)

@@ -48,7 +48,6 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         show_plot(plot, lambda: _charts(built, plot))
         return
     plan = built.plan
-    tell(f"{plan.name} on {plan.scanner!r}", bold=True)
     lines = built.summary().splitlines()
     if optimum:
         from tablegen.certificate.certificate import Certificate
@@ -58,7 +57,8 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         certificates: dict[str, Certificate] = {
             line.axis: with_optimum(line, built.certificates[line.axis]) for line in plan.lines
         }
-        lines = summary(plan, certificates)
+        title = f"{plan.name} on {plan.scanner!r}"
+        lines = [*built.brief(), "", title, *summary(plan, certificates)]
     for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
     click.echo()

@@ -22,6 +22,7 @@ def document(
     sections: Sequence[Section],
     notice: str = "",
     foot: str = "",
+    answers: Sequence[str] = (),
 ) -> bytes:
     """Render the whole page as UTF-8. All texts are escaped here, whatever their origin."""
     script = _resource("page.js")
@@ -31,6 +32,7 @@ def document(
         "findings": findings,
         "sections": sections,
         "notice": notice,
+        "answers": answers,
         "foot": foot,
         "style": Markup(_resource("page.css")),
         "script": Markup(script),

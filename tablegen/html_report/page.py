@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from tablegen.certificate.error_answer import duration, error_answers
 from tablegen.charts.chart import Chart
 from tablegen.html_report.basis import basis
 from tablegen.html_report.blocks import Charts, Section, TableCell
@@ -71,7 +72,16 @@ def page(subject: Subject, parts: list[Section]) -> bytes:
         )
     title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
     foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is computed from the scan; nothing is measured."
-    return document(title, _verdict(subject, findings), findings, parts, notice, foot)
+    return document(title, _verdict(subject, findings), findings, parts, notice, foot, answers(subject))
+
+
+def answers(subject: Subject) -> list[str]:
+    """Return the error of each axis and the time of an image; empty for a build, which has no scan file."""
+    planned = subject.planned
+    if planned is None:
+        return []
+    errors = error_answers(planned.setup, planned.plan, planned.certificates)
+    return [*map(str, errors), duration(planned.plan.schedule)]
 
 
 def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:

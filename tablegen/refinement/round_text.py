@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from tablegen.base.data_files import Source
+from tablegen.certificate.error_answer import ErrorAnswer, Of, measured_answer
+from tablegen.config.frame import lines_inside
 from tablegen.refinement.departure import Departure
 from tablegen.refinement.image_round import ImageRound, MismatchRound
 from tablegen.refinement.round import Round, TraceRound
@@ -15,6 +17,8 @@ def refine_text(result: Round, name: str, sources: Sequence[Source]) -> list[str
     """Format a round for the terminal."""
     update = result.update
     lines = [
+        str(round_answer(result)),
+        "",
         f"{name}, {result.line.axis}: {_what(result, sources)}",
         "",
         "                        residual [% of the line]   scaling error",
@@ -33,6 +37,23 @@ def refine_text(result: Round, name: str, sources: Sequence[Source]) -> list[str
         "",
     ]
     return lines
+
+
+def round_answer(result: Round) -> ErrorAnswer:
+    """Return the error of the axis that the measurement of a round shows, and the next step."""
+    step = "build, upload, record again"
+    if result.worse:
+        step = "find out why it grew; do not use this round"
+    elif result.stopped:
+        step = "build and upload with the best layer" if result.best is not None else "remove the layer"
+    elif not result.update.harmonics:
+        step = "nothing: only noise is left"
+    scan = result.setup.scan
+    limit, line_count = scan.y.band_limit, scan.timing.lines
+    rows = lines_inside(scan.y.turn, limit.window, limit.directions == "both", line_count)[0][1]
+    of: Of = "trace to retrace, rms" if isinstance(result, MismatchRound) else "rms"
+    count = scan.timing.pixels if result.line.axis == "x" else max(rows, 1)
+    return measured_answer(result.line, count, of, result.update.before.rms_percent, "measured (refine)", step)
 
 
 def _what(result: Round, sources: Sequence[Source]) -> str:

@@ -1,0 +1,168 @@
+"""One line an axis: how large its error is, what limits it, and what to do next; of every command the same text.
+
+Percentages are of the whole line, errors those inside the imaging window. A pixel of x is the window over the pixels of
+a line, one of y the window over the image lines.
+"""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from tablegen.certificate.certificate import Certificate
+from tablegen.compensation.expectation import LEVEL_PERCENT
+from tablegen.config.load import Setup
+from tablegen.config.schema import Refinement
+from tablegen.device.schedule import Schedule
+from tablegen.planning.line_plan import LinePlan, Plan
+
+_CONVERTER_SHARE = 0.5  # of the error; above it a better piezo model gains little
+
+Basis = Literal["measured", "predicted", "laws", "uncompensated", "rests"]
+Of = Literal["rms", "trace to retrace, rms", "trace to retrace, at most"]
+
+
+class ErrorAnswer(Struct, frozen=True):
+    """The error of one axis in percent of the line, nm and pixels, where it is from, its limit and the next step.
+
+    ``percent``, ``nm`` and ``pixels`` are None where nothing is known of the piezo, and ``of`` is then empty.
+    """
+
+    axis: str
+    basis: Basis
+    source: str
+    next_step: str
+    of: Of | None = None
+    percent: float | None = None
+    nm: float | None = None
+    pixels: float | None = None
+    limit: str = ""
+
+    def __str__(self) -> str:
+        if self.basis == "rests":
+            return f"{self.axis}: {self.source}"
+        parts = [f"limited by {self.limit}"] if self.limit else []
+        parts.append(f"next: {self.next_step}")
+        if self.percent is None or self.nm is None or self.pixels is None:
+            return "; ".join([f"{self.axis}: not measured: {self.source}", *parts])
+        figures = f"{short(self.percent)} % of the line = {short(self.nm)} nm = {short(self.pixels)} pixel ({self.of})"
+        if self.basis == "laws":
+            return "; ".join([f"{self.axis}: not measured: {self.source}", f"by them {figures}", *parts])
+        return "; ".join([f"{self.axis}: {figures}, {self.source}", *parts])
+
+
+def short(value: float) -> str:
+    """Format an error with two digits, and without an exponent where it is not tiny."""
+    return f"{value:.2g}" if abs(value) < 100.0 else f"{value:.0f}"
+
+
+def error_answers(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[ErrorAnswer]:
+    """Return the answer of each axis: measured before predicted, and predicted by traces before the laws alone."""
+    return [
+        _answer(line, plan.schedule, certificates[line.axis], getattr(setup.scan, line.axis).refinement)
+        for line in plan.lines
+    ]
+
+
+def measured_answer(line: LinePlan, count: int, of: Of, percent: float, source: str, next_step: str) -> ErrorAnswer:
+    """Return the answer of a measurement of the running scan, whose window has ``count`` pixels along the axis."""
+    return _with_figures(line, count, of, percent, basis="measured", source=source, next_step=next_step)
+
+
+def pixel_count(line: LinePlan, schedule: Schedule) -> int:
+    """Return the number of pixels of the imaging window along an axis."""
+    return schedule.pixels if line.axis == "x" else max(schedule.up.count, 1)
+
+
+def converter_percent(line: LinePlan, certificate: Certificate) -> float:
+    """Return the rms error of the emitted codes, behind the response where one is known, in percent of the line."""
+    rms = certificate.rms_error_lsb if certificate.position is None else certificate.position.rms_error_lsb
+    return 100.0 * rms / abs(line.codes_per_unit)
+
+
+def duration(schedule: Schedule) -> str:
+    """Return the time of an image, and of a frame where that holds two, such as ``9 min 28 s an image``."""
+    frame_s = float(Fraction(1) / schedule.frame_rate)
+    if not schedule.down.count:
+        return f"{time_text(frame_s)} an image"
+    return f"{time_text(0.5 * frame_s)} an image, two images a frame: up and down"
+
+
+def time_text(seconds: float) -> str:
+    """Format a time for people: ``9 min 28 s``, ``2 h 5 min``, ``0.5 s``, ``2.5 ms``."""
+    if seconds >= 3600.0:
+        hours, minutes = divmod(round(seconds / 60.0), 60)
+        return f"{hours} h {minutes} min" if minutes else f"{hours} h"
+    if round(seconds) >= 60:
+        minutes, rest = divmod(round(seconds), 60)
+        return f"{minutes} min {rest} s" if rest else f"{minutes} min"
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
+        if seconds * factor >= 0.1 or unit == "us":
+            return f"{seconds * factor:.3g} {unit}"
+    raise AssertionError("the last unit fits")  # pragma: no cover
+
+
+def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
+    axis, expected, count = line.axis, certificate.expected, pixel_count(line, schedule)
+    if line.drive.resting:
+        return ErrorAnswer(axis, "rests", f"rests at {line.drive.v_offset:.6g} V", "")
+    if line.layer is not None:
+        return _refined(line, count, certificate, refinement)
+    refine = f"record the scan, then tablegen refine --axis {axis}"
+    if expected is not None and expected.basis == "traces" and expected.rms:
+        figure = max(expected.rms.values(), key=lambda one: one.value)
+        source = "predicted by the operator"
+        if figure.uncertainty is not None:
+            source += f" +- {short(figure.uncertainty)} % for {LEVEL_PERCENT} % of scans"
+        answer = _with_figures(line, count, "rms", figure.value, basis="predicted", source=source, next_step=refine)
+        return _limited(answer, line, certificate)
+    if not line.drive.hysteresis.compensates:
+        return ErrorAnswer(
+            axis,
+            "uncompensated",
+            "hysteresis is not corrected, typically some 10 % of the line",
+            f"take images or traces, then tablegen calibrate images --axis {axis} (or hysteresis)",
+        )
+    source = "laws of the scanner file alone"
+    if expected is not None and expected.mismatch is not None:
+        of: Of = "trace to retrace, at most"
+        return _with_figures(line, count, of, expected.mismatch.value, basis="laws", source=source, next_step=refine)
+    return ErrorAnswer(axis, "laws", source, refine)
+
+
+def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
+    """Return the answer of an axis with a layer: what was measured when it was learnt."""
+    again = f"record the scan, then tablegen refine --axis {line.axis}"
+    if refinement is None or refinement.before_percent is None:
+        return ErrorAnswer(line.axis, "laws", "refined, but its layer does not say what was measured", again)
+    of: Of = "trace to retrace, rms" if refinement.before_of == "mismatch" else "rms"
+    # The best of the rounds has the measurement that was made while it was played itself.
+    best = refinement.best is True
+    source = "measured (refine, best round)" if best else "measured (refine) before the layer of the last round"
+    answer = _with_figures(line, count, of, refinement.before_percent, basis="measured", source=source, next_step=again)
+    return _limited(answer, line, certificate, final=best)
+
+
+def _limited(answer: ErrorAnswer, line: LinePlan, certificate: Certificate, final: bool = False) -> ErrorAnswer:
+    """Add what limits the error: the converter where its codes make most of it, else the piezo."""
+    assert answer.percent is not None
+    if converter_percent(line, certificate) < _CONVERTER_SHARE * answer.percent:
+        step = "nothing: more rounds did not help" if final else answer.next_step
+        return _replaced(answer, "the piezo", step)
+    shaped = line.program.output.shaping.order > 0
+    step = "more dac.bits, or an amplifier whose range fits" if shaped else "shaping of the [dac]"
+    return _replaced(answer, "the converter", step)
+
+
+def _replaced(answer: ErrorAnswer, limit: str, next_step: str) -> ErrorAnswer:
+    return replace(answer, limit=limit, next_step=next_step)
+
+
+def _with_figures(
+    line: LinePlan, count: int, of: Of, percent: float, *, basis: Basis, source: str, next_step: str
+) -> ErrorAnswer:
+    nm = 0.01 * percent * line.drive.size_nm
+    pixels = nm * count / line.drive.window_nm
+    return ErrorAnswer(line.axis, basis, source, next_step, of, percent, nm, pixels)
