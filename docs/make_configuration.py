@@ -62,7 +62,7 @@ tablegen solves for the periods. `build` and `show` print what was chosen, in li
   with 512 of them, `turn = 0.5` and a window of 0.1 to 0.9, 204 lines are imaged on the way up and 204 on the way down.
 - `frame = "flyback"`: every image goes up, and y flies back. `frame = "up-down"`: images are taken on the way up and on
   the way down, each with all `image_lines`. Without `frame`, `turn` and `directions` of y hold; their defaults are
-  those of `"up-down"`.
+  those of `"up-down"`. What a command prints first says it: `30 s an image, two images a frame: up and down`.
 - A frame is one period of y. With `"up-down"` it has two images, so `frame_rate_hz = 1` gives two images a second.
 - `speed_um_per_s` and `speed_mm_per_s` are the speed of the tip along the forward line, inside the window.
 - Keys with `um` are those with `nm`, in micrometres: 0.3 um are 300 nm, to the last bit.

@@ -92,7 +92,7 @@ def duration(schedule: Schedule) -> str:
 
 def time_text(seconds: float) -> str:
     """Format a time for people: ``9 min 28 s``, ``2 h 5 min``, ``0.5 s``, ``2.5 ms``."""
-    if seconds >= 3600.0:
+    if round(seconds) >= 3600:
         hours, minutes = divmod(round(seconds / 60.0), 60)
         return f"{hours} h {minutes} min" if minutes else f"{hours} h"
     if round(seconds) >= 60:
@@ -110,7 +110,7 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
         return ErrorAnswer(axis, "rests", f"rests at {line.drive.v_offset:.6g} V", "")
     if line.layer is not None:
         return _refined(line, count, certificate, refinement)
-    refine = f"record the scan, then tablegen refine --axis {axis}"
+    refine = f"tablegen refine --axis {axis}"
     if expected is not None and expected.basis == "traces" and expected.rms:
         figure = max(expected.rms.values(), key=lambda one: one.value)
         source = "predicted by the operator"
@@ -134,7 +134,7 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
 
 def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
     """Return the answer of an axis with a layer: what was measured when it was learnt."""
-    again = f"record the scan, then tablegen refine --axis {line.axis}"
+    again = f"tablegen refine --axis {line.axis}"
     if refinement is None or refinement.before_percent is None:
         return ErrorAnswer(line.axis, "laws", "refined, but its layer does not say what was measured", again)
     of: Of = "trace to retrace, rms" if refinement.before_of == "mismatch" else "rms"

@@ -182,7 +182,8 @@ def test_a_build_writes_its_files_and_says_what_they_promise(scan: Path) -> None
     done = tablegen("build", "scan.toml", "-o", "some/where", cwd=scan.parent)
     assert (done.returncode, done.stderr) == (0, b"")
     lines = done.stdout.decode("ascii").splitlines()
-    assert lines[0].startswith("annexin_200nm on 'hs-afm': 400 Hz lines of 1250 ticks")
+    assert [line.split(":")[0] for line in lines[:2]] == ["x", "y"]
+    assert lines[4].startswith("annexin_200nm on 'hs-afm': 400 Hz lines of 1250 ticks")
     assert [line[0] for line in lines if re.match("[xy] ", line)] == ["x", "y"]
     assert lines[-1] == f"some/where: {len(OWN_FILES)} of {len(OWN_FILES)} files and the runtime dac_* written"
     out = scan.parent / "some" / "where"
@@ -307,10 +308,13 @@ def test_a_changed_scan_makes_its_build_stale(scan: Path) -> None:
 # check and show
 
 
-def test_check_is_silent(scan: Path) -> None:
+def test_check_says_that_all_is_well(scan: Path) -> None:
     before = contents(scan.parent)
     outcome = run("check", scan)
-    assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
+    assert (outcome.status, outcome.err) == (0, "")
+    lines = outcome.out.splitlines()
+    assert lines[2:] == ["0.5 s an image", f"{scan}: correct"]
+    assert [line[:2] for line in lines[:2]] == ["x:", "y:"]
     assert contents(scan.parent) == before
 
 
