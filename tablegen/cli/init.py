@@ -70,6 +70,10 @@ def _quantity(
 @click.option(
     "--tick", callback=_quantity(_SECONDS, "2us"), metavar="TIME", help="Time between two updates, in place of --clock."
 )
+@click.option("--v-max", type=float, callback=finite, metavar="V", help="Highest output of your piezo driver.")
+@click.option("--v-min", type=float, callback=finite, metavar="V", help="Lowest output of your piezo driver.")
+@click.option("--nm-per-v", type=float, callback=finite, metavar="K", help="Sensitivity of your scanner in nm/V.")
+@click.option("--gain", type=float, callback=finite, metavar="G", help="Gain of your amplifier.")
 @click.option("--name", metavar="NAME", help="Name of the scan, and of its file.  [default: from the size]")
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
 def init(
@@ -84,6 +88,10 @@ def init(
     bits: int,
     clock: float | None,
     tick: float | None,
+    v_max: float | None,
+    v_min: float | None,
+    nm_per_v: float | None,
+    gain: float | None,
     name: str | None,
     force: bool,
 ) -> int:
@@ -93,10 +101,14 @@ def init(
     other values so that the scan can be built. The scanner is an example whose range fits the image: calibrate your own
     scanner, and keep the scan file.
 
+    With --v-max, --v-min, --nm-per-v or --gain the scanner file is that of your scanner. It then has no hysteresis,
+    which nobody has measured on it yet, and a comment says how to measure it.
+
     \b
     Examples:
       tablegen init demo
       tablegen init demo --image-um 2 --pixels 512 --line-rate 1
+      tablegen init mine --v-max 150 --nm-per-v 20 --gain 15
       tablegen init demo --bits 12 --clock 100k --pixels 128
 
     Exit status: 0 done, 2 a file exists already (see --force) or no such scan can be built, 4 cannot write.
@@ -124,7 +136,16 @@ def init(
         frame=frame,
         rate=rate,
         name=name or "",
+        v_min=v_min,
+        v_max=v_max,
+        nm_per_v=nm_per_v,
+        gain=gain,
     )
+    low, high = wishes.driver
+    if not low < high:
+        raise click.UsageError(f"the driver goes from {low:g} to {high:g} V: give a --v-max above --v-min")
+    if nm_per_v is not None and not nm_per_v > 0.0:
+        raise click.UsageError(f"--nm-per-v {nm_per_v:g} is not above 0")
     texts = files(wishes)
     there = [folder / name for name in texts if os.path.lexists(folder / name)]
     if there and not force:

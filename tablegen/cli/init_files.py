@@ -7,6 +7,7 @@ from tablegen.compensation.size import SizeLaw
 
 SCANNER_FILE = "scanner.toml"
 _V_MAX = 100.0  # V, of the example's driver
+_CONVERTER_SPAN = 10.0  # V, of the example's converter
 _K, _BETA, _BASE_NM = 10.0, 0.53, 200.0
 _SHARE = 0.8  # of the line of x that is imaged
 _FASTEST_HZ = 500.0
@@ -27,6 +28,21 @@ class Wishes:
     rate: tuple[str, float] | None = None
     name: str = ""
     table_length: int = 2048
+    v_min: float | None = None
+    v_max: float | None = None
+    nm_per_v: float | None = None
+    gain: float | None = None
+
+    @property
+    def own_scanner(self) -> bool:
+        """True if anything is known of the user's scanner: the example's piezo would then be somebody else's."""
+        return any(value is not None for value in (self.v_min, self.v_max, self.nm_per_v, self.gain))
+
+    @property
+    def driver(self) -> tuple[float, float]:
+        """The range of the piezo driver in V."""
+        low = 0.0 if self.v_min is None else self.v_min
+        return low, low + _V_MAX if self.v_max is None else self.v_max
 
     @property
     def scan_name(self) -> str:
@@ -74,7 +90,7 @@ scanner = "{SCANNER_FILE}"         # relative to this file
 {_line(f"{key} = {_number(value)}", f"{why}or {' or '.join(others)}")}
 
 [x]
-{_line(f"offset_v = {_number(0.5 * _V_MAX)}", "where the image is; or offset_nm")}
+{_line(f"offset_v = {_number(0.5 * sum(wishes.driver))}", "where the image is; or offset_nm")}
 {tables}
 [y]
 {_line('like = "x"', 'the same; its own keys go before that. motion = "off" makes a line scan')}
@@ -84,7 +100,50 @@ scanner = "{SCANNER_FILE}"         # relative to this file
 """
 
 
+def _own_scanner(wishes: Wishes) -> str:
+    """Return the scanner of the user: the driver, the size, and nothing that nobody has measured on it."""
+    low, high = wishes.driver
+    span = high - low
+    line_nm = wishes.image_nm / _SHARE
+    if wishes.nm_per_v is None:
+        k, origin = float(f"{line_nm / (0.3 * span):.3g}"), "a guess that fits the image: measure it"
+    else:
+        k, origin = wishes.nm_per_v, "as given"
+    lowest = "" if wishes.v_min is None else _line(f"v_min = {_number(low)}", "V, least output of the driver") + "\n"
+    gain = span / _CONVERTER_SPAN if wishes.gain is None else wishes.gain
+    return f"""\
+# The instrument: converter, amplifier and scanner. Voltages are at the piezo. What is not measured is not here.
+name = "scanner"
+{_line(f"v_max = {_number(high)}", "V, maximum output of the piezo driver; normalised voltages refer to it")}
+{lowest}
+[dac]
+{_line(f"bits = {wishes.bits}", "")}
+{_line('coding = "offset-binary"', "offset-binary | twos-complement")}
+{_line("v_min = -5.0", "V at the converter")}
+v_max = 5.0
+{_line(f"update_rate_hz = {_number(wishes.update_rate_hz)}", "ticks: updates of both converters a second")}
+
+[amplifier]                      # piezo voltage = gain * converter voltage + bias_v
+gain = {_number(gain)}
+bias_v = {_number(0.5 * (low + high))}
+
+[x.size]                         # `tablegen calibrate size` measures it, with how it bends
+{_line(f"k_nm_per_v = {_number(k)}", origin)}
+{_line(f"base_nm = {_number(min(line_nm, 0.5 * k * span))}", "the size at which k_nm_per_v holds")}
+
+# Hysteresis is not corrected yet: typically some 10 % of the line. Take images of a grating or a lattice, trace and
+# retrace, with a plain triangle of some voltages, and let the command write [x.hysteresis] here; then the same for y:
+#   tablegen calibrate images --axis x --scanner {SCANNER_FILE} --write --pair VOLTS TRACE RETRACE
+# With a displacement sensor: tablegen calibrate hysteresis, or tablegen calibrate operator.
+
+[y]
+like = "x"                       # all of it; tables of its own go before that
+"""
+
+
 def _scanner(wishes: Wishes) -> str:
+    if wishes.own_scanner:
+        return _own_scanner(wishes)
     factor = _factor(wishes)
     larger = "" if factor == 1.0 else f", with a range {factor:g} times as large"
     return f"""\

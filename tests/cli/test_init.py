@@ -94,3 +94,41 @@ def test_what_cannot_be_built_is_refused_and_nothing_written(
     assert outcome.status == 2
     assert says in " ".join(outcome.err.split()), outcome.err
     assert not (tmp_path / "demo").exists()
+
+
+OWN_SCANNERS: dict[tuple[str, ...], tuple[float, float, float]] = {
+    ("--v-max", "150", "--nm-per-v", "20", "--gain", "15"): (0.0, 150.0, 15.0),
+    ("--v-min", "-20", "--v-max", "120"): (-20.0, 120.0, 14.0),
+    ("--nm-per-v", "35", "--image-um", "1"): (0.0, 100.0, 10.0),
+    ("--gain", "8", "--image-nm", "400"): (0.0, 100.0, 8.0),
+}
+
+
+@pytest.mark.parametrize("options", OWN_SCANNERS, ids=" ".join)
+def test_an_own_scanner_has_no_hysteresis_of_the_example(options: tuple[str, ...], tmp_path: Path) -> None:
+    path = made(tmp_path, *options)
+    text = path.with_name("scanner.toml").read_text("utf-8")
+    scanner, (low, high, gain) = tomllib.loads(text), OWN_SCANNERS[options]
+    assert (scanner.get("v_min", 0.0), scanner["v_max"], scanner["amplifier"]["gain"]) == (low, high, gain)
+    assert set(scanner["x"]) == {"size"}
+    assert "tablegen calibrate images" in text
+    if "--nm-per-v" in options:
+        assert scanner["x"]["size"]["k_nm_per_v"] == float(options[options.index("--nm-per-v") + 1])
+    checked = run("check", path, "--strict")
+    assert (checked.status, checked.err) == (0, "")
+    assert checked.out.startswith("x: not measured: hysteresis is not corrected")
+    assert run("build", path, "-o", tmp_path / "out").status == 0
+
+
+@pytest.mark.parametrize("options", [("--v-max", "-5"), ("--v-min", "10", "--v-max", "5"), ("--nm-per-v", "0")])
+def test_an_own_scanner_that_cannot_be(options: tuple[str, ...], tmp_path: Path) -> None:
+    outcome = run("init", tmp_path, *options)
+    assert outcome.status == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_gain_without_range_is_refused(tmp_path: Path) -> None:
+    """The builder has the reason: a scan of 200 nm does not fit what such an amplifier gives."""
+    outcome = run("init", tmp_path, "--gain", "0.01")
+    assert outcome.status == 2
+    assert "nothing was written" in outcome.err
