@@ -13,6 +13,7 @@ from tablegen.certificate.certificate import certify as certify_plan
 from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers
 from tablegen.certificate.scan_notes import scan_findings
+from tablegen.certificate.scan_text import scan_text
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import summary as summary_of
 from tablegen.config.load import Setup, from_values
@@ -269,6 +270,11 @@ class Build(Result):
     def brief(self) -> list[str]:
         """Return the lines that every output of the scan begins with: the error of each axis, and the time."""
         return [*map(str, self.answers), self.duration]
+
+    def overview(self) -> str:
+        """Return what ``tablegen show`` prints above its plots: the errors, and the scan in the user's words."""
+        title = f"{self.plan.name} on {self.plan.scanner!r}"
+        return "\n".join([*self.brief(), "", title, *scan_text(self.plan, self.certificates)])
 
     def summary(self) -> str:
         """Return the error of each axis, and drive and certificate of both axes, as text."""

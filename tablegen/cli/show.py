@@ -24,14 +24,27 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Add the least peak acceleration that any waveform of this scaling error could have. Needs scipy.",
 )
-def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None, no_plot: bool, optimum: bool) -> None:
+@click.option("--all", "complete", is_flag=True, help="Print factors, words of tables and equations too.")
+def show(
+    scan: Path,
+    as_json: bool,
+    formats: tuple[str, ...],
+    plot: Path | None,
+    no_plot: bool,
+    optimum: bool,
+    complete: bool,
+) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
+
+    It begins with the error of each axis and the time of an image. --all prints each factor, the tables and the whole
+    certificate as well; so does --optimum.
 
     In the plots, > is forward and < is backward; a double axis marks the imaged part.
 
     \b
     Examples:
       tablegen show annexin_200nm.toml
+      tablegen show annexin_200nm.toml --all
       tablegen show annexin_200nm.toml --plot annexin.png
       tablegen show annexin_200nm.toml --json > manifest.json
 
@@ -48,7 +61,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         show_plot(plot, lambda: _charts(built, plot))
         return
     plan = built.plan
-    lines = built.summary().splitlines()
+    lines = (built.summary() if complete else built.overview()).splitlines()
     if optimum:
         from tablegen.certificate.certificate import Certificate
         from tablegen.certificate.optimum import with_optimum

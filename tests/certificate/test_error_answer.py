@@ -117,3 +117,15 @@ def test_every_output_begins_with_it(built: tablegen.Build, tmp_path: Path) -> N
     page = (tmp_path / "r.html").read_text("utf-8")
     assert all(page.index(line) < page.index('class="verdict') for line in lines)
     assert repr(built).splitlines()[1].strip() == lines[0]
+
+
+def test_show_is_brief_and_all_has_the_rest(built: tablegen.Build) -> None:
+    brief, complete = (run("show", EXAMPLE, "--no-plot", *more).out for more in ((), ("--all",)))
+    assert len(brief.splitlines()) <= 40
+    assert brief.startswith(built.overview())
+    assert complete.startswith(built.summary())
+    assert "m g V_scan" in complete
+    assert "m g V_scan" not in brief
+    scaling = max(one.scaling_error_percent for one in built.certificates.values())
+    assert f"it varies by {scaling:.3g} %" in brief
+    assert run("show", EXAMPLE, "--json").out == run("show", EXAMPLE, "--json", "--all").out

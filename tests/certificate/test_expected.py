@@ -124,7 +124,7 @@ def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read
     assert built.status == 0
     assert re.search(r"\nx +on the scanner +rms forward .*\n +scaling forward .*\n +mismatch .*\n +nearest ", built.out)
     assert run("verify", out, "--target", "files").status == 0
-    text = run("show", path, "--no-plot").out
+    text = run("show", path, "--no-plot", "--all").out
     assert re.search(r"on the scanner +rms forward [\d.e-]+ \+- 0\.05 %, rms backward ", text)
     assert re.search(r"\n +scaling forward [\d.e-]+ \+- 1\.5 %, scaling backward ", text)
     assert re.search(r"\n +mismatch [\d.e-]+ \+- 0\.2 %, size [+-][\d.e-]+ \+- 0\.1 %", text)

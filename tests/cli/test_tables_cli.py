@@ -168,8 +168,8 @@ def test_show_report_compare_and_the_manifest_say_what_was_asked(tmp_path: Path)
     auto.write_text(edited(SCAN, *AUTO), "utf-8")
     program = make_plan(load(auto)).x.program
     chosen = f"{len(program.words)} words of {program.bits} bits, {program.mode}"
-    assert f"{chosen}, the least memory within 1 LSB" in run("show", auto, "--no-plot").out
-    assert "the least memory within" not in run("show", written, "--no-plot").out
+    assert f"{chosen}, the least memory within 1 LSB" in run("show", auto, "--no-plot", "--all").out
+    assert "the least memory within" not in run("show", written, "--no-plot", "--all").out
     manifest = json.loads(run("show", auto, "--json").out)
     assert manifest["axes"]["x"]["table"]["asked"] == {"max_error_lsb": 1.0, "free": ["mode", "length", "bits"]}
     compared = run("compare", written, auto).out

@@ -128,5 +128,8 @@ def test_what_is_bold_is_so_on_a_terminal_only(tmp_path: Path) -> None:
     """Negative control too: the streams do let through what this package itself writes."""
     scan = write_pair(tmp_path)
     _, shown = on_a_terminal("show", scan, "--no-plot")
-    assert shown.startswith("\x1b[1mannexin_200nm on 'hs-afm'\x1b[0m\n")
-    assert run("show", scan, "--no-plot").out.startswith("annexin_200nm on 'hs-afm'\n")
+    assert shown.startswith("\x1b[1mx: ")
+    assert "\x1b[1mannexin_200nm on 'hs-afm'\x1b[0m\n" in shown
+    plain = run("show", scan, "--no-plot").out
+    assert plain.startswith("x: ")
+    assert "\nannexin_200nm on 'hs-afm'\n" in plain
