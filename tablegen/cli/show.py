@@ -36,8 +36,8 @@ def show(
 ) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
-    It begins with the error of each axis and the time of an image. --all prints each factor, the tables and the whole
-    certificate as well; so does --optimum.
+    It begins with the error of each axis and the time of an image. With --all it prints factors, tables and the whole
+    certificate as well.
 
     In the plots, > is forward and < is backward; a double axis marks the imaged part.
 
