@@ -110,7 +110,7 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
         return ErrorAnswer(axis, "rests", f"rests at {line.drive.v_offset:.6g} V", "")
     if line.layer is not None:
         return _refined(line, count, certificate, refinement)
-    refine = f"tablegen refine --axis {axis}"
+    refine = "refine"
     if expected is not None and expected.basis == "traces" and expected.rms:
         figure = max(expected.rms.values(), key=lambda one: one.value)
         source = "predicted by the operator"
@@ -134,7 +134,7 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
 
 def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
     """Return the answer of an axis with a layer: what was measured when it was learnt."""
-    again = f"tablegen refine --axis {line.axis}"
+    again = "refine"
     if refinement is None or refinement.before_percent is None:
         return ErrorAnswer(line.axis, "laws", "refined, but its layer does not say what was measured", again)
     of: Of = "trace to retrace, rms" if refinement.before_of == "mismatch" else "rms"
