@@ -48,7 +48,7 @@ def correct(
     lattice_nm, pitch_nm, fit : optional
         Constant in nm of a periodic sample, which is fitted; ``fit=True`` where it is unknown.
     lattice : {"hexagonal", "square"}, optional
-        Kind of the lattice of ``lattice_nm``; hexagonal by default, unless the frame is nearly straight as a square one.
+        Kind of the lattice of ``lattice_nm``; hexagonal by default, unless the frame is straight as a square one.
     **how : optional
         ``size_v`` in V peak to peak at the piezo or ``size_nm``, ``offset_v``, ``turn``, ``window`` of the fast axis,
         the same with ``slow_`` of the slow one; ``rate_hz``, ``lines``, ``slow_back``, ``delay_pixels``; of files

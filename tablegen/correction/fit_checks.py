@@ -298,8 +298,8 @@ def check_moves(distortion: Distortion) -> None:
                 if not share / count <= most:
                     raise Unphysical(
                         f"{name} would move by {100.0 * share / count:.1f} % of the picture {what} that hysteresis "
-                        f"makes, and at most {100.0 * most:.0f} % is plausible; is the sample one lattice, of the kind that "
-                        f"--lattice says? Image more periods with less drift, or correct with --scanner"
+                        f"makes, and at most {100.0 * most:.0f} % is plausible; is the sample one lattice, of the "
+                        f"kind that --lattice says? Image more periods with less drift, or correct with --scanner"
                     )
 
 
