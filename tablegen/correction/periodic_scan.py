@@ -92,7 +92,8 @@ class PeriodicScan:
     def _frame(self, kind: str) -> Floats:
         """Return how bent the frame is, its width, height and shear in constants of a lattice, shape (4,)."""
         readings = []
-        waves = np.linalg.inv(reduced(np.linalg.inv(self.waves).T)).T
+        cell: Floats = np.asarray(np.linalg.inv(self.waves).T, dtype=np.float64)
+        waves = np.linalg.inv(np.asarray(reduced(cell), dtype=np.float64)).T
         for angle in (60.0, 120.0) if kind == "hexagonal" else (90.0,):
             turned = np.radians(angle)
             ideal = np.array([[1.0, 0.0], [np.cos(turned), np.sin(turned)]]) / np.sin(turned)  # periods a constant

@@ -109,4 +109,4 @@ def _bases(indices: Ints, strong: Floats) -> tuple[Ints, Floats]:
     if abs(bases[1, 0]) > abs(bases[0, 0]):
         bases, change = bases[::-1], change[:, ::-1]
     signs = np.where(bases[:, :1] < 0.0, -1, 1)
-    return change * signs.T, bases * signs
+    return change * signs.T, np.asarray(bases * signs, dtype=np.float64)
