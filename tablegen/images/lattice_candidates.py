@@ -53,6 +53,11 @@ def candidates(correlation: Autocorrelation) -> list[Candidate]:
         level = _sums(vectors, correlation, both, levels)
         if level >= _LEAST_HEIGHT * min(heights[i], heights[j]):
             cells.append(_refined(Candidate(vectors, level, np.inf), both, levels))
+    return distinct(cells)
+
+
+def distinct(cells: list[Candidate]) -> list[Candidate]:
+    """Return the cells that differ, the smallest first."""
     unique: list[Candidate] = []
     for cell in sorted(cells, key=lambda one: one.area):
         if not _known(cell.vectors, unique):
