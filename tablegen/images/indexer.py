@@ -38,6 +38,7 @@ _NEAR_SPOT = 1.2  # periods in the image: spots of two views this near are one
 _ALONG = 0.5  # of a wave along the rows: slopes show it about as well as heights
 _SLOW, _SLOW_SHARE = 4.0, 0.5  # periods in the image, and of the slowest wave of the cell: a terrace has waves below
 _STEEP = 0.12  # of a wave along the rows
+_SPOT_WIDTH, _STRAY = 0.4, 0.02  # periods in the image; chance that a spot belongs to no lattice
 _PRIMES = (2, 3, 5, 7)
 _CLEARLY_LESS = 0.5  # of the autocorrelation at the cell's sides
 _LEAST_DECIDING = 2  # spots
@@ -139,15 +140,63 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
     raise reasons[-1]
 
 
-def ambiguous(one: Floats, other: Floats) -> str:
-    """Return the text that refuses two cells, shape (2, 2) each, in pixels."""
-    sizes = " and ".join(
-        "{:.4g} x {:.4g} pixels at {:.3g} degrees".format(*sides_and_angle(cell)) for cell in (one, other)
-    )
+def ambiguous(cells: list[Floats], spots: Spots, extent: Floats, reason: str = "they explain the image") -> str:
+    """Return the text that refuses several cells.
+
+    Parameters
+    ----------
+    cells
+        Cells in pixels, shape (2, 2) each.
+    spots
+        The significant spots, by which the cells have their likelihoods.
+    extent
+        Columns and rows of the image.
+    reason
+        Why they are possible.
+    """
+    shares = likelihoods(cells, spots, extent)
+    order = np.argsort(-shares, kind="stable")
+    names = []
+    for number in order.tolist():
+        one, other, angle = sides_and_angle(reduced(cells[number]))
+        share = _percent(float(shares[number]))
+        names.append(f"{one:.4g} x {other:.4g} pixels at {angle:.3g} degrees ({share})")
+    sizes = " or ".join(names)
     return (
-        f"the lattice is ambiguous: cells of {sizes} explain the image about as well; give the sample's --lattice-nm, "
-        f"or image more periods with less noise"
+        f"the lattice is ambiguous: the cell may be {sizes}, as {reason}; give the sample's --lattice-nm, or image "
+        f"more periods with less noise"
     )
+
+
+def _percent(share: float) -> str:
+    return "below 1 %" if share < 0.01 else "above 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
+
+
+def likelihoods(cells: list[Floats], spots: Spots, extent: Floats) -> Floats:
+    """Return the likelihood of each cell by the places of the spots; they add to 1.
+
+    A spot is with a chance of ``_STRAY`` anywhere, else near one of the waves of the cell. A large cell has many waves,
+    so that each is less likely to be the place of a spot by itself.
+
+    Parameters
+    ----------
+    cells
+        Cells in pixels, shape (2, 2) each.
+    spots
+        Spots of both views: each counts half.
+    extent
+        Columns and rows of the image.
+    """
+    pixels = float(np.prod(extent))
+    logarithms = []
+    for cell in cells:
+        index = spots.waves @ cell.T
+        distance = np.hypot(*(((index - np.round(index)) @ np.linalg.inv(cell).T) * extent).T)
+        width = _SPOT_WIDTH + 0.5 * _STRAIN * np.hypot(*(spots.waves * extent).T)
+        near = np.exp(-0.5 * (distance / width) ** 2) / (2.0 * np.pi * width**2) / max(area(cell), 1.0)
+        logarithms.append(0.5 * float(np.sum(np.log((1.0 - _STRAY) * near + _STRAY / pixels))))
+    shares = np.exp(np.array(logarithms) - max(logarithms))
+    return np.asarray(shares / np.sum(shares))
 
 
 def _check(heights: Floats) -> None:
@@ -207,7 +256,7 @@ def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Flo
     if sure is None:
         raise Unphysical(_why_none(cells, strong))
     if all_of_them is not None and not same_lattice(sure, all_of_them):
-        raise Unphysical(ambiguous(sure, all_of_them))
+        raise Unphysical(ambiguous([sure, all_of_them], every, extent, "weak spots are at the waves of one alone"))
     if all_of_them is None:
         explained, informative = explained_spots(sure, every)
         waves = every.waves[informative & ~explained]
@@ -216,7 +265,7 @@ def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Flo
         if missing > 2 + len(explained) // 20:
             raise Unphysical(_unexplained(missing, len(explained)))
     explained, informative = explained_spots(sure, every)
-    _check_sublattice(sure, every.waves[informative & explained])
+    _check_sublattice(sure, every.waves[informative & explained], every, extent)
     if expected_area is None:
         _check_deciding(sure, strong, views)
         for view in views:
@@ -239,7 +288,10 @@ def _check_deciding(vectors: Floats, spots: Spots, views: list[_View]) -> None:
             ):
                 continue
             if int(np.sum((index @ np.array([u, v])) % part != 0)) < _LEAST_DECIDING:
-                raise Unphysical(_smaller(part))
+                other = vectors[1] if u else vectors[0]
+                smaller = np.array([np.array([u, v]) @ vectors / part, other])
+                reason = "one spot alone tells them apart"
+                raise Unphysical(ambiguous([vectors, smaller], spots, _extent(views[0]), reason))
 
 
 def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
@@ -257,10 +309,20 @@ def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Flo
         direction = np.arctan2(waves[:, 1], waves[:, 0])
         beside = np.abs((direction[:, None] - direction[None] + np.pi / 2) % np.pi - np.pi / 2) < _PARALLEL
         if np.any(np.sum(beside, axis=1) < _STREAK):
-            raise Unphysical(
-                "the lattice is ambiguous: a weak spot is at a fraction of the cell's waves, so that the cell may be "
-                "larger; give the sample's --lattice-nm, or image more periods with less noise"
-            )
+            larger = _supercell(vectors, waves)
+            cells = [vectors] if larger is None else [vectors, larger]
+            reason = "a weak spot is at a fraction of the smaller cell's waves"
+            raise Unphysical(ambiguous(cells, spots, _extent(views[0]), reason))
+
+
+def _supercell(vectors: Floats, waves: Floats) -> Floats | None:
+    """Return the smallest multiple of a cell of which these waves are; None if it has more than 16 times the area."""
+    for index in range(2, max(_FRACTIONS) ** 2 + 1):
+        for basis in lattices_of_index(index):
+            numbers = waves @ (basis @ vectors).T
+            if np.all(np.abs(numbers - np.round(numbers)) <= index * _NEAR_FRACTION):
+                return reduced(basis @ vectors)
+    return None
 
 
 def _together(views: list[_View], contrast: float) -> Spots:
@@ -447,17 +509,17 @@ def _check_periods(vectors: Floats, extent: Floats) -> None:
         )
 
 
-def _check_sublattice(vectors: Floats, waves: Floats) -> None:
-    index = sublattice_index(np.round(waves @ vectors.T).astype(np.int64))
-    if index != 1:
-        raise Unphysical(_smaller(index))
-
-
-def _smaller(part: int) -> str:
-    return (
-        f"the lattice is ambiguous: a cell of 1/{part} of the area explains the significant spots too; give the "
-        f"sample's --lattice-nm, or image more periods with less noise"
-    )
+def _check_sublattice(vectors: Floats, waves: Floats, spots: Spots, extent: Floats) -> None:
+    numbers = np.round(waves @ vectors.T).astype(np.int64)
+    index = sublattice_index(numbers)
+    if index == 1:
+        return
+    cells = [vectors]
+    for basis in lattices_of_index(index) if index else []:
+        parts = numbers @ np.linalg.inv(basis)
+        if np.allclose(parts, np.round(parts), atol=1e-6):
+            cells.append(np.linalg.inv(basis).T @ vectors)
+    raise Unphysical(ambiguous(cells, spots, extent, f"all spots are those of 1/{index} of the area too"))
 
 
 def same_lattice(one: Floats, other: Floats) -> bool:

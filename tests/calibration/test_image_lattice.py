@@ -12,8 +12,9 @@ from real_files import real_folder
 import tablegen
 from tablegen.base.input_errors import Unphysical
 from tablegen.cli import cli
+from tablegen.images.autocorrelation import Spots
 from tablegen.images.cell_vectors import reduced, sides_and_angle
-from tablegen.images.indexer import find_cell, same_lattice
+from tablegen.images.indexer import find_cell, likelihoods, same_lattice
 from tablegen.images.measured_cell import measured_cell
 
 REAL = real_folder()
@@ -72,6 +73,23 @@ def accepted_and_wrong(seeds: range) -> tuple[int, list[int]]:
 def test_slow_waves_of_a_terrace_make_no_larger_cell(seed: int) -> None:
     """The steps along the rows are levelled, and what remains has fewer than four periods in one direction."""
     assert accepted_and_wrong(range(seed, seed + 1)) == (1, [])
+
+
+def test_an_ambiguous_lattice_names_the_cells_with_their_likelihoods() -> None:
+    with pytest.raises(Unphysical, match=r"14\.41 x 14\.41 pixels at 60 degrees \(\d+ %\)") as reason:
+        find_cell(three_sites(5051)[0])
+    assert "may be 14.41 x 24.97 pixels at 90 degrees (" in str(reason.value)
+    assert "ambiguous" in str(reason.value)
+
+
+def test_likelihoods_prefer_the_cell_whose_waves_are_the_spots() -> None:
+    cell = np.array([[14.0, 1.0], [-2.0, 13.0]])
+    numbers = np.array([[0, 1], [1, 0], [1, 1], [1, -1], [2, 0], [0, 2], [2, 1]])
+    spots = Spots(numbers @ np.linalg.inv(cell).T, np.full(7, 30.0), np.ones(7))
+    double, half = cell * [[2.0], [1.0]], cell * [[0.5], [1.0]]
+    shares = likelihoods([double, cell, half], spots, np.array([128.0, 128.0]))
+    assert shares.sum() == pytest.approx(1.0)
+    assert shares[1] > shares[0] > shares[2]
 
 
 @pytest.mark.common
