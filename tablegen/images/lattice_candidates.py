@@ -93,7 +93,9 @@ def _refined(cell: Candidate, lags: Floats, heights: Floats) -> Candidate:
         near = max(_NEAR * float(np.hypot(*vectors[0])), 1.5)
         close = np.max(np.abs(lags), axis=1) <= near + np.max(np.abs(points @ vectors))
         places, levels = lags[close], heights[close]
-        distance = np.hypot(*np.moveaxis(places[None] - (points @ vectors)[:, None], -1, 0))
+        expected = points @ vectors
+        x, y = (places[None, :, axis] - expected[:, None, axis] for axis in (0, 1))
+        distance = np.sqrt(x * x + y * y)
         nearest = np.argmin(distance, axis=1)
         matched = distance[np.arange(len(points)), nearest] <= near
         matched &= levels[nearest] > 0.0

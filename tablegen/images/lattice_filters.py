@@ -63,8 +63,10 @@ def complete_region(heights: Floats) -> tuple[slice, slice]:
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
     valid = _valid(heights)
-    rows = _longest(np.mean(valid, axis=1) >= _COMPLETE)
-    return rows, _longest(np.mean(valid[rows], axis=0) >= _COMPLETE)
+    there = valid[:, valid.any(axis=0)]
+    rows = _longest(np.mean(there, axis=1) >= _COMPLETE) if there.size else slice(0, 0)
+    columns = _longest(np.mean(valid[rows], axis=0) >= _COMPLETE) if valid[rows].size else slice(0, 0)
+    return rows, columns
 
 
 def _longest(there: Bools) -> slice:

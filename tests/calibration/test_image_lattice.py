@@ -92,6 +92,12 @@ def test_likelihoods_prefer_the_cell_whose_waves_are_the_spots() -> None:
     assert shares[1] > shares[0] > shares[2]
 
 
+def test_half_of_the_columns_may_be_missing() -> None:
+    heights, cell = plain_lattice()
+    heights[:, :60] = np.nan
+    assert same_lattice(find_cell(heights).vectors, cell)
+
+
 @pytest.mark.common
 def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
     accepted, wrong = accepted_and_wrong(range(24))
