@@ -203,6 +203,27 @@ def _background(amplitude: Floats, own: Bools, along: float, across: float, shap
     return float(np.sqrt(1.44 * np.median(beside**2))) if len(beside) else float(np.inf)
 
 
+def check_constant(fit: PeriodicScan, constant_nm: float, has_size: bool) -> None:
+    """Check that the constant of a lattice is that of the whole cell, which nothing shows where its spots are weak.
+
+    Parameters
+    ----------
+    has_size
+        True if the file has a size, with which another cell would have been refused.
+
+    Raises
+    ------
+    Unphysical
+        If the strong spots are those of a smaller cell, whose constant may be meant, and there is no size.
+    """
+    if fit.indexed and fit.strong_index > 1 and not has_size:
+        raise Unphysical(
+            f"{constant_nm:.4g} nm may be the constant of the whole cell, or of one with 1/{fit.strong_index} of its "
+            f"area, whose spots are the strong ones, and the file has no size that decides; correct images from a file "
+            f"that has its size, or with --scanner"
+        )
+
+
 def check_straight_cell(
     fit: PeriodicScan,
     pictures: Sequence[Floats],

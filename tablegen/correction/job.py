@@ -13,7 +13,7 @@ from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
-from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves, check_straight_cell
+from tablegen.correction.fit_checks import check_agreement, check_cell, check_constant, check_moves, check_straight_cell
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
@@ -423,8 +423,9 @@ def by_fit(
     record |= {**images.angle, **images.timing}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
-            kind = kind or fit.likely_kind()
+            check_constant(fit, lattice_nm, expected is not None)
             distortion = fit.of_lattice(lattice_nm, kind)
+            kind = kind or fit.likely_kind()
             record |= {"lattice_nm": lattice_nm, "lattice": kind}
         else:
             has_size = first.width_nm is not None and first.height_nm is not None

@@ -34,6 +34,7 @@ _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
 _CLEARLY_SQUARE = 0.15  # the same, of a lattice that is taken for square
+_STRONG = 0.7  # of the largest amplitude
 _LEAST_ANGLE = 0.2  # sine of the angle between two waves that separate y from x
 
 
@@ -44,7 +45,7 @@ class PeriodicScan:
     ``distortion`` has x in lines, about 0..1, and y in frames. ``waves`` are the base vectors of the sample, in periods
     per line and per frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
     true if y is that of the sample and not of the rows. ``indexed`` is true if the cell is that of the indexer, and not
-    of the strongest spots.
+    of the strongest spots. The strong spots alone are those of a cell with the area divided by ``strong_index``.
     """
 
     distortion: Distortion
@@ -52,6 +53,7 @@ class PeriodicScan:
     explained: float
     tells_y: bool
     indexed: bool = False
+    strong_index: int = 1
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
         """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
@@ -155,7 +157,7 @@ def periodic_scan(
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
-    return replace(_scan(model, state), indexed=cell is not None)
+    return replace(_scan(model, state), indexed=cell is not None, strong_index=_strong_index(model, state))
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:
@@ -239,6 +241,16 @@ def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Float
     penalty = np.tile(_penalty(count, normal), bases)
     step = np.linalg.solve(normal + np.diag(penalty), aim - penalty * current.ravel())
     return np.asarray(step.reshape(bases, count), dtype=np.float64)
+
+
+def _strong_index(model: PeriodicModel, state: FitState) -> int:
+    """Return the index of the lattice of the strong spots in that of all spots; 1 where they have one direction."""
+    amplitudes = np.abs(state.amplitudes)
+    strong = model.spots[amplitudes > _STRONG * np.max(amplitudes)]
+    if model.bases < 2 or np.linalg.matrix_rank(strong) < 2:
+        return 1
+    minors = strong[:, :1] * strong[:, 1] - strong[:, 1:] * strong[:, 0]
+    return int(np.gcd.reduce(np.abs(minors), axis=None))
 
 
 def _strong_spots(model: PeriodicModel, state: FitState) -> Ints:

@@ -40,7 +40,7 @@ def weak(constant_nm: float, lowest: float, times: Times) -> Surface:
     return height
 
 
-@pytest.mark.parametrize(("times", "lowest"), [("2", 0.05), ("3", 0.05)])
+@pytest.mark.parametrize(("times", "lowest"), [("root of 3", 0.05), ("root of 3", 0.6), ("2", 0.05), ("3", 0.05)])
 def test_weak_lowest_spots_are_seen_and_nothing_is_written(
     times: str, lowest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -50,25 +50,28 @@ def test_weak_lowest_spots_are_seen_and_nothing_is_written(
     outcome = run("correct", "trace.npy", "retrace.npy", "--fit", "--lattice-nm", "50", "-o", "o.gwy")
     assert (outcome.status, outcome.out) == (2, "")
     assert len(outcome.messages) == 1
-    if times == "2":
-        assert "does not show the sample's cell: the lattice is ambiguous: " in outcome.err
-        assert "1/2 of the area" in outcome.err
-    else:
-        assert (
-            "trace.npy, retrace.npy: the cell may be a multiple or a root of the sample's: a spot at (" in outcome.err
-        )
+    if times == "3":
+        assert "the cell may be a multiple or a root of the sample's: a spot at (" in outcome.err
         assert "is that of another cell with 3 times the area; image more periods" in outcome.err
+    else:
+        share = {"root of 3": 3, "2": 4}[times]
+        assert f"50 nm may be the constant of the whole cell, or of one with 1/{share} of its area" in outcome.err
     assert not (tmp_path / "o.gwy").exists()
 
 
 @pytest.mark.parametrize("lowest", [0.05, 0.6])
-def test_weak_lowest_spots_are_those_of_the_cell(lowest: float, tmp_path: Path) -> None:
-    """The strong spots alone would make the size wrong by the root of 3."""
+def test_weak_lowest_spots_are_those_of_the_cell_by_the_size_of_the_file(lowest: float, tmp_path: Path) -> None:
+    """The strong spots alone would make the size wrong by the root of 3; the other constant does not fit the size."""
     constant = 50.0 * TIMES["root of 3"][0]
     frame = old_frame("paper", surface=weak(constant, lowest, TIMES["root of 3"]), **SHAPE)
-    scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), OldScan(), lattice_nm=constant)
-    assert fit.indexed
+    path = tmp_path / "a.sxm"
+    path.write_bytes(sxm({"Z": (frame.trace.heights, frame.retrace.heights)}, (1080.0, 1080.0), times_s=(5e-3, 5e-3)))
+    images = read_scan(path, None, Choice())
+    scan, fit = by_fit(images, OldScan(), lattice_nm=constant)
+    assert (fit.indexed, fit.strong_index) == (True, 3)
     assert off(scan.distortion, frame).size == pytest.approx((0.0, 0.0), abs=0.3)
+    with pytest.raises(Unphysical, match="is that of another cell with 3 times the area"):
+        by_fit(images, OldScan(), lattice_nm=50.0)
 
 
 def test_another_cell_in_the_corrected_image_is_refused(tmp_path: Path) -> None:
