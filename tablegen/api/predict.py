@@ -77,7 +77,14 @@ def predict(
 
     Examples
     --------
-    >>> predicted = tablegen.predict("scanner.toml", "25v.csv", axis="x", against="25v.csv")
+    >>> import numpy
+    >>> laboratory = tablegen.Laboratory(like="scanner.toml")
+    >>> traces = [laboratory.trace("x", v, 50.0, 100.0, samples=200) for v in (10, 25, 45, 65, 82, 97)]
+    >>> written = tablegen.calibrate_operator(traces, axis="x", scanner="scanner.toml").write("own.toml")
+    >>> numpy.savez("drive.npz", **traces[2])
+    >>> predicted = tablegen.predict("own.toml", "drive.npz", axis="x", start="rest")
+    >>> len(predicted.position_nm) == len(traces[2]["time_s"])
+    True
     """
     if axis not in ("x", "y"):
         raise ValueError(f"axis {axis!r} is not x or y")
