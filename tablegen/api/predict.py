@@ -77,9 +77,10 @@ def predict(
 
     Examples
     --------
-    >>> import numpy
+    >>> import numpy, shutil
     >>> laboratory = tablegen.Laboratory(like="scanner.toml")
     >>> traces = [laboratory.trace("x", v, 50.0, 100.0, samples=200) for v in (10, 25, 45, 65, 82, 97)]
+    >>> copy = shutil.copy("scanner.toml", "own.toml")
     >>> written = tablegen.calibrate_operator(traces, axis="x", scanner="scanner.toml").write("own.toml")
     >>> numpy.savez("drive.npz", **traces[2])
     >>> predicted = tablegen.predict("own.toml", "drive.npz", axis="x", start="rest")
