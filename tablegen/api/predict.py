@@ -39,7 +39,7 @@ def predict(
     *,
     axis: Literal["x", "y"],
     against: str | Path | None = None,
-    start: Literal["settled", "rest"] = "settled",
+    start: Literal["settled", "rest"] = "rest",
     columns: Columns | None = None,
     drive_gain: float | None = None,
     drive_offset: float | None = None,
@@ -57,7 +57,8 @@ def predict(
     against : str or Path, optional
         Table with time and displacement that were measured; it may be the same file.
     start : str
-        State at the first sample: "settled", after many repetitions of the record, or "rest", after 0 V.
+        State at the first sample: "rest", at the first voltage after v_min, or "settled", after many repetitions of
+        the record.
     columns : str or dict, optional
         Which column is which, as ``--columns``.
     drive_gain, drive_offset : float, optional
@@ -83,7 +84,7 @@ def predict(
     >>> copy = shutil.copy("scanner.toml", "own.toml")
     >>> written = tablegen.calibrate_operator(traces, axis="x", scanner="scanner.toml").write("own.toml")
     >>> numpy.savez("drive.npz", **traces[2])
-    >>> predicted = tablegen.predict("own.toml", "drive.npz", axis="x", start="rest")
+    >>> predicted = tablegen.predict("own.toml", "drive.npz", axis="x")
     >>> len(predicted.position_nm) == len(traces[2]["time_s"])
     True
     """
@@ -137,9 +138,8 @@ def predict(
             )
             raise Rejected([Problem(other.file, 0, TIME.name, why)])
         measured = np.interp(time_s, other[TIME], other[DISPLACEMENT])
-    return Predicted(
-        axis, state, time_s, volts, position, 0.01 * extent * sqrt(rms * rms + 0.25 * size * size), measured
-    )
+    bound = 0.01 * extent * sqrt(rms * rms + 0.25 * size * size) if state is Start.SETTLED else None
+    return Predicted(axis, state, time_s, volts, position, bound, measured)
 
 
 @dataclass(frozen=True)
@@ -200,8 +200,9 @@ def _check_times(table: MeasuredTable) -> None:
 class Predicted(Result):
     """Predicted positions of an axis; ``measured_nm`` is None without a measurement.
 
-    Arrays have the shape (samples,). ``uncertainty_nm`` is the rms error below which 90 % of settled records
-    stay, as the traces that were left out tell. Positions count from the lower turn of the widest loop.
+    Arrays have the shape (samples,). ``uncertainty_nm`` is the rms error below which 90 % of settled lines stay, by the
+    traces that were left out; None for a start at rest, of which no trace tells. Positions count from the lower turn of
+    the widest loop.
     """
 
     axis: str
@@ -209,7 +210,7 @@ class Predicted(Result):
     time_s: Floats
     volts: Floats
     position_nm: Floats
-    uncertainty_nm: float
+    uncertainty_nm: float | None
     measured_nm: Floats | None
 
     @property
@@ -266,20 +267,20 @@ class Predicted(Result):
 
     def charts(self) -> PlottedCharts:
         """Return the position over time, and the error where there is a measurement."""
-        curves = [DrawnCurve("predicted", "forward", self.time_s, self.position_nm)]
+        curves = [DrawnCurve("predicted", "other", self.time_s, self.position_nm)]
         charts = [Chart("position", "position", "time [s]", "position [nm]", tuple(curves))]
         if self.error_nm is not None:
-            error = DrawnCurve("error", "forward", self.time_s, self.error_nm)
+            error = DrawnCurve("error", "other", self.time_s, self.error_nm)
             charts.append(Chart("error", "predicted less measured", "time [s]", "error [nm]", (error,)))
         return PlottedCharts(f"prediction of {self.axis}", tuple(charts))
 
     def _lines(self) -> Sequence[str]:
         span_s = float(self.time_s[-1] - self.time_s[0])
         first = f"prediction of {self.axis}: {len(self.time_s)} samples, {span_s:.4g} s, start {self.start.value}"
-        lines = [
-            first,
-            f"stroke {self.extent_nm:.6g} nm, rms error below {self.uncertainty_nm:.2g} nm when settled (90 %)",
-        ]
+        bound = "its error is known with --against alone"
+        if self.uncertainty_nm is not None:
+            bound = f"rms error below {self.uncertainty_nm:.2g} nm if every period is like the last (90 %)"
+        lines = [first, f"stroke {self.extent_nm:.6g} nm, {bound}"]
         errors = self.errors_percent
         if errors is not None:
             lines.append(f"measured: rms error {errors[0]:.3g} %, worst {errors[1]:.3g} % of the stroke")

@@ -35,10 +35,10 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 @click.option("--against", type=_path, metavar="FILE", help="Measured positions; print the error of the prediction.")
 @click.option(
     "--start",
-    type=click.Choice(["settled", "rest"]),
-    default="settled",
+    type=click.Choice(["rest", "settled"]),
+    default="rest",
     show_default=True,
-    help="State at the first sample: after many repetitions of the record, or at rest after v_min.",
+    help="State at the first sample: at rest after v_min, or after many repetitions of the record.",
 )
 @recorder_options
 @plot_option("positions and errors over time")

@@ -1,5 +1,6 @@
 """``tablegen predict`` as a user runs it: a foreign piezo's own record, and bad input by name."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +29,16 @@ def scanner(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.common
 def test_record_is_predicted_and_bad_input_is_named(scanner: Path, tmp_path: Path) -> None:
     trace, out = scanner.parent.parent / "t3.csv", tmp_path / "p.csv"
-    done = run("predict", scanner, trace, "--axis", "x", "--against", trace, "-o", out)
+    done = run("predict", scanner, trace, "--axis", "x", "--against", trace, "--start", "settled", "-o", out)
     assert done.status == 0, done.err
     rows = np.genfromtxt(out, delimiter=",", names=True)
     error = rows["error_nm"]
     assert float(np.std(error)) < 0.01 * float(np.ptp(rows["measured_nm"]))
+    assert "rms error below" in done.out
+    rest = run("predict", scanner, trace, "--axis", "x", "--against", trace, "--json")
+    figures = json.loads(rest.out)
+    assert (figures["start"], figures["uncertainty_nm"]) == ("rest", None)
+    assert figures["rms_error_percent"] > 100.0 * float(np.std(error)) / float(np.ptp(rows["measured_nm"]))
     time, volts = rows["time_s"], rows["drive_v"]
     for name, bad_time, bad_volts, why in (
         ("time", time[::-1], volts, "line 3|:3:"),

@@ -119,14 +119,14 @@ def late_mode(time_s: Floats, y: Floats, tau_s: complex, settled: bool) -> NDArr
     lost = -np.expm1(-x)
     first = np.where(np.abs(x) > 1e-5, lost / x, 1.0 - 0.5 * x)  # share of the first y beyond the decay
     gain = np.concatenate([[0.0], (first - decay) * y[:-1] + (1.0 - first) * y[1:]]).astype(np.complex128)
-    kept = np.concatenate([[1.0], decay]).astype(np.complex128)
+    factor = np.concatenate([[1.0], decay]).astype(np.complex128)
     step = 1
     while step < len(y):  # states over ever longer stretches: as many rounds as the length has binary digits
-        gain[step:] = gain[step:] + kept[step:] * gain[:-step]
-        kept[step:] = kept[step:] * kept[:-step]
+        gain[step:] = gain[step:] + factor[step:] * gain[:-step]
+        factor[step:] = factor[step:] * factor[:-step]
         step *= 2
-    begin = gain[-1] / (1.0 - kept[-1]) if settled else y[0]
-    out: NDArray[np.complex128] = gain + kept * begin
+    begin = gain[-1] / (1.0 - factor[-1]) if settled else y[0]
+    out: NDArray[np.complex128] = gain + factor * begin
     return out
 
 
