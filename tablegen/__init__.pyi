@@ -25,6 +25,7 @@ from tablegen.api.lattice import lattice as lattice
 from tablegen.api.refine import refine as refine
 from tablegen.api.correct import correct as correct
 from tablegen.api.simulate import simulate as simulate
+from tablegen.api.predict import predict as predict
 from tablegen.api.compare import compare as compare
 from tablegen.api.tables import tables as tables
 from tablegen.api.report import report as report
@@ -52,6 +53,7 @@ from tablegen.api.lattice import ImageLattice as ImageLattice
 from tablegen.api.refine import RefinedScan as RefinedScan
 from tablegen.api.correct import Corrected as Corrected
 from tablegen.api.simulate import SimulatedScan as SimulatedScan
+from tablegen.api.predict import Predicted as Predicted
 from tablegen.api.compare import Compared as Compared
 from tablegen.api.tables import FeasibleTables as FeasibleTables
 from tablegen.api.report import ReportPage as ReportPage

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from tablegen.api.image_input import ImageSource, check_names, read_trace_and_perhaps_retrace
 from tablegen.api.result import Result
@@ -31,6 +31,7 @@ def correct(
     scanner: str | Path | None = None,
     scan: str | Path | None = None,
     lattice_nm: float | None = None,
+    lattice: Literal["hexagonal", "square"] | None = None,
     pitch_nm: float | None = None,
     fit: bool = False,
     **how: Any,
@@ -46,6 +47,8 @@ def correct(
         Scanner file, with ``how`` the image was taken; or the scan file that it was taken with.
     lattice_nm, pitch_nm, fit : optional
         Constant in nm of a periodic sample, which is fitted; ``fit=True`` where it is unknown.
+    lattice : {"hexagonal", "square"}, optional
+        Kind of the lattice of ``lattice_nm``; hexagonal by default, unless the frame is straight as a square one.
     **how : optional
         ``size_v`` in V peak to peak at the piezo or ``size_nm``, ``offset_v``, ``turn``, ``window`` of the fast axis,
         the same with ``slow_`` of the slow one; ``rate_hz``, ``lines``, ``slow_back``, ``delay_pixels``; of files
@@ -85,7 +88,7 @@ def correct(
         mirrored = bool(how.get("retrace_mirrored", False))
         images = Images(tuple(both), (True, False)[: len(both)], tuple(range(len(both))), (), mirrored)
     files = [None if path is None else Path(path) for path in (scanner, scan)]
-    return Corrected(straight(images, files[0], files[1], old_scan_of(how), pitch_nm, lattice_nm), images)
+    return Corrected(straight(images, files[0], files[1], old_scan_of(how), pitch_nm, lattice_nm, lattice), images)
 
 
 def straight(
@@ -95,6 +98,7 @@ def straight(
     old_scan: OldScan,
     pitch_nm: float | None,
     lattice_nm: float | None,
+    kind: str | None = None,
 ) -> StraightScan:
     """Correct images by the scan file, else by the scanner file, else by a fit.
 
@@ -109,7 +113,7 @@ def straight(
         return by_scan_file(images, scan, scanner, old_scan)
     if scanner is not None:
         return by_scanner(images, scanner, old_scan)
-    return by_fit(images, old_scan, pitch_nm, lattice_nm)[0]
+    return by_fit(images, old_scan, pitch_nm, lattice_nm, kind)[0]
 
 
 def choice_of(how: Mapping[str, Any]) -> Choice:

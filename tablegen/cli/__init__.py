@@ -34,6 +34,7 @@ _COMMANDS = {
     "channels": ("images.channels", "channels"),
     "lattice": ("images.lattice", "lattice"),
     "simulate": ("simulate", "simulate"),
+    "predict": ("predict", "predict"),
     "refine": ("images.refine", "refine"),
     "correct": ("images.correct", "correct"),
     "verify": ("verify", "verify"),

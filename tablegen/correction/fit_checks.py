@@ -4,6 +4,7 @@ Each check raises ``Unphysical`` with the cause and a remedy. A wrong displaceme
 correction that fails these checks is not written.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -13,14 +14,22 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.correction.agreement import Agreement, levelled
 from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan
+from tablegen.images.cell_vectors import area, reduced, sides_and_angle
+from tablegen.images.indexer import find_cell, same_lattice
+from tablegen.images.measured_cell import IDEAL_ANGLES, measured_cell
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _MOST_MOVED = 0.05  # of the picture, without the bow of hysteresis
+_MOST_SHEARED = 0.15  # of the picture, from its first row to its last: a steady drift
 _MOST_BOWED = 0.12  # of the picture: the sagitta of a sweep; hysteresis of piezos stays below 0.1
 _BETTER = 0.95  # times the difference before: a better agreement
 _WORSE = 1.02  # times the difference before: more than noise and resampling explain
 _CLOSER = 0.5  # times the distance of trace and retrace before
 _CLOSE = 0.5  # pixels: trace and retrace within this distance agree
+
+_SIDE_OFF = 0.01  # share of a side of the straight cell
+_ANGLE_OFF = 1.0  # degrees
+_ERRORS = 3.0  # standard errors
 
 _CLIPPED = 1.0  # percent of the heights at either end: debris has power at all frequencies
 _LEAST_PERIODS = 2.5  # along the line; levelling the rows removes slower waves
@@ -86,6 +95,8 @@ def check_cell(fit: PeriodicScan, heights: Floats, forward: bool) -> None:
             f"or correct with --scanner"
         )
     spot = strange_spot(Resampler.of(distortion, forward)(heights), waves)
+    if fit.indexed and (spot is None or spot.area is None or spot.contrast < _STANDS_OUT):
+        return  # the indexer has judged what is at no fraction of the cell, such as terraces
     if spot is None or (spot.share < _VISIBLE or (spot.contrast < _STANDS_OUT and spot.share < _HIDDEN)):
         return
     place = ", ".join(f"{one:.2g}" for one in spot.index)
@@ -192,12 +203,107 @@ def _background(amplitude: Floats, own: Bools, along: float, across: float, shap
     return float(np.sqrt(1.44 * np.median(beside**2))) if len(beside) else float(np.inf)
 
 
+def check_constant(fit: PeriodicScan, constant_nm: float, has_size: bool) -> None:
+    """Check that the constant of a lattice is that of the whole cell, which nothing shows where its spots are weak.
+
+    Parameters
+    ----------
+    has_size
+        True if the file has a size, with which another cell would have been refused.
+
+    Raises
+    ------
+    Unphysical
+        If the strong spots are those of a smaller cell, whose constant may be meant, and there is no size.
+    """
+    if fit.indexed and fit.strong_index > 1 and not has_size:
+        raise Unphysical(
+            f"{constant_nm:.4g} nm may be the constant of the whole cell, or of one with 1/{fit.strong_index} of its "
+            f"area, whose spots are the strong ones, and the file has no size that decides; correct images from a file "
+            f"that has its size, or with --scanner"
+        )
+
+
+def check_straight_cell(
+    fit: PeriodicScan,
+    pictures: Sequence[Floats],
+    size_nm: tuple[float, float] | None = None,
+    constant_nm: float | None = None,
+    kind: str = "hexagonal",
+    by_size: bool = False,
+) -> None:
+    """Check by the indexer that the mean of the straight pictures has the cell of the sample, or else of the fit.
+
+    A lattice of known constant may be off by 1 % and 1 degree, and three standard errors of the cell.
+
+    Parameters
+    ----------
+    fit
+        The fit; one that began without the indexer is not checked.
+    pictures
+        Straight trace, and retrace if there is one, shape (rows, columns) each; NaN where nothing was imaged.
+    size_nm, constant_nm, kind
+        Width and height of the pictures, and constant and kind of the lattice, where they are known.
+    by_size
+        True if the size in the file decided between cells of several sizes.
+
+    Raises
+    ------
+    Unphysical
+        If it has another cell, or none.
+    """
+    if not fit.indexed:
+        return
+    rows, columns = pictures[0].shape
+    imaged = _imaged_rectangle(np.isfinite(np.sum(pictures, axis=0)))
+    picture = np.mean(pictures, axis=0)[imaged]
+    (low_x, high_x), (low_y, high_y) = fit.distortion.x_range, fit.distortion.y_range
+    own = np.linalg.inv(fit.waves).T / np.array([(high_x - low_x) / columns, (high_y - low_y) / rows])
+    pixel = (1.0, 1.0) if size_nm is None or constant_nm is None else (size_nm[0] / columns, size_nm[1] / rows)
+    expected = area(own)
+    if constant_nm is not None:
+        expected = constant_nm**2 * float(np.sin(np.radians(IDEAL_ANGLES[kind]))) / (pixel[0] * pixel[1])
+    try:
+        image_cell = find_cell(picture, None, expected if by_size else None)
+    except Unphysical as reason:
+        raise Unphysical(f"the corrected image does not show the sample's cell: {reason}") from None
+    cell = measured_cell(image_cell.vectors, image_cell.covariance, pixel)
+    if constant_nm is None:
+        if same_lattice(image_cell.vectors, own):
+            return
+        sides = "{:.4g} x {:.4g} pixels at {:.3g} degrees".format(*sides_and_angle(reduced(own)))
+    else:
+        angle_off = abs(cell.angle_deg.value - IDEAL_ANGLES[kind])
+        right = angle_off <= _ANGLE_OFF + _ERRORS * cell.angle_deg.standard_error
+        for side in (cell.a, cell.b):
+            right &= abs(side.value - constant_nm) <= _SIDE_OFF * constant_nm + _ERRORS * side.standard_error
+        if right:
+            return
+        sides = f"{constant_nm:.4g} nm at {IDEAL_ANGLES[kind]:g} degrees"
+    raise Unphysical(
+        f"the corrected image does not show the sample's cell: its sides are {cell.a.value:.4g} x {cell.b.value:.4g} "
+        f"at {cell.angle_deg.value:.3g} degrees, and not {sides}; give --lattice-nm and --lattice, image more periods "
+        f"with less noise, or correct with --scanner"
+    )
+
+
+def _imaged_rectangle(imaged: Bools) -> tuple[slice, slice]:
+    """Return rows and columns that were imaged everywhere: the edge with the least share of pixels goes first."""
+    top, left, bottom, right = 0, 0, *imaged.shape
+    while top < bottom and left < right and not np.all(part := imaged[top:bottom, left:right]):
+        shares = [float(np.mean(edge)) for edge in (part[0], part[-1], part[:, 0], part[:, -1])]
+        worst = int(np.argmin(shares))
+        top, bottom = top + (worst == 0), bottom - (worst == 1)
+        left, right = left + (worst == 2), right - (worst == 3)
+    return slice(top, bottom), slice(left, right)
+
+
 def check_moves(distortion: Distortion) -> None:
     """Check that no row or column moves further than drift and hysteresis explain.
 
     Hysteresis bows the sweep of a direction, more on one side than on the other: a polynomial of the third order, which
-    may be 12 % of the picture away from its chord. The remainder, including a shear and a shift within the line, may be
-    5 %.
+    may be 12 % of the picture away from its chord. A steady drift shears the rows by up to 15 % of the picture. The
+    remainder, including a larger shear and a shift within the line, may be 5 %.
 
     Raises
     ------
@@ -208,14 +314,27 @@ def check_moves(distortion: Distortion) -> None:
         displacements = [distortion.displacement(way)[axis] for way, _ in distortion.sides]
         groups = displacements if axis == 0 else [np.concatenate(displacements, axis=1)]
         for one in groups:
-            bowed, beside = _bow(one if axis == 0 else one.T)
+            bowed, beside = _bow(_without_shear(one) if axis == 0 else one.T)
             for share, most, what in ((bowed, _MOST_BOWED, "in a bow"), (beside, _MOST_MOVED, "beside the bow")):
                 if not share / count <= most:
                     raise Unphysical(
                         f"{name} would move by {100.0 * share / count:.1f} % of the picture {what} that hysteresis "
-                        f"makes, and at most {100.0 * most:.0f} % is plausible; is the sample one lattice? Image more "
-                        f"periods with less drift, or correct with --scanner"
+                        f"makes, and at most {100.0 * most:.0f} % is plausible; is the sample one lattice, of the "
+                        f"kind that --lattice says? Image more periods with less drift, or correct with --scanner"
                     )
+
+
+def _without_shear(displacement: Floats) -> Floats:
+    """Subtract the shear from displacements along x, shape (rows, columns), if a steady drift explains it."""
+    rows, columns = displacement.shape
+    imaged = np.isfinite(displacement)
+    offset = np.where(imaged, displacement, 0.0).sum(axis=1) / np.maximum(imaged.sum(axis=1), 1)
+    place = (np.arange(rows) + 0.5) / rows - 0.5
+    use = imaged.any(axis=1)
+    slope = float(np.polyfit(place[use], offset[use], 1)[0])
+    if abs(slope) > _MOST_SHEARED * columns:
+        return displacement
+    return np.asarray(displacement - slope * place[:, None], dtype=np.float64)
 
 
 def _bow(displacement: Floats) -> tuple[float, float]:

@@ -13,11 +13,12 @@ from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
-from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves
+from tablegen.correction.fit_checks import check_agreement, check_cell, check_constant, check_moves, check_straight_cell
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
+from tablegen.images.measured_cell import IDEAL_ANGLES
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.images.scan_angle import is_turned
 from tablegen.numerics.arrays import Floats
@@ -383,9 +384,15 @@ def _scanned(
 
 
 def by_fit(
-    images: Images, conditions: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
+    images: Images,
+    conditions: OldScan,
+    pitch_nm: float | None = None,
+    lattice_nm: float | None = None,
+    kind: str | None = None,
 ) -> tuple[StraightScan, PeriodicScan]:
     """Correct images by a fit to a periodic sample; return the fit too.
+
+    ``kind`` is that of the lattice of ``lattice_nm``: "hexagonal" or "square".
 
     Raises
     ------
@@ -396,24 +403,30 @@ def by_fit(
     conditions = _timed(images, conditions)
     trace, retrace = (*(images.channels[i].heights for i in images.reference), None)[:2]
     retrace_alone = not any(images.forward)
+    first, (rows, columns) = images.first, images.shape
+    expected = None
+    if lattice_nm is not None and first.width_nm is not None and first.height_nm is not None:
+        angle = np.radians(IDEAL_ANGLES[kind or "hexagonal"])
+        expected = lattice_nm**2 * float(np.sin(angle)) * rows * columns / (first.width_nm * first.height_nm)
     if retrace is None and not all(images.forward) and not retrace_alone:
         raise Unphysical("has channels of the retrace, but none of the fitted signal; give --retrace-channel")
     assert trace is not None
     (turn, (low, high)), delay_pixels, mirrored = conditions.x.timing, conditions.delay_pixels, images.mirrored
     if retrace_alone:  # a way back is a way forward over the mirror image of the sample
         trace = np.ascontiguousarray(images.heights(images.reference[0])[:, ::-1])
-        fit = periodic_scan(trace, None, 1.0 - turn, (1.0 - high, 1.0 - low), False, delay_pixels)
+        fit = periodic_scan(trace, None, 1.0 - turn, (1.0 - high, 1.0 - low), False, delay_pixels, expected)
     else:
-        fit = periodic_scan(trace, retrace, turn, (low, high), mirrored, delay_pixels)
-    first, (rows, columns) = images.first, images.shape
+        fit = periodic_scan(trace, retrace, turn, (low, high), mirrored, delay_pixels, expected)
     size: tuple[float, float] | None = None
     distortion: Distortion = fit.distortion
     record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources}
     record |= {**images.angle, **images.timing}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
-            distortion = fit.of_lattice(lattice_nm)
-            record["lattice_nm"] = lattice_nm
+            check_constant(fit, lattice_nm, expected is not None)
+            distortion = fit.of_lattice(lattice_nm, kind)
+            kind = kind or fit.likely_kind()
+            record |= {"lattice_nm": lattice_nm, "lattice": kind}
         else:
             has_size = first.width_nm is not None and first.height_nm is not None
             aspect = (first.height_nm or 1.0) / (first.width_nm or 1.0) if has_size else rows / columns
@@ -440,6 +453,8 @@ def by_fit(
     check_moves(distortion)
     check_cell(fit, trace if retrace_alone else images.heights(images.reference[0]), True)
     check_agreement(scan.agreement)
+    pictures = [scan.pictures[i].heights for i in images.reference]
+    check_straight_cell(fit, pictures, size, lattice_nm, kind or "hexagonal", expected is not None)
     return scan, fit
 
 

@@ -5,7 +5,7 @@ is corrected by a free series for the residual of the branches of (17), and the 
 the phases of two waves also separate y from a drift of x. A grating shows neither, and its rows stay.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
@@ -14,10 +14,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
+from tablegen.images.cell_start import cell_of, fit_cell_spots
+from tablegen.images.cell_vectors import reduced
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
 from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
-from tablegen.numerics.arrays import Bools, Floats
+from tablegen.numerics.arrays import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
 _MOST_BENDS = 20  # terms for the residual of the branches, in each direction
@@ -31,6 +33,8 @@ _ROUNDS = 40
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
+_CLEARLY_SQUARE = 0.15  # the same, of a lattice that is taken for square
+_STRONG = 0.7  # of the largest amplitude
 _LEAST_ANGLE = 0.2  # sine of the angle between two waves that separate y from x
 
 
@@ -40,13 +44,16 @@ class PeriodicScan:
 
     ``distortion`` has x in lines, about 0..1, and y in frames. ``waves`` are the base vectors of the sample, in periods
     per line and per frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
-    true if y is that of the sample and not of the rows.
+    true if y is that of the sample and not of the rows. ``indexed`` is true if the cell is that of the indexer, and not
+    of the strongest spots. The strong spots alone are those of a cell with the area divided by ``strong_index``.
     """
 
     distortion: Distortion
     waves: Floats
     explained: float
     tells_y: bool
+    indexed: bool = False
+    strong_index: int = 1
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
         """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
@@ -56,10 +63,11 @@ class PeriodicScan:
         length = pitch_nm * min(hypot(q, s / aspect) for q, s in self.waves.tolist())
         return _scaled(self.distortion, length, length * aspect, 0.0)
 
-    def of_lattice(self, constant_nm: float) -> Distortion:
+    def of_lattice(self, constant_nm: float, kind: str | None = None) -> Distortion:
         """Return the distortion in nm, where the sample is a hexagonal or a square lattice of this constant.
 
-        The lattice may be turned. This gives the height of the frame too, and the shear of a steady drift.
+        The lattice may be turned. This gives the height of the frame too, and the shear of a steady drift. Without a
+        ``kind`` the lattice is hexagonal, unless the frame is nearly straight as a square one.
 
         Raises
         ------
@@ -68,23 +76,34 @@ class PeriodicScan:
         """
         if not self.tells_y:
             raise Unphysical("the images show waves of one direction; for a grating give its pitch, not a lattice")
+        kind = kind or self.likely_kind()
+        worst, across, along, shear = (float(value) for value in self._frame(kind) * [1.0, *3 * [constant_nm]])
+        if worst > _MOST_BENT_LATTICE:
+            raise Unphysical(
+                f"as a {kind} lattice the frame would be {across:.4g} x {along:.4g} nm and sheared by "
+                f"{shear:.4g} nm; is the sample such a lattice (--lattice), and was the frame as high "
+                f"as its lines are long?"
+            )
+        return _scaled(self.distortion, across, along, shear)
+
+    def likely_kind(self) -> str:
+        """Return "square" if the frame is nearly straight as that of a square lattice, else "hexagonal"."""
+        square, hexagonal = (float(self._frame(kind)[0]) for kind in ("square", "hexagonal"))
+        return "square" if square < min(_CLEARLY_SQUARE, 0.5 * hexagonal) else "hexagonal"
+
+    def _frame(self, kind: str) -> Floats:
+        """Return how bent the frame is, its width, height and shear in constants of a lattice, shape (4,)."""
         readings = []
-        for angle in (60.0, 90.0, 120.0):
-            k = constant_nm * np.sin(np.radians(angle))
+        cell: Floats = np.asarray(np.linalg.inv(self.waves).T, dtype=np.float64)
+        waves = np.linalg.inv(np.asarray(reduced(cell), dtype=np.float64)).T
+        for angle in (60.0, 120.0) if kind == "hexagonal" else (90.0,):
             turned = np.radians(angle)
-            ideal = np.array([[1.0, 0.0], [np.cos(turned), np.sin(turned)]]) / k  # waves, periods a nm
-            lattice = np.linalg.inv(ideal)
-            frame = lattice @ self.waves  # from frames to nm, turned
+            ideal = np.array([[1.0, 0.0], [np.cos(turned), np.sin(turned)]]) / np.sin(turned)  # periods a constant
+            frame = np.linalg.inv(ideal) @ waves  # from frames to constants, turned
             metric = np.linalg.cholesky(frame.T @ frame).T
             across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
             readings.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
-        worst, across, along, shear = min(readings)
-        if worst > _MOST_BENT_LATTICE:
-            raise Unphysical(
-                f"as a hexagonal or square lattice the frame would be {across:.4g} x {along:.4g} nm and sheared by "
-                f"{shear:.4g} nm; is the sample such a lattice, and was the frame as high as its lines are long?"
-            )
-        return _scaled(self.distortion, across, along, shear)
+        return np.array(min(readings))
 
 
 def _scaled(distortion: Distortion, across: float, along: float, shear: float) -> Distortion:
@@ -105,6 +124,7 @@ def periodic_scan(
     window: tuple[float, float] = (0.0, 1.0),
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
+    expected_area: float | None = None,
 ) -> PeriodicScan:
     """Fit trace and retrace of a periodic sample, or a trace alone.
 
@@ -118,6 +138,8 @@ def periodic_scan(
         Part of each sweep that the columns span, 0..1.
     delay_pixels
         Delay of the columns against the position.
+    expected_area
+        Area of the sample's cell in square pixels by the size in the file.
 
     Raises
     ------
@@ -127,11 +149,15 @@ def periodic_scan(
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
-    spot, bends = begin(geometry, heights, retrace_mirrored)
-    model, state, free = fit_spots(geometry, heights, spot, bends)
+    cell = cell_of(trace, retrace, expected_area)
+    if cell is None:
+        spot, bends = begin(geometry, heights, retrace_mirrored)
+        model, state, free = fit_spots(geometry, heights, spot, bends)
+    else:
+        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
-    return _scan(model, state)
+    return replace(_scan(model, state), indexed=cell is not None, strong_index=_strong_index(model, state))
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:
@@ -139,11 +165,13 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
     free = free.copy()
     free[:4] = False  # the branches stay; the series is added to them
     geometry = model.geometry
-    q = float(model.q(state.parameters)[0])
+    q = float(np.max(np.abs(_strong_spots(model, state) @ model.q(state.parameters))))
     bends = _series(geometry.columns, int(np.clip(round(_BENDS_A_PERIOD * q), _LEAST_BENDS, _MOST_BENDS)))
     row_bends = _series(geometry.rows, _ROW_BENDS)
-    waves = model.row_waves(state)
-    phases = np.stack([_followed(_without_others(model, state, base, wave)) for base, wave in enumerate(waves)])
+    strong = _strong_spots(model, state)
+    waves = model.row_waves(state, strong)
+    followed = [_followed(_without_others(model, state, spot, wave)) for spot, wave in zip(strong, waves, strict=True)]
+    phases = np.linalg.solve(strong.astype(np.float64), np.stack(followed))
     along = phases @ np.linalg.pinv(row_bends)  # coefficients of the whole sum, which the penalty smooths
     across = [np.zeros(len(bends)) for _ in model.images]
     model = model.with_offsets(model.off, _less_line(along @ row_bends))
@@ -215,12 +243,32 @@ def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Float
     return np.asarray(step.reshape(bases, count), dtype=np.float64)
 
 
-def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
-    """Return a base vector's wave in the rows, averaged so that waves of as many periods in the line vanish."""
+def _strong_index(model: PeriodicModel, state: FitState) -> int:
+    """Return the index of the lattice of the strong spots in that of all spots; 1 where they have one direction."""
+    amplitudes = np.abs(state.amplitudes)
+    strong = model.spots[amplitudes > _STRONG * np.max(amplitudes)]
+    if model.bases < 2 or np.linalg.matrix_rank(strong) < 2:
+        return 1
+    minors = strong[:, :1] * strong[:, 1] - strong[:, 1:] * strong[:, 0]
+    return int(np.gcd.reduce(np.abs(minors), axis=None))
+
+
+def _strong_spots(model: PeriodicModel, state: FitState) -> Ints:
+    """Return the strongest spots that determine the phases of the base vectors, shape (bases, bases)."""
+    order = np.argsort(-np.abs(state.amplitudes))
+    strong = [model.spots[order[0]]]
+    for number in order[1:]:
+        if len(strong) < model.bases and np.linalg.matrix_rank([*strong, model.spots[number]]) > len(strong):
+            strong.append(model.spots[number])
+    return np.stack(strong)
+
+
+def _without_others(model: PeriodicModel, state: FitState, own: Ints, wave: Complexes) -> Complexes:
+    """Return a spot's wave in the rows, averaged so that waves of as many periods in the line vanish."""
     q, s = model.q(state.parameters), model.s(state.parameters)[:, 0]
     nearest = np.inf
     for spot in (*model.spots, *-model.spots):
-        beside, ahead = float(spot @ q - q[base]), float(spot @ s - s[base])
+        beside, ahead = float((spot - own) @ q), float((spot - own) @ s)
         if abs(beside) < _SAME_WAVE and abs(ahead) > _SAME_WAVE:
             nearest = min(nearest, abs(ahead))
     width = _AVERAGED * model.geometry.rows / nearest

@@ -13,7 +13,7 @@ from tablegen.images.autocorrelation import WEAKEST, Autocorrelation, Spots, aut
 from tablegen.images.cell_errors import fit_cell
 from tablegen.images.cell_vectors import area, lattices_of_index, reduced, sides_and_angle, sublattice_index
 from tablegen.images.hum import hum_waves, of_hum
-from tablegen.images.lattice_candidates import Candidate, candidates
+from tablegen.images.lattice_candidates import Candidate, candidates, distinct
 from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images, without_holes
 from tablegen.images.pair_checks import MIN_PIXELS
 from tablegen.numerics.arrays import Bools, Floats
@@ -36,7 +36,9 @@ _OWN_SHARE = 0.6  # of the spots that are near enough to 0
 _FAINT = 0.5  # of the contrast of a significant spot
 _NEAR_SPOT = 1.2  # periods in the image: spots of two views this near are one
 _ALONG = 0.5  # of a wave along the rows: slopes show it about as well as heights
+_SLOW, _SLOW_SHARE = 4.0, 0.5  # periods in the image, and of the slowest wave of the cell: a terrace has waves below
 _STEEP = 0.12  # of a wave along the rows
+_SPOT_WIDTH, _STRAY = 0.4, 0.02  # periods in the image; chance that a spot belongs to no lattice
 _PRIMES = (2, 3, 5, 7)
 _CLEARLY_LESS = 0.5  # of the autocorrelation at the cell's sides
 _LEAST_DECIDING = 2  # spots
@@ -84,6 +86,7 @@ class _View:
     spots: Spots
     faint: Spots  # of less contrast and power: they confirm those of another view
     least: float  # contrast of a significant spot
+    cells: list[Candidate]  # of its autocorrelation
 
 
 def find_cell(heights: Floats, other: Floats | None = None, expected_area: float | None = None) -> ImageCell:
@@ -119,32 +122,81 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
     views = [_view(image) for image in filtered_images(heights)]
     hum = np.zeros((0, 2))
     if other is not None:
-        beside = np.concatenate([_view(image).faint.waves for image in filtered_images(without_holes(other[region]))])
+        beside = np.concatenate(
+            [_view(image, False).faint.waves for image in filtered_images(without_holes(other[region]))]
+        )
         hum = hum_waves(_together(views, 1.0).waves, beside, (heights.shape[0], heights.shape[1]))
-    cells: list[ImageCell] = []
+    if not any(len(view.spots.contrast) and view.spots.contrast[0] >= _CLEAR * view.least for view in views):
+        raise Unphysical(_NO_LATTICE)
+    vectors = _chosen(views, hum, expected_area)
+    _check_periods(vectors, np.array([heights.shape[1], heights.shape[0]]))
     reasons: list[Unphysical] = []
-    for view in views:
+    # A view whose own maxima gave the cell comes first.
+    for view in sorted(views, key=lambda view: not any(same_lattice(cell.vectors, vectors) for cell in view.cells)):
         try:
-            cells.append(_cell_of(view, views, hum, expected_area))
+            return _fitted(view, vectors)
         except Unphysical as reason:
             reasons.append(reason)
-    if not cells:
-        # A view that shows nothing explains less than one whose spots no cell explains.
-        raise next((reason for reason in reasons if str(reason) != _NO_LATTICE), reasons[0])
-    if len(cells) == 2 and not same_lattice(cells[0].vectors, cells[1].vectors):
-        raise Unphysical(ambiguous(cells[0].vectors, cells[1].vectors))
-    return cells[0]
+    raise reasons[-1]
 
 
-def ambiguous(one: Floats, other: Floats) -> str:
-    """Return the text that refuses two cells, shape (2, 2) each, in pixels."""
-    sizes = " and ".join(
-        "{:.4g} x {:.4g} pixels at {:.3g} degrees".format(*sides_and_angle(cell)) for cell in (one, other)
-    )
+def ambiguous(cells: list[Floats], spots: Spots, extent: Floats, reason: str = "they explain the image") -> str:
+    """Return the text that refuses several cells.
+
+    Parameters
+    ----------
+    cells
+        Cells in pixels, shape (2, 2) each.
+    spots
+        The significant spots, by which the cells have their likelihoods.
+    extent
+        Columns and rows of the image.
+    reason
+        Why they are possible.
+    """
+    shares = likelihoods(cells, spots, extent)
+    order = np.argsort(-shares, kind="stable")
+    names = []
+    for number in order.tolist():
+        one, other, angle = sides_and_angle(reduced(cells[number]))
+        share = _percent(float(shares[number]))
+        names.append(f"{one:.4g} x {other:.4g} pixels at {angle:.3g} degrees ({share})")
+    sizes = " or ".join(names)
     return (
-        f"the lattice is ambiguous: cells of {sizes} explain the image about as well; give the sample's --lattice-nm, "
-        f"or image more periods with less noise"
+        f"the lattice is ambiguous: the cell may be {sizes}, as {reason}; give the sample's --lattice-nm, or image "
+        f"more periods with less noise"
     )
+
+
+def _percent(share: float) -> str:
+    return "below 1 %" if share < 0.01 else "above 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
+
+
+def likelihoods(cells: list[Floats], spots: Spots, extent: Floats) -> Floats:
+    """Return the likelihood of each cell by the places of the spots; they add to 1.
+
+    A spot is with a chance of ``_STRAY`` anywhere, else near one of the waves of the cell. A large cell has many waves,
+    so that each is less likely to be the place of a spot by itself.
+
+    Parameters
+    ----------
+    cells
+        Cells in pixels, shape (2, 2) each.
+    spots
+        Spots of both views: each counts half.
+    extent
+        Columns and rows of the image.
+    """
+    pixels = float(np.prod(extent))
+    logarithms = []
+    for cell in cells:
+        index = spots.waves @ cell.T
+        distance = np.hypot(*(((index - np.round(index)) @ np.linalg.inv(cell).T) * extent).T)
+        width = _SPOT_WIDTH + 0.5 * _STRAIN * np.hypot(*(spots.waves * extent).T)
+        near = np.exp(-0.5 * (distance / width) ** 2) / (2.0 * np.pi * width**2) / max(area(cell), 1.0)
+        logarithms.append(0.5 * float(np.sum(np.log((1.0 - _STRAY) * near + _STRAY / pixels))))
+    shares = np.exp(np.array(logarithms) - max(logarithms))
+    return np.asarray(shares / np.sum(shares))
 
 
 def _check(heights: Floats) -> None:
@@ -158,19 +210,17 @@ def _check(heights: Floats) -> None:
         raise Unphysical(f"{100.0 * share:.2g} % of the pixels have heights; crop the image to what was scanned")
 
 
-def _view(image: FilteredImage) -> _View:
+def _view(image: FilteredImage, with_cells: bool = True) -> _View:
     correlation = autocorrelation(image)
     least = float(np.log(image.values.size) + _CERTAINTY)
     faint = significant_spots(image, _FAINT * least, 0.3 * WEAKEST)
-    return _View(image, correlation, significant_spots(image, least), faint, least)
+    cells = candidates(correlation) if with_cells else []
+    return _View(image, correlation, significant_spots(image, least), faint, least, cells)
 
 
-def _cell_of(view: _View, views: list[_View], hum: Floats, expected_area: float | None) -> ImageCell:
+def _fitted(view: _View, vectors: Floats) -> ImageCell:
+    """Fit a cell to the maxima of a view's autocorrelation. Raise ``Unphysical`` if it is none of them."""
     spots, shape = view.spots, view.image.values.shape
-    if not len(spots.contrast) or spots.contrast[0] < _CLEAR * view.least:
-        raise Unphysical(_NO_LATTICE)
-    vectors = _chosen(view.correlation, views, hum, expected_area)
-    _check_periods(vectors, np.array([shape[1], shape[0]]))
     fit = fit_cell(view.image, vectors)
     if fit is None or fit.level < _LEAST_LEVEL or not same_lattice(fit.vectors, vectors):
         raise Unphysical(
@@ -188,12 +238,13 @@ def _cell_of(view: _View, views: list[_View], hum: Floats, expected_area: float 
     return ImageCell(fit.vectors, fit.covariance, spots, explained, fit.level, (shape[0], shape[1]), view.image.name)
 
 
-def _chosen(correlation: Autocorrelation, views: list[_View], hum: Floats, expected_area: float | None) -> Floats:
+def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Floats:
     """Return the smallest cell that explains all spots. Raise ``Unphysical`` if there is none, or more than one."""
+    extent = _extent(views[0])
     strong, every = _together(views, _STRONG), _together(views, 1.0)
     if len(strong.waves) < 2 or one_direction(strong.waves):
         raise Unphysical(_why_none([], strong))
-    cells = candidates(correlation)
+    cells = distinct([cell for view in views for cell in view.cells])
     if expected_area is not None:
         cells = [cell for cell in cells if abs(np.log(cell.area / expected_area)) < np.log(_MOST_AREA_RATIO)]
         if not cells:
@@ -201,26 +252,28 @@ def _chosen(correlation: Autocorrelation, views: list[_View], hum: Floats, expec
                 "no cell of the autocorrelation has the area that the sample's constant and the size in the file give; "
                 "is the constant that of this sample, and the lattice of this kind?"
             )
-    sure, all_of_them = (_smallest(cells, spots, hum, expected_area) for spots in (strong, every))
+    sure, all_of_them = (_smallest(cells, spots, hum, extent, expected_area) for spots in (strong, every))
     if sure is None:
         raise Unphysical(_why_none(cells, strong))
     if all_of_them is not None and not same_lattice(sure, all_of_them):
-        raise Unphysical(ambiguous(sure, all_of_them))
+        raise Unphysical(ambiguous([sure, all_of_them], every, extent, "weak spots are at the waves of one alone"))
     if all_of_them is None:
         explained, informative = explained_spots(sure, every)
-        missing = int(np.sum(~of_hum(every.waves[informative & ~explained], hum, sure)))
+        waves = every.waves[informative & ~explained]
+        waves = waves[~of_an_edge(waves, every.waves[explained], extent)]
+        missing = int(np.sum(~of_hum(waves, hum, sure)))
         if missing > 2 + len(explained) // 20:
             raise Unphysical(_unexplained(missing, len(explained)))
     explained, informative = explained_spots(sure, every)
-    _check_sublattice(sure, every.waves[informative & explained])
+    _check_sublattice(sure, every.waves[informative & explained], every, extent)
     if expected_area is None:
-        _check_deciding(sure, strong, correlation)
+        _check_deciding(sure, strong, views)
         for view in views:
             _check_fractions(sure, view.spots, views, hum)
     return sure
 
 
-def _check_deciding(vectors: Floats, spots: Spots, correlation: Autocorrelation) -> None:
+def _check_deciding(vectors: Floats, spots: Spots, views: list[_View]) -> None:
     """Check that a smaller cell leaves two spots or more, or is none of the autocorrelation: one may be an artefact."""
     explained, informative = explained_spots(vectors, spots)
     index = np.round(spots.waves[explained & informative] @ vectors.T).astype(np.int64)
@@ -229,10 +282,16 @@ def _check_deciding(vectors: Floats, spots: Spots, correlation: Autocorrelation)
     for part in _PRIMES:
         for u, v in [(1, k) for k in range(part)] + [(0, 1)]:
             sides = np.arange(1, part)[:, None] * (np.array([[u, v]]) @ vectors) / part
-            if np.nanmin(correlation.at(sides)) < _CLEARLY_LESS * float(np.min(correlation.at(vectors))):
+            if any(
+                np.nanmin(view.correlation.at(sides)) < _CLEARLY_LESS * float(np.min(view.correlation.at(vectors)))
+                for view in views
+            ):
                 continue
             if int(np.sum((index @ np.array([u, v])) % part != 0)) < _LEAST_DECIDING:
-                raise Unphysical(_smaller(part))
+                other = vectors[1] if u else vectors[0]
+                smaller = np.array([np.array([u, v]) @ vectors / part, other])
+                reason = "one spot alone tells them apart"
+                raise Unphysical(ambiguous([vectors, smaller], spots, _extent(views[0]), reason))
 
 
 def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
@@ -241,6 +300,7 @@ def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Flo
     waves = spots.waves[informative & ~explained]
     waves = waves[~of_hum(waves, hum, vectors)]
     waves = waves[_fractional(waves @ vectors.T)]
+    waves = waves[~of_an_edge(waves, spots.waves[explained], _extent(views[0]))]
     for other in views:
         if other.image.name == "slopes":  # where a wave along the rows shows, unless it is the edge of a terrace
             steep = np.abs(waves[:, 0]) < _ALONG * np.hypot(*waves.T)
@@ -249,10 +309,20 @@ def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Flo
         direction = np.arctan2(waves[:, 1], waves[:, 0])
         beside = np.abs((direction[:, None] - direction[None] + np.pi / 2) % np.pi - np.pi / 2) < _PARALLEL
         if np.any(np.sum(beside, axis=1) < _STREAK):
-            raise Unphysical(
-                "the lattice is ambiguous: a weak spot is at a fraction of the cell's waves, so that the cell may be "
-                "larger; give the sample's --lattice-nm, or image more periods with less noise"
-            )
+            larger = _supercell(vectors, waves)
+            cells = [vectors] if larger is None else [vectors, larger]
+            reason = "a weak spot is at a fraction of the smaller cell's waves"
+            raise Unphysical(ambiguous(cells, spots, _extent(views[0]), reason))
+
+
+def _supercell(vectors: Floats, waves: Floats) -> Floats | None:
+    """Return the smallest multiple of a cell of which these waves are; None if it has more than 16 times the area."""
+    for index in range(2, max(_FRACTIONS) ** 2 + 1):
+        for basis in lattices_of_index(index):
+            numbers = waves @ (basis @ vectors).T
+            if np.all(np.abs(numbers - np.round(numbers)) <= index * _NEAR_FRACTION):
+                return reduced(basis @ vectors)
+    return None
 
 
 def _together(views: list[_View], contrast: float) -> Spots:
@@ -298,19 +368,22 @@ def explained_spots(vectors: Floats, spots: Spots) -> tuple[Bools, Bools]:
     return np.asarray(off <= tolerance), np.asarray(tolerance <= _INFORMATIVE)
 
 
-def _smallest(cells: list[Candidate], spots: Spots, hum: Floats, expected_area: float | None) -> Floats | None:
+def _smallest(
+    cells: list[Candidate], spots: Spots, hum: Floats, extent: Floats, expected_area: float | None
+) -> Floats | None:
     """Return the smallest cell that explains all spots: a candidate, or a supercell of the smallest ones."""
-    for cell in cells:
-        vectors = fitted_to_spots(cell.vectors, spots)
-        if _explains(vectors, spots, hum, expected_area is not None):
-            return reduced(vectors)
+    for fractions_explained in (False, True)[: 1 if expected_area is None else 2]:
+        for cell in cells:
+            vectors = fitted_to_spots(cell.vectors, spots)
+            if _explains(vectors, spots, hum, extent, fractions_explained):
+                return reduced(vectors)
     if expected_area is not None:
         return None
     for cell in cells[:3]:
         for index in _SUPERCELLS:
             for basis in lattices_of_index(index):
                 vectors = fitted_to_spots(reduced(basis @ cell.vectors), spots)
-                if _explains(vectors, spots, hum):
+                if _explains(vectors, spots, hum, extent):
                     return reduced(vectors)
     return None
 
@@ -330,7 +403,7 @@ def fitted_to_spots(vectors: Floats, spots: Spots) -> Floats:
     return vectors
 
 
-def _explains(vectors: Floats, spots: Spots, hum: Floats, supercells_known: bool = False) -> bool:
+def _explains(vectors: Floats, spots: Spots, hum: Floats, extent: Floats, supercells_known: bool = False) -> bool:
     """Return True if a cell explains all spots but for hum, or for one wave that belongs to no lattice.
 
     A wave of a superstructure is at fractions of the cell's waves. With ``supercells_known`` the sample's constant
@@ -344,6 +417,7 @@ def _explains(vectors: Floats, spots: Spots, hum: Floats, supercells_known: bool
         return False
     strange = informative & ~explained
     strange[strange] = ~of_hum(spots.waves[strange], hum, vectors)
+    strange[strange] = ~of_an_edge(spots.waves[strange], spots.waves[own], extent)
     if not np.any(strange):
         return True
     fractional = _fractional(spots.waves[strange] @ vectors.T)
@@ -357,6 +431,31 @@ def _explains(vectors: Floats, spots: Spots, hum: Floats, supercells_known: bool
     strongest = np.flatnonzero(strange)[np.argmax(spots.contrast[strange])]
     alone = of_hum(spots.waves[strange], spots.waves[[strongest]], vectors, _LONE_HARMONICS)
     return bool(np.all(alone) and np.sum(strange) <= np.sum(own) / _OWN_PER_STRANGE)
+
+
+def of_an_edge(waves: Floats, own: Floats, extent: Floats) -> Bools:
+    """Return True for slow waves if all slow ones are in one direction: those of a step, a facet or a bow.
+
+    A larger cell would have slow waves in two directions, or faster ones beside those of the smaller cell.
+
+    Parameters
+    ----------
+    waves, own
+        Waves per pixel that a cell does not explain, and that it does, shape (n, 2) and (m, 2).
+    extent
+        Columns and rows of the image.
+    """
+    periods, least = waves * extent, np.min(np.hypot(*(own * extent).T), initial=np.inf)
+    slow: Bools = np.hypot(*periods.T) < min(_SLOW, _SLOW_SHARE * float(least))
+    if not np.any(slow):
+        return slow
+    unit = np.linalg.svd(periods[slow], full_matrices=False)[2][0]
+    across = np.abs(periods @ np.array([-unit[1], unit[0]]))
+    return np.asarray(slow & np.all(across[slow] <= _NEAR_SPOT))
+
+
+def _extent(view: _View) -> Floats:
+    return np.array(view.image.values.shape[::-1], dtype=np.float64)
 
 
 def _fractional(index: Floats) -> Bools:
@@ -410,17 +509,17 @@ def _check_periods(vectors: Floats, extent: Floats) -> None:
         )
 
 
-def _check_sublattice(vectors: Floats, waves: Floats) -> None:
-    index = sublattice_index(np.round(waves @ vectors.T).astype(np.int64))
-    if index != 1:
-        raise Unphysical(_smaller(index))
-
-
-def _smaller(part: int) -> str:
-    return (
-        f"the lattice is ambiguous: a cell of 1/{part} of the area explains the significant spots too; give the "
-        f"sample's --lattice-nm, or image more periods with less noise"
-    )
+def _check_sublattice(vectors: Floats, waves: Floats, spots: Spots, extent: Floats) -> None:
+    numbers = np.round(waves @ vectors.T).astype(np.int64)
+    index = sublattice_index(numbers)
+    if index == 1:
+        return
+    cells = [vectors]
+    for basis in lattices_of_index(index) if index else []:
+        parts = numbers @ np.linalg.inv(basis)
+        if np.allclose(parts, np.round(parts), atol=1e-6):
+            cells.append(np.linalg.inv(basis).T @ vectors)
+    raise Unphysical(ambiguous(cells, spots, extent, f"all spots are those of 1/{index} of the area too"))
 
 
 def same_lattice(one: Floats, other: Floats) -> bool:

@@ -53,6 +53,11 @@ def candidates(correlation: Autocorrelation) -> list[Candidate]:
         level = _sums(vectors, correlation, both, levels)
         if level >= _LEAST_HEIGHT * min(heights[i], heights[j]):
             cells.append(_refined(Candidate(vectors, level, np.inf), both, levels))
+    return distinct(cells)
+
+
+def distinct(cells: list[Candidate]) -> list[Candidate]:
+    """Return the cells that differ, the smallest first."""
     unique: list[Candidate] = []
     for cell in sorted(cells, key=lambda one: one.area):
         if not _known(cell.vectors, unique):
@@ -88,7 +93,9 @@ def _refined(cell: Candidate, lags: Floats, heights: Floats) -> Candidate:
         near = max(_NEAR * float(np.hypot(*vectors[0])), 1.5)
         close = np.max(np.abs(lags), axis=1) <= near + np.max(np.abs(points @ vectors))
         places, levels = lags[close], heights[close]
-        distance = np.hypot(*np.moveaxis(places[None] - (points @ vectors)[:, None], -1, 0))
+        expected = points @ vectors
+        x, y = (places[None, :, axis] - expected[:, None, axis] for axis in (0, 1))
+        distance = np.sqrt(x * x + y * y)
         nearest = np.argmin(distance, axis=1)
         matched = distance[np.arange(len(points)), nearest] <= near
         matched &= levels[nearest] > 0.0

@@ -12,6 +12,10 @@ from tablegen.numerics.arrays import Bools, Floats
 
 _CLIPPED = 1.0  # percent of the heights at either end
 _SLOPE_LIMIT = 3.0  # times the usual slope: the edge of a terrace has more
+_EDGE = 2.0  # times the limit: a slope that is the edge of a terrace or a speck, and none of the lattice
+_BESIDE = 10  # pixels on either side of an edge, whose medians tell a terrace from a speck
+_STEP_SHARE = 0.5  # of the slope at an edge that remains as a step between these medians
+_LEAST_TERRACE = 6  # pixels of a row: a shorter part is not levelled by itself
 _COMPLETE = 0.8  # share of valid pixels: a row or column with fewer is missing
 _BOW_DEGREE = 2
 _WIDTH = 1.0  # pixels: standard deviation of the Gaussian that smooths slopes
@@ -41,7 +45,7 @@ def filtered_images(heights: Floats) -> list[FilteredImage]:
     """
     valid = _valid(heights)
     rows = np.where(valid, heights, 0.0)
-    level = _rows_levelled(rows, valid)
+    level = _terraces_levelled(_rows_levelled(rows, valid), valid)
     images = [_windowed("heights", _clipped(level, valid), valid)]
     slopes, inside = _slopes(level, valid)
     images.append(_windowed("slopes", slopes, inside))
@@ -59,8 +63,10 @@ def complete_region(heights: Floats) -> tuple[slice, slice]:
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
     valid = _valid(heights)
-    rows = _longest(np.mean(valid, axis=1) >= _COMPLETE)
-    return rows, _longest(np.mean(valid[rows], axis=0) >= _COMPLETE)
+    there = valid[:, valid.any(axis=0)]
+    rows = _longest(np.mean(there, axis=1) >= _COMPLETE) if there.size else slice(0, 0)
+    columns = _longest(np.mean(valid[rows], axis=0) >= _COMPLETE) if valid[rows].size else slice(0, 0)
+    return rows, columns
 
 
 def _longest(there: Bools) -> slice:
@@ -107,6 +113,39 @@ def _rows_levelled(heights: Floats, valid: Bools) -> Floats:
     return np.where(valid, level - bow, 0.0)
 
 
+def _terraces_levelled(level: Floats, valid: Bools) -> Floats:
+    """Subtract the median of each part of a row between the edges of terraces."""
+    steps, inside = _steps(level, valid)
+    edges = inside & (np.abs(steps) > _EDGE * _slope_limit(steps, inside))
+    result = level.copy()
+    for row in np.flatnonzero(edges.any(axis=1)):
+        ends = [0]
+        for end in (np.flatnonzero(edges[row]) + 1).tolist():
+            before, after = level[row, max(end - _BESIDE, 0) : end], level[row, end : end + _BESIDE]
+            step = float(np.median(after) - np.median(before))
+            if abs(step) > _STEP_SHARE * abs(steps[row, end - 1]) and end - ends[-1] >= _LEAST_TERRACE:
+                ends.append(end)
+        for first, stop in zip(ends, [*ends[1:], level.shape[1]], strict=True):
+            there = valid[row, first:stop]
+            if len(ends) > 1 and there.any():
+                part = level[row, first:stop]
+                result[row, first:stop] = np.where(there, part - np.median(part[there]), 0.0)
+    return result
+
+
+def _steps(level: Floats, valid: Bools) -> tuple[Floats, Bools]:
+    """Return the differences to the next pixel of each row, and where both are valid."""
+    steps = np.diff(level, axis=1, append=level[:, -1:])
+    inside = valid & np.roll(valid, -1, axis=1)
+    inside[:, -1] = False
+    return steps, inside
+
+
+def _slope_limit(steps: Floats, inside: Bools) -> float:
+    usual = 1.4826 * float(np.median(np.abs(steps[inside])))
+    return _SLOPE_LIMIT * (usual or float(np.std(steps[inside])))
+
+
 def _clipped(values: Floats, valid: Bools) -> Floats:
     low, high = np.percentile(values[valid], (_CLIPPED, 100.0 - _CLIPPED))
     return np.where(valid, np.clip(values, low, high), 0.0)
@@ -114,12 +153,10 @@ def _clipped(values: Floats, valid: Bools) -> Floats:
 
 def _slopes(level: Floats, valid: Bools) -> tuple[Floats, Bools]:
     """Return clipped slopes along the rows, smoothed by a Gaussian, and where all pixels that they need are valid."""
-    steps = np.diff(level, axis=1, append=level[:, -1:])
-    inside = valid & np.roll(valid, -1, axis=1)
-    inside[:, -1] = False
-    usual = 1.4826 * float(np.median(np.abs(steps[inside])))
-    limit = _SLOPE_LIMIT * (usual or float(np.std(steps[inside])))
-    steps = np.where(inside, np.clip(steps, -limit, limit), 0.0)
+    steps, inside = _steps(level, valid)
+    limit = _slope_limit(steps, inside)
+    use = inside & (np.abs(steps) <= _EDGE * limit)
+    steps = np.where(use, np.clip(steps, -limit, limit), 0.0)
     return np.where(inside, _smoothed(steps, _WIDTH), 0.0), inside
 
 

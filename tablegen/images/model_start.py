@@ -75,7 +75,9 @@ def prepare_heights(
     return geometry, [image / spread for image in images]
 
 
-def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Spot, tuple[Bend, ...]]:
+def begin(
+    geometry: Geometry, heights: list[Floats], mirrored: bool, spot: Spot | None = None
+) -> tuple[Spot, tuple[Bend, ...]]:
     """Find the strongest spot and each image's branch; check that the retrace, if any, belongs to the trace.
 
     Parameters
@@ -84,14 +86,19 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
         Levelled heights of the trace, and of the retrace if there is one, shape (rows, columns) each.
     mirrored
         True if the retrace was mirrored before.
+    spot
+        A spot of the sample's lattice; the strongest one by default.
 
     Raises
     ------
     Unphysical
         If no spot stands out, the retrace does not show the trace's pattern, or a sweep leads the drive.
     """
-    spot = strongest(geometry, heights[0])
-    forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
+    if spot is None:
+        spot = strongest(geometry, heights[0])
+        forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
+    else:
+        forward = bend_of(geometry, heights[0], True, spot)
     if len(heights) == 1:
         check_signs(forward.shape.lag, 0.0, 0.02, "")
         return spot, (forward,)
@@ -147,6 +154,14 @@ def fit_spots(
     tuple
         The model, its state at the fitted parameters, and the parameters that are free, shape (parameters,).
     """
+    images, start, free, off = first_wave(geometry, heights, spot, bends)
+    return fit_from_start(geometry, images, start, free, off)
+
+
+def first_wave(
+    geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, ...]
+) -> tuple[list[tuple[bool, Floats]], Floats, Bools, tuple[Floats, Floats]]:
+    """Return the images, parameters of one wave, which of them are free, and offsets of x; see ``fit_from_start``."""
     images = list(zip((True, False), heights, strict=False))
     start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
     start[: 2 * len(bends)] = np.concatenate([bend.shape.coordinates for bend in bends])
@@ -167,7 +182,7 @@ def fit_spots(
             start[:4] = settle(
                 PeriodicModel(geometry, [images[i]], [(1,)], _ROW_POLYNOMIAL_ORDER, off), start, alone
             ).parameters[:4]
-    return fit_from_start(geometry, images, start, free, off)
+    return images, start, free, off
 
 
 def fit_from_start(
@@ -194,7 +209,7 @@ def fit_from_start(
     nowhere = np.zeros(geometry.columns)
     model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
     state = settle(model, start, free)
-    model = _with_spots(model, state)
+    model = with_spots(model, state)
     state = settle(model, state.parameters, free)
     if np.any(off):  # the rest of the phase may be an error of the phase itself
         plain = PeriodicModel(
@@ -214,7 +229,7 @@ def fit_from_start(
     part = 1 if other is None else _part_of(state, model, other[0], other[1])
     if part > 1:  # the strongest wave was a harmonic of the sample's period
         model, state = model.divided(state, part)
-        model = _with_spots(model, state)
+        model = with_spots(model, state)
         state = settle(model, state.parameters, free)
     elif other is not None:
         second, polynomial = other
@@ -225,9 +240,9 @@ def fit_from_start(
         state = settle(model, start, free)
         free = free.copy()
         free[LAG] = True  # two directions tell a shift in y from one in x
-        model = _with_spots(model, state)
+        model = with_spots(model, state)
         state = settle(model, state.parameters, free)
-    model = _with_spots(model, state)
+    model = with_spots(model, state)
     return model, settle(model, state.parameters, free), free
 
 
@@ -311,9 +326,9 @@ def _multiples(model: PeriodicModel, parameters: Floats) -> Floats:
     return start
 
 
-def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:
+def with_spots(model: PeriodicModel, state: FitState, highest: int | None = None) -> PeriodicModel:
     """Add the spots that stand out of the residuals, the strongest first."""
-    geometry, highest = model.geometry, _MAX_SPOT_INDEX[model.bases]
+    geometry, highest = model.geometry, highest or _MAX_SPOT_INDEX[model.bases]
     ranges = [np.arange(0, highest + 1), *[np.arange(-highest, highest + 1)] * (model.bases - 1)]
     spots: Ints = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, model.bases)
     along, across = spots @ model.q(state.parameters), spots @ model.s(state.parameters)[:, 0]

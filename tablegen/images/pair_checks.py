@@ -19,7 +19,10 @@ _CLIPPED_STEP = 0.01  # share of the heights' range: heights this near to a limi
 _CLIPPED_SPIKE = 4.0  # times the pixels next to it
 _MAX_LINE_POWER = 100.0  # times the usual power of a line
 _FLAT, _MANY_FLAT = 1e-9, 0.02  # share of the largest power of a line; share of all lines
-_MAX_SIZE_RATIO = 1.4  # of the measured and the nominal size: below the root of two
+_MAX_SIZE_RATIO = {
+    "line": 1.4,
+    "frame": 1.6,
+}  # of the measured and the nominal size: below the root of two, and of three
 _STRIPS = 8  # of the columns, in each of which trace and retrace are matched
 _REACH = 0.12  # share of the columns: largest distance of trace and retrace in the search
 _MIRRORED = 1.5, 0.25  # ratio to the straight match, and least correlation, of a mirrored retrace
@@ -141,11 +144,11 @@ def check_size(measured_nm: float, nominal_nm: float, source: str, side: Literal
     Raises
     ------
     Unphysical
-        If the sizes differ by a factor of 1.4 or more.
+        If the lines differ by a factor of 1.4 or more, or the frames by one of 1.6.
     """
     ratio = measured_nm / nominal_nm
     long = "long" if side == "line" else "high"
-    if not 1.0 / _MAX_SIZE_RATIO < ratio < _MAX_SIZE_RATIO:
+    if not 1.0 / _MAX_SIZE_RATIO[side] < ratio < _MAX_SIZE_RATIO[side]:
         raise Unphysical(
             f"the {side} is {measured_nm:.4g} nm {long} by the sample's constant, and {nominal_nm:.4g} nm by "
             f"{source}; is the constant that of this sample, the lattice of this kind, and a period more than "

@@ -291,17 +291,22 @@ class PeriodicModel:
         spots = [tuple(spot) for spot in self.spots.tolist()]
         return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
 
-    def row_waves(self, state: FitState) -> Complexes:
-        """Return each base vector's wave in each row of both images; its phase is the error of the polynomials.
+    def row_waves(self, state: FitState, spots: Ints) -> Complexes:
+        """Return each spot's wave in each row of both images; its phase is the error of the polynomials.
+
+        Parameters
+        ----------
+        spots
+            Whole numbers of the base vectors, shape (n, bases).
 
         Returns
         -------
         Complexes
-            Sums of heights over the columns, shape (bases, rows).
+            Sums of heights over the columns, shape (n, rows).
         """
-        other = self.with_spots([tuple(one) for one in np.eye(self.bases, dtype=np.int64).tolist()])
+        other = self.with_spots([tuple(one) for one in spots.tolist()])
         row = np.conj(other._rows(state.parameters)[0])
-        waves = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
+        waves = np.zeros((len(spots), self.geometry.rows), dtype=np.complex128)
         for forward, heights in self.images:
             waves += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
         return waves

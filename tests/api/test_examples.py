@@ -15,7 +15,7 @@ import tablegen
 
 FUNCTIONS = [name for name in tablegen.__all__ if inspect.isfunction(getattr(tablegen, name))]
 SCREEN = 60  # lines
-SLOW = ("calibrate_operator",)
+SLOW = ("calibrate_operator", "predict")
 
 
 @pytest.fixture(scope="module")

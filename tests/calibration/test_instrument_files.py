@@ -20,7 +20,7 @@ from tablegen.api.image_input import sample_image
 from tablegen.base.input_errors import Rejected
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
-from tablegen.images.formats.channel import Channel, split_direction
+from tablegen.images.formats.channel import Channel, rotation_deg, split_direction
 from tablegen.images.formats.createc import createc_channels
 from tablegen.images.formats.igor import ibw_channels
 from tablegen.images.formats.iso28600 import iso_channels
@@ -232,7 +232,7 @@ def test_valid_rows_that_cannot_be_are_not_believed(value: str, tmp_path: Path) 
 TURNED = {
     "a.sxm": sxm(NANONIS, angle_deg=90.0),
     "a.ibw": ibw(ASYLUM, NOTE | {"ScanAngle": "90"}),
-    "scan.spm": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 90\r\n"),
+    "scan.spm": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 1.5708\r\n"),
     "image.001": spm({"Height": (T, R)}, of_scan="\\Rotate Ang.: 0\r\n", of_image="\\Rotate Ang.: 90 deg\r\n"),
     "a.jpk": jpk({"Height": (T, R)}, angle_deg=90.0),
     "iso.spm": iso28600({"Z": T}, angle_deg=90.0),
@@ -246,14 +246,36 @@ TURNED = {
 @pytest.mark.parametrize("name", TURNED)
 def test_the_scan_angle_is_read(name: str, tmp_path: Path) -> None:
     channels = channels_of(put(tmp_path, name, TURNED[name]))
-    assert [one.angle_deg for one in channels] == [pytest.approx(90.0)] * len(channels)
-    assert read_image(tmp_path / name, "0").angle_deg == pytest.approx(90.0)
+    assert [one.angle_deg for one in channels] == [pytest.approx(90.0, abs=1e-3)] * len(channels)
+    assert read_image(tmp_path / name, "0").angle_deg == pytest.approx(90.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "angle"),
+    [
+        ("1.5708", 90.0),
+        ("-0.785398", -45.0),
+        ("6.28319", 360.0),
+        ("90", 90.0),
+        ("1.5 deg", 1.5),
+        ("1 °", 1.0),
+        ("?", None),
+    ],
+)
+def test_a_rotation_of_nanoscope_is_in_radians_unless_it_cannot_be(text: str, angle: float | None) -> None:
+    """As in a file of an instrument, version 9.3, whose ``Rotate Ang.`` is a right angle: 1.5708."""
+    assert rotation_deg(text) == (None if angle is None else pytest.approx(angle, abs=1e-3))
 
 
 @pytest.mark.parametrize(
     ("key", "text", "angle"),
     [
-        *(("ScanAngle", "90", 90.0), ("Scan angle", "-30 deg", -30.0), ("Rotate Ang.", "12.5 °", 12.5)),
+        *(
+            ("ScanAngle", "90", 90.0),
+            ("Scan angle", "-30 deg", -30.0),
+            ("Rotate Ang.", "12.5 °", 12.5),
+            ("Rotate Ang.", "1.5708", 90.00021),
+        ),
         *(("NanonisRecord::Scan_angle", "45°", 45.0), ("Scan angle", "unknown", None), ("Scan angle", " ", None)),
         ("Phase angle", "90", None),
     ],
@@ -262,7 +284,7 @@ def test_the_scan_angle_of_a_gwyddion_file_is_in_its_metadata(
     key: str, text: str, angle: float | None, tmp_path: Path
 ) -> None:
     gwy(tmp_path / "a.gwy", {key: text}, Z=T)
-    assert read_image(tmp_path / "a.gwy").angle_deg == angle
+    assert read_image(tmp_path / "a.gwy").angle_deg == (None if angle is None else pytest.approx(angle))
 
 
 def test_without_an_angle_none_is_made_up(tmp_path: Path) -> None:

@@ -2,18 +2,20 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from correcting import LAWS, old_frame, save_pair
+from correcting import LAWS, off, old_frame, save_pair
 from editing import run
 from instrument_files import sxm
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.agreement import Agreement
 from tablegen.correction.distortion import Distortion, Sweep1D
-from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves, strange_spot
+from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves, check_straight_cell, strange_spot
+from tablegen.correction.job import Choice, OldScan, by_fit, read_scan
 from tablegen.correction.periodic_scan import PeriodicScan
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.imaging import Surface
@@ -48,10 +50,45 @@ def test_weak_lowest_spots_are_seen_and_nothing_is_written(
     outcome = run("correct", "trace.npy", "retrace.npy", "--fit", "--lattice-nm", "50", "-o", "o.gwy")
     assert (outcome.status, outcome.out) == (2, "")
     assert len(outcome.messages) == 1
-    assert "trace.npy, retrace.npy: the cell may be a multiple or a root of the sample's: a spot at (" in outcome.err
-    area = {"root of 3": 3, "2": 2, "3": 3}[times]
-    assert f"is that of another cell with {area} times the area; image more periods" in outcome.err
+    if times == "3":
+        assert "the cell may be a multiple or a root of the sample's: a spot at (" in outcome.err
+        assert "is that of another cell with 3 times the area; image more periods" in outcome.err
+    else:
+        share = {"root of 3": 3, "2": 4}[times]
+        assert f"50 nm may be the constant of the whole cell, or of one with 1/{share} of its area" in outcome.err
     assert not (tmp_path / "o.gwy").exists()
+
+
+@pytest.mark.parametrize("lowest", [0.05, 0.6])
+def test_weak_lowest_spots_are_those_of_the_cell_by_the_size_of_the_file(lowest: float, tmp_path: Path) -> None:
+    """The strong spots alone would make the size wrong by the root of 3; the other constant does not fit the size."""
+    constant = 50.0 * TIMES["root of 3"][0]
+    frame = old_frame("paper", surface=weak(constant, lowest, TIMES["root of 3"]), **SHAPE)
+    path = tmp_path / "a.sxm"
+    path.write_bytes(sxm({"Z": (frame.trace.heights, frame.retrace.heights)}, (1080.0, 1080.0), times_s=(5e-3, 5e-3)))
+    images = read_scan(path, None, Choice())
+    scan, fit = by_fit(images, OldScan(), lattice_nm=constant)
+    assert (fit.indexed, fit.strong_index) == (True, 3)
+    assert off(scan.distortion, frame).size == pytest.approx((0.0, 0.0), abs=0.3)
+    with pytest.raises(Unphysical, match="is that of another cell with 3 times the area"):
+        by_fit(images, OldScan(), lattice_nm=50.0)
+
+
+def test_another_cell_in_the_corrected_image_is_refused(tmp_path: Path) -> None:
+    """Negative control: the picture of the right fit passes, with the sizes of another one it does not."""
+    frame = old_frame("paper", **SHAPE)
+    scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), OldScan(), lattice_nm=60.0)
+    pictures = [picture.heights for picture in scan.pictures]
+    check_straight_cell(fit, pictures, scan.size_nm, 60.0)
+    check_straight_cell(fit, pictures)
+    assert scan.size_nm is not None
+    with pytest.raises(Unphysical, match=r"does not show the sample's cell: its sides are .* and not 60 nm at 60"):
+        check_straight_cell(fit, pictures, (1.03 * scan.size_nm[0], scan.size_nm[1]), 60.0)
+    with pytest.raises(Unphysical, match=r"does not show the sample's cell: its sides are .* and not .* pixels at"):
+        check_straight_cell(replace(fit, waves=2.0 * fit.waves), pictures)
+    noise = np.random.default_rng(1).standard_normal((2, *pictures[0].shape))
+    with pytest.raises(Unphysical, match="does not show the sample's cell: no lattice stands out"):
+        check_straight_cell(fit, list(noise), scan.size_nm, 60.0)
 
 
 def test_the_same_lattice_without_weak_spots_is_corrected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

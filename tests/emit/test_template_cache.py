@@ -2,6 +2,7 @@
 
 import marshal
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import jinja2
@@ -20,9 +21,11 @@ SHOUT = compile("def root(context, *_):\n    yield 'not ours'\nblocks = {}\ndebu
 
 
 @pytest.fixture(autouse=True)
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The cache of this test; no template that it compiled or took stays for the tests after it."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache" / "tablegen" / "templates"
+    yield tmp_path / "cache" / "tablegen" / "templates"
+    templates._environment.cache_clear()
 
 
 @pytest.fixture

@@ -27,6 +27,7 @@ PLOTTING: dict[str, tuple[str, ...]] = {
     "simulate own": ("simulate", "own/scan.toml"),
     "compare": ("compare", "scan.toml", "scan.toml"),
     "refine": ("refine", "scan.toml", "trace.csv", "--axis", "x"),
+    "predict": ("predict", "own/scanner.toml", "o3.csv", "--axis", "x", "--against", "o3.csv"),
     "lattice": ("lattice", "trace.npy", "retrace.npy"),
     "correct": ("correct", "trace.npy", "retrace.npy", "--fit", "--lattice-nm", "60"),
     "calibrate offset": ("calibrate", "offset", *_AXIS, "offset.csv"),

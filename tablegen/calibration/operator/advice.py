@@ -7,8 +7,9 @@ import numpy as np
 
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
-from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
+from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.field import covariance
+from tablegen.compensation.operator.operator import STROKE_REACH
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.numerics.driver import Driver
 

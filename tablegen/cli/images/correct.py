@@ -59,6 +59,11 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @click.option("--fit", is_flag=True, help="Fit a periodic sample in the image; no scanner file is needed.")
 @_number("--pitch-nm", "NM", "With --fit: pitch of the grating, for the size.")
 @_number("--lattice-nm", "NM", "With --fit: constant of a hexagonal or square lattice, for size, height and shear.")
+@click.option(
+    "--lattice",
+    type=click.Choice(["hexagonal", "square"]),
+    help="Kind of the lattice of --lattice-nm.  [default: hexagonal, unless the frame is straight as a square one]",
+)
 @_number("--size-v", "V", "Scan voltage of the fast axis at the piezo, peak to peak.")
 @_number("--size-nm", "NM", "Instead of --size-v: scan size by the size calibration of the scanner file.")
 @_number(
@@ -228,10 +233,12 @@ def _wrong_way(options: dict[str, Any]) -> str | None:
     if not options["fit"]:
         if not files:
             return "give --scanner FILE, or --scan SCAN.TOML, or --fit for a periodic sample"
-        if options["pitch_nm"] or options["lattice_nm"]:
-            return "--pitch-nm and --lattice-nm are for --fit"
+        if options["pitch_nm"] or options["lattice_nm"] or options["lattice"]:
+            return "--pitch-nm, --lattice-nm and --lattice are for --fit"
     elif files:
         return "--fit needs no scanner file; keep one of the two"
+    elif options["lattice"] and not options["lattice_nm"]:
+        return "--lattice is the kind of the lattice of --lattice-nm"
     elif options["pitch_nm"] and options["lattice_nm"]:
         return "--pitch-nm and --lattice-nm: keep one of the two"
     return None

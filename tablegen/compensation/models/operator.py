@@ -22,7 +22,7 @@ from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.minimum_acceleration_line import minimum_acceleration_waveform
-from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
+from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, Operator
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
@@ -32,8 +32,7 @@ from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 
-# An operator serves strokes this far beyond the largest that was measured, and centres this far from any, of v_max.
-STROKE_REACH = 0.05
+# An operator serves centres this far from any that was measured, of v_max.
 CENTRE_REACH = 0.4
 _BEND_UNKNOWN = 0.7  # of what a loop grows by its bend; on simulated piezos of four kinds it was wrong by less
 _SLOWEST_HZ = 0.01  # of frames over which drift is followed

@@ -55,6 +55,12 @@ class LogarithmicCreep(Struct, frozen=True):
         size = float(np.sqrt(real * real + imaginary * imaginary)[0])
         return tuple((share / size, tau_s) for share, tau_s in self._terms())
 
+    @property
+    def direct(self) -> float:
+        """The share of the displacement that follows at once, where |C| is 1 at the reference."""
+        real, imaginary = self._response(np.array([self.reference_hz]))
+        return 1.0 / float(np.sqrt(real * real + imaginary * imaginary)[0])
+
     def _response(self, f_hz: Floats) -> tuple[Floats, Floats]:
         real, imaginary = np.ones_like(f_hz), np.zeros_like(f_hz)
         for share, tau_s in self._terms():

@@ -15,6 +15,7 @@ from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.numerics.arrays import Floats
 
 SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
+STROKE_REACH = 0.05  # of v_max: an operator serves strokes this far beyond the largest that was measured
 _END_POINTS = 48  # of a branch at either end
 _LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands still, and cannot be inverted
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import degrees, isfinite, pi
 from typing import Literal
 
 import numpy as np
@@ -195,6 +195,19 @@ def number(value: object, unit: float = 1.0) -> float | None:
     except (TypeError, ValueError):
         return None
     return finite if isfinite(finite) else None
+
+
+def rotation_deg(text: str) -> float | None:
+    """Convert the ``Rotate Ang.`` of Nanoscope to degrees; None unless it is a number.
+
+    Files of Nanoscope 9 have it in radians, without a unit: 1.5708 is a right angle. A number above a turn can only be
+    in degrees.
+    """
+    word, _, unit = text.strip().partition(" ")
+    value = number(word.rstrip("°"))
+    if value is None or unit.strip() or word.endswith("°") or abs(value) > 2.001 * pi:
+        return value
+    return degrees(value)
 
 
 def complete_lines(values: Matrix) -> int:

@@ -10,12 +10,13 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, channel_of_array, number, positive
+from tablegen.images.formats.channel import Channel, channel_of_array, number, positive, rotation_deg
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
 _MAX_COMPONENTS = 100_000  # of an object or a list; files have some hundred
 _ANGLES = ("scanangle", "rotateang", "rotation", "scanrotation", "fastscanangle")  # keys of metadata: letters alone
+_NANOSCOPE_ANGLE = "rotateang"
 _FIXED = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
 _ITEMS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
 
@@ -85,8 +86,11 @@ def _angle(content: bytes, at: int, end: int) -> float | None:
     for key, kind, start, stop in _components(content, *inside):
         letters = "".join(c for c in key.rpartition("::")[2].lower() if c.isalpha())
         if kind == b"s" and letters in _ANGLES:
-            text = content[start : stop - 1].decode("utf-8", "replace").split()
-            return number(text[0].rstrip("°")) if text else None
+            text = content[start : stop - 1].decode("utf-8", "replace")
+            if letters == _NANOSCOPE_ANGLE:
+                return rotation_deg(text)
+            words = text.split()
+            return number(words[0].rstrip("°")) if words else None
     return None
 
 

@@ -10,7 +10,7 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, number, positive
+from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, positive, rotation_deg
 
 _MAGICS = b"\\*File list", b"\\*EC File list"  # EC: of an electrochemical cell
 _END = b"File list end"
@@ -96,7 +96,7 @@ def _channel(content: bytes, at: int, image: _List, others: _List, scan: _List) 
         None if height is None else height * complete / planned,
         positive(scan.get("scan rate", "").partition(" ")[0]),
         first,
-        angle_deg=number((image.get("rotate ang.") or scan.get("rotate ang.") or "").partition(" ")[0]),
+        angle_deg=rotation_deg(image.get("rotate ang.") or scan.get("rotate ang.") or ""),
     )
 
 

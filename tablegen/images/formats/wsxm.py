@@ -74,7 +74,7 @@ def wsxm_channels(content: bytes, _: str) -> list[Channel]:
             quantity_nm(keys.get("y amplitude", "")),
             positive(keys.get("x-frequency", "").removesuffix("Hz")),
             first,
-            angle_deg=number(keys.get("rotation", "").partition(" ")[0]),
+            angle_deg=number((keys.get("rotation") or keys.get("angle", "")).partition(" ")[0]),
         )
     ]
 

@@ -1,0 +1,287 @@
+"""Predict the position of an axis for any drive, on the operator of its scanner file."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from tablegen.api.result import Result
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
+from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
+from tablegen.calibration.tables.recorder import Columns, Recorder
+from tablegen.calibration.tables.table import MeasuredTable
+from tablegen.charts.chart import Chart, DrawnCurve
+from tablegen.charts.picture_file import PlottedCharts
+from tablegen.compensation.dynamics import Response
+from tablegen.compensation.offset import OffsetLaw
+from tablegen.compensation.offset_sizes import OffsetSurface
+from tablegen.compensation.operator.file import read_operator
+from tablegen.compensation.operator.in_time import OperatorInTime, Start
+from tablegen.compensation.operator.operator import STROKE_REACH, Operator
+from tablegen.compensation.operator.uncertainty import departures
+from tablegen.config.load import load_scanner
+from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
+from tablegen.planning.laws import dynamics_of, offset_surface, size_law_of
+
+_LEAST_SAMPLES = 3
+_LEAST_STROKE = 0.005  # of the driver's range
+_BEYOND = 1e-3  # of the driver's range, for the rounding of a recorder
+
+
+def predict(
+    scanner: str | Path,
+    drive: str | Path,
+    *,
+    axis: Literal["x", "y"],
+    against: str | Path | None = None,
+    start: Literal["settled", "rest"] = "rest",
+    columns: Columns | None = None,
+    drive_gain: float | None = None,
+    drive_offset: float | None = None,
+) -> "Predicted":
+    """Predict the position of an axis for a drive of any shape.
+
+    Parameters
+    ----------
+    scanner : str or Path
+        Scanner file whose ``[axis.hysteresis]`` has ``model = "operator"``.
+    drive : str or Path
+        Table with time and drive, evenly sampled or not.
+    axis : str
+        "x" or "y".
+    against : str or Path, optional
+        Table with time and displacement that were measured; it may be the same file.
+    start : str
+        State at the first sample: "rest", at the first voltage after v_min, or "settled", after many repetitions of
+        the record.
+    columns : str or dict, optional
+        Which column is which, as ``--columns``.
+    drive_gain, drive_offset : float, optional
+        V at the piezo = gain x recorded V + offset.
+
+    Returns
+    -------
+    Predicted
+        ``time_s``, ``volts``, ``position_nm``, ``uncertainty_nm``; ``error_nm`` with ``against``.
+
+    Raises
+    ------
+    Rejected
+        A file is faulty, the axis has no operator, or the drive leaves what the operator knows.
+    ValueError
+        ``axis`` or ``start`` has another value, or the gain or offset is none.
+
+    Examples
+    --------
+    >>> import numpy, shutil
+    >>> laboratory = tablegen.Laboratory(like="scanner.toml")
+    >>> traces = [laboratory.trace("x", v, 50.0, 100.0, samples=200) for v in (10, 25, 45, 65, 82, 97)]
+    >>> copy = shutil.copy("scanner.toml", "own.toml")
+    >>> written = tablegen.calibrate_operator(traces, axis="x", scanner="scanner.toml").write("own.toml")
+    >>> numpy.savez("drive.npz", **traces[2])
+    >>> predicted = tablegen.predict("own.toml", "drive.npz", axis="x")
+    >>> len(predicted.position_nm) == len(traces[2]["time_s"])
+    True
+    """
+    if axis not in ("x", "y"):
+        raise ValueError(f"axis {axis!r} is not x or y")
+    state = Start(start)
+    recorder = Recorder(columns, drive_gain, drive_offset)
+    known = _KnownAxis.read(Path(scanner), axis)
+    table = recorder.read(Path(drive), [TIME, DRIVE], [DISPLACEMENT])
+    time_s, volts = table[TIME], table[DRIVE]
+    _check_times(table)
+    low, high = float(np.min(volts)), float(np.max(volts))
+    beyond = np.maximum(known.driver.v_min - volts, volts - known.driver.v_max)
+    at = int(np.argmax(beyond))
+    if known.driver.beyond(low, high) > _BEYOND * known.driver.span:
+        why = (
+            f"{volts[at]:.6g} V is outside the driver's {known.driver}; if a controller's output before the amplifier "
+            "was recorded, give --drive-gain and --drive-offset"
+        )
+        raise Rejected([Problem(table.file, int(table.lines[at]), DRIVE.name, why)])
+    u = known.driver.share(volts)
+    stroke, centre = (high - low) / known.driver.span, float(known.driver.share(0.5 * (low + high)))
+    largest = max(line.stroke for line in known.operator.lines)
+    problem = ""
+    if stroke < _LEAST_STROKE:
+        problem = f"the drive moves by {high - low:.4g} V; {_LEAST_STROKE * known.driver.span:.4g} V or more are needed"
+    elif stroke > largest + STROKE_REACH:
+        problem = (
+            f"the drive spans {high - low:.4g} V, and the operator's largest trace {largest * known.driver.span:.4g}"
+            " V; identify it with a larger one"
+        )
+    if problem:
+        raise Rejected([Problem(table.file, 0, DRIVE.name, problem)])
+    mean = float(np.mean(u))
+    in_time = OperatorInTime(known.operator, known.factor(mean), known.response)
+    try:
+        position = in_time.position(time_s, u, state)
+    except Unphysical as reason:
+        raise Rejected([Problem(str(scanner), 0, f"{axis}.hysteresis.file", str(reason))]) from None
+    rms, _, _, size = departures(known.operator.lines, stroke, centre)
+    extent = float(np.max(position) - np.min(position))
+    measured = None
+    if against is not None:
+        # What an amplifier does to the drive is no matter of a file of positions.
+        other = Recorder(columns).read(Path(against), [TIME, DISPLACEMENT], [DRIVE])
+        _check_times(other)
+        if other[TIME][0] > time_s[0] + 1e-9 or other[TIME][-1] < time_s[-1] - 1e-9:
+            why = (
+                f"has {other[TIME][0]:g} to {other[TIME][-1]:g} s, the drive {time_s[0]:g} to {time_s[-1]:g} s; "
+                "both need one clock, and the measurement the whole of the drive"
+            )
+            raise Rejected([Problem(other.file, 0, TIME.name, why)])
+        measured = np.interp(time_s, other[TIME], other[DISPLACEMENT])
+    bound = 0.01 * extent * sqrt(rms * rms + 0.25 * size * size) if state is Start.SETTLED else None
+    return Predicted(axis, state, time_s, volts, position, bound, measured)
+
+
+@dataclass(frozen=True)
+class _KnownAxis:
+    operator: Operator
+    driver: Driver
+    surface: OffsetSurface
+    response: Response | None
+
+    @classmethod
+    def read(cls, path: Path, axis: str) -> "_KnownAxis":
+        """Read an axis of a scanner file that has an operator."""
+        scanner, document = load_scanner(path)
+        its = scanner.x if axis == "x" else scanner.y
+        named = None if its.hysteresis is None else its.hysteresis.operator_file
+        if named is None:
+            key = f"{axis}.hysteresis"
+            raise Rejected([document.problem(key, f"is no operator; `calibrate operator --axis {axis}` makes one")])
+        driver = scanner.driver
+        beside = path.parent / named
+        operator, file = read_operator(beside, shown_path(beside))
+        problems = Problems()
+        if file.axis != axis:
+            problems.add(document, f"{axis}.hysteresis.file", f"is the operator of {file.axis}")
+        if max(abs(file.v_max - driver.v_max), abs(file.v_min - driver.v_min)) > 1e-6 * driver.span:
+            why = f"was identified from {file.v_min:g} to {file.v_max:g} V; the scanner file has {driver}"
+            problems.add(document, f"{axis}.hysteresis.file", why)
+        surface, response = OffsetSurface.everywhere(OffsetLaw()), None
+        with problems.at(document, f"{axis}.offset"):
+            if its.offset is not None:
+                surface = offset_surface(its.offset, driver, size_law_of(its.size, driver))
+        with problems.at(document, f"{axis}.resonance"):
+            response = None if its.resonance is None else dynamics_of(its.resonance, path.parent)
+        problems.stop_if_any()
+        return cls(operator, driver, surface, response)
+
+    def factor(self, mean: float) -> float:
+        """Return m of (1) at a mean over that at the operator's centre."""
+        here, there = (
+            self.surface.small.factor(self.driver.p(self.driver.volts(v))) for v in (mean, self.operator.centre)
+        )
+        return float(here / there)
+
+
+def _check_times(table: MeasuredTable) -> None:
+    """Refuse times that do not ascend, and tables of next to nothing."""
+    time_s = table[TIME]
+    if len(time_s) < _LEAST_SAMPLES:
+        raise Rejected([Problem(table.file, 0, "", f"has {len(time_s)} samples; {_LEAST_SAMPLES} or more are needed")])
+    back = np.flatnonzero(np.diff(time_s) <= 0.0)
+    if len(back):
+        row = int(back[0]) + 1
+        why = f"{time_s[row]:g} s does not come after {time_s[row - 1]:g} s; give one record with ascending times"
+        raise Rejected([Problem(table.file, int(table.lines[row]), TIME.name, why)])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Predicted(Result):
+    """Predicted positions of an axis; ``measured_nm`` is None without a measurement.
+
+    Arrays have the shape (samples,). ``uncertainty_nm`` is the rms error below which 90 % of settled lines stay, by the
+    traces that were left out; None for a start at rest, of which no trace tells. Positions count from the lower turn of
+    the widest loop.
+    """
+
+    axis: str
+    start: Start
+    time_s: Floats
+    volts: Floats
+    position_nm: Floats
+    uncertainty_nm: float | None
+    measured_nm: Floats | None
+
+    @property
+    def extent_nm(self) -> float:
+        """The stroke of the position, peak to peak."""
+        return float(np.max(self.position_nm) - np.min(self.position_nm))
+
+    @property
+    def error_nm(self) -> Floats | None:
+        """Predicted less measured position, without its mean, since a sensor's zero is anywhere."""
+        if self.measured_nm is None:
+            return None
+        error = self.position_nm - self.measured_nm
+        centred: Floats = error - np.mean(error)
+        return centred
+
+    @property
+    def errors_percent(self) -> tuple[float, float] | None:
+        """The rms and the largest error, in percent of the measured stroke."""
+        error = self.error_nm
+        if error is None or self.measured_nm is None:
+            return None
+        stroke = float(np.max(self.measured_nm) - np.min(self.measured_nm))
+        return 100.0 * float(np.sqrt(np.mean(error * error))) / stroke, 100.0 * float(np.max(np.abs(error))) / stroke
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The figures as plain data, as ``tablegen predict --json`` prints them."""
+        errors = self.errors_percent
+        return {
+            "axis": self.axis,
+            "start": self.start.value,
+            "samples": len(self.time_s),
+            "duration_s": float(self.time_s[-1] - self.time_s[0]),
+            "stroke_nm": self.extent_nm,
+            "uncertainty_nm": self.uncertainty_nm,
+            "rms_error_percent": None if errors is None else errors[0],
+            "worst_error_percent": None if errors is None else errors[1],
+        }
+
+    def csv(self) -> bytes:
+        """Return the table that ``-o`` writes."""
+        names, columns = ["time_s", "drive_v", "displacement_nm"], [self.time_s, self.volts, self.position_nm]
+        if self.measured_nm is not None and self.error_nm is not None:
+            names, columns = [*names, "measured_nm", "error_nm"], [*columns, self.measured_nm, self.error_nm]
+        rows = (
+            ",".join(f"{value:.10g}" for value in row) for row in zip(*(one.tolist() for one in columns), strict=True)
+        )
+        return ("\n".join([",".join(names), *rows]) + "\n").encode("ascii")
+
+    def summary(self) -> str:
+        """Return what ``tablegen predict`` prints."""
+        return "\n".join(self._lines())
+
+    def charts(self) -> PlottedCharts:
+        """Return the position over time, and the error where there is a measurement."""
+        curves = [DrawnCurve("predicted", "other", self.time_s, self.position_nm)]
+        charts = [Chart("position", "position", "time [s]", "position [nm]", tuple(curves))]
+        if self.error_nm is not None:
+            error = DrawnCurve("error", "other", self.time_s, self.error_nm)
+            charts.append(Chart("error", "predicted less measured", "time [s]", "error [nm]", (error,)))
+        return PlottedCharts(f"prediction of {self.axis}", tuple(charts))
+
+    def _lines(self) -> Sequence[str]:
+        span_s = float(self.time_s[-1] - self.time_s[0])
+        first = f"prediction of {self.axis}: {len(self.time_s)} samples, {span_s:.4g} s, start {self.start.value}"
+        bound = "its error is known with --against alone"
+        if self.uncertainty_nm is not None:
+            bound = f"rms error below {self.uncertainty_nm:.2g} nm if every period is like the last (90 %)"
+        lines = [first, f"stroke {self.extent_nm:.6g} nm, {bound}"]
+        errors = self.errors_percent
+        if errors is not None:
+            lines.append(f"measured: rms error {errors[0]:.3g} %, worst {errors[1]:.3g} % of the stroke")
+        return lines

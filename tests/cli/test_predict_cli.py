@@ -1,0 +1,53 @@
+"""``tablegen predict`` as a user runs it: a foreign piezo's own record, and bad input by name."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from editing import run
+from foreign_plants import SIX, BoucWen, ForeignPlant, record
+
+
+@pytest.fixture(scope="module")
+def scanner(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scanner file with an operator of x, and the largest record beside it."""
+    folder, plant, paths = tmp_path_factory.mktemp("predict"), ForeignPlant(BoucWen()), []
+    for number, at in enumerate(SIX):
+        columns = record(plant, *at, seed=number, samples=400)
+        paths.append(folder / f"t{number}.csv")
+        np.savetxt(
+            paths[-1], np.column_stack(columns), "%.9g", ",", header="time_s,drive_v,displacement_nm", comments=""
+        )
+    assert run("init", folder / "demo").status == 0
+    path = folder / "demo" / "scanner.toml"
+    done = run("calibrate", "operator", "--axis", "x", *paths, "--scanner", path, "--write")
+    assert done.status == 0, done.err
+    return path
+
+
+@pytest.mark.common
+def test_record_is_predicted_and_bad_input_is_named(scanner: Path, tmp_path: Path) -> None:
+    trace, out = scanner.parent.parent / "t3.csv", tmp_path / "p.csv"
+    done = run("predict", scanner, trace, "--axis", "x", "--against", trace, "--start", "settled", "-o", out)
+    assert done.status == 0, done.err
+    rows = np.genfromtxt(out, delimiter=",", names=True)
+    error = rows["error_nm"]
+    assert float(np.std(error)) < 0.01 * float(np.ptp(rows["measured_nm"]))
+    assert "rms error below" in done.out
+    rest = run("predict", scanner, trace, "--axis", "x", "--against", trace, "--json")
+    figures = json.loads(rest.out)
+    assert (figures["start"], figures["uncertainty_nm"]) == ("rest", None)
+    assert figures["rms_error_percent"] > 100.0 * float(np.std(error)) / float(np.ptp(rows["measured_nm"]))
+    time, volts = rows["time_s"], rows["drive_v"]
+    for name, bad_time, bad_volts, why in (
+        ("time", time[::-1], volts, "line 3|:3:"),
+        ("beyond", time, 3.0 * volts, "--drive-gain"),
+        ("still", time, 0.0 * volts + 50.0, "moves by 0 V"),
+    ):
+        path = tmp_path / f"{name}.csv"
+        np.savetxt(path, np.column_stack([bad_time, bad_volts]), "%.9g", ",", header="time_s,drive_v", comments="")
+        refused = run("predict", scanner, path, "--axis", "x")
+        assert refused.status == 2
+        assert any(part in refused.err for part in why.split("|")), refused.err
+    assert "calibrate operator --axis y" in run("predict", scanner, trace, "--axis", "y").err
