@@ -208,6 +208,8 @@ def check_constant(fit: PeriodicScan, constant_nm: float, has_size: bool) -> Non
 
     Parameters
     ----------
+    constant_nm
+        Constant of the lattice, or the pitch of its densest rows, in nm.
     has_size
         True if the file has a size, with which another cell would have been refused.
 

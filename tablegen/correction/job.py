@@ -430,6 +430,7 @@ def by_fit(
         else:
             has_size = first.width_nm is not None and first.height_nm is not None
             aspect = (first.height_nm or 1.0) / (first.width_nm or 1.0) if has_size else rows / columns
+            check_constant(fit, pitch_nm or 0.0, first.width_nm is not None)
             distortion = fit.of_pitch(pitch_nm or 0.0, aspect)
             record["pitch_nm"] = pitch_nm
         size = distortion.x_range[1] - distortion.x_range[0], distortion.y_range[1] - distortion.y_range[0]

@@ -19,10 +19,8 @@ _CLIPPED_STEP = 0.01  # share of the heights' range: heights this near to a limi
 _CLIPPED_SPIKE = 4.0  # times the pixels next to it
 _MAX_LINE_POWER = 100.0  # times the usual power of a line
 _FLAT, _MANY_FLAT = 1e-9, 0.02  # share of the largest power of a line; share of all lines
-_MAX_SIZE_RATIO = {
-    "line": 1.4,
-    "frame": 1.6,
-}  # of the measured and the nominal size: below the root of two, and of three
+# Of the measured and the nominal size: below the root of two and of three. Drift changes the height, not the width.
+_MAX_SIZE_RATIO = {"line": 1.4, "frame": 1.6}
 _STRIPS = 8  # of the columns, in each of which trace and retrace are matched
 _REACH = 0.12  # share of the columns: largest distance of trace and retrace in the search
 _MIRRORED = 1.5, 0.25  # ratio to the straight match, and least correlation, of a mirrored retrace

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from test_operator_waveform import THRESHOLDS, WEIGHTS, operator
+from test_operator_waveform import operator, stepped
 
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.in_time import OperatorInTime, late_mode, resonant
-from tablegen.compensation.operator.plays import FIXED_BENDS, envelopes
 from tablegen.numerics.arrays import Floats
 
 
@@ -27,18 +26,6 @@ def test_settled_line_is_the_closed_form(low: float, stroke: float, turn: int, f
     expected = loop.extent_nm * np.where(rising, loop.position(u[:100], True), loop.position(u[:100], False))
     y = OperatorInTime(operator()).hysteresis(u)
     assert np.max(np.abs(y[200:] - expected)) < 1e-9 * loop.extent_nm
-
-
-def stepped(u: Floats) -> Floats:
-    """The plays of ``operator()`` by their definition, after one repetition of the drive."""
-    transforms = [envelopes(u, bend)[0] for bend in FIXED_BENDS]
-    state, out = np.zeros((3, len(THRESHOLDS))), np.empty(len(u))
-    for _ in range(2):
-        for k in range(len(u)):
-            g = np.array([[transform[k]] for transform in transforms])
-            state = np.minimum(np.maximum(state, g - THRESHOLDS), g + THRESHOLDS)
-            out[k] = float(np.sum(WEIGHTS * state)) + 700.0 * u[k] + 60.0 * u[k] ** 2
-    return out
 
 
 @given(st.lists(st.floats(0.05, 0.95), min_size=3, max_size=12))

@@ -40,6 +40,19 @@ def weak(constant_nm: float, lowest: float, times: Times) -> Surface:
     return height
 
 
+@pytest.mark.parametrize(("times", "lowest"), [("root of 3", 0.05), ("root of 3", 0.6), ("2", 0.6), ("3", 0.6)])
+def test_a_pitch_that_may_be_that_of_the_strong_spots_is_refused(
+    times: str, lowest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The densest rows of which cell have this pitch?"""
+    monkeypatch.chdir(tmp_path)
+    save_pair(old_frame("paper", surface=weak(50.0 * TIMES[times][0], lowest, TIMES[times]), **SHAPE), tmp_path)
+    outcome = run("correct", "trace.npy", "retrace.npy", "--fit", "--pitch-nm", "43.3", "-o", "o.gwy")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "43.3 nm may be the constant of the whole cell, or of one with 1/" in outcome.err
+    assert not (tmp_path / "o.gwy").exists()
+
+
 @pytest.mark.parametrize(("times", "lowest"), [("root of 3", 0.05), ("root of 3", 0.6), ("2", 0.05), ("3", 0.05)])
 def test_weak_lowest_spots_are_seen_and_nothing_is_written(
     times: str, lowest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
