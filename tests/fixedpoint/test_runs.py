@@ -76,7 +76,7 @@ def check_every_tick_is_in_its_run(program: Program) -> None:
     assert np.array_equal(np.repeat(split.codes, split.lengths), codes)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.one_of(programs(), splines()))
 def test_every_tick_is_in_its_run(program: Program) -> None:
     check_every_tick_is_in_its_run(program)
@@ -188,6 +188,7 @@ def check_parts_do_not_show(program: Program, size: int) -> None:
     assert np.array_equal(parts.codes, whole.codes)
 
 
+@pytest.mark.common
 @settings(max_examples=5, deadline=None)
 @given(st.one_of(programs(), splines()), st.integers(1, 40))
 def test_parts_do_not_show(program: Program, size: int) -> None:
