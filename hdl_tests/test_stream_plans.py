@@ -94,7 +94,7 @@ def test_the_longest_table(tmp_path: Path) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("low_area", [0, 1])
+@pytest.mark.parametrize("low_area", common([0], [0, 1]))
 def test_a_plan_from_its_fourier_words(low_area: int, tmp_path: Path) -> None:
     """The swap is from the uploaded plan to the same, rendered from a fiftieth of the words: no code may differ."""
     plan = planned(tmp_path, PLANS["settle_0"])

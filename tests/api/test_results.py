@@ -75,6 +75,7 @@ def test_image_files_are_listed_and_read(lab: Path) -> None:
     assert tablegen.read_image("t.npy").retrace is None
 
 
+@pytest.mark.common
 def test_a_scan_is_compared_and_its_tables_are_listed_as_by_the_commands(lab: Path) -> None:
     text = (lab / "scan.toml").read_text("utf-8").replace("size_nm = 200", "size_nm = 210", 1)
     (lab / "other.toml").write_text(text, "utf-8")

@@ -8,7 +8,8 @@ from building import REPOSITORY
 from page_script import Shown, different, run_page, script_of
 
 DOCS = REPOSITORY / "docs"
-NEEDS = {"start/firmware.md": "rest"}  # a cross compiler and an emulator
+# A cross compiler and an emulator; the longest simulation of a page, where the tutorial has a shorter one.
+NEEDS = {"start/firmware.md": "rest", "start/fpga.md": "rest"}
 PAGES = [
     "tutorial.md",
     "start/microscopist.md",

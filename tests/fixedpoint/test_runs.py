@@ -58,9 +58,7 @@ def splines(draw: st.DrawFn) -> Program:
     return replace(program, mode="cubic", bits=bits, words=words)
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.one_of(programs(), splines()))
-def test_every_tick_is_in_its_run(program: Program) -> None:
+def check_every_tick_is_in_its_run(program: Program) -> None:
     ticks = np.arange(program.ticks)
     codes = program.codes(ticks)
     with pytest.MonkeyPatch.context() as patch:
@@ -76,6 +74,19 @@ def test_every_tick_is_in_its_run(program: Program) -> None:
     split = runs.split_at(k)
     assert np.isin(k, split.starts).all()
     assert np.array_equal(np.repeat(split.codes, split.lengths), codes)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.one_of(programs(), splines()))
+def test_every_tick_is_in_its_run(program: Program) -> None:
+    check_every_tick_is_in_its_run(program)
+
+
+@pytest.mark.rest
+@settings(max_examples=150, deadline=None)
+@given(st.one_of(programs(), splines()))
+def test_every_tick_is_in_its_run_of_many(program: Program) -> None:
+    check_every_tick_is_in_its_run(program)
 
 
 @settings(max_examples=30, deadline=None)
@@ -112,9 +123,7 @@ def test_codes_finer_than_samples(program: Program, doubled: int, sign: int) -> 
     assert len(runs.starts) <= np.count_nonzero(np.diff(codes)) + len(program.words)
 
 
-@settings(max_examples=100, deadline=None)
-@given(splines())
-def test_pieces_of_splines(program: Program) -> None:
+def check_pieces_of_splines(program: Program) -> None:
     """They cover every fraction of every segment once, their samples are those of the spline, and they rise or fall."""
     count = 0
     for pieces in pieces_of(program):
@@ -131,9 +140,20 @@ def test_pieces_of_splines(program: Program) -> None:
     assert len(program.words) <= count <= most_levels(program)
 
 
+@settings(max_examples=15, deadline=None)
+@given(splines())
+def test_pieces_of_splines(program: Program) -> None:
+    check_pieces_of_splines(program)
+
+
+@pytest.mark.rest
 @settings(max_examples=100, deadline=None)
 @given(splines())
-def test_runs_of_splines_are_no_more_than_their_bound(program: Program) -> None:
+def test_pieces_of_splines_of_many(program: Program) -> None:
+    check_pieces_of_splines(program)
+
+
+def check_runs_of_splines_are_no_more_than_their_bound(program: Program) -> None:
     """So that pieces are given up for ticks before they take memory; and pieces do not show in the runs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "_MIN_TICKS_PER_RUN", 0)
@@ -143,9 +163,20 @@ def test_runs_of_splines_are_no_more_than_their_bound(program: Program) -> None:
     assert len(runs.starts) <= changes + len(program.words)
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.one_of(programs(), splines()), st.integers(1, 40))
-def test_parts_do_not_show(program: Program, size: int) -> None:
+@settings(max_examples=6, deadline=None)
+@given(splines())
+def test_runs_of_splines_are_no_more_than_their_bound(program: Program) -> None:
+    check_runs_of_splines_are_no_more_than_their_bound(program)
+
+
+@pytest.mark.rest
+@settings(max_examples=100, deadline=None)
+@given(splines())
+def test_runs_of_splines_are_no_more_than_their_bound_of_many(program: Program) -> None:
+    check_runs_of_splines_are_no_more_than_their_bound(program)
+
+
+def check_parts_do_not_show(program: Program, size: int) -> None:
     """However many levels, and pieces, are worked out together, the runs are the same."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "_MIN_TICKS_PER_RUN", 0)
@@ -155,6 +186,20 @@ def test_parts_do_not_show(program: Program, size: int) -> None:
         parts = runs_of(program)
     assert np.array_equal(parts.starts, whole.starts)
     assert np.array_equal(parts.codes, whole.codes)
+
+
+@pytest.mark.common
+@settings(max_examples=5, deadline=None)
+@given(st.one_of(programs(), splines()), st.integers(1, 40))
+def test_parts_do_not_show(program: Program, size: int) -> None:
+    check_parts_do_not_show(program, size)
+
+
+@pytest.mark.rest
+@settings(max_examples=30, deadline=None)
+@given(st.one_of(programs(), splines()), st.integers(1, 40))
+def test_parts_do_not_show_of_many(program: Program, size: int) -> None:
+    check_parts_do_not_show(program, size)
 
 
 @pytest.mark.parametrize(("mode", "bits"), [("interpolated", 16), ("cubic", 16), ("cubic", 14)])

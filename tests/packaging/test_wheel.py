@@ -67,14 +67,14 @@ def test_installed_wheel_verifies_a_build(installed: Path, tmp_path: Path) -> No
     """Outside the repository: command, simulation and the cocotb side inside the simulator are those of the wheel."""
     python(tmp_path, "-m", "tablegen", "init", "scan", path=installed)
     python(tmp_path, "-m", "tablegen", "build", f"scan/{EXAMPLE.name}", "-o", "out", path=installed)
-    shown = python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, path=installed)
+    shown = python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, "--axis", "blocks", path=installed)
     assert shown.splitlines()[-1].startswith("out: verified, ")
     # Negative control: without its cocotb side the copy fails, so that nothing came from the tree.
     copy = tmp_path / "copy"
     shutil.copytree(installed, copy)
     (copy / "tablegen" / "verification" / "verilog" / "cocotb_stream.py").unlink()
     with pytest.raises(AssertionError, match="simulation: "):
-        python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, path=copy)
+        python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, "--axis", "blocks", path=copy)
 
 
 def test_installed_command_is_the_module(installed: Path, tmp_path: Path) -> None:

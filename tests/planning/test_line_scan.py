@@ -72,9 +72,9 @@ def test_verify_of_the_files_agrees_and_finds_a_y_that_is_said_to_rest(built: Pa
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("target", ["c", "verilog"])
-def test_c_and_verilog_play_it(built: Path, target: str) -> None:
-    outcome = run("verify", built / "out", "--target", target, "--ticks", "20000")
+@pytest.mark.parametrize("options", [("c",), ("verilog", "--axis", "blocks")], ids=["c", "verilog"])
+def test_c_and_verilog_play_it(built: Path, options: tuple[str, ...]) -> None:
+    outcome = run("verify", built / "out", "--target", *options, "--ticks", "20000")
     assert outcome.status == 0, outcome.out + outcome.err
 
 

@@ -167,11 +167,11 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("target", ["verilog", "c"])
-def test_such_a_build_verifies(target: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("options", [("verilog", "--axis", "blocks"), ("c",)], ids=["verilog", "c"])
+def test_such_a_build_verifies(options: tuple[str, ...], tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, "timing.lines = 6", *at("x")))
     assert run("build", path, "-o", tmp_path / "out", "-q").status == 0
-    outcome = run("verify", tmp_path / "out", "--target", target)
+    outcome = run("verify", tmp_path / "out", "--target", *options)
     assert outcome.status == 0, outcome.err
 
 

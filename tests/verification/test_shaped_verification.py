@@ -154,7 +154,7 @@ def test_the_c_plays_shaped_codes(played: Path) -> None:
 
 @pytest.mark.common
 def test_the_verilog_plays_shaped_codes(played: Path) -> None:
-    all_shaped(run("verify", played, "--sim", "icarus"))
+    all_shaped(run("verify", played, "--sim", "icarus", "--axis", "blocks"))
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,13 @@ def test_the_verilog_plays_shaped_codes(played: Path) -> None:
     [
         ("dac_run.h", r"next.older = last.newest;", "next.older = last.older;", ("--target", "c")),
         ("dac_run.h", r"\) >> 6\)", ") >> 5)", ("--target", "c")),
-        pytest.param("dac_shaper.v", "product - ", "product + ", ("--sim", "icarus"), marks=pytest.mark.common),
+        pytest.param(
+            "dac_shaper.v",
+            "product - ",
+            "product + ",
+            ("--sim", "icarus", "--axis", "blocks"),
+            marks=pytest.mark.common,
+        ),
     ],
 )
 def test_a_sequencer_that_shapes_otherwise_is_found(

@@ -8,12 +8,14 @@ import json
 import re
 import signal
 import sys
+from contextlib import nullcontext
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
+from kept_plays import kept_plays
 from sets import quick
 from verifying import (
     check_first_difference,
@@ -60,13 +62,31 @@ MODES = (
 )
 
 
-# Of these a build is verified by `make test`; together they have both modes of tables, steps, and words of all widths.
-COMMON_MODES = ("bits_24", "narrow_table_wide_dac", "direct_steps", "turn_0.7", "left_aligned")
-OTHER_MODES = [pytest.param(name, marks=pytest.mark.rest) for name in MODES if name not in ("example", *COMMON_MODES)]
+# By `make test` some are verified; together they have both modes of tables, steps, and words of all widths.
+# Of some only on multiplier blocks; widths are what the look-up tables go by.
+ON_BLOCKS = ("turn_0.7", "left_aligned", "narrow_table_wide_dac")
+PLACED = [
+    *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "bits_24", "direct_steps")]),
+    *(pytest.param((name, "blocks"), marks=pytest.mark.common) for name in ON_BLOCKS),
+    *(
+        pytest.param((name, "pipelined"), marks=pytest.mark.rest)
+        for name in MODES
+        if name not in ("example", "bits_24", "direct_steps")
+    ),
+]
+
+# One edit for two tests, which share its play; what is in the comment ends a text of XML.
+ROUNDED_DOWN = ("1'b1} + step", "1'b0} + step  /* <&]]> */")
 
 
 def verify(folder: Path, *arguments: str | Path | int, ticks: int = TICKS) -> Outcome:
-    return run("verify", folder, "--ticks", str(ticks), *map(str, arguments))
+    """Verify with multiplier blocks, which play twice as fast, unless the placement is given; a play is kept.
+
+    With ``--keep`` it is not, since the test is of what a play leaves.
+    """
+    placed = () if {"--axis", "--fourier", "--target"} & set(map(str, arguments)) else ("--axis", "blocks")
+    with nullcontext() if "--keep" in arguments else kept_plays():
+        return run("verify", folder, "--ticks", str(ticks), *placed, *map(str, arguments))
 
 
 def flip(path: Path, line: int, bit: int) -> None:
@@ -79,11 +99,12 @@ def flip(path: Path, line: int, bit: int) -> None:
 # What is right
 
 
-@pytest.mark.parametrize("name", [*quick(["example"], ["example", *COMMON_MODES]), *OTHER_MODES])
-def test_a_build_verifies(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("placed", PLACED, ids="-".join)
+def test_a_build_verifies(placed: tuple[str, str], tmp_path: Path) -> None:
     """Both modes of tables, steps, all widths of words and codes, turns."""
+    name, axis = placed
     built = build(tmp_path, VARIANTS[name])
-    outcome = verify(built.folder)
+    outcome = verify(built.folder, "--axis", axis)
     assert (outcome.status, outcome.err) == (0, "")
     assert set(verdicts(outcome).values()) == {"ok"}
     assert len(verdicts(outcome)) == CHECKS
@@ -94,8 +115,8 @@ def test_a_build_verifies(name: str, tmp_path: Path) -> None:
 @pytest.mark.common
 def test_a_whole_frame_verifies(short: Build) -> None:
     """Codes of all of a line and of a frame, frames that follow, a swap in mid-frame; by any seed."""
-    for seed in (1, 2):
-        outcome = verify(short.folder, "--seed", seed, ticks=300000)
+    for seed, axis in ((1, "pipelined"), (2, "blocks")):
+        outcome = verify(short.folder, "--seed", seed, "--axis", axis, ticks=300000)
         assert (outcome.status, outcome.err) == (0, "")
         assert "note:" not in outcome.out
         table = " ".join(outcome.out.split())
@@ -119,7 +140,7 @@ def test_verilator_finds_the_same(folder: Path, tmp_path: Path) -> None:
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
     outcome = verify(folder, "--sim", "verilator")
     assert outcome.status == 5
-    on_icarus = verify(folder)
+    on_icarus = verify(folder, "--axis", "pipelined")
     assert differing(outcome) == differing(on_icarus)
     assert verdicts(outcome) == verdicts(on_icarus)
 
@@ -141,7 +162,9 @@ def test_what_was_not_played_is_said(short: Build) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 15), ("y", 100, 8)])
+@pytest.mark.parametrize(
+    ("axis", "at", "bit"), [pytest.param("x", 70, 6, marks=pytest.mark.rest), ("x", 250, 15), ("y", 100, 8)]
+)
 def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     """A bit of the word of that tick."""
     program: Program = getattr(read_build(folder).program, axis)
@@ -230,7 +253,7 @@ def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) 
 @pytest.mark.common
 def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
     """Rounding down in place of to the nearest: one code too low here and there, told with tick, expected and got."""
-    edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
+    edit(folder / "dac_interpolator.v", *ROUNDED_DOWN)
     outcome = verify(folder)
     assert outcome.status == 5
     assert {("files", "SHA-256 in the manifest"), ("y", "integer model")} <= failed(outcome)
@@ -442,7 +465,7 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
 
 @pytest.mark.common
 def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
-    edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step  /* <&]]> */")
+    edit(folder / "dac_interpolator.v", *ROUNDED_DOWN)
     report = tmp_path / "verify.xml"
     outcome = verify(folder, "--junit", report)
     told = read_report(report)
@@ -533,7 +556,7 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
         pytest.param(["--axis", "blocks"], 24, marks=pytest.mark.rest),
         pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
         (["--axis", "blocks", "--fourier"], 24),
-        (["--axis", "serial", "--fourier"], 41),
+        pytest.param(["--axis", "serial", "--fourier"], 41, marks=pytest.mark.rest),
         (["--fourier"], 36),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -104,9 +104,9 @@ def test_the_slew_of_one_amplifier_is_the_guard_of_its_axis_alone(mixed: Build) 
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("target", ["c", "verilog"])
-def test_both_sequencers_play_it(mixed: Build, target: str) -> None:
-    outcome = run("verify", mixed.folder, "--target", target)
+@pytest.mark.parametrize("options", [("c",), ("verilog", "--axis", "blocks")], ids=["c", "verilog"])
+def test_both_sequencers_play_it(mixed: Build, options: tuple[str, ...]) -> None:
+    outcome = run("verify", mixed.folder, "--target", *options)
     assert outcome.status == 0, outcome.out + outcome.err
 
 

@@ -156,7 +156,7 @@ def test_verilog_alone_is_verified_as_verilog(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("build", write_pair(tmp_path), "-o", out, "-f", "verilog").status == 0
     assert {path.suffix for path in out.iterdir()} == {".v", ".vh", ".mem", ".json"}
-    outcome = run("verify", "--ticks", "3000", out)
+    outcome = run("verify", "--ticks", "2000", "--axis", "blocks", out)
     assert outcome.status == 0, outcome.err
     assert "verilog header" in outcome.out
     refused = run("verify", "--target", "c", out)
