@@ -27,7 +27,7 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
     ]
     verdict = TableCell(f"{both.verdict}.", "good" if both.same else "quiet")
     title = "{} and {}".format(*both.titles)
-    foot = f"Made by tablegen {__version__}. All is computed from the files; nothing is measured."
+    foot = f"Made by tablegen {__version__}. All is computed from the files."
     return document(title, verdict, both.findings, sections, "", foot)
 
 

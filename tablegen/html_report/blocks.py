@@ -1,5 +1,6 @@
 """The contents of a page before they are HTML: sections of texts, tables, charts and pictures."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -52,6 +53,23 @@ class Charts:
 
 
 @dataclass(frozen=True)
+class ScaleBar:
+    """A length in the lower left of a picture: its share of the width, and its text with a unit."""
+
+    share: float
+    text: str
+
+    @classmethod
+    def of(cls, width_nm: float) -> "ScaleBar":
+        """Choose 1, 2 or 5 times a power of ten, at most three tenths of a width in nm."""
+        most = 0.3 * width_nm
+        power = 10.0 ** math.floor(math.log10(most))
+        length_nm = power * max(step for step in (1, 2, 5) if step * power <= most)
+        text = f"{length_nm / 1000:g} um" if length_nm >= 1000 else f"{length_nm:g} nm"
+        return cls(round(length_nm / width_nm, 4), text)
+
+
+@dataclass(frozen=True)
 class PagePicture:
     """A picture with the ideal positions of its features, in shares of width and height from the upper left."""
 
@@ -59,7 +77,8 @@ class PagePicture:
     address: str
     alternative: str
     sites: tuple[tuple[float, float], ...]
-    height: float = 1.0  # of the width
+    height: float  # of the width
+    bar: ScaleBar
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tablegen.charts.png import data_address, grey_png
-from tablegen.html_report.blocks import PagePicture, Paragraph, Pictures, Section
+from tablegen.html_report.blocks import PagePicture, Paragraph, Pictures, ScaleBar, Section
 from tablegen.html_report.playing import PlayedAxis
 from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
@@ -30,12 +30,13 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
         return None
     pictures, worst = [], []
     ratio = round(min(max(_size(planned.plan.y) / _size(planned.plan.x), 0.5), 2.0), 4)
+    bar = ScaleBar.of(_size(planned.plan.x))
     for name, one, other in pairs:
         images, error_percent = _images(planned, one, other, ratio)
         for side, image in images:
             alternative = f"{side} image of a lattice, {name} the correction of hysteresis"
             title = f"{name} correction, {side} (simulation)"
-            pictures.append(PagePicture(title, data_address(image[0]), alternative, image[1], ratio))
+            pictures.append(PagePicture(title, data_address(image[0]), alternative, image[1], ratio, bar))
         worst.append(f"{name} it by up to {error_percent:.3g} % of the image")
     grounds = [f"{'the operator' if one.on_operator else 'the laws of the scanner file'}" for one in axes]
     where = f"x on {grounds[0]}, y on {grounds[1]}" if grounds[0] != grounds[1] else f"both axes on {grounds[0]}"

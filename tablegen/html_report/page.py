@@ -71,7 +71,10 @@ def page(subject: Subject, parts: list[Section]) -> bytes:
             "scanner, the usable area and the calibration as well."
         )
     title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
-    foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is computed from the scan; nothing is measured."
+    foot = (
+        f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is computed from the scan and the scanner file; what "
+        "is called measured stands in the scanner file."
+    )
     return document(title, _verdict(subject, findings), findings, parts, notice, foot, answers(subject))
 
 

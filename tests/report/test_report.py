@@ -19,6 +19,7 @@ from sets import quick
 
 from tablegen.base.input_errors import Problem
 from tablegen.charts.png import grey_png
+from tablegen.html_report.blocks import ScaleBar
 from tablegen.html_report.page import charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.ranking import ranked
@@ -397,3 +398,21 @@ def test_every_chart_is_in_the_page_once(subject: Subject) -> None:
     read = Page(page(subject, made).decode("utf-8"))
     assert {f"chart-{key}" for key in charts_of(made)} == {name for name in read.ids if name.startswith("chart-")}
     assert len(charts_of(made)) >= 20
+
+
+@pytest.mark.parametrize(
+    ("width_nm", "length_nm", "text"),
+    [(200.0, 50.0, "50 nm"), (0.9, 0.2, "0.2 nm"), (3400.0, 1000.0, "1 um"), (90000.0, 20000.0, "20 um")],
+)
+def test_a_scale_bar_is_a_round_part_of_the_width(width_nm: float, length_nm: float, text: str) -> None:
+    bar = ScaleBar.of(width_nm)
+    assert bar.share * width_nm == pytest.approx(length_nm, rel=1e-3)
+    assert bar.text == text
+    assert 0.1 < bar.share <= 0.3
+
+
+def test_pictures_have_scale_bars(found: tuple[bytes, Page]) -> None:
+    """A bar of 20 nm is an eighth of the window of 160 nm, in each of the four pictures."""
+    page = found[0].decode("utf-8")
+    bars = re.findall(r'<path class="bar" d="M40 \d+h(\d+)"/>\s*<text[^>]*>([^<]*)</text>', page)
+    assert bars == [("125", "20 nm")] * 4
