@@ -1,4 +1,4 @@
-"""``tablegen check``: check a scan without output, by the exit status."""
+"""``tablegen check``: check a scan, and write nothing."""
 
 from pathlib import Path
 
@@ -14,9 +14,9 @@ def check(scan: Path, strict: bool) -> None:
     """Check a scan file and its scanner file: syntax, physical limits, and the limits of the certificate.
 
     If both are correct it says so, with the error of each axis and the time of an image, as `tablegen show` does.
-    Otherwise it prints all errors to stderr, each as file:line: key: why. A
-    scaling error above 1 %, or above that of the uncompensated line, is a warning, with remedies that were tried; so is
-    a pixel whose positions in trace and retrace differ by more than a quarter of a pixel.
+    Otherwise it prints all errors to stderr, each as file:line: key: why. A scaling error above 1 %, or above that of
+    the uncompensated line, is a warning, with remedies that were tried; so is a pixel whose positions in trace and
+    retrace differ by more than a quarter of a pixel.
 
     \b
     Example:
@@ -26,4 +26,6 @@ def check(scan: Path, strict: bool) -> None:
     --strict, there is a warning.
     """
     built = planned(scan, strict=strict)
-    click.echo("\n".join([*built.brief(), f"{scan}: correct"]))
+    count = len(built.warnings)
+    result = f"{scan}: correct" + (f", with {count} warning{'s' if count > 1 else ''}" if count else "")
+    click.echo("\n".join([*built.brief(), result]))

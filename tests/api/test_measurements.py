@@ -132,7 +132,7 @@ def test_a_round_is_that_of_the_command(lab: Path, laboratory: tablegen.Laborato
     assert found.write() == []  # it is there already
     built = tablegen.build(of_arrays.setup)
     assert built.plan.x.layer is not None
-    assert f"{found.before_percent:.3g} % rms" in repr(found)
+    assert f"\n  x: {found.before_percent:.2g} % of the line = " in repr(found)
 
 
 def test_refining_stops_where_the_scaling_error_rises_and_keeps_the_best_layer(

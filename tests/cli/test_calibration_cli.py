@@ -88,7 +88,9 @@ def test_a_whole_calibration_is_accepted_by_check_and_builds(lab: Path) -> None:
     assert branch["backward"] == pytest.approx({"beta_max": 0.07, "rho": 1.2, "u_peak": 0.46}, rel=0.1)
     assert written["y"] == tomllib.loads(SCANNER)["y"]
     assert written["x"]["resonance"]["max_boost_db"] == 6.0
-    assert run("check", "scan.toml") == Outcome(0, "", "")
+    checked = run("check", "scan.toml")
+    assert (checked.status, checked.err) == (0, "")
+    assert checked.out.endswith("\nscan.toml: correct\n")
     assert run("build", "scan.toml", "-o", "out", "-q").status == 0
 
 

@@ -59,7 +59,9 @@ def test_a_scanner_file_from_images_builds(lab: Path) -> None:
     for v in AMPLITUDES:
         for name in (f"t{v:g}.npy", f"r{v:g}.npy"):
             assert f"# from {name}, sha256 {hashlib.sha256((lab / name).read_bytes()).hexdigest()[:16]}\n" in text
-    assert run("check", "scan.toml") == Outcome(0, "", "")
+    checked = run("check", "scan.toml")
+    assert (checked.status, checked.err) == (0, "")
+    assert checked.out.endswith("\nscan.toml: correct\n")
     assert run("build", "scan.toml", "-o", "out", "-q").status == 0
     again = calibrate("--scanner", "scanner.toml", "--write")
     assert again.out.splitlines()[-1] == "scanner.toml: x.hysteresis up to date"

@@ -29,12 +29,17 @@ def truth(folder: Path, *edits: str) -> Path:
     return path
 
 
+def heading(text: str) -> str:
+    """The first line after those of the error of each axis."""
+    return text.split("\n\n")[1].splitlines()[0]
+
+
 @pytest.mark.common
 def test_text_and_data_say_the_same(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     shown, plain = run("simulate", scan), run("simulate", scan, "--json")
     assert (shown.status, shown.err, plain.status, plain.err) == (0, "", 0, "")
-    assert "simulation" in shown.out.splitlines()[0]
+    assert "simulation" in heading(shown.out)
     assert shown.out.splitlines()[-1].startswith("A simulation, not a measurement")
     data = json.loads(plain.out)
     assert data["simulation"] is True
@@ -169,7 +174,7 @@ def test_a_scanner_of_another_range(tmp_path: Path) -> None:
     given = run(
         "simulate", tmp_path / "scan.toml", "--no-calibration", "--scanner-truth", truth(tmp_path, "v_max = 150")
     )
-    assert "virtual'" in given.out.splitlines()[0]
+    assert "virtual'" in heading(given.out)
     assert "scaled" not in given.out
 
 
@@ -178,7 +183,7 @@ def test_the_own_operator(tmp_path: Path) -> None:
     scan = write_operator_scan(tmp_path, operator_file())
     shown, plain, other = (run("simulate", scan, *extra) for extra in ((), ("--json",), ("--json", "--seed", "5")))
     assert (shown.status, shown.err, plain.status, plain.err) == (0, "", 0, "")
-    assert "simulation on the scanner file's own operator; 200 nm in x requested" in shown.out.splitlines()[0]
+    assert "simulation on the scanner file's own operator; 200 nm in x requested" in heading(shown.out)
     assert shown.out.splitlines()[-1].startswith("A simulation, not a measurement")
     assert "y     has no operator; --scanner-truth default" in shown.out
     data = json.loads(plain.out)

@@ -20,7 +20,8 @@ def test_a_good_scan_has_no_warning(tmp_path: Path) -> None:
     scan = write_pair(tmp_path)
     for command in (("check", scan), ("check", scan, "--strict")):
         found = run(*command)
-        assert (found.status, found.out, found.err) == (0, "", "")
+        assert (found.status, found.err) == (0, "")
+        assert found.out.endswith(f"\n{scan}: correct\n")
     built = run("build", scan, "-o", tmp_path / "build", "--strict")
     assert (built.status, built.err) == (0, "")
 
@@ -35,7 +36,9 @@ def test_build_check_and_show_warn_and_succeed(small: Path, tmp_path: Path) -> N
     assert y.startswith(f"warning: {small}:")
     assert ": y.size_nm: " in y
     check = run("check", small)
-    assert (check.status, check.out, check.err) == (0, "", build.err)
+    assert (check.status, check.err) == (0, build.err)
+    assert check.out.startswith("x: ")
+    assert check.out.endswith(f"\n{small}: correct, with 2 warnings\n")
     show = run("show", small, "--json")
     assert (show.status, show.err) == (0, build.err)
     assert json.loads(show.out)["hash"] == json.loads((tmp_path / "build" / "manifest.json").read_bytes())["hash"]

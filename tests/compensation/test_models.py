@@ -122,7 +122,7 @@ def test_it_is_built_shown_verified_and_simulated(pair: Path) -> None:
         assert certificate[side]["total"] < 0.5
         assert abs(certificate[side]["size"]) < 0.05
     assert "x.operator.json" in (pair / "out.d").read_text("utf-8")
-    shown = run("show", pair / "scan.toml")
+    shown = run("show", pair / "scan.toml", "--all")
     assert shown.status == 0
     assert "play; forward beta " in shown.out
     verified = run("verify", pair / "out", "--target", "files")

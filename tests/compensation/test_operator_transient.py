@@ -237,7 +237,7 @@ def test_auto_takes_the_lines_of_the_slower_axis(tmp_path: Path) -> None:
     assert [one is not None for one in found] == [True, True]
     assert plan.schedule.settle_lines == max(one.lines for one in found if one is not None)
     assert 50 < plan.schedule.settle_lines < 255
-    shown = run("show", str(scan), "--no-plot").out
+    shown = run("show", str(scan), "--no-plot", "--all").out
     assert f"settles           in {plan.schedule.settle_lines} lines after a change of offset of 10 V; drifts" in shown
     assert "nm in the first frame" in shown
     assert re.search(
@@ -245,13 +245,13 @@ def test_auto_takes_the_lines_of_the_slower_axis(tmp_path: Path) -> None:
     )
     fewer = make_plan(load(pair(tmp_path, "xy", "timing.settle_lines = 3")))
     assert fewer.schedule.settle_lines == 3
-    assert "after the 3 settle_lines that follow" in run("show", str(scan), "--no-plot").out
+    assert "after the 3 settle_lines that follow" in run("show", str(scan), "--no-plot", "--all").out
 
 
 @pytest.mark.common
 def test_lines_that_a_device_cannot_count_are_255_and_said(tmp_path: Path) -> None:
     scan = pair(tmp_path, "xy", "timing.line_rate_hz = 1000.0", "timing.lines = 1000", "timing.pixels = 150")
-    done = run("show", str(scan), "--no-plot")
+    done = run("show", str(scan), "--no-plot", "--all")
     assert "settles           in more than 255 lines after a change of offset of 10 V" in done.out
     assert "a frame after the 255 settle_lines that follow a change of offset of 10 V" in done.out
 
@@ -263,7 +263,7 @@ def test_auto_takes_one_operator_for_both_axes_and_says_what_is_not_known(tmp_pa
     found = settling("x", plan.x.drive, plan.schedule)
     assert found is not None
     assert plan.schedule.settle_lines == found.lines > 1
-    shown = run("show", str(scan), "--no-plot").out
+    shown = run("show", str(scan), "--no-plot", "--all").out
     assert shown.count("settles           in ") == 1
     assert "settles           not known: there is no operator of y" in shown
 

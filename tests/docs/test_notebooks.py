@@ -171,7 +171,7 @@ def test_the_calibration_helps_and_says_where_it_is_from() -> None:
 
 @pytest.mark.common
 def test_three_rounds_take_the_error_away() -> None:
-    residuals = numbers(r"residual ([\d.]+) % rms, [\d.]+ % predicted", said("refine"))
+    residuals = numbers(r"x: ([\d.]+) % of the line = ", said("refine"))
     assert len(residuals) == 3
     assert residuals[2] < 0.2 * residuals[0]
     assert "build, upload and record again" in said("refine")  # a trace is used once

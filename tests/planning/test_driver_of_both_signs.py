@@ -193,7 +193,7 @@ def test_the_tubes_page_and_terminal_speak_of_its_range(tmp_path: Path) -> None:
     scan = changed(TUBE, {"timing.lines": 20, "y.band_limit.harmonics": 16, "limits": REMOVED})
     (tmp_path / "scan.toml").write_text(to_toml(scan), "utf-8")
     (tmp_path / "tube_scanner.toml").write_bytes((EXAMPLES / "tube_scanner.toml").read_bytes())
-    shown = run("show", tmp_path / "scan.toml")
+    shown = run("show", tmp_path / "scan.toml", "--all")
     assert shown.status == 0, shown.err
     assert "187.325 V   0.425739 of v_max - v_min, (9) (12)" in shown.out
     assert run("report", tmp_path / "scan.toml", "-o", tmp_path / "page.html").status == 0

@@ -88,7 +88,7 @@ def test_a_device_takes_and_plays_the_upload(built: Path, form: str) -> None:
 
 
 def test_page_and_text_show_x_alone(built: Path) -> None:
-    shown = run("show", built / "scan.toml")
+    shown = run("show", built / "scan.toml", "--all")
     assert shown.status == 0
     assert "rests             at 40 V" in shown.out
     assert "y drive [V]" not in shown.out

@@ -98,14 +98,14 @@ def test_what_remains_is_said(tmp_path: Path) -> None:
     assert worst == HALF / 625
     assert retrace_mismatch(schedule, 0.5) == pytest.approx(float(worst), rel=1e-12)
     setup_of(tmp_path)
-    shown = run("show", tmp_path / "scan.toml", "--no-plot").out
+    shown = run("show", tmp_path / "scan.toml", "--no-plot", "--all").out
     assert (
         "imaged are ticks 62..561 and 688..1187; a pixel's places in trace and retrace are up to 0.08 % of the" in shown
     )
     assert "a timing.ticks_per_line of 1000 or 1500 makes them match" in shown
     for ticks in ("1000", "1500"):
         setup_of(tmp_path, {"timing.ticks_per_line": ticks})
-        shown = run("show", tmp_path / "scan.toml", "--no-plot").out
+        shown = run("show", tmp_path / "scan.toml", "--no-plot", "--all").out
         assert "are up to 0.000 % of the line apart" in shown
         assert "makes them match" not in shown
     assert run("check", tmp_path / "scan.toml").err == ""
@@ -115,5 +115,5 @@ def test_what_remains_is_said(tmp_path: Path) -> None:
     assert warned.status == 0
     assert "timing.ticks_per_line: the same pixel of trace and retrace shows places up to 0.08 % of" in warned.err
     setup_of(tmp_path, {"x.band_limit.directions": '"forward"'})
-    shown = run("show", tmp_path / "scan.toml", "--no-plot").out
+    shown = run("show", tmp_path / "scan.toml", "--no-plot", "--all").out
     assert "imaged are ticks 62..561\n" in shown

@@ -157,7 +157,7 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
     assert "4 harmonics learnt" in header
     assert "takes away" in header
     path = write_pair(tmp_path, edited(SCAN, *at("x")))
-    assert "refined forward   moves up to" in run("show", path, "--no-plot").out
+    assert "refined forward   moves up to" in run("show", path, "--no-plot", "--all").out
     built = run("build", path, "-o", tmp_path / "out")
     assert "x     refinement, backward: moves up to" in built.out
     stored = read_build(tmp_path / "out")
