@@ -25,6 +25,7 @@ from tablegen.images.formats.asd import asd_channels
 from tablegen.images.formats.channel import Channel, rotation_deg, split_direction
 from tablegen.images.formats.createc import createc_channels
 from tablegen.images.formats.h5_jpk import h5_jpk_channels
+from tablegen.images.formats.hdf5 import Hdf5Object, hdf5_members, hdf5_object
 from tablegen.images.formats.igor import ibw_channels
 from tablegen.images.formats.iso28600 import iso_channels
 from tablegen.images.formats.jpk import jpk_channels
@@ -122,7 +123,7 @@ def test_other_scales_and_grids_of_a_jpk_file_of_hdf5() -> None:
     assert np.array_equal(unscaled.load(1), h5_jpk_steps(0, 1))
     other, *_ = h5_jpk_channels(with_attribute(content, "theta", "<d", -0.0), "a")
     assert str(other.angle_deg) == "0.0"
-    reflected = re.sub(rb"(grid\.reflect\0.{20,40}?)false", rb"\1true\0", content, flags=re.DOTALL)
+    reflected = re.sub(rb"(grid\.reflect\0.{10,30}?)false", rb"\1true\0", content, flags=re.DOTALL)
     assert {one.first_row for one in h5_jpk_channels(reflected, "a")} == {"top"}
 
 
@@ -147,6 +148,33 @@ def test_chunks_that_are_not_whole_are_refused(at: int, layout: str, value: int,
     struct.pack_into(layout, content, chunk_tree(bytes(content), 0) + at, value)
     with pytest.raises(ValueError, match=said):
         h5_jpk_channels(bytes(content), "a")[0].load(0)
+
+
+@pytest.mark.parametrize(
+    ("leaves", "members", "said"),
+    [
+        (50, 50, "a group of more members than it has room for"),
+        (60000, 1, "a tree of more entries than it has room for"),
+    ],
+)
+def test_a_group_has_no_more_members_than_the_file_has_room_for(leaves: int, members: int, said: str) -> None:
+    """Every leaf is the same one, so that few bytes would make many members."""
+    heap = b"HEAP" + bytes(4) + struct.pack("<3Q", 8, 0, 24) + bytes(8)
+    tree, leaf = len(heap), len(heap) + 24 + 16 * 50
+    content = heap + b"TREE" + struct.pack("<BBHQQ", 0, 0, leaves, 0, 0) + struct.pack("<QQ", 0, leaf) * 50
+    content += b"SNOD" + struct.pack("<BBH", 1, 0, members) + bytes(40 * members)
+    with pytest.raises(ValueError, match=said):
+        hdf5_members(content, Hdf5Object(((0x11, struct.pack("<QQ", tree, 0)),)))
+
+
+def test_a_header_that_goes_on_in_itself_and_one_of_many_messages_are_refused() -> None:
+    header = struct.pack("<BxHII4x", 1, 1, 1, 24)
+    circle = header + struct.pack("<HHB3xQQ", 0x10, 16, 0, 16, 24)
+    with pytest.raises(ValueError, match="has an object header that refers to itself"):
+        hdf5_object(circle, 0)
+    many = struct.pack("<BxHII4x", 1, 1, 1, 8 * 5000) + struct.pack("<HHB3x", 0, 0, 2) * 5000
+    with pytest.raises(ValueError, match="has an object header of more than 4096 messages"):
+        hdf5_object(many, 0)
 
 
 def test_a_chunk_is_unpacked_as_far_as_its_shape_says() -> None:

@@ -37,7 +37,10 @@ def h5_jpk_channels(content: bytes, _: str) -> list[Channel]:
     """
     channels: list[Channel] = []
     groups = hdf5_members(content, hdf5_root(content))
-    for name in sorted(one for one in groups if one.startswith(_MEASUREMENT)):
+    measurements = sorted(one for one in groups if one.startswith(_MEASUREMENT))
+    if len(measurements) > _MAX_CHANNELS:
+        raise ValueError(f"has {len(measurements)} measurements; at most {_MAX_CHANNELS} are read")
+    for name in measurements:
         measurement = hdf5_object(content, groups[name])
         attributes = measurement.attributes()
         members = hdf5_members(content, measurement)

@@ -18,7 +18,8 @@ from tablegen.images.formats.channel import MAX_PIXELS, Matrix
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 _MAX_BLOCKS = 1000  # of one header, and levels of a tree
-_MAX_MESSAGES = 100_000  # of one header
+_MAX_MESSAGES = 4096  # of one header
+_MAX_NAME = 1000  # bytes of a member's
 _MAX_RANK = 32
 _MAX_UNPACKED = 4 * MAX_PIXELS  # elements of the chunks of one image
 _DATASPACE, _DATATYPE, _LAYOUT, _FILTERS, _ATTRIBUTE, _CONTINUATION, _SYMBOLS = 0x01, 0x03, 0x08, 0x0B, 0x0C, 0x10, 0x11
@@ -91,16 +92,17 @@ class Hdf5Array:
         _check(min(high, wide) > 0 and high * wide <= MAX_PIXELS, f"has chunks of {high} x {wide} values; damaged?")
         _check(itemsize == self.dtype.itemsize, "has chunks of another type than its array")
         values = np.zeros(rows, self.dtype)
-        missing = set(range(0, rows, high))
+        missing = np.ones(-(-rows // high), np.bool_)
         _check(len(missing) * high * wide <= _MAX_UNPACKED, "has chunks far larger than its images; damaged?")
         for size, mask, row, column, at in _chunks(self.content, tree, 3):
-            if not column <= number < column + wide or row not in missing:
+            if not column <= number < column + wide or row % high or row >= rows or not missing[row // high]:
                 continue
-            missing.remove(row)
+            missing[row // high] = False
             stored = self._unpacked(_part(self.content, at, size), mask, high * wide * itemsize)
             chunk = np.frombuffer(stored, self.dtype).reshape(high, wide)
             values[row : row + high] = chunk[: rows - row, number - column]
-        _check(not missing, f"has no values from row {min(missing, default=0)} of its array on; was it all written?")
+        first = int(np.argmax(missing)) * high
+        _check(not np.any(missing), f"has no values from row {first} of its array on; was it all written?")
         return values
 
     def _unpacked(self, stored: bytes, mask: int, size: int) -> bytes:
@@ -154,11 +156,12 @@ def hdf5_object(content: bytes, address: int) -> Hdf5Object:
     _check(version == 1, "has an object header of an unknown version")
     blocks = [(address + 16, size)]
     messages: list[tuple[int, bytes]] = []
-    seen: set[int] = set()
+    count = 0
+    visited: set[int] = set()
     while blocks:
         at, size = blocks.pop(0)
-        _check(at not in seen and len(seen) < _MAX_BLOCKS, "has an object header that refers to itself")
-        seen.add(at)
+        _check(at not in visited and len(visited) < _MAX_BLOCKS, "has an object header that refers to itself")
+        visited.add(at)
         block = _part(content, at, size)
         inside = 0
         while inside + 8 <= len(block):
@@ -170,7 +173,8 @@ def hdf5_object(content: bytes, address: int) -> Hdf5Object:
                 blocks.append((start, length))
             elif not flags & _SHARED:
                 messages.append((kind, body))
-            _check(len(messages) <= _MAX_MESSAGES, f"has an object header of more than {_MAX_MESSAGES} messages")
+            count += 1
+            _check(count <= _MAX_MESSAGES, f"has an object header of more than {_MAX_MESSAGES} messages")
     return Hdf5Object(tuple(messages))
 
 
@@ -190,12 +194,15 @@ def hdf5_members(content: bytes, group: Hdf5Object) -> dict[str, int]:
     size, _, start = _numbers("<3Q", content, heap + 8)
     names = _part(content, start, size)
     members: dict[str, int] = {}
+    entry_bytes = 0
     for at in _leaves(content, tree):
         _check(_part(content, at, 4) == b"SNOD", "has a group without members; is it damaged?")
         (count,) = _numbers("<H", content, at + 6)
+        entry_bytes += 40 * count
+        _check(entry_bytes <= len(content), "has a group of more members than it has room for; is it damaged?")
         for entry in range(count):
             name, address, kind = _numbers("<QQI", content, at + 8 + 40 * entry)
-            stop = names.find(b"\0", name)
+            stop = names.find(b"\0", name, name + _MAX_NAME)
             _check(stop >= 0, "has a member without a name; is it damaged?")
             if kind != _SYMBOLIC_LINK:
                 members[names[name:stop].decode("utf-8", "replace")] = address
@@ -236,11 +243,12 @@ def _chunks(content: bytes, tree: int, rank: int) -> Iterator[tuple[int, int, in
 def _children(content: bytes, tree: int, kind: int, key_bytes: int) -> Iterator[tuple[bytes, int]]:
     """Yield key and address of what a tree has below its lowest nodes."""
     nodes: list[tuple[int, int | None]] = [(tree, None)]
-    seen = set()
+    visited = set()
+    entry_bytes = 0
     while nodes:
         at, expected = nodes.pop()
-        _check(at not in seen, "has a tree that refers to itself; is it damaged?")
-        seen.add(at)
+        _check(at not in visited, "has a tree that refers to itself; is it damaged?")
+        visited.add(at)
         own, level, count = _numbers("<BBH", content, at + 4)
         _check(
             _part(content, at, 4) == b"TREE" and own == kind,
@@ -248,6 +256,8 @@ def _children(content: bytes, tree: int, kind: int, key_bytes: int) -> Iterator[
         )
         _check(expected is None or level == expected, "has a tree whose levels do not fit; is it damaged?")
         step = key_bytes + 8
+        entry_bytes += count * step
+        _check(entry_bytes <= len(content), "has a tree of more entries than it has room for; is it damaged?")
         entries = _part(content, at + 24, count * step)
         pairs = [
             (entries[i : i + key_bytes], int.from_bytes(entries[i + key_bytes : i + step], "little"))
