@@ -3,7 +3,9 @@
 import random
 import re
 import struct
+import tracemalloc
 import warnings
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +15,7 @@ import pytest
 from gwyfile.objects import GwyContainer, GwyDataField
 from igor2 import binarywave
 from image_writers import gwy, npy
-from instrument_files import asd, createc, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
+from instrument_files import asd, createc, h5_jpk, h5_jpk_steps, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
 from mutating import damaged
 
 from tablegen.api.image_input import sample_image
@@ -22,6 +24,8 @@ from tablegen.images.files import ScanImage, channels_of, read_channels, read_im
 from tablegen.images.formats.asd import asd_channels
 from tablegen.images.formats.channel import Channel, rotation_deg, split_direction
 from tablegen.images.formats.createc import createc_channels
+from tablegen.images.formats.h5_jpk import h5_jpk_channels
+from tablegen.images.formats.hdf5 import Hdf5Object, hdf5_members, hdf5_object
 from tablegen.images.formats.igor import ibw_channels
 from tablegen.images.formats.iso28600 import iso_channels
 from tablegen.images.formats.jpk import jpk_channels
@@ -93,6 +97,102 @@ def test_a_retrace_alone_is_the_mirror_image_of_the_sample_and_said(tmp_path: Pa
     assert np.array_equal(sample.trace, ASYLUM["HeightRetrace"][:, ::-1].astype("f4"))
     assert sample.retrace is None
     assert sample.name.endswith("r.ibw (the retrace alone, mirrored)")
+
+
+def test_frames_and_facts_of_a_jpk_file_of_hdf5(tmp_path: Path) -> None:
+    """Of the file that h5py has written, with and without chunks; of a stopped scan the height of its rows."""
+    path = put(tmp_path, "a.h5-jpk", h5_jpk())
+    channels = channels_of(path)
+    assert [one.title for one in channels] == ["height trace", "measuredHeight trace", "height retrace"]
+    for channel in channels:
+        for frame in (0, 1):
+            image = read_image(path, channel.title, frame=frame)
+            assert np.array_equal(image.heights, h5_jpk_steps(channel.number, frame) * -2e-14 + 3e-7)
+            assert (image.unit, image.frames, image.first_row, image.line_rate_hz) == ("m", 2, "bottom", 40.0)
+            assert (image.width_nm, image.height_nm) == pytest.approx((150.0, 200.0 * 34 / 40))
+            assert image.angle_deg == pytest.approx(90.0)
+    trace, retrace = read_pair(path, channel="height", frame=1)
+    assert (trace.number, retrace.number) == (0, 2)
+    assert "choose one with --frame, 0 to 1" in why(path, "measuredHeight")
+
+
+def test_other_scales_and_grids_of_a_jpk_file_of_hdf5() -> None:
+    content = h5_jpk()
+    unscaled, *_ = h5_jpk_channels(content.replace(b"linear\0", b"cubics\0"), "a")
+    assert unscaled.unit == "LSB"
+    assert np.array_equal(unscaled.load(1), h5_jpk_steps(0, 1))
+    other, *_ = h5_jpk_channels(with_attribute(content, "theta", "<d", -0.0), "a")
+    assert str(other.angle_deg) == "0.0"
+    reflected = re.sub(rb"(grid\.reflect\0.{10,30}?)false", rb"\1true\0", content, flags=re.DOTALL)
+    assert {one.first_row for one in h5_jpk_channels(reflected, "a")} == {"top"}
+
+
+def chunk_tree(content: bytes, number: int) -> int:
+    """Where a tree of chunks begins, by its order in the file."""
+    return [found.start() for found in re.finditer(rb"TREE\x01\x00", content)][number]
+
+
+@pytest.mark.parametrize(
+    ("at", "layout", "value", "said"),
+    [
+        (24, "<I", 5, "has a packed chunk without its end"),
+        (32, "<Q", 500, "has no values from row 0 of its array on"),
+        (40, "<Q", 2, "has no values from row 0 of its array on"),
+        (56, "<Q", 1 << 40, "refers to a place behind its end"),
+        (6, "<H", 0, "has no values from row 0 of its array on"),
+        (5, "<B", 1, "has a tree of another kind|whose levels do not fit"),
+    ],
+)
+def test_chunks_that_are_not_whole_are_refused(at: int, layout: str, value: int, said: str) -> None:
+    content = bytearray(h5_jpk())
+    struct.pack_into(layout, content, chunk_tree(bytes(content), 0) + at, value)
+    with pytest.raises(ValueError, match=said):
+        h5_jpk_channels(bytes(content), "a")[0].load(0)
+
+
+@pytest.mark.parametrize(
+    ("leaves", "members", "said"),
+    [
+        (50, 50, "a group of more members than it has room for"),
+        (60000, 1, "a tree of more entries than it has room for"),
+    ],
+)
+def test_a_group_has_no_more_members_than_the_file_has_room_for(leaves: int, members: int, said: str) -> None:
+    """Every leaf is the same one, so that few bytes would make many members."""
+    heap = b"HEAP" + bytes(4) + struct.pack("<3Q", 8, 0, 24) + bytes(8)
+    tree, leaf = len(heap), len(heap) + 24 + 16 * 50
+    content = heap + b"TREE" + struct.pack("<BBHQQ", 0, 0, leaves, 0, 0) + struct.pack("<QQ", 0, leaf) * 50
+    content += b"SNOD" + struct.pack("<BBH", 1, 0, members) + bytes(40 * members)
+    with pytest.raises(ValueError, match=said):
+        hdf5_members(content, Hdf5Object(((0x11, struct.pack("<QQ", tree, 0)),)))
+
+
+def test_a_header_that_goes_on_in_itself_and_one_of_many_messages_are_refused() -> None:
+    header = struct.pack("<BxHII4x", 1, 1, 1, 24)
+    circle = header + struct.pack("<HHB3xQQ", 0x10, 16, 0, 16, 24)
+    with pytest.raises(ValueError, match="has an object header that refers to itself"):
+        hdf5_object(circle, 0)
+    many = struct.pack("<BxHII4x", 1, 1, 1, 8 * 5000) + struct.pack("<HHB3x", 0, 0, 2) * 5000
+    with pytest.raises(ValueError, match="has an object header of more than 4096 messages"):
+        hdf5_object(many, 0)
+
+
+def test_a_chunk_is_unpacked_as_far_as_its_shape_says() -> None:
+    """A chunk of 16 MB in its place takes the memory of a chunk of 4000 bytes."""
+    content = h5_jpk()
+    tree = chunk_tree(content, 0)
+    bomb = zlib.compress(bytes(1 << 24))
+    longer = bytearray(content + bomb)
+    struct.pack_into("<I", longer, tree + 24, len(bomb))
+    struct.pack_into("<I", longer, tree + 28, 0b101)  # deflate alone: no shuffle, no checksum
+    struct.pack_into("<Q", longer, tree + 56, len(content))
+    channel = h5_jpk_channels(bytes(longer), "a")[0]
+    tracemalloc.start()
+    with pytest.raises(ValueError, match="has a chunk of 4004 bytes, not 4000"):
+        channel.load(0)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 1 << 20
 
 
 @pytest.mark.parametrize("version", [0, 1, 2])
@@ -490,6 +590,7 @@ READERS: dict[str, tuple[bytes, Callable[[bytes, str], list[Channel]]]] = {
     "nid": (nid({"Z-Axis": (SMALL, SMALL)}, curves=True), nid_channels),
     "mdt": (mdt({"1F:Height": SMALL, "1B:Height": SMALL}), mdt_channels),
     "park": (park(SMALL), park_channels),
+    "h5-jpk": (h5_jpk(), h5_jpk_channels),
 }
 NOT_NEEDED = {"iso": 1, "dat": 40, "dat1": 32, "mdt": 0}  # bytes behind the last pixel that may be missing
 
@@ -511,7 +612,7 @@ def read_or_refused(reader: Callable[[bytes, str], list[Channel]], content: byte
 def test_a_file_that_ends_early_is_refused_wherever_it_ends(kind: str) -> None:
     content, reader = READERS[kind]
     whole = len(content)
-    step = {"spm": 7, "dat": 41, "dat1": 41}.get(kind, 1)  # headers most of which is empty
+    step = {"spm": 7, "dat": 41, "dat1": 41, "h5-jpk": 41}.get(kind, 1)  # headers most of which is empty
     assert read_or_refused(reader, content)
     needed = whole - NOT_NEEDED.get(kind, 0)
     assert [cut for cut in range(0, needed, step) if read_or_refused(reader, content[:cut])] == []
@@ -552,6 +653,15 @@ HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     "spm, curves": ("spm", lambda c: c.replace(b"\\*File list\r", b"\\*Force file list\r"), "of force curves"),
     "jpk, curves": ("jpk", lambda _: b"PK\x03\x04" + bytes(100), "is an archive of curves, not of images"),
     "jpk, tags": ("jpk", lambda _: flood_of_tags(), "more than 100000 tags"),
+    "h5-jpk, layout": ("h5-jpk", lambda c: c[:8] + b"\x02" + c[9:], "has a superblock of version 2"),
+    "h5-jpk, sides": ("h5-jpk", lambda c: with_attribute(c, "ilength", "<i", WORLD), "image of 2000000000 x 40"),
+    "h5-jpk, minus": ("h5-jpk", lambda c: with_attribute(c, "jlength", "<i", -40), "image of 40 x -40"),
+    "h5-jpk, columns": ("h5-jpk", lambda c: with_attribute(c, "ilength", "<i", 41), "has 1360 values x 2 frames"),
+    "h5-jpk, rows": ("h5-jpk", lambda c: with_attribute(c, "jlength", "<i", 33), "channel 'height' of 40 x 33"),
+    "h5-jpk, no sides": ("h5-jpk", lambda c: c.replace(b"grid.ilength", b"grid.elength"), "no whole number as"),
+    "h5-jpk, no array": ("h5-jpk", lambda c: c.replace(b"Height\0", b"Weight\0"), "no array of pixels x frames"),
+    "h5-jpk, tree": ("h5-jpk", lambda c: with_child(c, 136), "has a group without members"),
+    "h5-jpk, circle": ("h5-jpk", lambda c: with_child(c[:141] + b"\1" + c[142:], 136), "a tree that refers to itself"),
     "asd": ("asd1", lambda c: with_numbers(c, 36, WORLD), "2000000000 frames by its header and bytes for 2"),
     "asd, pixels": ("asd1", lambda c: with_numbers(c, 48, WORLD, WORLD), "has frames of 2000000000 x"),
     "asd, header": ("asd1", lambda c: with_numbers(c, 4, -4), "frames behind -4 bytes of header"),
@@ -583,6 +693,20 @@ HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
 def with_numbers(content: bytes, at: int, *values: int) -> bytes:
     """Numbers of four bytes in a header."""
     return content[:at] + struct.pack(f"<{len(values)}i", *values) + content[at + 4 * len(values) :]
+
+
+def with_attribute(content: bytes, name: str, layout: str, value: float) -> bytes:
+    """Another number of the grid in a JPK file of HDF5, at the end of the attribute's message."""
+    at = content.index(f"position-pattern.grid.{name}\0".encode())
+    message = at - 16  # two headers of 8 bytes before the name
+    (size,) = struct.unpack_from("<H", content, message + 2)
+    start = message + 8 + size - 8  # numbers fill 8 bytes
+    return content[:start] + struct.pack(layout, value) + content[start + struct.calcsize(layout) :]
+
+
+def with_child(content: bytes, address: int) -> bytes:
+    """Another address as the first child of the tree of the root group, which is at byte 136."""
+    return content[:168] + struct.pack("<Q", address) + content[176:]
 
 
 def summed(content: bytes, layout: str, at: int, *values: int) -> bytes:

@@ -4,9 +4,12 @@ Heights are rows x columns, row 0 first in time and the left end of the line at 
 writer stores them as the instrument does.
 """
 
+import json
 import struct
 import zlib
+from base64 import b85decode
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -350,3 +353,19 @@ def park(
         far += value
     out += struct.pack("<H", len(entries)) + b"".join(entries[code] for code in sorted(entries)) + bytes(4) + far
     return bytes(out)
+
+
+def h5_jpk() -> bytes:
+    """JPK's HDF5, by h5py with the old layout: height and measuredHeight, then the retrace of height, 2 frames each.
+
+    A stopped scan of 34 of 40 rows, 40 columns, at 90 degrees. The first array has chunks of (500, 2) with a checksum,
+    the second no chunks, the third chunks of a frame, as JPK has. The integers are those of `h5_jpk_steps`.
+    """
+    stored = json.loads(Path(__file__).with_name("h5_jpk.json").read_text("utf-8"))["lines"]
+    return zlib.decompress(b85decode("".join(stored)))
+
+
+def h5_jpk_steps(channel: int, frame: int) -> Floats:
+    """The integers of a channel of `h5_jpk`; a step is -2e-14 m from 3e-7 m."""
+    row, column = np.mgrid[:34, :40]
+    return (3.0 * row + 2.0 * column + 5.0 * frame + 11.0 * channel) * 1000.0 - 50000.0
