@@ -7,7 +7,7 @@ from tablegen.base.input_errors import Problem
 from tablegen.base.warnings import Finding, as_printed, worst_first
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import Excess, excess
-from tablegen.certificate.expectation_checks import ExpectationWarning, expectation_warnings
+from tablegen.certificate.expectation_checks import RESONANCE_PERCENT, ExpectationWarning, expectation_warnings
 from tablegen.certificate.matching import pixel_mismatch_percent, pixel_mismatch_warning
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -42,8 +42,10 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
     """
     warnings = []
     for line, exceeded in _exceeded(plan, certificates):
-        share = _share(line, exceeded, certificates[line.axis])
-        text = f"{exceeded.text(line.axis)}{_behind_resonance(exceeded, certificates[line.axis])}"
+        certificate = certificates[line.axis]
+        share = _share(line, exceeded, certificate)
+        text = f"{exceeded.text(line.axis)}{_behind_resonance(exceeded, certificate)}"
+        text += _resonance_advice(setup, plan, line, exceeded, certificate)
         why = f"{text}; {share}{_advice(setup, plan, line, exceeded)}"
         problem = setup.scan_file.problem(_key(setup, line, exceeded), why)
         warnings.append((abs(exceeded.percent), problem.coded(exceeded.code, line.axis)))
@@ -96,6 +98,24 @@ def _advice(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, most: fl
     from tablegen.certificate.remedies import excess_remedies  # only a scan that needs them pays for them
 
     return _in_words(excess_remedies(setup, plan, line, exceeded, most), abs(exceeded.percent))
+
+
+def _resonance_advice(setup: Setup, plan: Plan, line: LinePlan, exceeded: Excess, certificate: Certificate) -> str:
+    """Return what tested remedies leave of a scaling error that the resonance makes larger; "" where it does not.
+
+    The remedies of the excess itself are judged by the codes alone, without the resonance.
+    """
+    position = certificate.position
+    if position is None or exceeded.what != "scaling error":
+        return ""
+    percent = position.worst[1]
+    if percent <= max(exceeded.percent, RESONANCE_PERCENT):
+        return ""
+    from tablegen.certificate.remedies import resonance_remedies
+
+    remedies = resonance_remedies(setup, plan, line, RESONANCE_PERCENT)
+    texts = [str(one) for one in remedies if one.percent < 0.9 * percent]
+    return f" ({', '.join(texts)})" if texts else ""
 
 
 def _in_words(remedies: "list[Remedy]", percent: float) -> str:

@@ -98,6 +98,7 @@ def test_a_resonance_that_is_driven_is_a_warning_with_remedies(tmp_path: Path) -
     (warning,) = [row for row in run("check", small).err.splitlines() if ": x.size_nm: " in row]
     assert "the cause is quantisation" in warning
     assert "; with the resonance that steps drive it is " in warning
+    assert ' % forward (dac.shaping = "' in warning
 
 
 def built(folder: Path, scanner: tuple[str, ...] = ()) -> Path:

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
+from editing import run
 from operator_files import operator_file, write_operator_scan
 from replacing import replace
 
 from tablegen.base.input_errors import Rejected
+from tablegen.compensation.operator.file import BoucWenTable
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
 
@@ -29,6 +31,15 @@ def test_a_size_that_the_law_refuses_and_the_operator_makes(tmp_path: Path) -> N
         "x.hysteresis.file: the operator makes 1265 nm with 97.21 V, and [x.size] refuses them: the two "
         "contradict each other; calibrate `size` again, or lower the size",
     ]
+
+
+def test_check_of_a_size_that_the_law_refuses_and_bouc_wen_makes(tmp_path: Path) -> None:
+    bouc_wen = BoucWenTable(depth_nm=30.0, n=1.3, beta=6.0, gamma=-2.0, asymmetry=0.3, bend=[0.0, 0.0])
+    scan = write_operator_scan(tmp_path, replace(operator_file(), bouc_wen=bouc_wen), "x.size_nm = 1265.0")
+    outcome = run("check", scan)
+    assert outcome.status == 2
+    assert "x.size_nm: 1265 nm needs 1.001 of v_max; at most 1263.56 nm fit" in outcome.err
+    assert "and [x.size] refuses them: the two contradict each other" in outcome.err
 
 
 @pytest.mark.parametrize("size_nm", [1400.0, 1e5, 1e9])
