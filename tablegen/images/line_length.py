@@ -91,6 +91,10 @@ class ImagedWaves(Protocol):
         """The model at the fitted parameters."""
 
     @property
+    def indexed(self) -> bool:
+        """True if the base waves are those of the indexer's cell."""
+
+    @property
     def waves(self) -> Floats:
         """Base waves of the image.
 
@@ -165,7 +169,8 @@ def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expecte
             raise Unphysical(
                 "two waves are in the image, as of a lattice; its constant is needed, and not that of bars"
             )
-        waves, covariance = _primitive(line, waves, covariance)
+        if not line.indexed:  # the indexer has judged all spots
+            waves, covariance = _primitive(line, waves, covariance)
         return _of_lattice(waves, covariance, cell, expected)
     if grating is None:
         raise Unphysical(
