@@ -114,10 +114,20 @@ def test_a_lattice_with_weak_lowest_spots_says_the_size(times: float, turned: fl
 
 @STRONG_WAVES
 def test_a_cell_that_one_weak_spot_decides_is_refused(times: float, turned: float, index: int) -> None:
-    assert index > 1
+    """Of the whole cell, or one of 1/index of its area."""
+    del index
     text = refused(weak_lowest(times, turned, 0.04), EIGHT_PERIODS)
     assert "the lattice is ambiguous: the cell may be" in text
     assert "the size of the line would be another with each; image more periods with less noise" in text
+
+
+@STRONG_WAVES
+def test_a_faint_wave_that_may_be_of_a_larger_cell_is_refused(times: float, turned: float, index: int) -> None:
+    """The indexer does not see it; a fit of all pixels does."""
+    part = 2 if index == 4 else 3
+    text = refused(weak_lowest(times, turned, 0.025), EIGHT_PERIODS)
+    assert f"a weak wave at parts of {part} of the strong ones may be that of a larger cell" in text
+    assert size(weak_lowest(times, turned, 0.0), EIGHT_PERIODS).value == pytest.approx(times * FULL_NM, rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", [0, 14, 17])
