@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
-from tablegen.images.cell_start import cell_of, fit_cell_spots
+from tablegen.images.cell_start import cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
@@ -34,7 +34,6 @@ _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
 _CLEARLY_SQUARE = 0.15  # the same, of a lattice that is taken for square
-_STRONG = 0.7  # of the largest amplitude
 _LEAST_ANGLE = 0.2  # sine of the angle between two waves that separate y from x
 
 
@@ -157,7 +156,7 @@ def periodic_scan(
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
-    return replace(_scan(model, state), indexed=cell is not None, strong_index=_strong_index(model, state))
+    return replace(_scan(model, state), indexed=cell is not None, strong_index=strong_index(model, state))
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:
@@ -241,16 +240,6 @@ def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Float
     penalty = np.tile(_penalty(count, normal), bases)
     step = np.linalg.solve(normal + np.diag(penalty), aim - penalty * current.ravel())
     return np.asarray(step.reshape(bases, count), dtype=np.float64)
-
-
-def _strong_index(model: PeriodicModel, state: FitState) -> int:
-    """Return the index of the lattice of the strong spots in that of all spots; 1 where they have one direction."""
-    amplitudes = np.abs(state.amplitudes)
-    strong = model.spots[amplitudes > _STRONG * np.max(amplitudes)]
-    if model.bases < 2 or np.linalg.matrix_rank(strong) < 2:
-        return 1
-    minors = strong[:, :1] * strong[:, 1] - strong[:, 1:] * strong[:, 0]
-    return int(np.gcd.reduce(np.abs(minors), axis=None))
 
 
 def _strong_spots(model: PeriodicModel, state: FitState) -> Ints:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.images.indexer import ImageCell, find_cell
-from tablegen.images.model_start import begin, first_wave, row_order, with_spots
+from tablegen.images.indexer import AmbiguousCell, ImageCell, find_cell
+from tablegen.images.model_start import begin, first_wave, fit_spots, row_order, with_spots
 from tablegen.images.pair_checks import MAX_PERIODS_PER_COLUMN, MIN_PERIODS
 from tablegen.images.periodic_model import BASES, LAG, FitState, Geometry, PeriodicModel, settle
 from tablegen.images.spots import Bend, Spot, row_polynomial
@@ -13,6 +13,8 @@ from tablegen.numerics.arrays import Bools, Floats, Ints
 _LEAST_SINE = 0.3  # of the angle between the waves that begin the fit
 _SECOND_SMOOTHED = 0.12  # share of the frame over which the phase of the second wave is averaged
 _HIGHEST = 5  # index of a spot that is fitted
+_SAME_AREA = 0.75, 1.35  # ratios of the areas of one cell in two fits: hysteresis and drift change them less
+_STRONG = 0.7  # of the largest amplitude
 
 
 def cell_of(trace: Floats, retrace: Floats | None, expected_area: float | None = None) -> ImageCell | None:
@@ -29,6 +31,58 @@ def cell_of(trace: Floats, retrace: Floats | None, expected_area: float | None =
         return find_cell(trace, retrace, expected_area)
     except Unphysical:
         return None
+
+
+def fit_sample_spots(
+    geometry: Geometry, heights: list[Floats], mirrored: bool, trace: Floats, retrace: Floats | None
+) -> tuple[PeriodicModel, FitState, Bools, bool]:
+    """Fit from the strongest spots, and from the indexer's cell where these are the spots of another cell.
+
+    Parameters
+    ----------
+    heights
+        Levelled heights, shape (rows, columns) each.
+    mirrored
+        True if the retrace was mirrored before.
+    trace, retrace
+        Heights in any unit, both with the left end on the left, shape (rows, columns) each.
+
+    Returns
+    -------
+    tuple
+        The model, its state at the fitted parameters, the parameters that are free, shape (parameters,), and True if
+        the fit began with the indexer's cell.
+
+    Raises
+    ------
+    Unphysical
+        If several cells explain the image, or no fit does.
+    """
+    spot, bends = begin(geometry, heights, mirrored)
+    fit = fit_spots(geometry, heights, spot, bends)
+    if fit[0].bases < 2:
+        return *fit, False
+    try:
+        cell = find_cell(trace, retrace)
+    except AmbiguousCell as reason:
+        cells = str(reason).partition("; ")[0]
+        raise Unphysical(
+            f"{cells}, and the size of the line would be another with each; image more periods with less noise, or "
+            f"choose another --channel"
+        ) from None
+    except Unphysical:
+        return *fit, False
+    if _SAME_AREA[0] < _area_ratio(*fit[:2], cell) < _SAME_AREA[1]:
+        return *fit, False
+    return *fit_cell_spots(geometry, heights, mirrored, cell), True
+
+
+def _area_ratio(model: PeriodicModel, state: FitState, cell: ImageCell) -> float:
+    """Return the area of a cell over that of the fitted base waves."""
+    geometry = model.geometry
+    (first, second), (first_s, second_s) = model.q(state.parameters), model.s(state.parameters)[:, 0]
+    span = geometry.window[1] - geometry.window[0]
+    return abs(float(first * second_s - second * first_s)) * span / cell.cells
 
 
 def fit_cell_spots(
@@ -110,3 +164,13 @@ def _bases(indices: Ints, strong: Floats) -> tuple[Ints, Floats]:
         bases, change = bases[::-1], change[:, ::-1]
     signs = np.where(bases[:, :1] < 0.0, -1, 1)
     return change * signs.T, np.asarray(bases * signs, dtype=np.float64)
+
+
+def strong_index(model: PeriodicModel, state: FitState) -> int:
+    """Return the index of the lattice of the strong spots in that of all spots; 1 where they have one direction."""
+    amplitudes = np.abs(state.amplitudes)
+    strong = model.spots[amplitudes > _STRONG * np.max(amplitudes)]
+    if model.bases < 2 or np.linalg.matrix_rank(strong) < 2:
+        return 1
+    minors = strong[:, :1] * strong[:, 1] - strong[:, 1:] * strong[:, 0]
+    return int(np.gcd.reduce(np.abs(minors), axis=None))

@@ -4,7 +4,7 @@
 the image supports (Akaike's criterion), so that periods are counted from turn to turn on any piezo.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -14,7 +14,8 @@ from scipy.special import chdtrc
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.measured_branch import BINS
-from tablegen.images.model_start import begin, fit_spots, prepare_heights
+from tablegen.images.cell_start import fit_sample_spots
+from tablegen.images.model_start import prepare_heights
 from tablegen.images.pair_checks import ALIASING_HINT, MIN_PERIODS
 from tablegen.images.periodic_model import BASES, FitState, Geometry, PeriodicModel, settle
 from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
@@ -46,7 +47,8 @@ class ImageLine:
     q_1, s_1, q_2, s_2. ``spots`` are the visible waves, whole numbers of the base waves, with their ``amplitudes``.
     ``gap`` is how far trace and retrace are apart at the left and the right turn, shares of the line, (2,), and
     ``gap_error``; nan where there is no retrace, or where the window leaves the turns out. ``explained`` is the share
-    of the heights' variance that is periodic, ``noise_percent`` that of a pixel, of the contrast.
+    of the heights' variance that is periodic, ``noise_percent`` that of a pixel, of the contrast. ``indexed`` is True
+    if the base waves are those of the indexer's cell, since the strongest spots are those of another one.
     """
 
     geometry: Geometry
@@ -61,6 +63,7 @@ class ImageLine:
     noise_percent: float
     widened: float
     strays: tuple[int, ...]
+    indexed: bool = False
 
     @property
     def waves(self) -> Floats:
@@ -220,13 +223,12 @@ def fit_line(
     if retrace is not None and retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
-    spot, bends = begin(geometry, heights, retrace_mirrored)
-    model, state, free = fit_spots(geometry, heights, spot, bends)
+    model, state, free, indexed = fit_sample_spots(geometry, heights, retrace_mirrored, trace, retrace)
     fits = _rippled(model, state, free)
     best = min(fits, key=lambda fit: fit.loss)
     _check(best.model, best.state)
     gap, gap_error = _gap(best)
-    return _result(best, fits, gap, gap_error)
+    return replace(_result(best, fits, gap, gap_error), indexed=indexed)
 
 
 def shows_turns(geometry: Geometry) -> bool:

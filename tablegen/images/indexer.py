@@ -55,6 +55,10 @@ _SAME_CELL = 0.12  # share
 _LEAST_LEVEL = 0.04  # of the variance, at the lattice points
 
 
+class AmbiguousCell(Unphysical):
+    """Several cells explain an image."""
+
+
 @dataclass(frozen=True, eq=False)
 class ImageCell:
     """The cell of an image in pixels.
@@ -256,7 +260,7 @@ def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Flo
     if sure is None:
         raise Unphysical(_why_none(cells, strong))
     if all_of_them is not None and not same_lattice(sure, all_of_them):
-        raise Unphysical(ambiguous([sure, all_of_them], every, extent, "weak spots are at the waves of one alone"))
+        raise AmbiguousCell(ambiguous([sure, all_of_them], every, extent, "weak spots are at the waves of one alone"))
     if all_of_them is None:
         explained, informative = explained_spots(sure, every)
         waves = every.waves[informative & ~explained]
@@ -291,7 +295,7 @@ def _check_deciding(vectors: Floats, spots: Spots, views: list[_View]) -> None:
                 other = vectors[1] if u else vectors[0]
                 smaller = np.array([np.array([u, v]) @ vectors / part, other])
                 reason = "one spot alone tells them apart"
-                raise Unphysical(ambiguous([vectors, smaller], spots, _extent(views[0]), reason))
+                raise AmbiguousCell(ambiguous([vectors, smaller], spots, _extent(views[0]), reason))
 
 
 def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
@@ -312,7 +316,7 @@ def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Flo
             larger = _supercell(vectors, waves)
             cells = [vectors] if larger is None else [vectors, larger]
             reason = "a weak spot is at a fraction of the smaller cell's waves"
-            raise Unphysical(ambiguous(cells, spots, _extent(views[0]), reason))
+            raise AmbiguousCell(ambiguous(cells, spots, _extent(views[0]), reason))
 
 
 def _supercell(vectors: Floats, waves: Floats) -> Floats | None:
@@ -519,7 +523,7 @@ def _check_sublattice(vectors: Floats, waves: Floats, spots: Spots, extent: Floa
         parts = numbers @ np.linalg.inv(basis)
         if np.allclose(parts, np.round(parts), atol=1e-6):
             cells.append(np.linalg.inv(basis).T @ vectors)
-    raise Unphysical(ambiguous(cells, spots, extent, f"all spots are those of 1/{index} of the area too"))
+    raise AmbiguousCell(ambiguous(cells, spots, extent, f"all spots are those of 1/{index} of the area too"))
 
 
 def same_lattice(one: Floats, other: Floats) -> bool:

@@ -32,6 +32,7 @@ _SAME_SIZE = 0.01  # share: readings that differ by less are one
 _LARGEST_INDEX = 2
 _SUPERCELLS = (2, 3)
 _MIN_PART = 0.05  # share of the strongest amplitude: least wave between the others that counts
+_FAINT_PART = 0.02  # share of the strongest amplitude: a wave between the others that may be of a larger cell
 _MIN_PART_ERRORS = 8.0
 
 
@@ -89,6 +90,10 @@ class ImagedWaves(Protocol):
     @property
     def state(self) -> FitState:
         """The model at the fitted parameters."""
+
+    @property
+    def indexed(self) -> bool:
+        """True if the base waves are those of the indexer's cell."""
 
     @property
     def waves(self) -> Floats:
@@ -165,7 +170,10 @@ def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expecte
             raise Unphysical(
                 "two waves are in the image, as of a lattice; its constant is needed, and not that of bars"
             )
-        waves, covariance = _primitive(line, waves, covariance)
+        if not line.indexed:  # the indexer has judged all spots
+            waves, covariance = _primitive(line, waves, covariance)
+            if np.array_equal(waves, line.waves):
+                _check_faint_parts(line)
         return _of_lattice(waves, covariance, cell, expected)
     if grating is None:
         raise Unphysical(
@@ -277,7 +285,17 @@ def _primitive(line: ImagedWaves, waves: Floats, covariance: Floats) -> tuple[Fl
     return waves, covariance
 
 
-def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
+def _check_faint_parts(line: ImagedWaves) -> None:
+    """Raise ``Unphysical`` if a weak wave between those of whole numbers may be one of a larger cell."""
+    for part in _SUPERCELLS:
+        if _strongest_part(line, part, _FAINT_PART) is not None:
+            raise Unphysical(
+                f"a weak wave at parts of {part} of the strong ones may be that of a larger cell, and the size of the "
+                f"line would be another with each; image more periods with less noise, or choose another --channel"
+            )
+
+
+def _strongest_part(line: ImagedWaves, part: int, share: float = _MIN_PART) -> tuple[int, ...] | None:
     """Return the strongest wave between those of whole numbers, in parts of the base waves; None if none counts."""
     model, state = line.model, line.state
     span = line.geometry.window[1] - line.geometry.window[0]
@@ -302,5 +320,5 @@ def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
     best = int(np.argmax(strength))
     pixels = line.geometry.rows * line.geometry.columns * len(model.images)
     noise = sqrt(2.0 * state.cost / pixels) * sqrt(2.0 * len(model.images) / pixels)
-    least = max(_MIN_PART * float(np.max(line.amplitudes)), _MIN_PART_ERRORS * noise)
+    least = max(share * float(np.max(line.amplitudes)), _MIN_PART_ERRORS * noise)
     return tuple(spots[best]) if strength[best] > least else None

@@ -51,6 +51,11 @@ class LatticeLine:
         return self.start.fitted
 
     @property
+    def indexed(self) -> bool:
+        """False: the base waves are those of the strongest spots."""
+        return False
+
+    @property
     def amplitudes(self) -> Floats:
         """The amplitudes of the spots.
 

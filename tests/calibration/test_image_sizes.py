@@ -8,12 +8,14 @@ from calibrating import LATTICE_NM, PITCH_NM, V_MAX, Scanner, grating, lattice, 
 from calibrating import Sample as Seen
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lattice_images import three_sites
 from replacing import replace
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage, sizes_of
 from tablegen.fitting.estimate import Estimate
 from tablegen.fitting.least_squares import Solution, solve, with_errors
+from tablegen.images.cell_vectors import reduced, sides_and_angle
 from tablegen.images.fast_axis_line import fit_line
 from tablegen.images.line_length import Cell, Grating
 from tablegen.numerics.arrays import Floats
@@ -84,6 +86,57 @@ def test_bars_whose_harmonic_is_strongest(part: int) -> None:
     weak = ((6.0, 3.0, 0.35, 0.1), (6.0 * part, 3.0, 1.0, 0.4), (6.0 * (part + 2), 3.0, 0.3, 0.2))
     found = size(shown(Seen(weak)), KnownSample(None, Grating(FULL_NM / 6.0, Estimate(3.0, 0.1))))
     assert found.value == pytest.approx(FULL_NM, rel=1e-3)
+
+
+def weak_lowest(times: float, turned: float, share: float) -> SampleImage:
+    """Images of a hexagonal lattice, 8 periods in the line, whose lowest waves have a share of the strong ones'."""
+    waves = []
+    for n, height in enumerate((1.0, 0.9, 0.8)):
+        waves.append((8.0, 7.0 + 60.0 * n, share * height, 0.1 * n))
+        waves.append((8.0 * times, 7.0 + 60.0 * n + turned, height, 0.3 * n + 0.05))
+    return shown(Seen(tuple(waves), pixels=128, lines=128), 0.02, 1)
+
+
+EIGHT_PERIODS = KnownSample(Cell.hexagonal(FULL_NM / 8.0 * 2.0 / sqrt(3.0)))
+STRONG_WAVES = pytest.mark.parametrize(
+    ("times", "turned", "index"), [(sqrt(3.0), 30.0, 3), (2.0, 0.0, 4), (3.0, 0.0, 9)]
+)
+
+
+@STRONG_WAVES
+def test_a_lattice_with_weak_lowest_spots_says_the_size(times: float, turned: float, index: int) -> None:
+    """The strong spots alone would give a size wrong by the root of 3, by 2 or by 3."""
+    sizes = sizes_of([weak_lowest(times, turned, 0.1)], V_MAX, EIGHT_PERIODS, Acquisition())
+    assert sizes.nm[0] == pytest.approx(FULL_NM, rel=3e-4)
+    assert abs(sizes.nm[0] - FULL_NM) < 3.0 * sizes.errors_nm[0]
+    assert f"the strong spots are those of a cell with 1/{index} of the area" in " ".join(map(str, sizes.remarks))
+
+
+@STRONG_WAVES
+def test_a_cell_that_one_weak_spot_decides_is_refused(times: float, turned: float, index: int) -> None:
+    """Of the whole cell, or one of 1/index of its area."""
+    del index
+    text = refused(weak_lowest(times, turned, 0.04), EIGHT_PERIODS)
+    assert "the lattice is ambiguous: the cell may be" in text
+    assert "the size of the line would be another with each; image more periods with less noise" in text
+
+
+@STRONG_WAVES
+def test_a_faint_wave_that_may_be_of_a_larger_cell_is_refused(times: float, turned: float, index: int) -> None:
+    """The indexer does not see it; a fit of all pixels does."""
+    part = 2 if index == 4 else 3
+    text = refused(weak_lowest(times, turned, 0.025), EIGHT_PERIODS)
+    assert f"a weak wave at parts of {part} of the strong ones may be that of a larger cell" in text
+    assert size(weak_lowest(times, turned, 0.0), EIGHT_PERIODS).value == pytest.approx(times * FULL_NM, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 14, 17])
+def test_an_image_with_three_sites_a_cell_terraces_and_rows_that_jump(seed: int) -> None:
+    """The strong spots gave 134 and 117 pixels in place of 128, and a refusal."""
+    heights, vectors = three_sites(seed)
+    sides = sides_and_angle(reduced(vectors))
+    line = size(SampleImage("an image", 100.0, None, heights, None), KnownSample(Cell(*sides, "given")))
+    assert line.value == pytest.approx(128.0, rel=0.02)
 
 
 def test_the_angle_of_bars_is_taken_from_the_rows_or_given() -> None:

@@ -11,6 +11,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.base.warnings import Remark, spoils
 from tablegen.compensation.size import SizeLaw
 from tablegen.fitting.estimate import ImageSize, LineSize
+from tablegen.images.cell_start import strong_index
 from tablegen.images.fast_axis_line import ImageLine, fit_line, shows_turns
 from tablegen.images.line_length import ASPECT_ERROR, DRIFT_ERROR, Cell, Grating, size_of_line
 from tablegen.numerics.arrays import Floats
@@ -178,6 +179,14 @@ def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
         remarks.append(spoils("the turns are not in the image; the ends of the line are extrapolated"))
     if not line.both:
         remarks.append(Remark("without a retrace nothing shows whether columns were cropped, or are late"))
+    index = strong_index(line.model, line.state) if line.indexed else 1
+    if index > 1:
+        remarks.append(
+            Remark(
+                f"the strong spots are those of a cell with 1/{index} of the area; the constant was taken for that of "
+                f"the whole cell"
+            )
+        )
     if line.widened > 3.0:
         widened = f"standard errors were widened by a factor of {line.widened:.3g}"
         remarks.append(Remark(f"{widened}, for what is not only noise"))
