@@ -296,27 +296,37 @@ class ImageLattice(Result):
         return f"lattice of {self._title()}", self._cell_lines()[0], "; ".join(self._drift_lines()) or "one image"
 
     def charts(self) -> PlottedCharts:
-        """Return the heights and their autocorrelation, with the sides of the cell."""
+        """Return the heights with the cell, the spectrum with its spots, and the autocorrelation with the cell."""
         from tablegen.correction.straight import ScanPicture
         from tablegen.html_report.corrected import height_chart
+        from tablegen.html_report.image_spectrum import spectrum_chart
         from tablegen.images.autocorrelation import autocorrelation
         from tablegen.images.lattice_filters import filtered_images
 
-        scan = self.scan
+        scan, one = self.scan, self.image_cell
         size = (scan.width_nm, scan.height_nm) if scan.width_nm and scan.height_nm else None
         bottom = scan.first_row == "bottom"
         title = f"{scan.channel or 'image'}, levelled line by line, with the cell"
         heights = height_chart("lattice", ScanPicture(scan.channel, True, scan.heights, scan.unit, bottom), size, title)
-        view = filtered_images(scan.heights)[
-            0 if self.image_cell is None or self.image_cell.filter_name == "heights" else 1
-        ]
+        view = filtered_images(scan.heights)[0 if one is None or one.filter_name == "heights" else 1]
+        if one is None:
+            assert self.wave is not None
+            waves, explained, base = self.wave[None], np.array([True]), self.wave[None]
+        else:
+            waves, explained, base = (
+                one.spots.waves,
+                one.explained,
+                np.linalg.inv(self.cell.vectors / np.array(self.pixel)).T,
+            )
+        spectrum = spectrum_chart(view, waves, explained, base, self.pixel, self.unit, bottom)
         values = autocorrelation(view).values
         picture = ScanPicture("", True, values, "", bottom)
         reach = (values.shape[1] * self.pixel[0], values.shape[0] * self.pixel[1]) if size else None
         around = height_chart("autocorrelation", picture, reach, "autocorrelation, with the cell")
         if around.raster is not None:
             around = replace(around, raster=replace(around.raster, label="correlation, levelled by lines [1]"))
-        return PlottedCharts(self._title(), (self._with_cell(heights, bottom), self._with_cell(around, bottom)))
+        charts = self._with_cell(heights, bottom), spectrum, self._with_cell(around, bottom)
+        return PlottedCharts(self._title(), charts, 3, charts[:2])
 
     def _with_cell(self, chart: Chart, bottom: bool) -> Chart:
         if self.wave is not None:

@@ -119,6 +119,26 @@ def _offsets(values: Floats, row: Ints, column: Ints) -> Floats:
     return np.stack(offsets, axis=1)
 
 
+def power_spectrum(image: FilteredImage) -> tuple[Floats, Floats, Floats]:
+    """Return the power of one half of the spectrum, averaged over some cells.
+
+    Parameters
+    ----------
+    image
+        A filtered image; its window is applied.
+
+    Returns
+    -------
+    tuple
+        Power, shape (len(v), len(u)), and the waves per pixel along x, from 0, and along y, from -0.5.
+    """
+    rows, columns = image.values.shape
+    size = (_PADDING * rows, _PADDING * columns)
+    power = np.abs(np.fft.rfft2(image.values * image.weight, size)) ** 2
+    u, v = np.fft.rfftfreq(size[1]), np.fft.fftshift(np.fft.fftfreq(size[0]))
+    return _smoothed(np.fft.fftshift(power, axes=0)), u.astype(np.float64), np.asarray(v, dtype=np.float64)
+
+
 def significant_spots(image: FilteredImage, least: float, weakest: float = WEAKEST) -> Spots:
     """Return the spots of the spectrum that stand out of their neighbourhood.
 
@@ -130,11 +150,7 @@ def significant_spots(image: FilteredImage, least: float, weakest: float = WEAKE
         Least power over that of the strongest spot.
     """
     rows, columns = image.values.shape
-    size = (_PADDING * rows, _PADDING * columns)
-    power = np.abs(np.fft.rfft2(image.values * image.weight, size)) ** 2
-    power = _smoothed(np.fft.fftshift(power, axes=0))
-    v = np.fft.fftshift(np.fft.fftfreq(size[0]))
-    u = np.fft.rfftfreq(size[1])
+    power, u, v = power_spectrum(image)
     searched = (u[None, :] * columns >= _STREAK) & (u[None, :] <= _FINEST) & (np.abs(v[:, None]) <= _FINEST)
     searched = searched & (np.hypot(u[None, :] * columns, v[:, None] * rows) >= _SLOWEST)
     row, column = np.nonzero(_peaks(power) & searched)

@@ -1,6 +1,7 @@
 """The lattice of an image: of known cells, of none, and of files of real instruments."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,37 @@ def test_the_command_prints_the_cell_and_the_shift_and_writes_nothing(tmp_path: 
     record = json.loads(CliRunner().invoke(cli, ["lattice", *files, "--json"], catch_exceptions=False).output)
     assert record["retrace_shift_pixels"]["value"] == pytest.approx([3.0, 0.0], abs=0.2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["retrace.npy", "trace.npy"]
+
+
+@pytest.mark.parametrize("first_row", ["top", "bottom"])
+def test_the_plot_shows_the_spots_where_the_spectrum_is_high(first_row: str) -> None:
+    """The lattice is not symmetric, so that a mirrored spectrum would show its maxima elsewhere."""
+    result = tablegen.lattice(plain_lattice()[0][:, :104])
+    heights, spectrum = replace(result, scan=replace(result.scan, first_row=first_row)).charts().charts[:2]
+    assert (heights.key, spectrum.key) == ("lattice", "spectrum")
+    assert spectrum.x_label == "waves along x [1/pixels]"
+    raster = spectrum.raster
+    assert raster is not None
+    rows, columns = raster.values.shape
+    x, y = np.concatenate([[curve.x, curve.y] for curve in spectrum.curves], axis=1)
+    assert len(x) >= 3
+    for sign in (1, -1):  # the left half is the right one, turned
+        column = np.round((0.5 + sign * x / (raster.x[1] - raster.x[0])) * columns - 0.5).astype(int)
+        row = np.round((0.5 - sign * y / (raster.y[1] - raster.y[0])) * rows - 0.5).astype(int)
+        assert np.all(raster.values[row, column] > np.median(raster.values) + 10.0)  # dB
+    assert spectrum.arrows is not None
+    sides, waves = (np.stack([one.dx, one.dy], axis=1) for one in (heights.arrows, spectrum.arrows) if one is not None)
+    assert sides @ waves.T == pytest.approx(np.eye(2), abs=1e-9)
+
+
+def test_the_plot_of_a_grating_shows_its_wave() -> None:
+    result = tablegen.lattice(without_lattice(2), lattice="grating")
+    spectrum = result.charts().charts[1]
+    assert result.wave is not None
+    assert [(curve.x.tolist(), curve.y.tolist()) for curve in spectrum.curves] == [
+        ([result.wave[0]], [-result.wave[1]])
+    ]
+    assert "1 of 1 spots" in spectrum.title
 
 
 if REAL is not None:  # else the run says so at its end

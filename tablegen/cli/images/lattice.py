@@ -58,7 +58,7 @@ Exit status: 0 done, 2 wrong input or no lattice, 4 cannot write, 6 a library is
 @channel_option
 @retrace_channel_option
 @click.option("--frames", type=_Frames(), metavar="A:B", help="Frames A to B - 1 of a movie: registered and averaged.")
-@plot_option("the image and its autocorrelation with the cell")
+@plot_option("the image and its autocorrelation with the cell, and the spectrum with its spots")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def lattice(images: tuple[Path, ...], plot: Path | None, as_json: bool, **how: Any) -> int:
     """Find the lattice of an image, and print its cell: both sides and the angle, with standard errors.
