@@ -11,7 +11,7 @@ from tablegen.base.warnings import Finding
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.certificate import certify as certify_plan
 from tablegen.certificate.certified_scan import certify_scan
-from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers
+from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers, first_lines
 from tablegen.certificate.scan_notes import scan_findings
 from tablegen.certificate.scan_text import scan_text
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
@@ -269,7 +269,7 @@ class Build(Result):
 
     def brief(self) -> list[str]:
         """Return the lines that every output of the scan begins with: the error of each axis, and the time."""
-        return [*map(str, self.answers), self.duration]
+        return first_lines(self.setup, self.plan, self.certificates)
 
     def overview(self) -> str:
         """Return what ``tablegen show`` prints above its plots: the errors, and the scan in the user's words."""

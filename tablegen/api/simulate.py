@@ -12,7 +12,7 @@ from tablegen.api.result import Result
 from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.certificate.certificate import certify
-from tablegen.certificate.error_answer import duration, error_answers
+from tablegen.certificate.error_answer import first_lines
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.planning.line_plan import make_plan
@@ -106,7 +106,7 @@ def _brief(setup: Setup) -> tuple[str, ...]:
         certificates = certify(plan)
     except Rejected:  # the simulation says of each model why
         return ()
-    return (*map(str, error_answers(setup, plan, certificates)), duration(plan.schedule))
+    return tuple(first_lines(setup, plan, certificates))
 
 
 def _calibrated(

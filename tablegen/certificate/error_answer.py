@@ -66,6 +66,11 @@ def error_answers(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
     ]
 
 
+def first_lines(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
+    """Return the lines that every output of a scan begins with: the error of each axis, and the time of an image."""
+    return [*map(str, error_answers(setup, plan, certificates)), duration(plan.schedule)]
+
+
 def measured_answer(line: LinePlan, count: int, of: Of, percent: float, source: str, next_step: str) -> ErrorAnswer:
     """Return the answer of a measurement of the running scan, whose window has ``count`` pixels along the axis."""
     return _with_figures(line, count, of, percent, basis="measured", source=source, next_step=next_step)

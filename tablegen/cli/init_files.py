@@ -100,6 +100,17 @@ scanner = "{SCANNER_FILE}"         # relative to this file
 """
 
 
+def _converter(wishes: Wishes) -> str:
+    return f"""\
+[dac]
+{_line(f"bits = {wishes.bits}", "")}
+{_line('coding = "offset-binary"', "offset-binary | twos-complement")}
+{_line("v_min = -5.0", "V at the converter")}
+v_max = 5.0
+{_line(f"update_rate_hz = {_number(wishes.update_rate_hz)}", "ticks: updates of both converters a second")}
+"""
+
+
 def _own_scanner(wishes: Wishes) -> str:
     """Return the scanner of the user: the driver, the size, and nothing that nobody has measured on it."""
     low, high = wishes.driver
@@ -116,13 +127,7 @@ def _own_scanner(wishes: Wishes) -> str:
 name = "scanner"
 {_line(f"v_max = {_number(high)}", "V, maximum output of the piezo driver; normalised voltages refer to it")}
 {lowest}
-[dac]
-{_line(f"bits = {wishes.bits}", "")}
-{_line('coding = "offset-binary"', "offset-binary | twos-complement")}
-{_line("v_min = -5.0", "V at the converter")}
-v_max = 5.0
-{_line(f"update_rate_hz = {_number(wishes.update_rate_hz)}", "ticks: updates of both converters a second")}
-
+{_converter(wishes)}
 [amplifier]                      # piezo voltage = gain * converter voltage + bias_v
 gain = {_number(gain)}
 bias_v = {_number(0.5 * (low + high))}
@@ -152,13 +157,7 @@ def _scanner(wishes: Wishes) -> str:
 name = "hs-afm"
 {_line(f"v_max = {_number(_V_MAX)}", "V, maximum output of the piezo driver; normalised voltages refer to it")}
 
-[dac]
-{_line(f"bits = {wishes.bits}", "")}
-{_line('coding = "offset-binary"', "offset-binary | twos-complement")}
-{_line("v_min = -5.0", "V at the converter")}
-v_max = 5.0
-{_line(f"update_rate_hz = {_number(wishes.update_rate_hz)}", "ticks: updates of both converters a second")}
-
+{_converter(wishes)}
 [amplifier]                      # piezo voltage = gain * converter voltage + bias_v
 gain = {_number(_V_MAX / 10.0)}
 bias_v = {_number(0.5 * _V_MAX)}

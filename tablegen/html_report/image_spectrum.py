@@ -63,10 +63,11 @@ def spectrum_chart(
         f"power of the {image.name} over the strongest spot [dB]",
     )
     arrows = Arrows(np.zeros(len(base)), np.zeros(len(base)), *(base * scale).T)
-    curves = [DrawnCurve("spots of the cell", "limit", spots[explained, 0], spots[explained, 1], kind="points")]
+    sample = "cell" if len(base) > 1 else "grating"
+    curves = [DrawnCurve(f"spots of the {sample}", "limit", spots[explained, 0], spots[explained, 1], kind="points")]
     if not np.all(explained):
         curves.append(DrawnCurve("other spots", "backward", spots[~explained, 0], spots[~explained, 1], kind="points"))
-    title = f"spectrum: {int(np.sum(explained))} of {len(explained)} spots are the cell's"
+    title = f"spectrum: {int(np.sum(explained))} of {len(explained)} spots are the {sample}'s"
     label = "waves along {} [1/{}]"
     return Chart(
         "spectrum",

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from tablegen.certificate.error_answer import duration, error_answers
+from tablegen.certificate.error_answer import first_lines
 from tablegen.charts.chart import Chart
 from tablegen.html_report.basis import basis
 from tablegen.html_report.blocks import Charts, Section, TableCell
@@ -73,7 +73,7 @@ def page(subject: Subject, parts: list[Section]) -> bytes:
     title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
     foot = (
         f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is computed from the scan and the scanner file; what "
-        "is called measured stands in the scanner file."
+        "is called measured stands in them."
     )
     return document(title, _verdict(subject, findings), findings, parts, notice, foot, answers(subject))
 
@@ -83,8 +83,7 @@ def answers(subject: Subject) -> list[str]:
     planned = subject.planned
     if planned is None:
         return []
-    errors = error_answers(planned.setup, planned.plan, planned.certificates)
-    return [*map(str, errors), duration(planned.plan.schedule)]
+    return first_lines(planned.setup, planned.plan, planned.certificates)
 
 
 def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:
