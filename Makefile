@@ -26,7 +26,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Whose shared library `libpython` is.
 export ENVIRONMENT_PYTHON := $(BIN)/python
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# What is imported is compiled then, by whom it is; the rest of the packages, most of them, never.
+INSTALL := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile
 
 # What the README asks for; every list below adds to it.
 README_PACKAGES := ca-certificates git gpgv make python3 python3-venv
@@ -173,19 +174,19 @@ paper: $(VENV)/installed-plot
 # The stamps depend on what decides an installation, so that the second run finds nothing to do.
 $(VENV)/installed: pyproject.toml
 	@.ci/virtual-environment $(PYTHON) $(VENV)
-	$(PIP) install --editable .
+	$(INSTALL) --editable .
 	@touch $@
 
 $(VENV)/installed-test: $(VENV)/installed
-	$(PIP) install --editable '.[test]'
+	$(INSTALL) --editable '.[test]'
 	@touch $@
 
 $(VENV)/installed-plot: $(VENV)/installed
-	$(PIP) install --editable '.[images,plot]'
+	$(INSTALL) --editable '.[images,plot]'
 	@touch $@
 
 $(VENV)/installed-docs: $(VENV)/installed
-	$(PIP) install --editable '.[docs]'
+	$(INSTALL) --editable '.[docs]'
 	@touch $@
 
 # The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.
