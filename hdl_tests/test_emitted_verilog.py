@@ -144,6 +144,7 @@ def test_memory_words_have_their_full_width(built: Build) -> None:
             assert [int(line, 16) - (int(line, 16) >> (bits - 1) << bits) for line in lines] == words
 
 
+@pytest.mark.common
 def test_player_equals_the_model(built: Build) -> None:
     schedule = built.plan.schedule
     lines = schedule.lines + 1 if schedule.lines <= 8 else LINES
@@ -166,6 +167,7 @@ def test_player_keeps_its_place_between_ticks(tmp_path: Path, gap: int) -> None:
     assert np.array_equal(simulated_codes(built, 2 * built.plan.schedule.ticks, gap), model_codes(built, 2))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("bits", "gain_word"), [(8, 131071), (16, -131072), (21, 131071), (24, -131072), (24, 131071)])
 def test_player_does_not_wrap_at_the_ends_of_the_arithmetic(tmp_path: Path, bits: int, gain_word: int) -> None:
     """Noise over the whole range of the words, the largest gains, and limits that clamp."""
@@ -176,6 +178,7 @@ def test_player_does_not_wrap_at_the_ends_of_the_arithmetic(tmp_path: Path, bits
     assert np.array_equal(simulated_codes(stressed, len(expected)), expected)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("name", "bits", "line", "bit"),
     [("x.mem", 16, 100, 0), ("y.mem", 16, 2047, 15), ("x_fourier.mem", 32, 0, 31), ("y_fourier.mem", 32, 128, 0)],
@@ -198,6 +201,7 @@ def test_a_flipped_bit_in_a_memory_is_heard(tmp_path: Path) -> None:
     assert len(differs) >= 1
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "name", ["two\nlines", "back\\slash\\", '`include "x"', "*/ /* */", "\u00b5-Scanner"], ids=ascii
 )

@@ -156,6 +156,7 @@ def damaged(memory: str, number: int, word: int) -> str:
     return "".join(f"{word}\n" for word in words)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("fourier", [False, True])
 @pytest.mark.parametrize("busy", [False, True])
 def test_a_pick_writes_the_program_of_the_manifest(library: Path, tmp_path: Path, fourier: bool, busy: bool) -> None:
@@ -164,6 +165,7 @@ def test_a_pick_writes_the_program_of_the_manifest(library: Path, tmp_path: Path
     assert found == [line for number in order for line in expected_writes(library, number, fourier)]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("word", [2, 30, 55, 200, -1])
 def test_a_damaged_record_is_withdrawn(library: Path, tmp_path: Path, word: int) -> None:
     """A bit of the program, of x, of y or of the sum itself; the picks before and after are as they should be."""

@@ -105,6 +105,7 @@ def test_every_check_is_that_of_the_model(seed: int, loader: Loader) -> None:
     assert len(reasons) >= 4
 
 
+@pytest.mark.common
 def test_what_passes_the_checks_fits_the_sequencer() -> None:
     """Or the sequencer would refuse it, and no check of the model would say why: words at the ends of their range."""
     info, image = TOLD, take_apart(bytes.fromhex(MADE["boot_image"]), TOLD.x, TOLD.y)

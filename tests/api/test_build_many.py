@@ -41,6 +41,7 @@ def test_a_limit_that_is_broken_is_an_error_too(tmp_path: Path) -> None:
     assert isinstance(outcome.error, tablegen.BrokenLimit)
 
 
+@pytest.mark.common
 def test_processes_give_the_builds_of_this_one(tmp_path: Path) -> None:
     """Whole: plans, arrays and files; errors too, with their problems."""
     scans = tablegen.variants(write_pair(tmp_path, BASE), {"x.size_nm": SIZES})
@@ -63,6 +64,7 @@ def test_processes_give_the_builds_of_this_one(tmp_path: Path) -> None:
     assert len(list((tmp_path / "out").iterdir())) == 3
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_sources_are_taken_as_they_are_needed(tmp_path: Path, jobs: int) -> None:
     setup = tablegen.load(write_pair(tmp_path, BASE))
@@ -108,6 +110,7 @@ def _doubled(number: int) -> int:
     return 2 * number
 
 
+@pytest.mark.common
 def test_a_worker_that_dies_is_an_error_of_its_task_alone() -> None:
     found = dict(results(_doubled, ((number,) for number in range(9)), 2))
     assert {number: value for number, value in found.items() if number not in (3, 4)} == {
@@ -118,6 +121,7 @@ def test_a_worker_that_dies_is_an_error_of_its_task_alone() -> None:
     assert "-9" in str(found[4])
 
 
+@pytest.mark.common
 def test_what_cannot_travel_is_an_error_and_not_a_wait() -> None:
     def local(number: int) -> int:
         return number
@@ -129,6 +133,7 @@ def test_what_cannot_travel_is_an_error_and_not_a_wait() -> None:
     assert unsent[1] == 2
 
 
+@pytest.mark.common
 def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     """A worker imports the package, not the program that asked for it."""
     scan = write_library(tmp_path)

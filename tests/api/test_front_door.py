@@ -22,6 +22,7 @@ def scan() -> tablegen.Build:
     return tablegen.build(EXAMPLE)
 
 
+@pytest.mark.common
 def test_names_are_listed_and_loaded_when_they_are_used() -> None:
     code = (
         "import sys, tablegen\n"

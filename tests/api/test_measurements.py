@@ -45,6 +45,7 @@ def measured(laboratory: tablegen.Laboratory) -> dict[str, list[dict[str, np.nda
     }
 
 
+@pytest.mark.common
 def test_calibrations_are_those_of_the_command(lab: Path, laboratory: tablegen.Laboratory) -> None:
     """Numbers, and the scanner file, byte for byte; of arrays all but the name and the digest of the measurement."""
     for kind, columns in measured(laboratory).items():
@@ -75,6 +76,7 @@ def test_a_scanner_file_is_begun(lab: Path, laboratory: tablegen.Laboratory) -> 
     assert "[x.size]" in path.read_text("utf-8")
 
 
+@pytest.mark.common
 def test_a_measured_response_goes_beside_the_file(lab: Path, laboratory: tablegen.Laboratory) -> None:
     response = measured(laboratory)["resonance"][0]
     found = tablegen.calibrate("resonance", response, axis="x", scanner=lab / "scanner.toml", points=True)
@@ -116,6 +118,7 @@ def test_without_a_full_scale_nothing_is_fitted(laboratory: tablegen.Laboratory)
         tablegen.calibrate("sizes", {}, axis="x", v_max=100.0)  # type: ignore[arg-type]
 
 
+@pytest.mark.common
 def test_a_round_is_that_of_the_command(lab: Path, laboratory: tablegen.Laboratory) -> None:
     scan = lab / "annexin_200nm.toml"
     trace = laboratory.running_trace(scan, "x")
@@ -135,6 +138,7 @@ def test_a_round_is_that_of_the_command(lab: Path, laboratory: tablegen.Laborato
     assert f"\n  x: {found.before_percent:.2g} % of the line = " in repr(found)
 
 
+@pytest.mark.common
 def test_refining_stops_where_the_scaling_error_rises_and_keeps_the_best_layer(
     lab: Path, laboratory: tablegen.Laboratory
 ) -> None:
@@ -199,6 +203,7 @@ def test_a_round_from_the_trace_before_is_refused(lab: Path, laboratory: tablege
         again.write()
 
 
+@pytest.mark.common
 def test_an_image_is_corrected_as_by_the_command(lab: Path, laboratory: tablegen.Laboratory) -> None:
     image = laboratory.image(laboratory.lattice(17.7), 20.0, 50.0, 2.0, pixels=96, slow_turn=0.95)
     both = image.trace.heights, image.retrace.heights
@@ -257,6 +262,7 @@ def test_a_laboratory_repeats_itself_and_is_scaled(lab: Path) -> None:
     assert frame.trace.heights.shape == (tablegen.plan(lab / "annexin_200nm.toml").schedule.up.count, 16)
 
 
+@pytest.mark.common
 def test_the_laboratory_plays_what_simulate_plays(lab: Path) -> None:
     scan = lab / "annexin_200nm.toml"
     outcome = run("simulate", scan, "--no-calibration", "--json")

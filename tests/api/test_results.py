@@ -41,6 +41,7 @@ def check(result: tablegen.Result, command: str = "") -> None:
         assert result.summary().strip() in run(*command.split()).out
 
 
+@pytest.mark.common
 def test_images_are_calibrated_as_by_the_command(lab: Path) -> None:
     found = tablegen.calibrate_images([(100.0, "t.npy", "r.npy")], axis="x", v_max=100.0)
     check(found, "calibrate images --axis x --v-max 100 --no-plot --pair 100 t.npy r.npy")
@@ -87,6 +88,7 @@ def test_a_scan_is_compared_and_its_tables_are_listed_as_by_the_commands(lab: Pa
         tablegen.compare("scan.toml", "scanner.toml")
 
 
+@pytest.mark.common
 def test_a_page_and_a_library_are_those_of_the_commands(lab: Path) -> None:
     page = tablegen.report("scan.toml")
     check(page)
@@ -103,6 +105,7 @@ def test_a_page_and_a_library_are_those_of_the_commands(lab: Path) -> None:
     assert ours == theirs
 
 
+@pytest.mark.common
 def test_a_scan_is_simulated_as_by_the_command(lab: Path) -> None:
     check(tablegen.simulate("scan.toml", calibrated=False), "simulate scan.toml --no-calibration")
     with pytest.raises(ValueError, match="has no operator; identify one with calibrate_operator"):

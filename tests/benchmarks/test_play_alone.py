@@ -47,6 +47,7 @@ def shown(*command: str | Path) -> int:
     return int(done.stdout.split()[0])
 
 
+@pytest.mark.common
 def test_in_c(plan: Plan, build: Path, tmp_path: Path) -> None:
     """Once by steps, and on from there by fills."""
     ticks = [tick for tick, _ in zip(played(plan), range(2 * TICKS), strict=False)]

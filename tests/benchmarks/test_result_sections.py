@@ -34,6 +34,7 @@ def test_no_other_turn_has_less_mean_square_acceleration() -> None:
         assert abs(np.mean(bend * bump)) <= 2e-3 * np.sqrt(np.mean(bend**2) * np.mean(bump**2))
 
 
+@pytest.mark.common
 def test_harmonics_of_the_spline_come_nearer_to_it() -> None:
     errors = [worst(SECTION_8, waveforms.spline(SECTION_8)(harmonics)) for harmonics in (32, 128, 512)]
     assert errors[0] > errors[1] > errors[2]
@@ -130,6 +131,7 @@ def test_versions_are_read_and_a_missing_tool_is_named() -> None:
         tool_version("no_such_tool")
 
 
+@pytest.mark.common
 def test_cpu_time_is_that_of_the_command() -> None:
     """Of two of which one computes for longer."""
     code = "sum(range({}))"

@@ -136,6 +136,7 @@ def test_a_header_that_promises_something_else(shape: str, tmp_path: Path) -> No
     assert peak < 20 << 20
 
 
+@pytest.mark.common
 def test_an_archive_that_unpacks_into_more_than_a_measurement_has(tmp_path: Path) -> None:
     path = tmp_path / "trace.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("time_s.npy", "w") as member:
@@ -144,6 +145,7 @@ def test_an_archive_that_unpacks_into_more_than_a_measurement_has(tmp_path: Path
     assert faults(path) == [": cannot be read: its arrays are above 512 MiB"]
 
 
+@pytest.mark.common
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data(), archive=st.booleans())
 def test_damaged_files_are_read_or_refused(data: st.DataObject, archive: bool, tmp_path: Path) -> None:

@@ -93,6 +93,7 @@ def test_an_outlier_is_named_and_kept() -> None:
     assert wrong.centre_nm.value != pytest.approx(clean.centre_nm.value, rel=1e-4), "it was dropped"
 
 
+@pytest.mark.common
 def test_outliers_are_rarely_seen_where_there_are_none() -> None:
     v = np.linspace(5.0, 95.0, 12)
     random = np.random.default_rng(4)

@@ -33,6 +33,7 @@ def noise(samples: int, seed: int, rms: float = 0.002) -> np.ndarray:
     return rms * np.random.default_rng(seed).standard_normal((2, samples))
 
 
+@pytest.mark.common
 @given(
     turn=st.floats(0.1, 0.9),
     begins=st.floats(0.0, 1.0),
@@ -61,6 +62,7 @@ def test_one_period_from_turn_to_turn_is_enough() -> None:
     assert fit.periods == pytest.approx(1.0)
 
 
+@pytest.mark.common
 def test_periods_are_averaged() -> None:
     """Four times the periods, half the error; and the errors say so."""
     scatter, errors = [], []
@@ -101,6 +103,7 @@ def test_a_delay_that_is_known_is_taken_off_and_one_that_is_not_can_be_fitted() 
     assert shapes(fit) == pytest.approx([0.037, 0.37, 0.080, 0.48], abs=1e-6)
 
 
+@pytest.mark.common
 def test_the_timing_of_a_noisy_drive_counts_in_the_errors() -> None:
     """Noise on the drive alone: what it does to the branches is in their standard errors."""
     off = []
@@ -125,6 +128,7 @@ def test_residuals_that_are_no_noise_widen_the_errors() -> None:
     assert any("residuals are correlated over" in remark for remark in fit.remarks)
 
 
+@pytest.mark.common
 def test_errors_of_a_slow_sensor_are_honest() -> None:
     """Noise that is alike over nine samples tells nine times less: without that the distances would be 3 errors."""
     off = []

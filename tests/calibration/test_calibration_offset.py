@@ -24,6 +24,7 @@ def looks(law: OffsetLaw, size: SizeLaw, size_v: float) -> Floats:
     return 17.7 * np.array([size.size_nm(v) / size.size_nm(v / one) for one in m])
 
 
+@pytest.mark.common
 @given(factors, st.floats(0.0, 1.5), st.floats(5.0, 80.0))
 def test_factors_are_those_of_the_drive(ends: tuple[float, float], beta: float, size_v: float) -> None:
     size = SizeLaw.calibrated(10.0, V_MAX, beta, 200.0, 0.5)

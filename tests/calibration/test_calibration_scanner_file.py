@@ -219,6 +219,7 @@ def test_faults_that_were_there_before_do_not_matter() -> None:
     assert put(text, offset())["x"]["size"]["colour"] == 3
 
 
+@pytest.mark.common
 @given(name=st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=30))
 @settings(max_examples=20)
 def test_no_file_name_can_spoil_the_file(name: str) -> None:

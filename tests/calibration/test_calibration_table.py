@@ -133,6 +133,7 @@ def test_what_is_no_file_is_named(tmp_path: Path) -> None:
             read_table(tmp_path / name, (OFFSET,))
 
 
+@pytest.mark.common
 @given(
     values=st.lists(
         st.tuples(st.floats(-1e5, 1e5), st.floats(1e-6, 1e9)).map(lambda pair: (pair[0] + 0.0, pair[1])),
@@ -164,6 +165,7 @@ def test_numbers_come_back_as_they_were_written(
     assert np.array_equal(table[APPARENT], [pair[1] for pair in values])
 
 
+@pytest.mark.common
 @given(
     content=st.one_of(
         st.binary(max_size=80), st.text(max_size=80).map(lambda text: ("offset_v,apparent_nm\n" + text).encode())

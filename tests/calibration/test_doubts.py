@@ -127,6 +127,7 @@ def test_a_law_that_misses_little_is_not_however_small_the_errors() -> None:
     assert doubts(with_forward(good)) == ()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("error", "doubted"), [(0.009, False), (0.021, True)])
 def test_two_standard_errors_are_the_limit(error: float, doubted: bool) -> None:
     fit = fit_hysteresis(traces(0.002), V_MAX)

@@ -61,6 +61,7 @@ def test_a_scan_voltage_may_be_the_whole_range() -> None:
         fit_size(drives, law, Driver(200.0, -200.0), 1000.0)
 
 
+@pytest.mark.common
 def test_the_operator_of_a_driver_of_both_signs(tmp_path: Path) -> None:
     """Its file keeps v_min, the plan is that of the moved voltages, and another driver is refused."""
     file = operator_file([0.3, 0.2, 0.1])

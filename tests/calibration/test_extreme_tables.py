@@ -37,6 +37,7 @@ def calibrated(folder: Path, kind: str, columns: dict[str, np.ndarray]) -> tuple
     return done.status, done.err
 
 
+@pytest.mark.common
 @pytest.mark.filterwarnings("error")
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(sorted(TABLES)), st.data())

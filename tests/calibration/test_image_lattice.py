@@ -30,6 +30,7 @@ def plain_lattice(side: float = 12.0, turn: float = 0.4, size: int = 128) -> tup
     return heights + 0.3 * np.random.default_rng(1).normal(size=heights.shape), cell
 
 
+@pytest.mark.common
 def test_a_plain_cell_is_right_within_its_errors() -> None:
     heights, cell = plain_lattice()
     result = find_cell(heights)
@@ -70,12 +71,14 @@ def accepted_and_wrong(seeds: range) -> tuple[int, list[int]]:
     return accepted, wrong
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("seed", [1019, 1043, 1031])
 def test_slow_waves_of_a_terrace_make_no_larger_cell(seed: int) -> None:
     """The steps along the rows are levelled, and what remains has fewer than four periods in one direction."""
     assert accepted_and_wrong(range(seed, seed + 1)) == (1, [])
 
 
+@pytest.mark.common
 def test_an_ambiguous_lattice_names_the_cells_with_their_likelihoods() -> None:
     with pytest.raises(Unphysical, match=r"14\.41 x 14\.41 pixels at 60 degrees \(\d+ %\)") as reason:
         find_cell(three_sites(5051)[0])
@@ -139,6 +142,7 @@ def test_images_without_a_lattice_are_refused() -> None:
     assert accepted_without_lattice(range(40)) == []
 
 
+@pytest.mark.common
 def test_a_grating_is_one_direction_and_has_a_pitch() -> None:
     heights = without_lattice(2)
     with pytest.raises(Unphysical, match="--lattice grating"):
@@ -156,6 +160,7 @@ def test_too_few_periods_are_refused() -> None:
         find_cell(plain_lattice(90.0)[0])
 
 
+@pytest.mark.common
 def test_the_command_prints_the_cell_and_the_shift_and_writes_nothing(tmp_path: Path) -> None:
     heights, _ = plain_lattice(14.0)
     np.save(tmp_path / "trace.npy", heights[:, 4:])
@@ -169,6 +174,7 @@ def test_the_command_prints_the_cell_and_the_shift_and_writes_nothing(tmp_path: 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["retrace.npy", "trace.npy"]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("first_row", ["top", "bottom"])
 def test_the_plot_shows_the_spots_where_the_spectrum_is_high(first_row: str) -> None:
     """The lattice is not symmetric, so that a mirrored spectrum would show its maxima elsewhere."""

@@ -618,6 +618,7 @@ def test_a_file_that_ends_early_is_refused_wherever_it_ends(kind: str) -> None:
     assert [cut for cut in range(0, needed, step) if read_or_refused(reader, content[:cut])] == []
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("kind", READERS)
 def test_damage_is_refused_or_read_and_never_worse(kind: str) -> None:
     content, reader = READERS[kind]

@@ -30,6 +30,7 @@ def line_by_line(path: Path, *needed: Column) -> table.MeasuredTable:
         return table.read_table(path, needed)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("end", "point"), [("\n", "."), ("\r\n", "."), ("\n", ","), ("\r", ".")])
 def test_blocks_have_the_numbers_and_lines_of_the_file(end: str, point: str, tmp_path: Path) -> None:
     path = long_csv(tmp_path / "long.csv", {40_000: "# a pause", 40_001: ""}, end, point)
@@ -41,6 +42,7 @@ def test_blocks_have_the_numbers_and_lines_of_the_file(end: str, point: str, tmp
     assert found.source == line_by_line(path, TIME, DRIVE).source
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -69,6 +71,7 @@ def test_a_byte_that_is_no_text_far_down_has_its_line(tmp_path: Path) -> None:
     assert [str(one) for one in caught.value.problems] == [f"{path}:{ROWS + 2}: byte 0xff is not UTF-8"]
 
 
+@pytest.mark.common
 def test_units_that_are_no_factor_are_converted_too(tmp_path: Path) -> None:
     path = tmp_path / "gains.csv"
     gains = np.linspace(-40.0, 20.0, ROWS)

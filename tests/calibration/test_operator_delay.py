@@ -58,6 +58,7 @@ def test_a_line_is_as_much_earlier_as_its_sensor_was_late() -> None:
     assert float(np.max(np.abs(behind.displacement_nm - straight.displacement_nm))) > 4.0
 
 
+@pytest.mark.common
 def test_round_turns_and_large_delays_are_refused() -> None:
     t = np.arange(5000) / 1000.0
     drive = 50.0 - 30.0 * np.cos(2.0 * np.pi * t)

@@ -111,6 +111,7 @@ def test_what_is_in_a_real_file(name: str) -> None:
     assert (np.min(first.heights), np.max(first.heights)) == pytest.approx(facts.heights, rel=1e-5)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", [name for name in THERE if name in FILES and name.endswith(".ibw")])
 def test_real_waves_by_igor2(name: str) -> None:
     """Each pixel; and the step of the columns, of which N - 1 make the width."""

@@ -14,6 +14,7 @@ GAIN = 20.0
 FOLDER = real_folder()  # conftest.py leaves this module out where there is none
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", [name for name in NAMES if FOLDER and (FOLDER / name).is_file()])
 def test_a_real_trace_is_read_as_it_is(name: str) -> None:
     assert FOLDER is not None

@@ -99,6 +99,7 @@ def test_a_record_that_may_be_wrong_has_a_note(fault: str) -> None:
     assert re.search(reason, remark), remark
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("turn", [0.5, 0.7])
 @pytest.mark.parametrize("share", [0.01, 0.02, 0.04, -0.02])
 def test_a_delay_is_named_in_percent_of_the_period(turn: float, share: float) -> None:
@@ -111,6 +112,7 @@ def test_a_delay_is_named_in_percent_of_the_period(turn: float, share: float) ->
     assert remarks(late, Known(DRIVER, 10.0, delay_s=share * 0.01)) == ()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("turn", [0.3, 0.5, 0.8])
 @pytest.mark.parametrize("period_s", [0.0017, 0.01, 0.1, 1.0])
 @pytest.mark.parametrize("v", [10.0, 60.0, 100.0])

@@ -32,6 +32,7 @@ def with_words(plan: Plan, words: np.ndarray) -> Plan:
     return replace(plan, x=replace(plan.x, program=replace(plan.x.program, words=words)))
 
 
+@pytest.mark.common
 def test_errors_are_those_of_every_tick(example: Plan) -> None:
     certificates = certify(example)
     for line in example.lines:
@@ -142,6 +143,7 @@ def test_coarse_converter_shows_in_quantisation(tmp_path: Path) -> None:
     assert coarse == pytest.approx(16 * fine, rel=0.4)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("mode", ["interpolated", "cubic"])
 def test_runs_and_ticks_measure_the_same(
     example: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str

@@ -72,6 +72,7 @@ def stepped(u: Floats) -> Floats:
     return out
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("harmonics", [6, 32])
 def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Path, harmonics: int) -> None:
     path = with_operator(tmp_path, f"x.band_limit.harmonics = {harmonics}", "dac.bits = 20")
@@ -115,6 +116,7 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
     assert (max(scaling.values()) > 10.0) == (harmonics == 6)  # it is the waveform that makes the difference
 
 
+@pytest.mark.common
 def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read(tmp_path: Path) -> None:
     path, out = (
         with_operator(tmp_path, "dac.bits = 24", "x.table.bits = 24"),
@@ -189,6 +191,7 @@ FIGURES: dict[str, Change] = {  # which no other number of the directory gives, 
 }
 
 
+@pytest.mark.common
 def test_what_no_build_states_is_found(tmp_path: Path) -> None:
     path, out = with_operator(tmp_path), tmp_path / "out"
     assert run("build", path, "-o", out).status == 0
@@ -227,6 +230,7 @@ def test_a_scan_that_is_near_a_trace_is_silent(tmp_path: Path) -> None:
     assert warned(with_operator(tmp_path, "x.offset_v = 59.0")) == []
 
 
+@pytest.mark.common
 def test_a_scan_that_is_far_from_all_traces_names_the_one_that_is_missing(tmp_path: Path) -> None:
     (text,) = warned(with_operator(tmp_path, "x.offset_v = 61.0"))
     found = re.search(r"scan\.toml:\d+: x\.size_nm: the x axis moves by ([\d.]+) V about 61 V, 11 % of v_max ", text)
@@ -237,6 +241,7 @@ def test_a_scan_that_is_far_from_all_traces_names_the_one_that_is_missing(tmp_pa
     assert f"record a trace of {found[1]} V about 61 V" in text
 
 
+@pytest.mark.common
 def test_too_few_harmonics_are_said_with_a_remedy_that_holds(tmp_path: Path) -> None:
     (text,) = warned(with_operator(tmp_path, "x.band_limit.harmonics = 6"))
     assert "x.band_limit.harmonics: on the scanner the x axis is expected to have a scaling error of " in text
@@ -246,6 +251,7 @@ def test_too_few_harmonics_are_said_with_a_remedy_that_holds(tmp_path: Path) -> 
     assert warned(with_operator(tmp_path, f"x.band_limit.harmonics = {tried[1]}")) == []
 
 
+@pytest.mark.common
 def test_a_limit_counts_what_is_expected_and_says_which_part_is_whose(tmp_path: Path) -> None:
     limit, few = "+ [limits]\nmax_scaling_error_percent = 0.5", "x.band_limit.harmonics = 14"
     broken = run("check", with_operator(tmp_path, limit, few))

@@ -3,6 +3,7 @@
 import tracemalloc
 from pathlib import Path
 
+import pytest
 from editing import SCAN, edited, write_pair
 
 import tablegen
@@ -10,6 +11,7 @@ import tablegen
 LONG_LINES = ("dac.bits = 24", "dac.update_rate_hz = 10e6", "timing.line_rate_hz = 10", "- [limits]")
 
 
+@pytest.mark.common
 def test_long_lines_are_measured_in_parts(tmp_path: Path) -> None:
     """A frame of 2e8 ticks and two million runs takes their starts and codes twice, and little beside those.
 

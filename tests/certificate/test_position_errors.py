@@ -142,6 +142,7 @@ def test_verify_finds_the_same_position_and_mismatch_and_every_other(tmp_path: P
     assert missed == []
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "resonance",
     [

@@ -106,6 +106,7 @@ def test_the_summary_says_it(certified: Certified) -> None:
     assert "position" not in "\n".join(value for _, value in certificate_lines(certified["off"][1]["x"]))
 
 
+@pytest.mark.common
 def test_a_period_too_long_for_all_is_judged_in_part(tmp_path: Path) -> None:
     plan = planned(tmp_path, "second", **{"timing.line_rate_hz": 2.0, "timing.lines": 20})
     line = plan.y
@@ -116,6 +117,7 @@ def test_a_period_too_long_for_all_is_judged_in_part(tmp_path: Path) -> None:
     assert shaped.ticks == 1 << 20
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", ["csv", "npz", "wav", "pwl"])
 def test_a_file_of_one_period_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(Unphysical, match="shaped codes have none"):

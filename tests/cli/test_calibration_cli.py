@@ -73,6 +73,7 @@ def calibrate(kind: str, *more: str, axis: str = "x", scanner: str = "scanner.to
     return run("calibrate", kind, "--axis", axis, *CALIBRATIONS[kind][0], "--scanner", scanner, *more)
 
 
+@pytest.mark.common
 def test_a_whole_calibration_is_accepted_by_check_and_builds(lab: Path) -> None:
     for kind in CALIBRATIONS:
         outcome = calibrate(kind, "--write")
@@ -159,6 +160,7 @@ def test_a_link_stays_a_link(lab: Path) -> None:
     assert "# calibrate offset" in (lab / "shared" / "scanner.toml").read_text("utf-8")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_a_plot_is_drawn_and_the_same_twice(ending: str, lab: Path) -> None:
     begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -228,6 +230,7 @@ def test_a_size_law_that_cannot_be_is_refused(beta: str, said: str, lab: Path) -
     assert run(*words).status == 0
 
 
+@pytest.mark.common
 def test_points_stand_in_for_the_law_and_back(lab: Path) -> None:
     """As measured at each amplitude; the file builds, and keeps all else; another calibration takes them out again."""
     before = (lab / "scanner.toml").read_text("utf-8")
@@ -272,6 +275,7 @@ def test_volts_and_lattice_constants_do_as_well(lab: Path) -> None:
         assert [found[key]["value"] for key in ("k_nm_per_v", "beta", "v_threshold")] == pytest.approx([11.0, 0.6, 0.5])
 
 
+@pytest.mark.common
 def test_several_traces_may_stand_in_one_file(lab: Path) -> None:
     separate = json.loads(calibrate("hysteresis", "--json").out)["branches"]
     bodies = [(lab / name).read_text("utf-8").splitlines() for name in TRACES]
@@ -459,6 +463,7 @@ def test_a_column_of_sizes_takes_the_size_law_and_no_option(lab: Path) -> None:
     assert (fewer.status, "images of 40 V: 2 different offsets do not" in fewer.err) == (2, True)
 
 
+@pytest.mark.common
 def test_traces_at_several_offsets_make_points_of_each(lab: Path) -> None:
     """40 and 80 V at 50 V, 40 V once more at 72 V with another branch: the scan between has what lies between."""
     noise = 0.002 * np.random.default_rng(13).standard_normal((2, 800))
@@ -508,6 +513,7 @@ def numbers(tree: Any) -> list[float]:
     return [float(tree)] if isinstance(tree, int | float) else []
 
 
+@pytest.mark.common
 def test_traces_of_a_scope_give_what_traces_at_the_piezo_give(lab: Path) -> None:
     def parameters(*arguments: str | Path) -> dict[str, Any]:
         outcome = run("calibrate", "hysteresis", "--axis", "x", "--v-max", "100", "--json", *arguments)

@@ -155,6 +155,7 @@ def test_branches_of_another_axis_are_refused(angle: str, axis: str, said: str, 
     assert (lab / "s.toml").read_text() == 'name = "s"\nv_max = 100.0\n'
 
 
+@pytest.mark.common
 def test_branches_of_the_axis_that_was_fast_are_fitted_and_the_angle_is_said(lab: Path) -> None:
     pair = {"HeightTrace": np.load(lab / "t.npy"), "HeightRetrace": np.load(lab / "r.npy")}
     (lab / "turned.ibw").write_bytes(ibw(pair, NOTE | {"ScanAngle": "90"}))

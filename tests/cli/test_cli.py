@@ -178,6 +178,7 @@ def test_a_missing_scan_is_named(tmp_path: Path) -> None:
 # build
 
 
+@pytest.mark.common
 def test_a_build_writes_its_files_and_says_what_they_promise(scan: Path) -> None:
     done = tablegen("build", "scan.toml", "-o", "some/where", cwd=scan.parent)
     assert (done.returncode, done.stderr) == (0, b"")
@@ -251,6 +252,7 @@ def test_a_quiet_build_prints_nothing(scan: Path) -> None:
     assert sorted(contents(scan.parent / "out")) == FILES
 
 
+@pytest.mark.common
 def test_the_default_directory_is_build(scan: Path) -> None:
     assert tablegen("build", "scan.toml", "-q", cwd=scan.parent).returncode == 0
     assert sorted(contents(scan.parent / "build")) == FILES
@@ -328,6 +330,7 @@ def test_a_broken_limit_is_status_3_and_nothing_is_written(tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.common
 def test_show_draws_in_braille_where_it_can_and_in_marks_elsewhere(scan: Path) -> None:
     braille = re.compile("[\u2801-\u28ff]")
     rich = tablegen("show", scan, PYTHONIOENCODING="utf-8")
@@ -358,6 +361,7 @@ def test_a_name_that_the_terminal_cannot_show_is_no_failure(tmp_path: Path, enco
         assert b"annexin_200nm on '" in done.stdout
 
 
+@pytest.mark.common
 def test_show_json_is_the_manifest_that_a_build_writes(scan: Path) -> None:
     shown = tablegen("show", scan, "--json")
     assert (shown.returncode, shown.stderr) == (0, b"")
@@ -475,6 +479,7 @@ def full_disk() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))
 
 
+@pytest.mark.common
 def test_a_full_disk_leaves_nothing_where_nothing_was(scan: Path) -> None:
     out = scan.parent / "out"
     done = tablegen("build", scan, "-o", out, before=full_disk)
@@ -483,6 +488,7 @@ def test_a_full_disk_leaves_nothing_where_nothing_was(scan: Path) -> None:
     assert not out.exists()
 
 
+@pytest.mark.common
 def test_a_full_disk_leaves_the_build_that_was_there(scan: Path) -> None:
     out = scan.parent / "out"
     run("build", scan, "-o", out)
@@ -494,6 +500,7 @@ def test_a_full_disk_leaves_the_build_that_was_there(scan: Path) -> None:
     assert stamps(out) == when
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("command", ["show", "build", "schema"])
 def test_a_full_disk_behind_stdout_is_told(scan: Path, command: str) -> None:
     arguments = {"show": ("show", scan), "build": ("build", scan, "-o", scan.parent / "out"), "schema": ("schema",)}
@@ -503,12 +510,14 @@ def test_a_full_disk_behind_stdout_is_told(scan: Path, command: str) -> None:
     assert done.stderr == b"cannot write to stdout: No space left on device\n"
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("command", ["show", "check"])
 def test_a_closed_stdout_is_no_failure(scan: Path, command: str) -> None:
     done = tablegen(command, scan, before=lambda: os.close(1), stdout=None)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("wanted", [0, 1, 20])
 def test_a_reader_that_leaves_is_no_failure(scan: Path, wanted: int) -> None:
     with subprocess.Popen(
@@ -619,6 +628,7 @@ main()
 """
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_from_outside_interrupts_a_build(scan: Path, number: signal.Signals) -> None:
     out = scan.parent / "out"
@@ -633,6 +643,7 @@ def test_a_signal_from_outside_interrupts_a_build(scan: Path, number: signal.Sig
     assert not out.exists()
 
 
+@pytest.mark.common
 def test_what_is_ignored_stays_ignored(scan: Path) -> None:
     """As ``nohup`` wants it: the signal comes first, and the build is there all the same."""
     shell = 'trap "" HUP; exec "$@"'

@@ -41,6 +41,7 @@ def refused(outcome: Outcome, *parts: str) -> None:
         assert part in outcome.err
 
 
+@pytest.mark.common
 def test_what_it_prints_and_that_it_writes_nothing(lab: Path) -> None:
     before = sorted(lab.iterdir())
     outcome = correct(*FIT)
@@ -96,6 +97,7 @@ def written(lab: Path, suffix: str) -> tuple[list[Floats], str]:
     return [np.asarray(one) for one in pictures], pictures[0].text["tablegen correct"]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("suffix", [".npy", ".tif", ".gwy", ".png"])
 def test_every_format_has_both_pictures_their_mask_and_what_was_done(lab: Path, suffix: str) -> None:
     assert correct(*DRIVE, "--window", "0.1", "0.9", "-o", f"o{suffix}").status == 0
@@ -124,6 +126,7 @@ def test_every_format_has_both_pictures_their_mask_and_what_was_done(lab: Path, 
     assert '"size_nm": [' in provenance
 
 
+@pytest.mark.common
 def test_the_size_is_in_the_file(lab: Path) -> None:
     """Of Gwyddion's in metres, of TIFF's as its resolution."""
     assert correct(*DRIVE, "-o", "o.gwy").status == 0
@@ -139,6 +142,7 @@ def test_the_size_is_in_the_file(lab: Path) -> None:
         assert 128 / (count / of) * 1e7 == pytest.approx(size[0], rel=1e-4)
 
 
+@pytest.mark.common
 def test_all_channels_of_one_file_by_their_names(lab: Path) -> None:
     trace, retrace = (np.load(lab / f"{name}.npy") for name in ("trace", "retrace"))
     phase = np.cumsum(trace, axis=1)
@@ -200,6 +204,7 @@ def test_wrong_usage(lab: Path, words: tuple[str, ...], part: str) -> None:
     refused(correct(*words), part)
 
 
+@pytest.mark.common
 def test_wrong_input_is_named_and_nothing_is_written(lab: Path) -> None:
     trace = np.load(lab / "trace.npy")
     np.save(lab / "noise.npy", np.random.default_rng(0).standard_normal((96, 128)))
@@ -238,6 +243,7 @@ def test_wrong_input_is_named_and_nothing_is_written(lab: Path) -> None:
     assert sorted(lab.iterdir()) == before
 
 
+@pytest.mark.common
 def test_a_lattice_that_is_none(lab: Path) -> None:
     """A grating has waves of one direction: a lattice constant is not what its size comes from."""
     from tablegen.virtual.imaging import grating

@@ -50,6 +50,7 @@ def calibrate(kind: str, *more: str) -> tuple[int, str, str]:
     return found.status, found.out, found.err
 
 
+@pytest.mark.common
 def test_a_meaningless_fit_is_printed_and_not_written(lab: Path) -> None:
     before = (lab / "scanner.toml").read_bytes()
     status, printed, errors = calibrate("hysteresis")
@@ -66,6 +67,7 @@ def test_a_meaningless_fit_is_printed_and_not_written(lab: Path) -> None:
     assert json.loads(calibrate("hysteresis", "--json")[1])["doubts"] == [line[len("warning: ") :] for line in warnings]
 
 
+@pytest.mark.common
 def test_force_writes_it_and_says_so_in_the_file(lab: Path) -> None:
     status, _, errors = calibrate("hysteresis", "--write", "--force")
     assert (status, errors) == (0, "")

@@ -79,6 +79,7 @@ READING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("what", quick(["check"], READING))
 def test_no_command_waits_at_a_pipe_or_reads_a_device(what: str, tmp_path: Path) -> None:
     write_pair(tmp_path)
@@ -214,6 +215,7 @@ DAMAGED: dict[str, tuple[str, Callable[[], bytes], str]] = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("what", quick(["directory of itself", "deep header"], DAMAGED))
 def test_a_damaged_image_is_told(what: str, tmp_path: Path) -> None:
     name, content, said = DAMAGED[what]

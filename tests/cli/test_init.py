@@ -34,6 +34,7 @@ OPTIONS: dict[tuple[str, ...], dict[str, object]] = {
 }  # fmt: skip
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("options", OPTIONS, ids=" ".join)
 def test_what_it_writes_says_what_was_asked_and_builds_without_a_warning(
     options: tuple[str, ...], tmp_path: Path
@@ -63,6 +64,7 @@ def test_nothing_is_said_twice(tmp_path: Path) -> None:
             assert all(scanner["x"][name].get(key) != value for key, value in table.items())
 
 
+@pytest.mark.common
 def test_few_bits_are_warned_of_with_what_would_be_enough(tmp_path: Path) -> None:
     outcome = run("init", tmp_path, "--bits", "12", "--clock", "100k", "--pixels", "128")
     assert outcome.status == 0
@@ -104,6 +106,7 @@ OWN_SCANNERS: dict[tuple[str, ...], tuple[float, float, float]] = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("options", OWN_SCANNERS, ids=" ".join)
 def test_an_own_scanner_has_no_hysteresis_of_the_example(options: tuple[str, ...], tmp_path: Path) -> None:
     path = made(tmp_path, *options)

@@ -196,6 +196,7 @@ def test_two_thousand_damaged_files(share: int, tmp_path: Path) -> None:
     assert in_a_process(tmp_path, range(200 * share, 200 * share + 200)) == []
 
 
+@pytest.mark.common
 def test_a_hang_and_an_escape_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Negative control."""
 

@@ -76,6 +76,7 @@ def test_a_file_takes_the_place_of_the_terminal(scan: Path, tmp_path: Path) -> N
         assert (tmp_path / f"a.{ending}").read_bytes().startswith(begins)
 
 
+@pytest.mark.common
 def test_the_terminal_by_default_or_when_asked(scan: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert "> forward" in run("show", scan).out

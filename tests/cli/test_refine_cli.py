@@ -74,6 +74,7 @@ def test_what_is_to_be_reached_is_reached(scan: Scan) -> None:
     assert set(after.residual_percent) == ({"forward", "backward"} if scan.axis == "x" else {"forward"})
 
 
+@pytest.mark.common
 def test_rounds_by_hand(folder: Path) -> None:
     """Record, refine, build: as the page says; each trace is of what the file then says."""
     residuals = []
@@ -91,6 +92,7 @@ def test_rounds_by_hand(folder: Path) -> None:
     assert manifest["axes"]["x"]["fourier"]["refinement"]["a"] == written["a"]
 
 
+@pytest.mark.common
 def test_text_and_data_say_the_same(folder: Path) -> None:
     trace = record(folder)
     before = (folder / "scan.toml").read_bytes()
@@ -118,6 +120,7 @@ def test_text_and_data_say_the_same(folder: Path) -> None:
     assert true == pytest.approx(after, abs=0.1 * before)
 
 
+@pytest.mark.common
 def test_the_trigger_and_the_drive_agree(folder: Path) -> None:
     with_drive = refining(folder, record(folder, clock=0.0), "--json")
     trace = record(folder, clock=0.0, without=("drive_v",))
@@ -141,6 +144,7 @@ def test_the_trigger_and_the_drive_agree(folder: Path) -> None:
         assert "is time 0 no line start?" in late.err
 
 
+@pytest.mark.common
 def test_a_sensor_that_is_late_or_turned(folder: Path) -> None:
     right = json.loads(refining(folder, record(folder), "--json").out)
     late = record(folder, delay_s=5e-5)
@@ -154,6 +158,7 @@ def test_a_sensor_that_is_late_or_turned(folder: Path) -> None:
     assert any("its sign was inverted" in remark for remark in turned["remarks"])
 
 
+@pytest.mark.common
 def test_a_trace_that_is_worse_is_not_learnt_from(folder: Path) -> None:
     """The monitor: with a stored residual that was better, nothing is written, unless it is forced."""
     assert refining(folder, record(folder), "--write").status == 0
@@ -172,6 +177,7 @@ def test_a_trace_that_is_worse_is_not_learnt_from(folder: Path) -> None:
     assert path.read_text("utf-8") != text
 
 
+@pytest.mark.common
 def test_a_loop_that_diverges_is_stopped(tmp_path: Path) -> None:
     """A delay beyond the bound that nobody told: learning makes it worse, and the monitor says so."""
     write_pair(tmp_path, SCAN, edited(SCANNER, "- [x.resonance]"))
@@ -188,6 +194,7 @@ def test_a_loop_that_diverges_is_stopped(tmp_path: Path) -> None:
     assert "refinement" in path.read_text("utf-8")
 
 
+@pytest.mark.common
 def test_a_trace_of_the_build_before_is_refused(folder: Path) -> None:
     trace = record(folder, samples=3000)
     assert refining(folder, trace, "--write").status == 0
@@ -196,6 +203,7 @@ def test_a_trace_of_the_build_before_is_refused(folder: Path) -> None:
     assert "of the layer that the scan file has; build, upload and record again" in outcome.err
 
 
+@pytest.mark.common
 def test_a_trace_is_learnt_from_once(folder: Path) -> None:
     """Of a late round the drive lacks too little to be seen, but the file knows where its layer came from."""
     assert refining(folder, record(folder, seed=0), "--write").status == 0
@@ -217,6 +225,7 @@ def test_a_trace_is_learnt_from_once(folder: Path) -> None:
     assert refining(folder, first, "--write").status == 0
 
 
+@pytest.mark.common
 def test_a_glitch_is_named(folder: Path) -> None:
     trace = record(folder, clock=0.0)
     rows = trace.read_text("utf-8").splitlines()
@@ -228,6 +237,7 @@ def test_a_glitch_is_named(folder: Path) -> None:
     assert "far off" not in refining(folder, record(folder)).out
 
 
+@pytest.mark.common
 def test_a_trigger_where_the_line_turns(folder: Path) -> None:
     """Nothing tells it from a sensor that counts the other way; it is said."""
     trace = record(folder, clock=0.0, without=("drive_v",))
@@ -236,6 +246,7 @@ def test_a_trigger_where_the_line_turns(folder: Path) -> None:
     assert "its sign" not in refining(folder, trace, "--triggered").out
 
 
+@pytest.mark.common
 def test_when_there_is_nothing_to_learn(folder: Path) -> None:
     """A short and noisy trace of what was refined well: the file is left as it is."""
     step = list(rounds(load(folder / "scan.toml"), "x", 2))[-1]
@@ -248,6 +259,7 @@ def test_when_there_is_nothing_to_learn(folder: Path) -> None:
     assert found.remarks
 
 
+@pytest.mark.common
 def test_pictures(folder: Path) -> None:
     trace = record(folder)
     assert refining(folder, trace, "--plot", folder / "p.png").status == 0
@@ -291,6 +303,7 @@ def changed(trace: Path, name: str, **factors: float) -> Path:
     return path
 
 
+@pytest.mark.common
 def test_a_wrong_trace_is_named_by_what_it_looks_like(folder: Path) -> None:
     trace = record(folder)
     sound = refining(folder, trace)

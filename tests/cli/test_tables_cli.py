@@ -29,6 +29,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return dict(axis)
 
 
+@pytest.mark.common
 def test_rows_are_what_a_build_of_that_table_has(found: dict[str, Any], tmp_path: Path) -> None:
     assert len(found["tables"]) > 10
     for row in found["tables"][::4]:
@@ -42,6 +43,7 @@ def test_rows_are_what_a_build_of_that_table_has(found: dict[str, Any], tmp_path
         assert row["stored_bits"] > row["length"] * storage_bits(row["bits"])
 
 
+@pytest.mark.common
 def test_of_shaped_output_errors_are_those_before_the_rounding(tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(f"{SCAN}", "dac.shaping = 'second'", "x.size_nm = 20"))
     text, data = run("tables", path, "--axis", "x"), run("tables", path, "--axis", "x", "--json")
@@ -86,6 +88,7 @@ def test_fourier_words_are_as_long_as_they_are_uploaded(found: dict[str, Any]) -
     assert fourier["rendered"] == {"mode": "cubic", "length": 128, "bits": 14, "memory_bits": 1792}
 
 
+@pytest.mark.common
 def test_the_lines_to_paste_give_the_table_that_is_marked(tmp_path: Path) -> None:
     text = run("tables", write_pair(tmp_path), "--axis", "x").out
     (marked,) = re.findall(r"^  \*  (\w+) +(\d+) +(\d+) ", text, re.M)
@@ -97,6 +100,7 @@ def test_the_lines_to_paste_give_the_table_that_is_marked(tmp_path: Path) -> Non
         assert (program.mode, f"{len(program.words)}", f"{program.bits}") == marked
 
 
+@pytest.mark.common
 def test_both_axes_are_told_unless_one_rests_or_is_named(tmp_path: Path) -> None:
     text = f"{SCAN.split('[y]')[0]}[y]\nmotion = 'off'\noffset_v = 40.0\n"
     path = write_pair(tmp_path, text)
@@ -106,6 +110,7 @@ def test_both_axes_are_told_unless_one_rests_or_is_named(tmp_path: Path) -> None
     assert "y is static in this scan" in outcome.err
 
 
+@pytest.mark.common
 def test_the_error_asked_for_is_that_of_the_file(tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, *AUTO, "x.table.max_error_lsb = 0.6"))
     text = run("tables", path, "--axis", "x").out
@@ -116,12 +121,14 @@ def test_the_error_asked_for_is_that_of_the_file(tmp_path: Path) -> None:
     assert re.search(r"scan\.toml:\d+: x\.table: no table keeps 0\.3 LSB; the best, ", outcome.err)
 
 
+@pytest.mark.common
 def test_a_scan_that_breaks_a_limit_is_told_all_the_same(tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, "x.table.length = 128"))
     assert run("build", path, "-o", tmp_path / "out").status == 3
     assert run("tables", path, "--axis", "x").status == 0
 
 
+@pytest.mark.common
 def test_a_picture_has_each_mode(tmp_path: Path) -> None:
     path, picture = write_pair(tmp_path), tmp_path / "tables.svg"
     assert run("tables", path, "--axis", "x", "--plot", picture).status == 0
@@ -129,6 +136,7 @@ def test_a_picture_has_each_mode(tmp_path: Path) -> None:
     assert all(f'data-name="{mode}"' in drawn for mode in MODES)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("edits", "output_storage_bits", "coded"),
     [
@@ -162,6 +170,7 @@ def test_modes_are_in_the_order_of_what_they_take() -> None:
     assert CELLS["direct"] < CELLS["cubic"] <= 3000
 
 
+@pytest.mark.common
 def test_show_report_compare_and_the_manifest_say_what_was_asked(tmp_path: Path) -> None:
     written = write_pair(tmp_path)
     auto = tmp_path / "auto.toml"

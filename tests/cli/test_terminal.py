@@ -91,6 +91,7 @@ def test_a_title_of_an_image(tmp_path: Path, encoding: str) -> None:
     assert steering(shown) == []
 
 
+@pytest.mark.common
 def test_a_name_of_a_file(tmp_path: Path) -> None:
     """In a message of ours, in one of click's, and of a file that is there."""
     name = EVIL.replace("/", "") + ".toml"
@@ -124,6 +125,7 @@ def test_a_key_and_a_value_of_a_scan(tmp_path: Path) -> None:
     assert steering(shown) == []
 
 
+@pytest.mark.common
 def test_what_is_bold_is_so_on_a_terminal_only(tmp_path: Path) -> None:
     """Negative control too: the streams do let through what this package itself writes."""
     scan = write_pair(tmp_path)

@@ -37,6 +37,7 @@ def endless() -> object:
     return endless()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("error", "status", "why"),
     [
@@ -139,6 +140,7 @@ def test_without_what_the_report_needs_there_is_a_message(tmp_path: Path) -> Non
     assert (outcome.status, outcome.err) == (70, "internal error: KeyError: 'x'\n")
 
 
+@pytest.mark.common
 def test_a_process_of_its_own_ends_so(tmp_path: Path) -> None:
     """Through the entry point, and with a text that ASCII cannot say."""
     scan = write_pair(tmp_path)

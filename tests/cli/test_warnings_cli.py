@@ -26,6 +26,7 @@ def test_a_good_scan_has_no_warning(tmp_path: Path) -> None:
     assert (built.status, built.err) == (0, "")
 
 
+@pytest.mark.common
 def test_build_check_and_show_warn_and_succeed(small: Path, tmp_path: Path) -> None:
     build = run("build", small, "-o", tmp_path / "build")
     assert build.status == 0
@@ -55,6 +56,7 @@ def test_the_block_in_the_emitted_files_says_it(small: Path, tmp_path: Path) -> 
     assert "warning" not in good
 
 
+@pytest.mark.common
 def test_strict_makes_them_errors(small: Path, tmp_path: Path) -> None:
     warnings = run("check", small).err
     for command in (("check", small), ("build", small, "-o", tmp_path / "build")):
@@ -86,6 +88,7 @@ def test_a_remedy_that_breaks_another_limit_says_so(tmp_path: Path) -> None:
     assert found.err.endswith(" %, with an error above limits.max_error_lsb\n")
 
 
+@pytest.mark.common
 def test_a_build_in_python_has_them(small: Path) -> None:
     scan = tablegen.build(small)
     assert [f"warning: {text}" for text in scan.warnings] == run("check", small).messages

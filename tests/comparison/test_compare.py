@@ -129,6 +129,7 @@ FOLLOW = {
 }
 
 
+@pytest.mark.common
 def test_every_number_of_a_manifest_that_is_changed_is_found(lab: Path) -> None:
     """Negative control, number by number: none of them is compared with itself."""
     plain = json.loads((lab / "one" / "manifest.json").read_text("utf-8"))
@@ -202,6 +203,7 @@ def test_what_cannot_be_compared_is_refused(lab: Path, a: str, b: str, said: str
     assert outcome.err.startswith(f"{lab}/" + said.format(lab)), outcome.err
 
 
+@pytest.mark.common
 def test_the_page_is_one_file_without_a_network(lab: Path, tmp_path: Path) -> None:
     outcome = run("compare", lab / "scan.toml", lab / "larger.toml", "-o", tmp_path / "compare.html")
     assert outcome.status == 1
@@ -216,6 +218,7 @@ def test_the_page_is_one_file_without_a_network(lab: Path, tmp_path: Path) -> No
     assert (tmp_path / "again.html").read_bytes() == content
 
 
+@pytest.mark.common
 def test_a_plot_has_what_differs_first(lab: Path, tmp_path: Path) -> None:
     """In a file all charts, the same bytes each time; in the terminal those that differ."""
     sides = lab / "scan.toml", lab / "larger.toml"

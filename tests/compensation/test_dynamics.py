@@ -19,6 +19,7 @@ def test_second_order_with_delay_is_inverted() -> None:
     assert real + 1j * imaginary == pytest.approx(exact, rel=1e-12, abs=1e-14)
 
 
+@pytest.mark.common
 def test_a_driven_oscillator_follows_the_target() -> None:
     """Independent of the formula: integrate the equation of motion under the inverted drive of one harmonic."""
     from oscillator import runge_kutta_oscillator

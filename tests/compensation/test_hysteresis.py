@@ -89,6 +89,7 @@ def test_a_branch_that_would_run_backwards_is_refused() -> None:
         BranchShape.harmonic(0.3, 0.9)
 
 
+@pytest.mark.common
 @given(betas, peaks)
 def test_the_backward_branch_is_the_mirror_image(beta: float, u_peak: float) -> None:
     """The trap: on the raw axis the peak of u - tau sits at 1 - u_peak, not at u_peak."""

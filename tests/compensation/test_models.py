@@ -83,6 +83,7 @@ ANOTHER_GAMMA = {
 }
 
 
+@pytest.mark.common
 def test_names_and_parameters_of_models_stand_in_no_other_module() -> None:
     known, names, parameters = models.names(), set(), set()
     for path in PACKAGE.rglob("*.py"):
@@ -111,6 +112,7 @@ def test_a_foreign_model_makes_a_line_that_is_straight_on_it(pair: Path) -> None
     assert plan.x.drive.shape.series == plan.x.target
 
 
+@pytest.mark.common
 def test_it_is_built_shown_verified_and_simulated(pair: Path) -> None:
     built = run("build", pair / "scan.toml", "-o", pair / "out", "--depfile", pair / "out.d")
     assert built.status == 0, built.err

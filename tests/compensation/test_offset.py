@@ -71,6 +71,7 @@ def test_a_factor_that_reaches_zero_inside_the_range_is_refused() -> None:
         OffsetLaw(alpha=2.2, beta=1.2)  # positive at both ends, negative at its vertex
 
 
+@pytest.mark.common
 @given(laws, st.floats(0.0, 100.0))
 def test_position_is_the_integral_of_the_local_slope(law: OffsetLaw, v: float) -> None:
     mp.mp.dps = 20

@@ -44,6 +44,7 @@ def test_m_is_linear_between_two_sizes_and_constant_beyond(
     assert OffsetSurface.everywhere(laws[0][1]).at(v) == laws[0][1]
 
 
+@pytest.mark.common
 @given(ends, st.floats(0.0, 1.0), st.floats(0.05, 0.7))
 def test_images_give_the_factors_of_the_drive(m: tuple[float, float], beta: float, v: float) -> None:
     """R(V) / R(V / m) of the exact law, at the offsets where such a scan fits, gives the law back."""

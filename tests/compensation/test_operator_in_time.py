@@ -17,6 +17,7 @@ def sweep(low: float, high: float, turn: int, count: int) -> Floats:
     return low + (high - low) * np.concatenate([np.arange(turn) / turn, 1.0 - np.arange(count + 1) / count])
 
 
+@pytest.mark.common
 @given(low=st.floats(0.02, 0.45), stroke=st.floats(0.05, 0.5), turn=st.integers(5, 90), first=st.integers(0, 60))
 def test_settled_line_is_the_closed_form(low: float, stroke: float, turn: int, first: int) -> None:
     period = sweep(low, low + stroke, turn, 100 - turn)
@@ -28,6 +29,7 @@ def test_settled_line_is_the_closed_form(low: float, stroke: float, turn: int, f
     assert np.max(np.abs(y[200:] - expected)) < 1e-9 * loop.extent_nm
 
 
+@pytest.mark.common
 @given(st.lists(st.floats(0.05, 0.95), min_size=3, max_size=12))
 def test_any_turns_are_those_of_plays_that_are_stepped(turns: list[float]) -> None:
     if max(turns) - min(turns) < 0.1 or np.min(np.abs(np.diff([*turns, turns[0]]))) < 2e-3:

@@ -27,6 +27,7 @@ def stepped(u: Floats, bend: Floats, threshold: float) -> Floats:
     return out
 
 
+@pytest.mark.common
 @given(st.floats(0.0, 0.6), st.floats(0.05, 0.4))
 def test_settled_plays_are_those_that_are_stepped(low: float, stroke: float) -> None:
     up = np.linspace(low, low + stroke, 60)

@@ -72,6 +72,7 @@ def test_step_and_memory_are_those_of_plays_that_are_stepped(
     assert found.most_memory_nm > 1.0 if after is after_offset else True
 
 
+@pytest.mark.common
 def test_drift_falls_from_line_to_line_and_lines_are_the_first_within_the_bound() -> None:
     after = after_offset(operator(LATE), 0.3, 0.6, 1.0, 0.5, LINE_S)
     drifts = [after.drift_nm(LINE_S, first, 200) for first in range(400)]

@@ -29,6 +29,7 @@ def measured(points: list[tuple[int, float, float]]) -> ResidualLaw:
     return ResidualLaw.of(Branch(points=found), V_MAX)
 
 
+@pytest.mark.common
 @given(rows, st.floats(0.0, 1.0))
 def test_points_are_met_and_joined_by_lines(points: list[tuple[int, float, float]], share: float) -> None:
     """Against numpy's interpolation, in any order of the points."""

@@ -40,6 +40,7 @@ def test_the_law_of_the_paper_reads_390_nm_as_8_percent_too_much() -> None:
     assert law.size_nm(0.39) / 390.0 == pytest.approx(17.7 / 16.4, abs=0.02)
 
 
+@pytest.mark.common
 @example(SizeLaw(99.00990099009901, 1.0, 0.25), 1.0)  # comes back a last place above full scale
 @given(laws, st.floats(1e-6, 1.0))
 def test_the_inverse_is_exact_on_both_branches(law: SizeLaw, v: float) -> None:

@@ -140,6 +140,7 @@ def test_keywords_are_refused_in_any_case(language: str) -> None:
     assert [word for word in refused if not why_not_a_name(word.upper()) or not why_not_a_name(word.title())] == []
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("compiler", "language"), VOUCHED)
 def test_a_compiler_vouches_for_the_keywords(compiler: str, language: str, tmp_path: Path) -> None:
     """The table holds no word that its language would take: otherwise the first test would demand too much."""
@@ -147,6 +148,7 @@ def test_a_compiler_vouches_for_the_keywords(compiler: str, language: str, tmp_p
     assert taken == (TAKEN_BY_GHDL if compiler == "ghdl" else set())
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_good_names_are_accepted_by_the_compiler(compiler: str, tmp_path: Path) -> None:
     """By themselves, and as the prefix of what is emitted."""

@@ -48,6 +48,7 @@ def corrected(build: Path, frame: FrameImages, scanner: str | None) -> Off:
     return off(by_scan_file(images, build / "scan.toml", path, OldScan()).distortion, frame)
 
 
+@pytest.mark.common
 def test_a_build_for_a_straight_scanner_on_one_that_bends(build: Path) -> None:
     """Its own scanner file changes nothing that counts; what is known since puts it straight, rounded turns and all."""
     frame = frame_of(build)
@@ -59,6 +60,7 @@ def test_a_build_for_a_straight_scanner_on_one_that_bends(build: Path) -> None:
     assert after.size == pytest.approx((0.0, 0.0), abs=0.1)
 
 
+@pytest.mark.common
 def test_the_command_takes_both_files_and_keeps_them(build: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_pair(frame_of(build), build)
     monkeypatch.chdir(build)
@@ -70,6 +72,7 @@ def test_the_command_takes_both_files_and_keeps_them(build: Path, monkeypatch: p
     assert '"file": "scan.toml"' in record
 
 
+@pytest.mark.common
 def test_a_part_of_a_frame_is_refused(build: Path) -> None:
     frame = frame_of(build)
     paths = save_pair(frame, build)

@@ -123,6 +123,7 @@ def test_the_distance_of_two_pictures_is_measured() -> None:
     assert nothing.worst is None
 
 
+@pytest.mark.common
 def test_a_bent_lattice_is_seen_and_a_straight_one_is_none() -> None:
     x, y = np.meshgrid(np.arange(256.0), np.arange(192.0))
     bend = 1.5 * np.sin(2.0 * np.pi * x / 256.0)

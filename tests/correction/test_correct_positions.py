@@ -149,6 +149,7 @@ def test_a_grating_tells_the_fast_axis_alone(tmp_path: Path) -> None:
     assert np.array_equal(scan.distortion.y, np.linspace(0.0, scan.distortion.y[-1], 129))
 
 
+@pytest.mark.common
 def test_a_wrong_drive_is_seen_without_the_truth(tmp_path: Path) -> None:
     """What trace against retrace is printed for: at half the drive they stay apart, where the noise is 17 %."""
     images, scanner = by_laws(tmp_path)
@@ -166,6 +167,7 @@ def by_laws(folder: Path) -> tuple[Images, Path]:
     return read_scan(*save_pair(old_frame("paper"), folder), Choice()), folder / "scanner.toml"
 
 
+@pytest.mark.common
 def test_mirrored_and_exchanged_images_are_named(tmp_path: Path) -> None:
     _, scanner = by_laws(tmp_path)
     trace, retrace = tmp_path / "trace.npy", tmp_path / "retrace.npy"

@@ -40,6 +40,7 @@ def weak(constant_nm: float, lowest: float, times: Times) -> Surface:
     return height
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("times", "lowest"), [("root of 3", 0.05), ("root of 3", 0.6), ("2", 0.6), ("3", 0.6)])
 def test_a_pitch_that_may_be_that_of_the_strong_spots_is_refused(
     times: str, lowest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -53,6 +54,7 @@ def test_a_pitch_that_may_be_that_of_the_strong_spots_is_refused(
     assert not (tmp_path / "o.gwy").exists()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("times", "lowest"), [("root of 3", 0.05), ("root of 3", 0.6), ("2", 0.05), ("3", 0.05)])
 def test_weak_lowest_spots_are_seen_and_nothing_is_written(
     times: str, lowest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -72,6 +74,7 @@ def test_weak_lowest_spots_are_seen_and_nothing_is_written(
     assert not (tmp_path / "o.gwy").exists()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("lowest", [0.05, 0.6])
 def test_weak_lowest_spots_are_those_of_the_cell_by_the_size_of_the_file(lowest: float, tmp_path: Path) -> None:
     """The strong spots alone would make the size wrong by the root of 3; the other constant does not fit the size."""
@@ -87,6 +90,7 @@ def test_weak_lowest_spots_are_those_of_the_cell_by_the_size_of_the_file(lowest:
         by_fit(images, OldScan(), lattice_nm=50.0)
 
 
+@pytest.mark.common
 def test_another_cell_in_the_corrected_image_is_refused(tmp_path: Path) -> None:
     """Negative control: the picture of the right fit passes, with the sizes of another one it does not."""
     frame = old_frame("paper", **SHAPE)
@@ -104,6 +108,7 @@ def test_another_cell_in_the_corrected_image_is_refused(tmp_path: Path) -> None:
         check_straight_cell(fit, list(noise), scan.size_nm, 60.0)
 
 
+@pytest.mark.common
 def test_the_same_lattice_without_weak_spots_is_corrected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The negative control."""
     monkeypatch.chdir(tmp_path)
@@ -229,6 +234,7 @@ def test_a_trace_alone_has_nothing_to_agree_with() -> None:
     check_agreement(None)
 
 
+@pytest.mark.common
 def test_no_better_agreement_ends_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     save_pair(old_frame("paper", **SHAPE), tmp_path)
@@ -240,6 +246,7 @@ def test_no_better_agreement_ends_the_command(tmp_path: Path, monkeypatch: pytes
     assert not (tmp_path / "o.gwy").exists()
 
 
+@pytest.mark.common
 def test_the_height_of_the_file_is_compared_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A frame of 1080 x 1080 nm, and a file that has half of its height."""
     monkeypatch.chdir(tmp_path)
@@ -253,6 +260,7 @@ def test_the_height_of_the_file_is_compared_too(tmp_path: Path, monkeypatch: pyt
     assert "the frame is 1080 nm high by the sample's constant, and 540 nm by the file" in outcome.err
 
 
+@pytest.mark.common
 def test_the_scan_angle_is_kept_and_said_where_an_axis_is_taken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

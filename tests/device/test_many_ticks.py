@@ -78,6 +78,7 @@ def test_a_guard_that_is_overlooked_makes_a_difference(monkeypatch: pytest.Monke
     assert played(SHAPES[0], 0) != right
 
 
+@pytest.mark.common
 @settings(max_examples=300, deadline=None)
 @given(
     st.lists(st.tuples(st.integers(-400, 400), st.integers(1, 120)), min_size=1, max_size=12),

@@ -95,6 +95,7 @@ def test_pixels_start_evenly_and_by_an_accumulator(pixels: int, extra: int) -> N
     assert max(np.diff([*starts, window.stop])) - min(np.diff([*starts, window.stop])) <= 1
 
 
+@pytest.mark.common
 @settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_no_line_mixes_two_programs_and_no_step_is_too_large(programs: list[DualProgram], data: st.DataObject) -> None:
@@ -162,6 +163,7 @@ def test_settling_keeps_valid_low_for_settle_lines(programs: list[DualProgram]) 
     assert play_line(program, 1).valid.any()
 
 
+@pytest.mark.common
 def test_frames_are_counted_and_then_parked(programs: list[DualProgram]) -> None:
     program = programs[2]
     sequencer = started(program, frames=2)

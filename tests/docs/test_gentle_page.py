@@ -34,6 +34,7 @@ def test_the_table_has_every_line_harmonics_and_error() -> None:
     assert max(ratios) <= 1.15
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", LINES)
 def test_rows_of_16_and_32_harmonics_are_measured(name: str) -> None:
     straight = LINES[name]

@@ -42,6 +42,7 @@ def test_the_list_has_the_name_that_the_page_says(folder: Path, monkeypatch: pyt
     assert done.out.startswith(name)
 
 
+@pytest.mark.common
 def test_the_c_of_the_page_compiles_with_the_library(folder: Path) -> None:
     (code,) = blocks("c")
     (folder / "page.c").write_text(code, "utf-8")
@@ -57,6 +58,7 @@ def test_the_verilog_of_the_page_elaborates(folder: Path) -> None:
     run_clean(["iverilog", "-g2005", f"-I{out}", "-o", folder / "page.vvp", folder / "page.v", out / "dac_library.v"])
 
 
+@pytest.mark.common
 def test_the_failure_is_what_the_page_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("scan.toml").write_text(SCAN, "utf-8")

@@ -83,6 +83,7 @@ def test_cells_are_counted(benchmark: ModuleType) -> None:
     assert benchmark.cells() == CELLS
 
 
+@pytest.mark.common
 def test_the_output_is_that_of_the_command(benchmark: ModuleType) -> None:
     shown = re.search(r"<!-- output -->\n```text\n\$ tablegen (.*)\n((?:.*\n)*?)```\n<!-- /output -->", PAGE)
     assert shown is not None

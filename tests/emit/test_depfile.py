@@ -91,6 +91,7 @@ def makes(folder: Path, target: str, prerequisite: str) -> bool:
     return "made" in done.stdout
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", NAMES)
 def test_make_reads_every_name_as_it_is(tmp_path: Path, name: str) -> None:
     """A target is made again when its prerequisite is newer, and when that is gone, and at no other time."""
@@ -219,6 +220,7 @@ def test_what_builds_do_not_read_is_not_named() -> None:
 # When it is there
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("edit", "status"), [("dac.bits = 30", 2), ("limits.max_error_lsb = 0.1", 3), ("scanner = 'absent.toml'", 2)]
 )
@@ -301,6 +303,7 @@ def test_a_file_that_is_no_depfile_is_kept(scan: Path) -> None:
     assert not (scan.parent / "out").exists()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", ["a\nb", "a\tb", "R&D"])
 def test_a_path_that_no_depfile_can_name_is_refused_before_anything_is_written(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()

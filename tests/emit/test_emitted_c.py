@@ -99,6 +99,7 @@ def test_lines_of_the_header_have_at_most_120_characters(built: Build) -> None:
     assert [line for line in lines if len(line) > 120 and line.strip("-0123456789, ")] == []
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", ["example", "header_only"])
 @pytest.mark.parametrize("dialect", by_tool(DIALECTS))
 def test_two_units_that_include_the_header_link(tmp_path: Path, name: str, dialect: str) -> None:

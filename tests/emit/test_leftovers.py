@@ -98,6 +98,7 @@ def test_files_of_somebody_else_are_neither_removed_nor_reported(built: Path) ->
     assert run("build", built.parent / "scan.toml", "-o", built, "--check").status == 0
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "name",
     [
@@ -127,6 +128,7 @@ def test_a_hostile_manifest_removes_nothing(built: Path, name: str) -> None:
     assert name not in listed(built)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("content", ["", "[]", "{", "3", '{"files": 3}', '{"files": {"a.h": 3}}', "[" * 100_000])
 def test_a_damaged_manifest_lists_nothing(built: Path, content: str) -> None:
     (built / "manifest.json").write_text(content, "ascii")

@@ -58,6 +58,7 @@ def test_a_second_build_compiles_nothing(cache: Path, compiled: list[str]) -> No
     assert all(path.stat().st_mode & 0o077 == 0 for path in cache.iterdir())
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("how", ["empty", "cut", "a bit", "code of another template", "code of ours, no digest"])
 def test_what_was_not_written_so_is_compiled_again(cache: Path, compiled: list[str], how: str) -> None:
     first = built()
@@ -96,6 +97,7 @@ def _of_nobody(cache: Path) -> None:
     os.chown(cache, 65534, 65534)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "given",
     [
@@ -140,6 +142,7 @@ def test_it_would_be_run_where_nobody_else_can_write(cache: Path, compiled: list
     assert {key for key in first if first[key] != second[key]} >= {"annexin_200nm.c"}
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("what", ["_", "sys.version", "jinja2.__version__"])
 def test_another_version_compiles_again(
     cache: Path, compiled: list[str], monkeypatch: pytest.MonkeyPatch, what: str

@@ -47,6 +47,7 @@ def test_shift_round(value: int, bits: int) -> None:
     assert int(shift_round(np.array([value]), bits)[0]) == exact
 
 
+@pytest.mark.common
 @given(st.integers(-(2**40), 2**40), st.integers(2, 32))
 def test_saturation_never_wraps(value: int, bits: int) -> None:
     low, high = signed_limits(bits)
@@ -113,6 +114,7 @@ tables = st.integers(2, 9).flatmap(
 )
 
 
+@pytest.mark.common
 @settings(max_examples=60)
 @given(tables, st.lists(st.integers(0, 2**32 - 1), min_size=1, max_size=30))
 def test_interpolation_is_the_rounded_line(table: tuple[tuple[int, list[int]]], phases: list[int]) -> None:

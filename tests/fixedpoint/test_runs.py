@@ -99,6 +99,7 @@ def test_held_and_direct_programs(program: Program, hold: int) -> None:
         assert np.array_equal(np.repeat(runs.codes, runs.lengths), one.codes(np.arange(one.ticks)))
 
 
+@pytest.mark.common
 @settings(max_examples=150, deadline=None)
 @given(programs(), st.integers(0, 2), st.sampled_from((1, -1)))
 def test_codes_finer_than_samples(program: Program, doubled: int, sign: int) -> None:
@@ -140,6 +141,7 @@ def check_pieces_of_splines(program: Program) -> None:
     assert len(program.words) <= count <= most_levels(program)
 
 
+@pytest.mark.common
 @settings(max_examples=15, deadline=None)
 @given(splines())
 def test_pieces_of_splines(program: Program) -> None:

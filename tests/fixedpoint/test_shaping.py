@@ -40,6 +40,7 @@ def test_codes_are_those_of_the_page_and_run_on_over_calls(one: tuple[Shaping, i
     assert np.concatenate(parts).tolist() == wanted
 
 
+@pytest.mark.common
 @given(played())
 def test_no_code_is_further_off_than_the_excess(one: tuple[Shaping, int, list[int]]) -> None:
     shaping, bits, values = one
@@ -109,6 +110,7 @@ def test_errors_do_not_add_up(one: tuple[Shaping, int, list[int]]) -> None:
     assert abs(total) <= most + (len(values) if shaping.order == 3 else 0)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("shaping", [Shaping(1), Shaping(2), Shaping(3, 0), Shaping(3, 110), Shaping(3, 128)])
 def test_the_spectrum_of_the_error_is_that_of_the_noise_filter(shaping: Shaping) -> None:
     bits, ticks, parts = remainder_bits(16), 512, 400

@@ -67,6 +67,7 @@ def test_a_constant_is_exact() -> None:
     assert np.all(cubic(words, RationalPhase(999).at(np.arange(999))) == -12345 * SPLINE_UNIT)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("length", "harmonic"), [(8, 1), (8, 3), (16, 7), (32, 4), (128, 32)])
 def test_words_are_the_nearest_ones(length: int, harmonic: int) -> None:
     """The least squares over a fine grid, solved as a dense system, are the closed form."""
@@ -86,6 +87,7 @@ def test_words_are_the_nearest_ones(length: int, harmonic: int) -> None:
     assert np.allclose(words, found, rtol=0.0, atol=2e-5)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("harmonic", "length"), [(1, 32), (1, 64), (2, 128)])
 def test_the_error_is_that_of_the_projection(harmonic: int, length: int) -> None:
     """h^4 / 720 of the fourth derivative, the largest value of the Bernoulli polynomial of degree 4 over 4!."""

@@ -110,6 +110,7 @@ def test_a_log_of_many_things() -> None:
 _CHANGES = [("crc", 1), ("ticks", -1), ("ticks", 1), ("line", 1), ("generation", 1), ("markers", 32), ("faults", 1)]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("name", "by"), _CHANGES)
 def test_a_number_that_is_another_one_is_found(name: str, by: int) -> None:
     lines = _played(_SOME)

@@ -394,6 +394,7 @@ def test_frames_that_cannot_be() -> None:
                 device.arm(frames)
 
 
+@pytest.mark.common
 def test_it_waits_by_the_clock_of_the_line_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Minutes of a dead line take no time here."""
     for name in ("sleep", "monotonic"):

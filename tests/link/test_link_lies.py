@@ -220,6 +220,7 @@ UPLOAD_LIES: list[tuple[int, Lie, int, str]] = [
 ]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("request_", "lie", "status", "why"), UPLOAD_LIES, ids=[why.split(";")[0] for *_, why in UPLOAD_LIES]
 )
@@ -273,6 +274,7 @@ def test_limits_may_be_narrower_than_those_of_the_build() -> None:
         assert device.narrow(wide, wide) == (INFO.x_limits, INFO.y_limits)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("seed", range(40))
 def test_answers_of_any_bytes_end_in_a_link_error_or_a_result(seed: int) -> None:
     """Whatever field it is: every answer has the right frame, and any bytes in one place of its payload."""

@@ -49,6 +49,7 @@ def tablegen(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
 def test_the_command_line_on_a_real_port(kind: str, folder: Path, scan: PreparedScan) -> None:
     with Served(model(info_for(scan)), kind, RATE_HZ) as served:
@@ -82,6 +83,7 @@ def test_a_pty_that_goes_for_good_is_a_lost_link(folder: Path, scan: PreparedSca
         assert served.device.status().hash.hex() == BOOT.digest
 
 
+@pytest.mark.common
 def test_an_interruption_leaves_what_was_received_for_the_next_time(folder: Path, scan: PreparedScan) -> None:
     """Of a device that takes its time."""
     device = model(info_for(scan, window=1))

@@ -48,6 +48,7 @@ def objections(scan: PreparedScan, info: DeviceInfo, form: str = "table", any_ra
 # Where scans come from
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("variant", ["example", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_a_plan_and_its_build_are_the_same_upload(tmp_path: Path, variant: str) -> None:
     of_build = PreparedScan.of_build(build(tmp_path, VARIANTS[variant]).folder)

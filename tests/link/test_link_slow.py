@@ -40,6 +40,7 @@ def upload(
     return result, line
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("key", [b"", KEY], ids=["open", "key"])
 @pytest.mark.parametrize("round_trip_s", [0.5, 1.0, 2.0])
 def test_a_long_way(round_trip_s: float, key: bytes) -> None:
@@ -51,6 +52,7 @@ def test_a_long_way(round_trip_s: float, key: bytes) -> None:
     assert result.slow_baud is None, "a long way is not a slow line"
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("key", [b"", KEY], ids=["open", "key"])
 @pytest.mark.parametrize("slower", [4, 12, 48])
 def test_a_slow_line_is_used_and_named(slower: int, key: bytes) -> None:
@@ -94,6 +96,7 @@ def test_no_way_costs_twice_the_bytes(slower: int, round_trip_s: float, window: 
     assert line.sent < 2 * SIZE
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("key", [b"", KEY], ids=["open", "key"])
 def test_lost_frames(key: bytes) -> None:
     """15 of 100, in both directions."""
@@ -234,6 +237,7 @@ BREAKS: dict[str, tuple[str, object, Callable[[], float]]] = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", BREAKS)
 def test_a_client_that_does_not_learn_is_caught(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes more bytes or seconds, or fails."""

@@ -26,6 +26,7 @@ NAMES = [
 ]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", NAMES)
 def test_an_operator_may_have_any_name(tmp_path: Path, name: str) -> None:
     scan, out = write_operator_scan(tmp_path, operator_file(), "- [limits]"), tmp_path / "out"
@@ -47,6 +48,7 @@ def test_an_operator_may_have_any_name(tmp_path: Path, name: str) -> None:
         assert outcome.status == 0, outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", NAMES)
 def test_scan_scanner_response_and_output_may_have_any_name(tmp_path: Path, name: str) -> None:
     folder = tmp_path / name

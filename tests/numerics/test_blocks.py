@@ -28,6 +28,7 @@ def by_columns(matrix: Floats) -> Floats:
     return np.tril(work)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("block", [linear._BLOCK, 300, 1])
 @pytest.mark.parametrize("size", [1, 2, 31, 32, 33, 64, 65, 288, 289, 330])
 def test_a_factor_has_the_bits_of_column_by_column(monkeypatch: pytest.MonkeyPatch, size: int, block: int) -> None:

@@ -29,6 +29,7 @@ def test_one_angle_has_the_bits_of_many(x: float) -> None:
     assert np.array(sine_and_cosine_of(x)).tobytes() == np.array(sine_and_cosine([x, 0.1])).T[0].tobytes()
 
 
+@pytest.mark.common
 @given(st.integers(-(10**6), 10**6))
 def test_zeros_and_extremes_are_exact(n: int) -> None:
     assert float(sine(n / 2)) == 0.0

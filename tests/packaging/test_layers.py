@@ -141,6 +141,7 @@ def naming_the_operator(sources: dict[str, str], known: dict[str, Path]) -> list
     return offences
 
 
+@pytest.mark.common
 def test_only_its_homes_name_the_operators_model() -> None:
     known = modules()
     sources = {name: path.read_text("utf-8") for name, path in known.items()}
@@ -187,6 +188,7 @@ def loaded_by(code: str) -> set[str]:
 CALCULATION = {"tablegen.compensation", "tablegen.waveform", "tablegen.planning", "jinja2"}
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "module",
     [
@@ -209,6 +211,7 @@ def test_the_independent_side_loads_no_calculation(module: str) -> None:
     assert loaded & CALCULATION == set()
 
 
+@pytest.mark.common
 def test_the_calculation_would_be_seen() -> None:
     assert loaded_by("import tablegen.planning.line_plan") >= CALCULATION - {"jinja2"}
     assert "jinja2" in loaded_by("from tablegen.emit.templates import template_text\ntemplate_text('', {}, str)")
@@ -233,6 +236,7 @@ SELDOM = {
 }
 
 
+@pytest.mark.common
 def test_a_plain_build_loads_nothing_that_few_builds_need() -> None:
     example = PACKAGE.parent / "examples" / "annexin_200nm.toml"
     loaded = loaded_by(f"import tablegen\ntablegen.build({str(example)!r}).files")

@@ -91,14 +91,17 @@ def around_the_reader(modules: dict[str, ast.AST]) -> set[tuple[str, str]]:
     return found
 
 
+@pytest.mark.common
 def test_every_file_of_a_user_goes_through_the_one_reader(modules: dict[str, ast.AST]) -> None:
     assert sorted(around_the_reader(modules) - ALLOWED.keys()) == []
 
 
+@pytest.mark.common
 def test_no_exception_is_out_of_date(modules: dict[str, ast.AST]) -> None:
     assert sorted(ALLOWED.keys() - around_the_reader(modules)) == []
 
 
+@pytest.mark.common
 def test_texts_are_parsed_where_they_are_bounded(modules: dict[str, ast.AST]) -> None:
     found = {(name, call) for name, tree in modules.items() for call in called(tree) & PARSERS}
     assert found == PARSED.keys()
@@ -118,6 +121,7 @@ def test_another_way_is_found(text: str) -> None:
     assert around_the_reader({"cli/new.py": ast.parse(text)})
 
 
+@pytest.mark.common
 def test_only_one_module_writes_controls(modules: dict[str, ast.AST]) -> None:
     """No style, no print, no escape but in ``cli/shared/terminal.py``; what click prints goes through its guard."""
     steering = {"click.style", "click.secho", "click.clear", "print", "sys.stdout.write", "sys.stderr.write"}

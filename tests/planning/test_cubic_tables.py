@@ -40,6 +40,7 @@ def test_a_build_says_what_a_device_needs_for_it(built: Build) -> None:
     assert "_SPLINE 1" in built.files["annexin_200nm.h"].decode()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_model_plays_what_plain_integers_play(built: Build, axis: str) -> None:
     program = getattr(built.plan, axis).program

@@ -189,6 +189,7 @@ def test_an_image_is_put_straight_alike() -> None:
         ScannerModel(setup.scanner, setup.scanner_file, Path()).position("x", beyond)
 
 
+@pytest.mark.common
 def test_the_tubes_page_and_terminal_speak_of_its_range(tmp_path: Path) -> None:
     scan = changed(TUBE, {"timing.lines": 20, "y.band_limit.harmonics": 16, "limits": REMOVED})
     (tmp_path / "scan.toml").write_text(to_toml(scan), "utf-8")

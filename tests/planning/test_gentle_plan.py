@@ -71,6 +71,7 @@ def test_by_laws_no_error_is_allowed_that_was_not_asked_for(tmp_path: Path) -> N
     assert free.target.a.tolist() == given.target.a.tolist()
 
 
+@pytest.mark.common
 def test_the_fewest_harmonics_alone_keep_what_the_converter_leaves(tmp_path: Path) -> None:
     """And at most half of what the limits of the scan leave."""
     fewest = {H: '"fewest"'}
@@ -84,6 +85,7 @@ def test_the_fewest_harmonics_alone_keep_what_the_converter_leaves(tmp_path: Pat
     assert allowed_error.CHORD == CHORD
 
 
+@pytest.mark.common
 def test_on_an_operator_the_default_is_what_the_converter_leaves(tmp_path: Path) -> None:
     edits = ("x.band_limit.window = [0.25, 0.75]", "- limits.max_scaling_error_percent")
     given, line = (

@@ -86,6 +86,7 @@ def test_a_response_that_is_missing_is_named(tmp_path: Path) -> None:
     assert "[y.dac] in the scanner file" in text
 
 
+@pytest.mark.common
 def test_room_to_the_end_of_the_driver(tmp_path: Path) -> None:
     """Without shaping the drive may end within a code of the driver's range."""
     at = {"x.offset_v": 89.0, "x.park_v": 50.0, "timing.lines": 40}

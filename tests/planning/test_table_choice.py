@@ -64,6 +64,7 @@ def worst_of(line: LinePlan, shape: TableShape) -> float:
     return float(np.max(np.abs(played - line.float_codes(w))))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("error", [0.55, 0.7, 1.0, 2.5])
 def test_no_table_is_smaller(tmp_path: Path, error: float) -> None:
     plan = plan_of(tmp_path, {**COARSE, **asking(error)})
@@ -74,6 +75,7 @@ def test_no_table_is_smaller(tmp_path: Path, error: float) -> None:
     assert found.memory_bits == min(shape.length * shape.bits for shape in keeping)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("asked", "error"), [(None, 0.01), (0.002, 0.002)])
 def test_of_shaped_output_it_is_the_error_before_the_rounding(
     tmp_path: Path, asked: float | None, error: float
@@ -142,6 +144,7 @@ def test_a_long_period_is_measured_piece_by_piece(tmp_path: Path, monkeypatch: p
     assert asked.worst_error(line.program) == whole
 
 
+@pytest.mark.common
 def test_of_a_slow_frame_few_ticks_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The worst error of a cubic table is found where runs begin and end, and is that of all ticks."""
     slow = {"timing.line_rate_hz": "20", "y.table.mode": '"cubic"', "y.table.length": "256", "y.table.bits": "14"}
@@ -193,6 +196,7 @@ def test_less_memory_for_more_error(tmp_path: Path) -> None:
     assert memory[-1] == 8 * 8
 
 
+@pytest.mark.common
 def test_an_error_that_no_table_keeps_is_refused_and_the_advice_holds(tmp_path: Path) -> None:
     with pytest.raises(Rejected) as refused:
         plan_of(tmp_path, {**COARSE, **asking(0.45)})

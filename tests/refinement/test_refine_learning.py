@@ -147,6 +147,7 @@ def test_the_coupled_loop_is_no_worse_than_its_harmonics(tmp_path: Path, turn: f
         assert radius < max(diagonal, 1.0) + 0.01, (gain, phase)
 
 
+@pytest.mark.common
 def test_noise_is_not_learnt(line: LinePlan) -> None:
     """Of traces with nothing but noise in them few are learnt from, and little."""
     generator = np.random.default_rng(8)

@@ -78,6 +78,7 @@ def test_the_drive_says_when_each_sample_was_taken(
     assert found.drive[1] < 1.6 * noise * min(1.0, 1.2 * np.sqrt(64 / len(turns))) + 1e-6
 
 
+@pytest.mark.common
 def test_a_long_trace_is_fitted_in_parts_as_a_whole(line: LinePlan, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of its first fit only every so many samples take part; one step with all of them ends where a whole fit does."""
     turns = 0.3 + np.arange(50_001) / 500

@@ -32,6 +32,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     os.chdir(before)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", quick(["show", "refine", "calibrate hysteresis"], [*PLOTTING]))
 def test_every_picture_of_a_command(name: str, lab: Path) -> None:
     """In the file, and in a terminal of 80 and of 120 characters, with Unicode and without."""
@@ -49,6 +50,7 @@ def test_every_picture_of_a_command(name: str, lab: Path) -> None:
                 assert text_faults(chart, width, unicode) == [], chart.title
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", quick(["report"], [*REPORTING]))
 def test_every_chart_of_a_page(name: str, lab: Path) -> None:
     if name == "report of a build":

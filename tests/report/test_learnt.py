@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from editing import run, write_pair
 from html_page import Page, well_formed
 from refining import play, scan_text, scanner, sensed
@@ -21,6 +22,7 @@ def record(folder: Path, name: str, seed: int) -> Path:
     return path
 
 
+@pytest.mark.common
 def test_rounds_have_pages(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, scan_text("- x.size_nm", "x.size_v = 60.0"))
     names = ("<script>first.csv", "second.csv")

@@ -76,6 +76,7 @@ def test_faults_of_a_page_are_found() -> None:
     assert Page("<p onclick='x'>y</p>").handlers == ["onclick"]
 
 
+@pytest.mark.common
 def test_the_same_scan_gives_the_same_bytes(found: tuple[bytes, Page], tmp_path: Path) -> None:
     """From another folder and in another process; and nothing in it is of this machine."""
     content, _ = found
@@ -89,6 +90,7 @@ def test_the_same_scan_gives_the_same_bytes(found: tuple[bytes, Page], tmp_path:
     assert not re.search(r"\b20[2-9]\d-\d\d-\d\d|\b\d\d:\d\d:\d\d", re.sub(r"base64,[A-Za-z0-9+/=]+", "", text))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", quick(FEW[:3], [*VARIANTS]))
 def test_every_kind_of_scan_has_a_page(name: str, tmp_path: Path) -> None:
     """Converters of all widths, steps, turns, a table a tick; with a limit of the example exceeded or not."""
@@ -104,6 +106,7 @@ def test_every_kind_of_scan_has_a_page(name: str, tmp_path: Path) -> None:
 EVIL = "<script>alert(1)</script>\"'&<img src=x onerror=f()>`\u202e{{7*7}}"
 
 
+@pytest.mark.common
 def test_names_of_others_are_text(tmp_path: Path) -> None:
     """In the scanner's name, a comment of calibrate, and the names of its files and traces."""
     scanner = edited(SCANNER, f"name = {json.dumps(EVIL)}")
@@ -119,6 +122,7 @@ def test_names_of_others_are_text(tmp_path: Path) -> None:
     assert read.said.count("<script>alert(1)</script>") >= 4  # title, heading, comment, file
 
 
+@pytest.mark.common
 def test_an_operator_with_hostile_traces(tmp_path: Path) -> None:
     file = operator_file()
     lines = [*file.lines[:-1], type(file.lines[0])(**{**_fields(file.lines[-1]), "name": EVIL[:60]})]
@@ -149,6 +153,7 @@ def test_the_certificate_is_that_of_the_build(found: tuple[bytes, Page], subject
         assert f"{name} {digest}" in said
 
 
+@pytest.mark.common
 def test_a_broken_limit_is_shown_and_is_status_3(tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, "limits.max_scaling_error_percent = 0.3"))
     content, read = report(path, status=3)
@@ -183,6 +188,7 @@ def test_a_finding_is_given_once_by_code_and_axis(tmp_path: Path) -> None:
     assert alone.count(("scaling-error", "x")) == 2
 
 
+@pytest.mark.common
 def test_what_spoils_an_image_comes_first(tmp_path: Path) -> None:
     """A coarse small scan whose y has no hysteresis model: what is not compensated, then the warnings, then notes."""
     scanner = edited(SCANNER, "- [y.hysteresis]", "- [[y.hysteresis.branches]]")
@@ -201,6 +207,7 @@ def test_what_spoils_an_image_comes_first(tmp_path: Path) -> None:
     assert "scan.toml:23: x.size_nm:" in read.said
 
 
+@pytest.mark.common
 def test_of_a_directory_what_it_has(example: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     assert run("build", example, "-o", folder, "-q").status == 0
@@ -217,6 +224,7 @@ def test_of_a_directory_what_it_has(example: Path, tmp_path: Path) -> None:
     assert "annexin_200nm.c cannot be read: No such file" in read.said
 
 
+@pytest.mark.common
 def test_what_verify_found(example: Path, tmp_path: Path) -> None:
     folder, record = tmp_path / "out", tmp_path / "verify.xml"
     assert run("build", example, "-o", folder, "-q").status == 0
@@ -255,6 +263,7 @@ def test_other_records_are_refused(example: Path, tmp_path: Path, content: bytes
     assert not (tmp_path / "r.html").exists()
 
 
+@pytest.mark.common
 def test_wrong_input(tmp_path: Path) -> None:
     assert run("report", tmp_path, "-o", tmp_path / "r.html").status == 2
     path = write_pair(tmp_path, edited(SCAN, "dac.bits = 30"))
@@ -267,6 +276,7 @@ def test_wrong_input(tmp_path: Path) -> None:
     assert "no such chart" in run("report", fine, "--svg", tmp_path, "--figure", "none").err
 
 
+@pytest.mark.common
 def test_charts_as_files(example: Path, tmp_path: Path) -> None:
     assert run("report", example, "-o", tmp_path / "r.html", "--svg", tmp_path / "s", "--figure", "drive-x").status == 0
     (path,) = (tmp_path / "s").iterdir()
@@ -334,6 +344,7 @@ def test_the_simulated_mismatch_is_what_the_certificate_expects(subject: Subject
     assert before[2] > 5.0 * mismatch
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_usable_area_is_what_check_accepts(subject: Subject, tmp_path: Path, axis: str) -> None:
     """Just inside of the curve a scan is accepted, and outside it is not, on both slopes of the driver's range."""
@@ -351,6 +362,7 @@ def test_the_usable_area_is_what_check_accepts(subject: Subject, tmp_path: Path,
             assert refused != fits, (volts, share)
 
 
+@pytest.mark.common
 def test_a_layer_of_refine_is_shown(tmp_path: Path) -> None:
     layer = """# refine 1: trace.csv, 5 periods
 [x.refinement]
@@ -369,6 +381,7 @@ b = [0.0, 1e-4, 0.0]"""
     assert "refine 1: trace.csv, 5 periods" in read.said
 
 
+@pytest.mark.common
 def test_the_least_acceleration_is_shown(tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, "x.band_limit.max_scaling_error_percent = 0.3"))
     content, read = report(path)
@@ -393,6 +406,7 @@ def test_a_picture_of_stored_blocks() -> None:
     assert np.abs(rows[:, 1:] - 255.0 * heights).max() <= 0.5 + 1e-9
 
 
+@pytest.mark.common
 def test_every_chart_is_in_the_page_once(subject: Subject) -> None:
     made = sections(subject)
     read = Page(page(subject, made).decode("utf-8"))

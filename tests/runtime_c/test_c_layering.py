@@ -59,6 +59,7 @@ def modules(graph: Graph, public: Iterable[str] = PUBLIC) -> Graph:
     return joined
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("choice", CHOICES)
 def test_files_do_not_call_each_other_in_a_circle(choice: str, tmp_path: Path) -> None:
     found = calls(EVERYTHING, tmp_path, *CHOICES[choice])
@@ -83,6 +84,7 @@ def test_modules_do_not_include_each_other_in_a_circle() -> None:
     assert graph["dac_arithmetic"] == {"dac_sequencer.h"}
 
 
+@pytest.mark.common
 def test_a_circle_of_calls_is_found(tmp_path: Path) -> None:
     """The control: three files, of which the last calls the first; then without that call."""
     paths = [tmp_path / name for name in ("top.c", "middle.c", "bottom.c")]

@@ -113,6 +113,7 @@ def test_a_random_dialogue_of_a_device_that_shapes() -> None:
             Dialogue(SHAPES[name], seed, order=order).play(STEPS)
 
 
+@pytest.mark.common
 def test_random_dialogues_are_about_everything() -> None:
     """A control of the test above: every request is answered in them, and refused for most reasons."""
     seen: Counter[Any] = Counter()

@@ -86,6 +86,7 @@ def blake2s(key: bytes, parts: list[bytes], size: int) -> bytes:
     return result.raw[:size]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("key", [b"", b"k", bytes(16), bytes(range(32))], ids=len)
 def test_blake2s_of_every_length_around_its_blocks(key: bytes) -> None:
     message = bytes(n * 7 & 255 for n in range(200))
@@ -95,6 +96,7 @@ def test_blake2s_of_every_length_around_its_blocks(key: bytes) -> None:
             assert blake2s(key, [message[:length]], size) == expected, (length, size)
 
 
+@pytest.mark.common
 @given(st.binary(max_size=32), st.lists(st.binary(max_size=255), max_size=6), st.integers(1, 32))
 def test_blake2s_is_that_of_hashlib(key: bytes, parts: list[bytes], size: int) -> None:
     assert blake2s(key, parts, size) == hashlib.blake2s(b"".join(parts), key=key, digest_size=size).digest()

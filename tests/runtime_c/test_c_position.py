@@ -60,6 +60,7 @@ def test_runs_are_exact(library: Library, period: int, index_bits: int, seed: in
     runs_from(library, period, index_bits, seed, data.draw(st.integers(0, max(period - RUN_TICKS, 0))))
 
 
+@pytest.mark.common
 @given(period=edges((MOST_ADVANCES - 1) // 2), index_bits=st.integers(3, 10), back=st.integers(0, RUN_TICKS - 1))
 @settings(max_examples=600)
 def test_runs_are_exact_where_the_next_fraction_is_nearest(

@@ -21,6 +21,7 @@ COMPILERS = {"gcc": ["gcc", "-std=c99"], "clang": ["clang", "-std=c99"], "gcc-c1
 INCLUDES = [f"-I{folder}" for folder in sorted({str(path.parent) for path in c_runtime()})]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_a_program_of_another_width_does_not_compile(tmp_path: Path, compiler: str) -> None:
     unit = tmp_path / "unit.c"
@@ -35,6 +36,7 @@ def test_a_program_of_another_width_does_not_compile(tmp_path: Path, compiler: s
             assert bits == compiled or "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in done.stderr
 
 
+@pytest.mark.common
 def test_a_runtime_of_another_width_refuses_the_program(tmp_path: Path) -> None:
     """The file with the program was compiled with one width, the runtime with the other."""
     for bits in (16, 32):

@@ -11,6 +11,7 @@ from tablegen.base.resources import c_runtime
 PROGRAMS = 8_000
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("sanitized", [False, pytest.param(True, marks=pytest.mark.rest)], ids=["plain", "tsan"])
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_every_line_is_of_one_program(compiler: str, sanitized: bool, tmp_path: Path) -> None:

@@ -100,6 +100,7 @@ def test_a_program_that_is_picked_plays_as_the_model_does(library: Path) -> None
     assert len(np.unique(np.array(codes), axis=0)) > 500
 
 
+@pytest.mark.common
 def test_a_name_or_number_that_there_is_not_is_none(library: Path) -> None:
     program = compiled(library, "gcc", "-std=c99")
     assert run_clean([program, "7", "narro", "narrower", "-1"]).split() == ["none"] * 4

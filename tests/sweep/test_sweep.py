@@ -95,6 +95,7 @@ def test_a_second_run_writes_nothing(library: Path) -> None:
     assert stamps(library / "out") == before
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("change", ["value", "comment", "scanner", "missing", "edited", "record"])
 def test_what_is_missing_or_changed_is_built_and_nothing_else(library: Path, change: str) -> None:
     path, out = library / "scan.toml", library / "out"
@@ -140,6 +141,7 @@ def test_programs_that_are_not_asked_for_go_unless_they_were_edited(library: Pat
     assert "EVEN" not in (out / "lines_library.h").read_text("ascii")
 
 
+@pytest.mark.common
 def test_formats_that_go_take_their_index_and_runtime_along(library: Path) -> None:
     assert sweep(library, "-f", "c")[0] == 0
     out = library / "out"
@@ -166,6 +168,7 @@ def test_failures_are_listed_once_with_their_reasons_and_the_rest_is_built(tmp_p
     assert (tmp_path / "out" / "lines_library.c").exists()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("settings", "options", "status"),
     [
@@ -213,6 +216,7 @@ def test_list_says_what_would_be_done_and_writes_nothing(library: Path) -> None:
     assert stamps(library) == before
 
 
+@pytest.mark.common
 def test_check_finds_what_a_sweep_would_write(library: Path) -> None:
     assert sweep(library, "--check") == (0, "./out: 3 scans: 3 up to date\n", "")
     path, out = library / "scan.toml", library / "out"
@@ -282,6 +286,7 @@ TAMPERINGS: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("tampering", TAMPERINGS)
 def test_check_believes_nothing_that_the_directory_says_of_itself(library: Path, tampering: str) -> None:
     """And the next sweep puts it right, though the digests of a word's files were made right too."""
@@ -295,6 +300,7 @@ def test_check_believes_nothing_that_the_directory_says_of_itself(library: Path,
     assert {path: path.read_bytes() for path in (library / "out").rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("what", ["broad/dac_axis.c", "lines_library.vh", "dac_evil.c", "copied", "linked", "program"])
 def test_what_no_sweep_has_made_is_named_and_stays(library: Path, what: str) -> None:
     """A compiler that is given ``out/*.c out/*/*.c`` takes it in; a folder is a program if it looks like one."""
@@ -321,6 +327,7 @@ def test_what_no_sweep_has_made_is_named_and_stays(library: Path, what: str) -> 
     assert {path: path.read_bytes() for path in library.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.common
 def test_a_library_of_somebody_else_is_made_again_and_not_written(
     library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

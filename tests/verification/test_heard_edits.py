@@ -33,15 +33,18 @@ def marks(edit: Edit) -> list[pytest.MarkDecorator]:
     return [] if edit.breaks in QUICK else [pytest.mark.common if edit.breaks in COMMON else pytest.mark.rest]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("edit", [pytest.param(edit, id=edit.breaks, marks=marks(edit)) for edit in SEQUENCER])
 def test_an_edit_of_the_sequencer_is_heard(edit: Edit, prepared: PreparedPlay, tmp_path: Path) -> None:
     assert prepared.judge(edit, tmp_path) is not None
 
 
+@pytest.mark.common
 def test_outputs_as_they_are_pass(tmp_path: Path) -> None:
     assert judge_output(None, tmp_path, Path(str(resource_folder("firmware_templates") / "verilog"))) is None
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("edit", OUTPUT, ids=[edit.breaks for edit in OUTPUT])
 def test_an_edit_of_an_output_is_found(edit: Edit, tmp_path: Path) -> None:
     failure = judge_output(edit, tmp_path, Path(str(resource_folder("firmware_templates") / "verilog")))

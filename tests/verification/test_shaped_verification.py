@@ -47,6 +47,7 @@ def test_two_ways_to_shaped_codes(data: st.DataObject) -> None:
     assert shaped_codes(program, count).tolist() == program.played(0, count).tolist()
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("shaping", ["first", "second", "scanner"])
 def test_every_figure_is_found_again(shaping: str, tmp_path: Path) -> None:
     made = build(tmp_path, Variant({**SHORT, "dac.shaping": shaping}, {"y.resonance": SECOND_ORDER}))
@@ -54,6 +55,7 @@ def test_every_figure_is_found_again(shaping: str, tmp_path: Path) -> None:
     assert wrong(made.folder) == []
 
 
+@pytest.mark.common
 def test_in_a_band_where_no_response_is_known(tmp_path: Path) -> None:
     made = build(tmp_path, Variant({**SHORT, "dac.shaping": "second"}))
     passages = {axis: made.manifest["axes"][axis]["certificate"]["shaped"]["passage"] for axis in "xy"}
@@ -87,6 +89,7 @@ def test_behind_a_measured_response_every_figure_is_found_again(measured: Path) 
 RESPONSE = ("shaped", "passage", "response")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("place", "change"),
     [
@@ -148,6 +151,7 @@ def all_shaped(outcome: Outcome) -> None:
     assert {("x", "shaped codes"), ("y", "shaped codes")} <= verdicts(outcome).keys()
 
 
+@pytest.mark.common
 def test_the_c_plays_shaped_codes(played: Path) -> None:
     all_shaped(run("verify", played, "--target", "c"))
 
@@ -157,6 +161,7 @@ def test_the_verilog_plays_shaped_codes(played: Path) -> None:
     all_shaped(run("verify", played, "--sim", "icarus", "--axis", "blocks"))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("name", "pattern", "new", "target"),
     [
@@ -200,6 +205,7 @@ TAMPERINGS: list[tuple[tuple[str, ...], Any]] = [
 ]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("place", "value"), TAMPERINGS, ids=lambda value: str(value)[:50])
 def test_a_tampering_is_found(place: tuple[str, ...], value: Any, tmp_path: Path) -> None:
     made = build(tmp_path, Variant({**SHORT, "dac.shaping": "scanner"}, {"y.resonance": SECOND_ORDER}))

@@ -221,6 +221,7 @@ def test_a_certificate_is_worked_out_again(folder: Path, path: tuple[str, ...], 
         assert f"certificate.{path[1]}" in outcome.err
 
 
+@pytest.mark.common
 def test_the_certificate_of_a_layer_is_worked_out_again(tmp_path: Path) -> None:
     """And one whose period is too long to look at every tick."""
     long = Variant({"timing.lines": 4000, "timing.line_rate_hz": 100.0})

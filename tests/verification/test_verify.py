@@ -505,6 +505,7 @@ def test_memories_are_what_a_build_writes(short: Build) -> None:
 # Tools, interruptions
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("simulator", ["icarus", "verilator"])
 def test_a_missing_simulator_is_status_6_with_its_remedy(short: Build, tmp_path: Path, simulator: str) -> None:
     done = command(short.folder, "--sim", simulator, PATH=str(tmp_path))

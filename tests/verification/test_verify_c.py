@@ -106,6 +106,7 @@ def substitute(path: Path, pattern: str, new: str) -> None:
 # What is right
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", common(["short_frame", "cubic"], IN_C))
 def test_a_whole_frame_of_every_build_verifies(name: str, tmp_path: Path) -> None:
     """Every mode, width, coding and alignment, header-only builds, with arrays of 16 and of 32 bits."""
@@ -627,6 +628,7 @@ def test_a_missing_compiler_is_status_6_with_its_remedy(short: Build, compiler: 
     assert done.stderr == f"{compiler.split(' ')[0]} is not installed: apt-get install gcc, or set CC\n"
 
 
+@pytest.mark.common
 def test_a_compiler_without_a_c_library_is_status_6_with_its_remedy(short: Build, tmp_path: Path) -> None:
     """As Debian's gcc is where recommended packages are left out."""
     compiler = tmp_path / "bare-cc"

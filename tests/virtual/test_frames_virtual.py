@@ -44,6 +44,7 @@ def frame(plan: Plan, conditions: Conditions = CLEAN) -> FrameImages:
     return running_frame(plan, scanner().x, scanner().y, plane, conditions)
 
 
+@pytest.mark.common
 def test_pixels_are_where_the_played_line_has_the_scanner(plan: Plan) -> None:
     """Columns evenly in time in the window of each sweep, rows the imaged lines of y's way up, by another way."""
     found = frame(plan)

@@ -77,6 +77,7 @@ def setup_of(model: Identified) -> Setup:
     return msgspec.structs.replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=x))
 
 
+@pytest.mark.common
 def test_it_is_simulated_on_its_own_piezo() -> None:
     setup = setup_of(Identified())
     assert own_axes(setup) == ("x",)

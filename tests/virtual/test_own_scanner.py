@@ -89,6 +89,7 @@ def test_the_operator_of_another_piezo_is_clearly_worse(line: LinePlan, tmp_path
     assert np.min(np.abs(foreign[:, 3])) > 2.0 * np.max(np.abs(own[:, 3]))
 
 
+@pytest.mark.common
 def test_departures_are_as_large_as_the_uncertainty(line: LinePlan) -> None:
     rms, size = 0.2, 0.3
     lines = tuple(replace(one, left_out=(rms, 4.0, 0.6, size)) for one in read(line).lines)

@@ -53,6 +53,7 @@ def foreign(
     return load(write_pair(folder, scan, scanner))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("v_max", "k", "converter"), SCANNERS)
 def test_sizes_are_right_without_compensation(
     tmp_path: Path, built_in: VirtualScanner, v_max: float, k: float, converter: tuple[float, ...]
@@ -122,6 +123,7 @@ def test_a_resonance_that_is_near_stays(
     assert (scanner is built_in, how == "") == (stays, stays)
 
 
+@pytest.mark.common
 def test_the_tube_of_the_examples_is_calibrated_through_its_resonance() -> None:
     """Its converter and its amplifiers stand in the scanner file, and go with the axes."""
     setup = load(EXAMPLES / "tube_5um.toml")

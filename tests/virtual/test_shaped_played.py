@@ -42,6 +42,7 @@ def test_of_a_long_period_the_volts_are_those_of_the_mean(plan: Plan) -> None:
     assert np.std(thinned.volts - mean) < 0.15 * abs(line.converter.v_per_code)
 
 
+@pytest.mark.common
 def test_the_report_and_a_comparison_say_it(tmp_path: Path) -> None:
     shaped, rounded = scan(tmp_path / "shaped", "second"), scan(tmp_path / "off", "off")
     page = tmp_path / "report.html"

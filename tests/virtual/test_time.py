@@ -49,6 +49,7 @@ def planned(folder: Path, size: tuple[float, float, float, int, int], resonance:
     return make_plan(linear_setup(folder, rate, updates, *edits, resonance=resonance))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("size", SIZES, ids=str)
 @pytest.mark.parametrize("dynamics", [False, True], ids=["ideal", "second order"])
 def test_trace_and_retrace_agree(size: tuple[float, float, float, int, int], dynamics: bool, tmp_path: Path) -> None:

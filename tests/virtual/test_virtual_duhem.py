@@ -52,6 +52,7 @@ def integrated(operator: Duhem, history: list[float]) -> Floats:
     return np.array(out)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("operator", [BUILT_IN, SMALL], ids=["built in", "small"])
 def test_the_equation_is_solved(operator: Duhem) -> None:
     history = [0.7, 0.2, 0.9, 0.35, 0.36, 1.0, 0.0, 0.5]
@@ -82,6 +83,7 @@ def test_a_history_can_be_played_in_pieces(operator: Duhem, history: list[float]
     assert again.nm == pytest.approx(end.nm, abs=NM)
 
 
+@pytest.mark.common
 @settings(max_examples=60)
 @given(OPERATORS, st.lists(DRIVE, min_size=2, max_size=12))
 def test_a_settled_period_closes(operator: Duhem, period: list[float]) -> None:
@@ -97,6 +99,7 @@ def test_a_settled_period_closes(operator: Duhem, period: list[float]) -> None:
     assert operator.play(np.tile(drive, periods))[0][-len(drive) :] == pytest.approx(settled, abs=NM)
 
 
+@pytest.mark.common
 @settings(max_examples=60)
 @given(OPERATORS, HISTORY)
 def test_nothing_moves_against_its_drive(operator: Duhem, history: list[float]) -> None:

@@ -41,6 +41,7 @@ def test_blocks_are_the_recursion(modes: Modes, ticks: int) -> None:
     assert found == pytest.approx(ticked(modes, NOISE[:ticks], TICK, 0.7), abs=1e-11)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("frequency_hz", "quality"), [(50e3, 20.0), (3e3, 0.8), (120e3, 5.0)])
 def test_resonance_is_scipys(frequency_hz: float, quality: float) -> None:
     """The zero-order hold of a state space, in parts of a tick, and the frequency response of its transfer function."""

@@ -92,6 +92,7 @@ def test_relays_see_a_memory_that_is_not_wiped_out() -> None:
     assert np.max(np.abs(wrong - Relays(SMALL, 64).play(history))) > 0.05 * float(SMALL.branch(1.0, 0.0))
 
 
+@pytest.mark.common
 @settings(max_examples=60)
 @given(OPERATORS, HISTORY, st.integers(1, 5))
 def test_the_rate_does_not_matter(operator: Preisach, history: list[float], between: int) -> None:
@@ -146,6 +147,7 @@ def test_nothing_moves_against_its_drive(operator: Preisach, history: list[float
     assert moved[driven == 0.0] == pytest.approx(0.0, abs=NM)
 
 
+@pytest.mark.common
 @given(HISTORY)
 def test_without_density_there_is_no_hysteresis(history: list[float]) -> None:
     operator = Preisach(DEFAULT.reversible, ((0.0, 0.0), (0.0,)))

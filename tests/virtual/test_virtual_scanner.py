@@ -85,6 +85,7 @@ def test_apparent_sizes_over_offset(axis: VirtualAxis, targets: Targets, rate_hz
         assert found["apparent_nm"][[0, -1]] == pytest.approx([0.92, 1.25], abs=0.003)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("axis", "targets", "rate_hz"), [(X, X_TARGETS, 100.0), (Y, Y_TARGETS, 1.0)], ids=["x", "y"])
 def test_sizes_over_voltage(axis: VirtualAxis, targets: Targets, rate_hz: float) -> None:
     """Section 6: beta = 0.53, the tangent beyond half of full scale; 10 nm/V at 200 nm as in the example."""
@@ -202,6 +203,7 @@ def test_y_is_a_frame(tmp_path: Path) -> None:
     assert np.ptp(thin) == pytest.approx(np.ptp(full), rel=2e-3)
 
 
+@pytest.mark.common
 def test_models_of_a_scan(tmp_path: Path) -> None:
     setup = setup_of(tmp_path)
     assert models_of(setup) == ("triangle", "sinusoidal", "harmonic")
@@ -244,6 +246,7 @@ def test_a_trace_begins_at_rest_and_creeps() -> None:
     assert np.ptp(still) < 1e-6
 
 
+@pytest.mark.common
 def test_the_page_has_the_table_of_the_paper() -> None:
     page = REPOSITORY / "docs" / "virtual.md"
     assert table() in page.read_text(encoding="utf-8")

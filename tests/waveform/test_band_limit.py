@@ -102,6 +102,7 @@ def test_what_cannot_be_held_is_refused() -> None:
         band_limited(SECTION_8, BandLimit(window=(0.0, 1.0), directions="forward"), 16)
 
 
+@pytest.mark.common
 @settings(max_examples=25)
 @given(st.floats(0.2, 0.95), st.floats(0.03, 0.2), st.integers(12, 64), st.booleans())
 def test_the_fit_minimises_what_it_says(turn: float, low: float, harmonics: int, both: bool) -> None:

@@ -40,6 +40,7 @@ def by_quadrature(forward: BranchShape, backward: BranchShape, turn: float) -> n
     return total
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("turn", TURNS)
 @pytest.mark.parametrize("model", MODELS)
 def test_closed_form_is_the_integral(model: str, turn: float) -> None:

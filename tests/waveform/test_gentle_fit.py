@@ -59,6 +59,7 @@ def test_rows_are_the_derivatives_of_the_series(derivative: int) -> None:
 
 
 # Wherever the programme has a solution: at H = 16 nothing below 0.6 % can be had.
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("harmonics", "percent"),
     [
@@ -77,6 +78,7 @@ def test_acceleration_is_within_fifteen_percent_of_the_optimum(harmonics: int, p
     assert worst_error(BOTH, series) <= percent
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("percent", "least"), [(0.05, 74.6), (0.3, 61.9), (1.0, 54.6)])
 def test_the_programme_finds_the_optimum_that_is_known(percent: float, least: float) -> None:
     """At H = 32, found by another programme, to the digits that it was told in and what grids differ by."""
@@ -114,6 +116,7 @@ def test_what_is_promised_is_kept(turn: float, low: float, harmonics: int, both:
     assert float(np.max(np.abs(apart))) <= percent / 100.0 * 0.1  # beside its place by what a chord or two make
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("harmonics", [8, 12, 16, 24, 32])
 @pytest.mark.parametrize("straight", [BOTH, slow_axis(0.8)], ids=["both", "forward"])
 def test_at_the_error_of_the_window_fit_it_is_never_rougher(harmonics: int, straight: Straightness) -> None:
@@ -158,6 +161,7 @@ def test_what_is_too_straight_for_its_harmonics_is_refused_with_what_they_can() 
     assert least_percent(BOTH, 16) == least
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("percent", [0.05, 1.0])
 def test_the_fewest_harmonics_are_the_fewest(percent: float) -> None:
     fewest = fewest_harmonics(BOTH, percent, 1, 64)

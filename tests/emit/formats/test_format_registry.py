@@ -101,6 +101,7 @@ def test_the_command_line_lists_every_format() -> None:
 # Choices
 
 
+@pytest.mark.common
 def test_the_manifest_names_formats_that_are_not_the_default(tmp_path: Path) -> None:
     scan = write_pair(tmp_path)
     found = {}
@@ -331,6 +332,7 @@ FORMAT = Words()
 """
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("body", "why"),
     [

@@ -53,6 +53,7 @@ def test_the_names_of_files_are_those_that_it_says(together: Formatted, name: st
         assert any(re.fullmatch(pattern, file) for file in files), pattern
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("build", quick(FEW, BUILDS))
 @pytest.mark.parametrize("name", own_names())
 def test_a_build_and_its_manifest_make_the_same_bytes(
@@ -78,6 +79,7 @@ def all_at_once(folder: Path) -> Outcome:
     return run("build", scan, "-o", folder / "out", *options)
 
 
+@pytest.mark.common
 def test_the_command_line_builds_and_verifies_all(tmp_path: Path) -> None:
     assert all_at_once(tmp_path).status == 0
     outcome = run("verify", "--target", "files", tmp_path / "out")
@@ -119,6 +121,7 @@ def test_a_manifest_that_a_format_cannot_hold_fails_the_check(tmp_path: Path, mo
     assert "npz files: a frame of 2648 ticks is 1648 ticks too long" in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", own_names())
 def test_a_missing_file_is_told(tmp_path: Path, name: str) -> None:
     built = formatted(tmp_path, "short", name)
