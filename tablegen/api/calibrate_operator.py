@@ -55,6 +55,7 @@ def calibrate_operator(
     columns: Columns | None = None,
     drive_gain: float | None = None,
     drive_offset: float | None = None,
+    scans: Sequence[tuple[float, float]] = (),
     progress: Callable[[str], object] = lambda _: None,
     **how: Any,
 ) -> "CalibratedOperator":
@@ -77,6 +78,8 @@ def calibrate_operator(
         Which column of ``traces`` is which, by number from 1 or by name: ``"time=3,drive=2,position=1:um"``.
     drive_gain, drive_offset : float, optional
         V at the piezo for a recorded V, and V at the piezo for 0 V: of a recorder at the controller's output.
+    scans : sequence of (volts, offset_v), optional
+        Scans that the next trace is to help, in V peak to peak and V; without any, all that a build serves.
     progress : callable
         Called with a text for each stage.
     **how : optional
@@ -131,7 +134,7 @@ def calibrate_operator(
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(one.file for one in sources)}: {reason}") from None
     return CalibratedOperator(
-        fit, axis, tuple(lines), prior.driver, delay, next_trace(fit, lines, prior.driver), sources, remarks
+        fit, axis, tuple(lines), prior.driver, delay, next_trace(fit, lines, prior.driver, scans), sources, remarks
     )
 
 
@@ -237,7 +240,12 @@ class CalibratedOperator(Result):
             "delay_s": {"value": self.delay.value, "standard_error": error if isfinite(error) else None},
             "traces": traces,
             "remarks": list(self.remarks),
-            "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
+            "next_trace": {
+                "size_v": further.size_v,
+                "offset_v": further.offset_v,
+                "rate_hz": further.rate_hz,
+                "uncertainty_left_share": further.left,
+            },
             "sources": [{"file": one.source.name, "sha256": one.source.sha256} for one in self.measured],
         }
 
@@ -272,7 +280,10 @@ class CalibratedOperator(Result):
 
     def _advice(self) -> list[str]:
         further = self.next_trace
-        text = [f"next trace: {further.size_v:.3g} V at {further.offset_v:.3g} V would help most"]
+        text = [
+            f"next trace: {further.size_v:.3g} V at {further.offset_v:.3g} V would help most; "
+            f"it leaves {100.0 * further.left:.0f} % of the uncertainty"
+        ]
         if further.rate_hz is not None:
             text.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would separate creep from hysteresis")
         return text

@@ -9,6 +9,7 @@ from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, JilesAtherton, ManyP
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.operator.advice import next_trace
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.loop_errors import compare
@@ -218,3 +219,25 @@ def test_fitted_envelopes_are_those_of_the_plant() -> None:
     true = np.sort([u + linear * bow + skew * bow * (u - 0.5) for linear, skew in plant.core.bends], axis=0)
     (bend,) = fit.operator.family.plays.bends
     assert np.stack(envelopes(u, bend)) == pytest.approx(true, abs=0.01)
+
+
+def test_the_next_trace_is_that_of_the_scans_and_says_what_it_brings() -> None:
+    plant, fit = identified(BoucWen, SIX)
+    lines = [line(plant, centre, stroke, seed) for seed, (centre, stroke) in enumerate(SIX)]
+    near = next_trace(fit, lines, 100.0, [(45.0, 50.0), (20.0, 85.0)])
+    assert (near.size_v, near.offset_v) == pytest.approx((20.0, 85.0))
+    assert near.left < 0.1
+    assert 0.3 < next_trace(fit, lines, 100.0).left < 0.99
+    with pytest.raises(Unphysical, match=r"a scan of 40 V at 85 V is not within 0\.\.100 V"):
+        next_trace(fit, lines, 100.0, [(40.0, 85.0)])
+
+
+@pytest.mark.parametrize("kind", [ManyPlays, BoucWen])
+def test_the_only_trace_of_an_offset_may_be_left_out(kind: type) -> None:
+    """Its gain goes with it, and the other offset's stays at its place."""
+    plant = ForeignPlant(kind())
+    at = ((0.5, 0.2), (0.5, 0.5), (0.5, 0.8), (0.3, 0.25), (0.8, 0.25), (0.8, 0.1))
+    lines = [line(plant, centre, stroke, seed) for seed, (centre, stroke) in enumerate(at)]
+    fit = fit_operator(lines, Response(plant), factor_of(plant))
+    assert max(errors.rms for errors in fit.in_fit) < 0.2
+    assert max(errors.rms for errors in fit.left_out) < 5.0

@@ -34,12 +34,16 @@ def calibrated(*arguments: str | Path) -> Outcome:
 @pytest.mark.common
 def test_a_fitted_delay_is_printed_and_written_and_the_picture_is_drawn(traces: list[Path], tmp_path: Path) -> None:
     scanner, picture = tmp_path / "s.toml", tmp_path / "fit.png"
-    done = calibrated(*traces, "--delay-s", "fit", "--json", "--plot", picture, "--scanner", scanner, "--write")
+    wanted = ("--for", "30", "60", "--for", "20", "85")
+    done = calibrated(
+        *traces, *wanted, "--delay-s", "fit", "--json", "--plot", picture, "--scanner", scanner, "--write"
+    )
     assert done.status == 0, done.err
     found = json.loads(done.out)
     lag_s = 2e-6 + 1.0 / (2.0 * np.pi * 60e3 * 14.0)  # of the axis, which has no [x.resonance] here
     assert found["delay_s"]["value"] == pytest.approx(DELAY_S + lag_s, abs=3e-6)
     assert 1e-7 < found["delay_s"]["standard_error"] < 2e-6
+    assert (found["next_trace"]["size_v"], found["next_trace"]["offset_v"]) == pytest.approx((20.0, 85.0))
     assert f"# delay of the sensor: {found['delay_s']['value']:.6g} s" in (tmp_path / "s_x_operator.toml").read_text()
     assert picture.read_bytes().startswith(b"\x89PNG")
     given = calibrated(*traces, "--delay-s", str(found["delay_s"]["value"]))

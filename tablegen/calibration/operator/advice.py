@@ -1,10 +1,12 @@
-"""Advise the next trace: the stroke and centre at which the fields are most uncertain, and the rate."""
+"""Advise the next trace: the stroke and centre whose measurement helps the scans most, and the rate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.models.operator import CENTRE_REACH
@@ -16,34 +18,80 @@ from tablegen.numerics.driver import Driver
 _STROKES = np.arange(0.1, 1.0, 0.05)
 _CENTRES = np.arange(0.1, 0.91, 0.05)
 _JITTER = 1e-5  # relative variance that every trace leaves
+_NOISE = 1e-4  # relative variance that the next trace leaves: a slope from two near points is not worth much
 _LEAST_RMS = 1e-4  # percent
 _DECADE = 8.0  # ratio of rates that separates creep from hysteresis
 
 
 @dataclass(frozen=True, slots=True)
 class NextTrace:
-    """Where to measure next, in V, and ``unknown``, the relative variance of the fields there.
+    """Where to measure next, in V, and ``left``, the share of the uncertainty of the fields that it leaves.
 
-    It is 1 without data, and 0 without uncertainty.
+    It is the rms uncertainty over the scans that the trace is for, after it over before it: 0 to 1.
     """
 
     size_v: float
     offset_v: float
-    unknown: float
+    left: float
     rate_hz: float | None
 
 
-def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver | float) -> NextTrace:
-    """Return the trace that helps most; ``rate_hz`` is a second rate if all traces have the same."""
-    reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
-    unknown = _unknown(fit, np.array(reach))
+def next_trace(
+    fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver | float, scans: Sequence[tuple[float, float]] = ()
+) -> NextTrace:
+    """Return the trace of one of the scans that helps them all most; ``rate_hz`` is a second rate if all have one.
+
+    A trace lowers the variance of the fields at a point by the square of their covariance over the trace's own
+    variance. The best one lowers the mean over the scans most.
+
+    Parameters
+    ----------
+    scans
+        Scan voltages peak to peak and offsets, in V; without any, all that a build serves.
+
+    Raises
+    ------
+    Unphysical
+        If the driver does not reach a scan.
+    """
+    driver = Driver.of(driver)
+    for volts, offset in scans:
+        if not (volts > 0.0 and driver.beyond(offset - 0.5 * volts, offset + 0.5 * volts) <= 1e-9 * driver.span):
+            raise Unphysical(
+                f"a scan of {volts:g} V at {offset:g} V is not within {driver.v_min:g}..{driver.v_max:g} V; give its "
+                "voltage peak to peak, above 0, and its offset, both at the piezo"
+            )
+    points = np.array([(volts / driver.span, driver.share(offset)) for volts, offset in scans] or _served(lines))
+    gain = _gain(fit, points, points)
     # Of two equal ones, such as those at equal distances to both sides, every machine takes the lower one.
-    best = int(np.argmax(np.round(unknown, 9)))
+    best = int(np.argmax(np.round(np.mean(gain, axis=1), 9)))
     rates = [line.rate_hz for line in lines]
     other = None if max(rates) > _DECADE * min(rates) else 10.0 * max(rates)
-    stroke, centre = reach[best]
-    driver = Driver.of(driver)
-    return NextTrace(stroke * driver.span, driver.volts(centre), float(max(unknown[best], 0.0)), other)
+    stroke, centre = (float(value) for value in points[best])
+    unknown = float(np.mean(np.maximum(_unknown(fit, points), _JITTER)))
+    left = sqrt(max(1.0 - float(np.mean(gain[best])) / unknown, 0.0))
+    return NextTrace(stroke * driver.span, driver.volts(centre), left, other)
+
+
+def _served(lines: Sequence[PeriodicLine]) -> list[tuple[float, float]]:
+    """Return strokes and centres that the driver reaches and that a build does not refuse."""
+    refused = beyond_reach(lines, _STROKES, _CENTRES)
+    return [
+        (float(s), float(c))
+        for i, s in enumerate(_STROKES)
+        for j, c in enumerate(_CENTRES)
+        if 0.5 * s <= min(c, 1.0 - c) + 1e-9 and not refused[i, j]
+    ]
+
+
+def _gain(fit: OperatorFit, traces: Floats, scans: Floats) -> Floats:
+    """Return by how much a trace lowers the relative variance at each scan: shape (traces, scans)."""
+    points, lengths = fit.operator.residual.points, fit.operator.residual.lengths
+    inverse = _inverse(fit)
+    near = covariance(traces, points, lengths)
+    joint = covariance(traces, scans, lengths) - near @ inverse @ covariance(points, scans, lengths)
+    own = 1.0 - np.einsum("ij,jk,ik->i", near, inverse, near)
+    return np.asarray(joint**2 / (np.maximum(own, 0.0) + _NOISE)[:, None], dtype=np.float64)
 
 
 def beyond_reach(lines: Sequence[PeriodicLine], strokes: Floats, centres: Floats) -> Bools:

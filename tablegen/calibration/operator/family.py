@@ -35,11 +35,20 @@ CreepOf = Callable[[float], LogarithmicCreep]
 
 @dataclass(frozen=True, eq=False)
 class FamilyFit:
-    """The family, and its basis: its own numbers, creep's loss per decade, the gain of every other centre."""
+    """The family, and its basis: its own numbers with creep's loss per decade, the centres beside the main one, gains.
+
+    ``numbers`` has shape (numbers,), ``gains`` shape (centres,).
+    """
 
     family: Family
-    loss_per_decade: float
     numbers: Floats
+    centres: Floats
+    gains: Floats
+
+    @property
+    def loss_per_decade(self) -> float:
+        """Creep's loss per decade."""
+        return float(self.numbers[-1])
 
 
 def groups_of(centres: Sequence[float]) -> list[int]:
@@ -79,6 +88,7 @@ class FamilyProblem(ABC):
         first = self._shapes + 1
         self._gain_of = [None if group == nearest else first + others.index(group) for group in groups]
         self._gains = len(others)
+        self._centres = np.array([lines[groups.index(group)].centre for group in others])
         self._share = [1.0 / (line.stroke * np.sqrt(len(u))) for line, u in zip(lines, self.drives, strict=True)]
         powers = [np.stack([u**n for n in range(1, DEGREE + 1)]) for u in self.drives]
         self._powers = [(part - part.mean(axis=1, keepdims=True)).T for part in powers]
@@ -114,27 +124,28 @@ class FamilyProblem(ABC):
             Coefficients of u, u^2, ... in nm, shape (DEGREE,).
         """
 
-    def fit(self, near: Floats | None, rounds: int) -> FamilyFit:
-        """Fit from the best of the starts, or from numbers that are near.
+    def fit(self, near: FamilyFit | None, rounds: int) -> FamilyFit:
+        """Fit from the best of the starts, or from a fit that is near.
 
         Parameters
         ----------
         near
-            Own numbers, creep's loss per decade and gains, shape (numbers,); the starts by default.
+            A fit of these lines and others; the starts by default.
         rounds
             Largest number of steps.
         """
         if near is None:
-            solutions = [self.improve(self.best_weights(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
+            ones = np.ones(self._gains)
+            solutions = [self.improve(self.best_weights(np.append(one, ones)), _FIRST_ROUNDS) for one in self.starts]
             best = self.improve(min(solutions, key=lambda one: one.cost), rounds)
         else:
-            best = self.improve(self.best_weights(self._whole(near)), rounds)
+            nearest = [int(np.argmin(np.abs(near.centres - centre))) for centre in self._centres]
+            best = self.improve(self.best_weights(np.append(near.numbers, near.gains[nearest])), rounds)
         weights, shape = best.weights * self.scale, best.numbers[: self._shapes]
         count = len(weights) - 2 * DEGREE
         reversible = weights[count : count + DEGREE] - weights[count + DEGREE :]
-        return FamilyFit(
-            self.family(shape, weights[:count], reversible), float(best.numbers[self._shapes]), best.numbers
-        )
+        own, gains = np.split(best.numbers, [self._shapes + 1])
+        return FamilyFit(self.family(shape, weights[:count], reversible), own, self._centres, gains)
 
     def best_weights(self, numbers: Floats) -> _WeightsFit:
         """Fit the weights for these numbers.
@@ -187,11 +198,6 @@ class FamilyProblem(ABC):
             numbers[i] += step
             rows.append((self.best_weights(numbers).residual - at.residual) / step)
         return np.stack(rows, axis=1)
-
-    def _whole(self, numbers: Floats) -> Floats:
-        """Append gains of 1 where there are none."""
-        count = self._shapes + 1 + self._gains
-        return np.append(numbers, np.ones(count))[:count] if len(numbers) < count else numbers
 
     def _limited(self, numbers: Floats) -> Floats:
         """Clip the numbers to their limits."""

@@ -11,7 +11,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.branches import BranchResidual, branch_residual
 from tablegen.calibration.operator.creep_fit import creep_of_fields
-from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_of
+from tablegen.calibration.operator.family import CreepOf, FamilyFit, FamilyProblem, groups_of
 from tablegen.calibration.operator.loop_errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.plays_fit import PlaysProblem
@@ -144,11 +144,11 @@ class _Fitted:
         main: float,
         family: Family,
         creep: LogarithmicCreep,
-        numbers: Floats | None = None,
+        solution: FamilyFit | None = None,
     ) -> None:
-        """Of lines that still have their creep; ``numbers`` are those of ``FamilyFit``."""
+        """Of lines that still have their creep; ``solution`` is the fit of the family, where there was one."""
         self.lines, self.main = lines, main
-        self.family, self.creep, self.numbers = family, creep, numbers
+        self.family, self.creep, self.solution = family, creep, solution
         self.settled = [line.without(None, creep) for line in lines]
         self.residuals = [branch_residual(line, family) for line in self.settled]
 
@@ -198,8 +198,8 @@ def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Fa
             family = _straight(some)
             return _Fitted(some, main, family, near.creep if near else creep_of_fields(some, family, factor, creep_of))
         problem = FAMILIES[name](some, main, creep_of)
-        solution = problem.fit(near.numbers, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
-        return _Fitted(some, main, solution.family, creep_of(solution.loss_per_decade), solution.numbers)
+        solution = problem.fit(near.solution, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
+        return _Fitted(some, main, solution.family, creep_of(solution.loss_per_decade), solution)
 
     whole = fitted(lines, None)
     return _Candidate(name, whole, [fitted([*lines[:i], *lines[i + 1 :]], whole) for i in range(len(lines))])

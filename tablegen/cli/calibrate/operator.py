@@ -39,12 +39,22 @@ if TYPE_CHECKING:
     (PAIR_NAME,),
 )
 @sample_options
+@click.option(
+    "--for",
+    "scans",
+    type=(float, float),
+    multiple=True,
+    metavar="VOLTS OFFSET_V",
+    help="Scan that the next trace is to help: its voltage peak to peak and its offset, in volts at the piezo. Repeat "
+    "the option for each scan.  [default: all that a build serves]",
+)
 def operator(
     common: Common,
     recorder: "Recorder",
     data: tuple[Path, ...],
     delay_s: str,
     images: tuple[tuple[float, float, float, Path, Path], ...],
+    scans: tuple[tuple[float, float], ...],
     **sample: Any,
 ) -> int:
     """Fit an operator, a model of the piezo at every size and offset, to sensor traces, to images, or to both.
@@ -94,6 +104,7 @@ def operator(
             columns=recorder.columns,
             drive_gain=recorder.drive_gain,
             drive_offset=recorder.drive_offset,
+            scans=scans,
             progress=progress.now,
             **scanner_options(common),
             **sample,
