@@ -4,20 +4,6 @@
 
 #include "dac_sequencer.h"
 
-/* 1: runs add products of 64 bits. 0: they use 32 bits, for processors where such a sum takes a call or several
- * instructions. Words of more than 16 bits need 64 bits everywhere. */
-#if DAC_TABLE_STORAGE_BITS != 16
-#undef DAC_LONG_MULTIPLY
-#define DAC_LONG_MULTIPLY 1
-#elif !defined(DAC_LONG_MULTIPLY)
-#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__) \
-    || (defined(__riscv) && __riscv_xlen == 32)
-#define DAC_LONG_MULTIPLY 0
-#else
-#define DAC_LONG_MULTIPLY 1
-#endif
-#endif
-
 #if DAC_TABLE_STORAGE_BITS == 16
 typedef int32_t dac_wide; /* holds the difference of two words times a fraction */
 #define DAC_GUARD(bank) 4

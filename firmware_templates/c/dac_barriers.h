@@ -2,6 +2,8 @@
 #ifndef DAC_BARRIERS_H
 #define DAC_BARRIERS_H
 
+#include "dac_config.h"
+
 /* The other side sees writes in order. On a single core a compiler barrier would be enough. */
 #ifndef DAC_RELEASE
 #if defined(__GNUC__)

@@ -3,14 +3,6 @@
  */
 #include "dac_sequencer.h"
 
-#ifndef DAC_SMALL
-#if defined(__OPTIMIZE_SIZE__)
-#define DAC_SMALL 1 /* less code, but about eight times the instructions */
-#else
-#define DAC_SMALL 0
-#endif
-#endif
-
 /* Values that are the same for all words of a table. */
 struct renderer {
     dac_word *table;

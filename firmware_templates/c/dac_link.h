@@ -29,22 +29,6 @@
 extern "C" {
 #endif
 
-#ifndef DAC_LINK_RING
-#if defined(__AVR__)
-#define DAC_LINK_RING 512 /* of the 8 KB of the largest Arduino with an AVR */
-#else
-#define DAC_LINK_RING 2048
-#endif
-/* bytes received but not processed yet: a power of two, 512..32768; a frame takes 256 */
-#endif
-#ifndef DAC_LINK_SLICE
-#define DAC_LINK_SLICE 64 /* words, or received bytes, that one call of dac_link_work() processes */
-#endif
-
-#ifndef DAC_LINK_CHALLENGE_MS
-#define DAC_LINK_CHALLENGE_MS 10000 /* how long the nonce of a CHALLENGE may be used */
-#endif
-
 #define DAC_LINK_ABORTS 8 /* ABORTs that can wait for a tick */
 
 /* Limits of every program: straight binary codes, codes per tick, codes at a change of programs. */

@@ -3,10 +3,6 @@
 #include "dac_axis.h"
 #include "dac_barriers.h"
 
-#ifndef DAC_WAIT
-#define DAC_WAIT 8 /* ticks that are played one by one after a refused run, before the next run is tried */
-#endif
-
 enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
 enum { NOTHING = 2 };         /* value of `playing` before the first program */
 #define UNKNOWN UINT32_MAX /* position of the pixels after ticks that were played without markers */

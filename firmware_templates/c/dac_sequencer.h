@@ -31,36 +31,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "dac_config.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Options of a firmware. They must be the same for all its files: give them to the compiler with -D. */
-
-#ifndef DAC_TABLE_STORAGE_BITS
-#define DAC_TABLE_STORAGE_BITS 16 /* bits of a table word in memory: 16, or 32 for tables of 17 to 24 bits */
-#endif
-#ifndef DAC_OUTPUT_STORAGE_BITS
-#define DAC_OUTPUT_STORAGE_BITS 16 /* bits of a converter word in memory: 16, or 32 for converters of 17 to 24 bits */
-#endif
-
-#ifndef DAC_SPLINE
-#define DAC_SPLINE 0 /* 1: plays cubic tables too, of up to 16384 words of 21 bits */
-#endif
 #define DAC_CUBIC 128 /* of a cubic table: added to its index_bits */
 /* Words of a table that stand behind its last one: its first ones again. */
 #define DAC_WORDS_BEHIND (DAC_SPLINE ? 3 : 1)
-
-#ifndef DAC_STRIDE
-#define DAC_STRIDE 2 /* distance of two words of an axis: 2 if x and y alternate in a buffer, 1 if each has its own */
-#endif
-
-#ifndef DAC_SHAPING
-#define DAC_SHAPING 0 /* highest order of shaped output: 0 none, 1 first, 2 second, 3 scanner */
-#endif
-#if DAC_SHAPING < 0 || DAC_SHAPING > 3
-#error "DAC_SHAPING is 0, 1, 2 or 3"
-#endif
 
 #if DAC_TABLE_STORAGE_BITS == 16
 typedef int16_t dac_word;
@@ -243,10 +222,6 @@ typedef struct {
 } dac_status;
 
 /* Private, down to the functions. It is declared here so that the application can allocate it. */
-
-#ifndef DAC_REQUESTS
-#define DAC_REQUESTS 8 /* a power of two, at most 128 */
-#endif
 
 /* A place in a period: word index and 15 bits of fraction, of a cubic table 18 bits, in `high`, 64 more bits in
  * `low`. */

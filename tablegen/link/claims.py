@@ -79,6 +79,14 @@ def check_unchanged(before: DeviceInfo, now: DeviceInfo) -> None:
             )
 
 
+def has_restarted(before: DeviceStatus, now: DeviceStatus) -> bool:
+    """Return True if the device restarted between two answers.
+
+    Its boot count differs or, of a device without one, it has taken fewer programs than before.
+    """
+    return now.boot != before.boot or now.generation < before.generation
+
+
 def check_status(status: DeviceStatus, info: DeviceInfo, source: str) -> None:
     """Raise ``NotUnderstood`` for the first field of a status that a device cannot have; ``source`` is its request."""
     _check(source, "line", status.line, 0, MAXIMUM_LINE)

@@ -9,7 +9,7 @@ from random import Random
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from tablegen.link.claims import check_length, check_limits, most_bytes
+from tablegen.link.claims import check_length, check_limits, has_restarted, most_bytes
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
 from tablegen.link.messages import (
     DATA_BYTES,
@@ -20,7 +20,7 @@ from tablegen.link.messages import (
     Reason,
     Request,
 )
-from tablegen.link.outcome import ProgressCall, UploadResult, UploadState
+from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, restart_count
 from tablegen.link.pace import LATENCY_S, Deadline
 from tablegen.link.readback import read_back
 from tablegen.link.refusal_reasons import Limits
@@ -200,12 +200,14 @@ class Device:
         session.status_at = -math.inf  # the status changes, whatever becomes of the upload
         self._uploader = Uploader(session, image, deadline, progress, limits)
         result = self._uploader.run()
-        playing = self.status()
+        hello, playing = session.status, self.status()
+        restarted = has_restarted(hello, playing)  # back to the program that it starts with
         session.status, session.status_at = playing, session.now()
-        if playing.hash not in (image.info.hash, _NO_HASH):
+        if playing.hash != image.info.hash and (restarted or playing.hash != _NO_HASH):
+            why = restart_count(1) if restarted else "did another program upload too?"
             raise NotPlaying(
                 f"the device took the upload, and plays {playing.hash.hex()[:12]} instead of "
-                f"{image.info.hash.hex()[:12]}; did another program upload too, or was the device reset?"
+                f"{image.info.hash.hex()[:12]}; {why}"
             )
         if playing.boot == before.boot and result.generation > playing.generation:
             raise NotUnderstood(

@@ -1,5 +1,6 @@
 """The exchange of requests and answers on one port and in one session: framing, numbering, and waits."""
 
+from collections import deque
 from dataclasses import dataclass
 from random import Random
 
@@ -11,17 +12,24 @@ from tablegen.link.transport import Transport
 
 _FRAME_END = b"\0"  # in front of a frame, it ends a frame that noise began
 _ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # their answers tell nothing about the latency
+_COUNTED_FRAMES = 40  # the last requests, of which the lost ones are counted
+_MIN_LOST_FRAMES = 4  # fewer say nothing about a line
+_MAX_ON_WAY = 255  # a seq has 8 bits
 
 
 @dataclass(slots=True)
 class Answer:
-    """The answer to a request: its ``payload``, or the ``reason`` and ``detail`` of a refusal."""
+    """The answer to a request: its ``payload``, or the ``reason`` and ``detail`` of a refusal.
+
+    ``lost`` are type and seq of the requests that were sent before it and are lost, since a line keeps the order.
+    """
 
     kind: int
     seq: int
     payload: bytes
     reason: int = 0
     detail: int = 0
+    lost: tuple[tuple[int, int], ...] = ()
 
 
 class Exchange:
@@ -39,6 +47,8 @@ class Exchange:
         self._free = random.randrange(256)
         self._number = random.randrange(256)
         self._strange_bytes = self._bad_before = 0  # bytes since the last frame; bad frames up to the last answer
+        self._on_way: list[tuple[int, int]] = []  # requests without an answer, in the order in which they were sent
+        self._outcomes: deque[bool] = deque(maxlen=_COUNTED_FRAMES)  # of the last requests: True if answered
         self.bytes_sent = 0
         self.new_session()
 
@@ -47,12 +57,24 @@ class Exchange:
         self.transport = transport
         self._reader = FrameReader()
         self._strange_bytes = self._bad_before = 0
+        self._on_way.clear()
         self.pace.forget()
 
     @property
     def noise(self) -> bool:
         """True if bytes that are no frames have come since the last answer."""
         return self._reader.bad_frames > self._bad_before or self._strange_bytes > MAXIMUM_FRAME
+
+    @property
+    def bad_line(self) -> str | None:
+        """Say that the line damages frames, and what to do, if it lost many before the last answer; else None."""
+        lost = self._outcomes.count(False)
+        if lost < _MIN_LOST_FRAMES:
+            return None
+        return (
+            f"the line damages or loses frames, {lost} of the last {len(self._outcomes)} before the last answer: "
+            "shorten or shield the cable, connect the grounds, or lower the baud rate at both ends"
+        )
 
     def new_session(self) -> None:
         """Choose another session; HELLO tells the device."""
@@ -79,6 +101,9 @@ class Exchange:
             wire = _FRAME_END + wire
         self.transport.write(wire)
         self.bytes_sent += len(wire)
+        if kind not in _ANSWERED_AT_LINE_START:
+            self._on_way = [request for request in self._on_way if request != (kind, seq)][-_MAX_ON_WAY:]
+            self._on_way.append((kind, seq))
         now, learn = self.now(), kind not in _ANSWERED_AT_LINE_START
         return now + self.pace.sent((kind, seq), now, self.transport.baud, (len(wire), answer_bytes), learn)
 
@@ -111,4 +136,14 @@ class Exchange:
                 raise NotUnderstood(f"a refusal of request {refusal.type}: reason is 0; possible: 1 to 255")
             answer = Answer(refusal.type, frame.seq, b"", refusal.reason, refusal.detail)
         self.pace.answered((answer.kind, answer.seq), self.now(), len(frame.payload))
+        answer.lost = self._count_lost((answer.kind, answer.seq))
         return [answer]
+
+    def _count_lost(self, answered: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+        """Count the requests that were sent before one that is answered as lost; return them."""
+        if answered not in self._on_way:
+            return ()
+        lost = self._on_way[: self._on_way.index(answered)]
+        del self._on_way[: len(lost) + 1]
+        self._outcomes.extend([False] * len(lost) + [True])
+        return tuple(lost)

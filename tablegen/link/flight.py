@@ -1,5 +1,6 @@
 """Requests on their way: their number, their time-outs, and the answers that still count."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from tablegen.link.messages import Request
@@ -72,6 +73,11 @@ class Flight:
             if before[0] in _ANSWERED_IN_ORDER:
                 self._late[before] = self._on_way.pop(before)
         return self._on_way.pop(key)
+
+    def lost_data(self, unanswered: Iterable[Key], received: int) -> int:
+        """Return how many of these DATA did not arrive: of the others the answer was lost."""
+        sent = [self._late[key] for key in unanswered if key in self._late]
+        return sum(one.kind == Request.DATA and one.end > received for one in sent)
 
     def forget(self, *kinds: Request) -> None:
         """Drop requests of these types: their answers count no more."""

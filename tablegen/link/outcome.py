@@ -1,6 +1,6 @@
 """The result of an upload, its progress, and the error at the end of its time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tablegen.link.errors import OutOfTime
@@ -17,7 +17,8 @@ class UploadResult:
 
     ``line`` is the last line of the old frame, None where the answer was lost. ``bytes`` are those of the image,
     ``wire_bytes`` those that were sent for it, ``resumed`` those that the device had before. ``slow_baud`` is about the
-    rate at which answers came, None where it was not far below that of the port.
+    rate at which answers came, None where it was not far below that of the port. ``restarts`` are those of the device
+    in mid-upload, by its boot count: each ends the scan that plays, and loses what was received.
     """
 
     already_running: bool
@@ -29,6 +30,7 @@ class UploadResult:
     retransmissions: int
     seconds: float
     slow_baud: int | None = None
+    restarts: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +43,17 @@ class UploadState:
 
 
 def out_of_time(
-    state: UploadState, upload: Upload | None, busy: bool, silence_s: float, slow_baud: int | None
+    state: UploadState,
+    upload: Upload | None,
+    busy: bool,
+    silence_s: float,
+    slow_baud: int | None,
+    causes: Sequence[str] = (),
 ) -> OutOfTime:
     """Return the error when the time of an upload is over: what the device said last, and what to do.
 
     ``upload`` is what the last STATUS said of this upload, None if there was none. ``busy``: another upload is in the
-    way. ``silence_s`` is the time since the last answer.
+    way. ``silence_s`` is the time since the last answer, ``causes`` are what else is known of the line and the device.
     """
     if busy:
         what = "the device is busy with another upload; try again when that is active"
@@ -65,4 +72,11 @@ def out_of_time(
         what = f"no answer for {silence_s:.0f} s; {what}"
     if slow_baud:
         what += f"; the line is slow, answers come at about {slow_baud} baud: give --baud {slow_baud}"
+    what = "; ".join([*causes, what])
     return OutOfTime(f"timeout: {what}, or increase --timeout")
+
+
+def restart_count(restarts: int) -> str:
+    """Say that a device restarted so many times, and what to look at."""
+    times = "once" if restarts == 1 else f"{restarts} times"
+    return f"the device restarted {times} meanwhile: was its power cut, or does its supply or its watchdog reset it?"

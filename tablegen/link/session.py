@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Callable
 from random import Random
 
-from tablegen.link.claims import check_device, check_length, check_status, check_unchanged
+from tablegen.link.claims import check_device, check_length, check_status, check_unchanged, has_restarted
 from tablegen.link.errors import LinkError, LinkLost, NoAnswer, NoPort, NotUnderstood, Refused, Silent
 from tablegen.link.exchange import Answer, Exchange
 from tablegen.link.messages import (
@@ -17,6 +17,7 @@ from tablegen.link.messages import (
     Reason,
     Request,
 )
+from tablegen.link.outcome import restart_count
 from tablegen.link.pace import back_off
 from tablegen.link.refusal_reasons import keyless, refused
 from tablegen.link.transport import Opener, Transport
@@ -48,6 +49,7 @@ class LinkSession:
         self.info: DeviceInfo
         self.status: DeviceStatus  # status at the last answer to HELLO
         self.status_at = 0.0
+        self.restarts = 0  # restarts of the device since the first HELLO
         self.acts: dict[Request, None] = {}  # requests that act which were sent, in order, each once
         self._opener = opener
         self._sleep = sleep
@@ -73,7 +75,10 @@ class LinkSession:
         if self._has_answered:
             check_unchanged(self.info, info)
         self.info = info
-        self.status, self.status_at = self.status_of(payload[size:], "HELLO"), self.now()
+        status = self.status_of(payload[size:], "HELLO")
+        if self._has_answered and has_restarted(self.status, status):
+            self.restarts += 1
+        self.status, self.status_at = status, self.now()
         self._has_answered = True
 
     def status_of(self, payload: bytes, source: str = "STATUS") -> DeviceStatus:
@@ -224,10 +229,14 @@ class LinkSession:
 
     def contested(self) -> LinkError:
         """Return the error where sessions do not last."""
+        if self.restarts:
+            return LinkLost(restart_count(self.restarts))
         return LinkLost("another program uses the device, or the device resets repeatedly; close the other program")
 
     def silent(self) -> LinkError:
         """Return the error where nobody answers."""
+        if self._has_answered and (why := self.exchange.bad_line):
+            return Silent(f"the device no longer answers; {why}")
         if self._has_answered and self.exchange.noise:
             return Silent(
                 "the device no longer answers, and bytes come that are not its frames: does its console write to the "

@@ -7,11 +7,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tablegen.link.claims import check_length
+from tablegen.link.data_size import DataSize
 from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
 from tablegen.link.exchange import Answer
 from tablegen.link.flight import Flight, SentFrame
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
-from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
+from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time, restart_count
 from tablegen.link.pace import Deadline
 from tablegen.link.refusal_reasons import Limits, refused
 from tablegen.link.session import LinkSession, SessionEnded
@@ -44,7 +45,7 @@ class Uploader:
         self._start, self._until = session.now(), deadline
         self._progress = progress
         self._limits = limits
-        self._step = min(session.info.data_bytes, DATA_BYTES)
+        self._data_size = DataSize(min(session.info.data_bytes, DATA_BYTES))
         self._digest = hashlib.blake2s(image.data).digest() if session.needs_key(Request.COMMIT) else b""
         self._committed = False  # a COMMIT may have reached the device
         self._sent_to = 0  # bytes that were sent at least once
@@ -52,7 +53,7 @@ class Uploader:
         self._retransmissions = 0
         self._restarts: dict[int, int] = {}
         self._flight = Flight(session.info.window, self._start)
-        self._before = session.status
+        self._before, self._restarts_before = session.status, session.restarts
         self._had = self._received(session.status)  # bytes that the device had before
         self._restart(session.status)
 
@@ -91,6 +92,7 @@ class Uploader:
             retransmissions=self._retransmissions,
             seconds=self._session.now() - self._start,
             slow_baud=self._slow_baud(),
+            restarts=self._device_restarts,
         )
 
     @property
@@ -106,6 +108,11 @@ class Uploader:
         return self._exchange.pace.slow_baud(self._exchange.transport.baud)
 
     # State of the device
+
+    @property
+    def _device_restarts(self) -> int:
+        """The restarts of the device since the upload began."""
+        return self._session.restarts - self._restarts_before
 
     def _received(self, status: DeviceStatus) -> int:
         """Return the bytes of this upload that the device has."""
@@ -185,7 +192,7 @@ class Uploader:
 
     def _send_data(self) -> None:
         offset = self._next
-        data = self._image.data[offset : offset + self._step]
+        data = self._image.data[offset : offset + self._data_size.next(self._flight.in_vain)]
         seq, end = self._exchange.seq(), offset + len(data)
         due = self._exchange.send(Request.DATA, seq, _CRC.pack(offset) + data, again=self._flight.in_vain > 0)
         self._flight.add(SentFrame(Request.DATA, seq, self._session.now(), due, self._round, end))
@@ -276,6 +283,7 @@ class Uploader:
             self._take_begin(received)
         else:
             self._take_data(received, sent)
+            self._data_size.learn(self._flight.lost_data(answer.lost, received))
         return None
 
     def _take_begin(self, received: int) -> None:
@@ -404,4 +412,9 @@ class Uploader:
             self._busy,
             silence_s,
             self._slow_baud(),
+            self._causes(),
         )
+
+    def _causes(self) -> list[str]:
+        causes = [restart_count(self._device_restarts)] if self._device_restarts else []
+        return causes + ([line] if (line := self._exchange.bad_line) else [])

@@ -278,6 +278,23 @@ def test_a_slow_line_is_named(info: DeviceInfo, folder: Path) -> None:
     assert "baud" not in bench.run("upload", folder, "--as", "table", "--force").out
 
 
+def test_a_power_cycle_in_mid_upload_is_said_to_be_one(info: DeviceInfo, folder: Path) -> None:
+    device = model(info, boot=BOOT)
+    bench = Bench(device)
+
+    class Cut(VirtualLine):
+        def write(self, data: bytes) -> None:
+            if device.boot == 0 and device.status().received > 3000:
+                device.reboot()
+            super().write(data)
+
+    with patch("client_rig.VirtualLine", Cut):
+        outcome = bench.run("upload", folder, "--as", "table")
+    assert (outcome.status, device.boot) == (0, 1)
+    assert "the device restarted once meanwhile: was its power cut, or" in outcome.out
+    assert "its old scan ended" in outcome.out
+
+
 def test_park_that_does_not_come_about(bench: Bench) -> None:
     bench.run("trigger")
     bench.options["tick_hz"] = 0

@@ -200,6 +200,23 @@ def test_trigger_needs_arming_and_parking(programs: list[DualProgram]) -> None:
     assert not sequencer.armed
 
 
+def test_a_trigger_before_the_first_program_is_taken_waits_for_it(programs: list[DualProgram]) -> None:
+    """The next tick takes it and plays; without a program, or if it is withdrawn, there is no scan."""
+    sequencer = Sequencer(None)
+    sequencer.arm(1)
+    assert not sequencer.trigger()
+    sequencer.commit(programs[0])
+    assert sequencer.trigger()
+    first = sequencer.step()
+    assert (first.swapped, first.playing, first.line, first.frame) == (True, True, True, True)
+    withdrawn = Sequencer(None)
+    withdrawn.commit(programs[0])
+    withdrawn.arm()
+    assert withdrawn.trigger()
+    withdrawn.withdraw()
+    assert not withdrawn.step().playing
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 400), st.sampled_from(["park", "reset"]))
 def test_park_and_reset_ramp_from_wherever_they_come(programs: list[DualProgram], at: int, how: str) -> None:

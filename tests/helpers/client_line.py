@@ -94,3 +94,17 @@ class Noise:
             found, self._kept = [piece, self._kept], None
         self.spoilt += found != [piece]
         return found
+
+
+class BadBytes:
+    """Damages one byte of so many on average, from a seed."""
+
+    def __init__(self, random: Random, one_of: int) -> None:
+        self.random, self.one_of = random, one_of
+
+    def __call__(self, piece: bytes) -> list[bytes]:
+        damaged = bytearray(piece)
+        for index in range(len(damaged)):
+            if self.random.random() * self.one_of < 1.0:
+                damaged[index] ^= 1 << self.random.randrange(8)
+        return [bytes(damaged)]

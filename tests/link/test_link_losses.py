@@ -4,8 +4,8 @@ from random import Random
 from unittest.mock import patch
 
 import pytest
-from client_line import Noise, VirtualLine
-from client_rig import KEY, LARGE, LARGE_INFO, LoseOnce, Watched, client, model
+from client_line import BadBytes, Noise, VirtualLine
+from client_rig import KEY, LARGE, LARGE_INFO, NEW, LoseOnce, Watched, client, model
 from link_programs import INFO, make_scan
 from replacing import replace
 
@@ -14,9 +14,12 @@ from tablegen.link.errors import (
     LinkError,
     LinkLost,
     NotPlaying,
+    OutOfTime,
+    Silent,
 )
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import DeviceState, Request, Upload
+from tablegen.link.outcome import restart_count
 from tablegen.link.upload import Uploader
 
 # What is lost, and goes
@@ -63,6 +66,59 @@ def test_uploads_survive_a_bad_line(seed: int, key: bytes) -> None:
             assert device_model.status().hash.hex() == scan.digest
             assert device.readback() == scan.image(False).data
     assert all(noise.spoilt for noise in noises)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("one_of", "longest_s"), [(300, 6.0), (150, 15.0)])
+def test_a_line_that_damages_bytes_gets_shorter_frames(seed: int, one_of: int, longest_s: float) -> None:
+    """A DATA of 240 bytes arrives whole in 4 or 2 of 10 cases; whoever sends it again and again gives up."""
+    chance = Random(seed)
+    line = Watched(model(LARGE_INFO), spoil_out=BadBytes(chance, one_of), spoil_back=BadBytes(chance, one_of))
+    with client(line, seed) as device:
+        assert device.upload(LARGE).seconds < longest_s
+        assert line.device.status().hash == LARGE.info.hash
+    assert line.sent < 5 * len(LARGE.data)
+
+
+def test_a_good_line_gets_long_frames_again() -> None:
+    """It damages one byte of 100 at first."""
+    line = Watched(model(LARGE_INFO))
+    with client(line) as device:
+        damaged = BadBytes(Random(1), 100)
+
+        def spoil(piece: bytes) -> list[bytes]:
+            return damaged(piece) if line.device.status().received < 2000 else [piece]
+
+        line.spoil_out = spoil
+        device.upload(LARGE)
+    sizes = [len(frame.payload) - 4 for frame in line.frames if frame.type == Request.DATA]
+    assert min(sizes) <= 60
+    assert sizes[-2] >= 4 * min(sizes)
+
+
+@pytest.mark.parametrize(
+    ("one_of", "what"),
+    [(60, "the line damages or loses frames, [0-9]+ of the last [0-9]+ before"), (10**9, "is it still on")],
+)
+def test_a_line_that_damages_frames_is_said_to(one_of: int, what: str) -> None:
+    """Not that the device may be off, if what it answers comes but now and then."""
+    line = VirtualLine(model(LARGE_INFO), spoil_out=BadBytes(Random(2), one_of))
+    with client(line, 2) as device:
+
+        def cut(done: int, total: int) -> None:
+            if done > 400:
+                line.spoil_back = lambda piece: []
+
+        with pytest.raises(Silent, match=what) as error:
+            device.upload(LARGE, cut)
+        assert ("still on" in str(error.value)) == ("still on" in what)
+        assert ("damages" in str(error.value)) == ("damages" in what)
+
+
+def test_the_end_of_the_time_says_so_too() -> None:
+    line = VirtualLine(model(LARGE_INFO), spoil_out=BadBytes(Random(1), 60))
+    with client(line) as device, pytest.raises(OutOfTime, match=r"timeout: the line damages or loses .*or increase"):
+        device.upload(LARGE, timeout_s=3.0)
 
 
 def test_a_port_that_vanishes_is_opened_again_and_the_upload_goes_on() -> None:
@@ -172,12 +228,50 @@ def test_a_device_that_is_reset_gets_it_again(after: int) -> None:
 
         try:
             result = device.upload(LARGE, reset)
-        except NotPlaying:
+        except NotPlaying as error:
             assert after == 8384, "reset when the scan was in force already"
+            text = str(error)
         else:
+            text = restart_count(result.restarts)
             assert result.generation == device_model.status().generation
             assert device_model.status().hash == LARGE.info.hash
+        assert "the device restarted once meanwhile" in text
         assert device.status().boot == len(resets) == 1
+
+
+@pytest.mark.parametrize("counts", [True, False], ids=["boot count", "none"])
+def test_a_device_that_restarts_again_and_again_is_said_to(counts: bool) -> None:
+    """Also of a device that does not count its starts, since it has taken fewer programs than before."""
+    device_model = model(LARGE_INFO)
+    line = VirtualLine(device_model)
+    with client(line) as device:
+        device.upload(NEW.image(False))
+
+        def reset(done: int, total: int) -> None:
+            if done >= 1000:
+                device_model.reboot()
+                device_model.boot *= counts
+
+        with pytest.raises(LinkLost, match=f"the device restarted {'4 times' if counts else 'once'} meanwhile"):
+            device.upload(LARGE, reset)
+
+
+def test_a_restart_behind_the_answer_to_commit_is_no_success() -> None:
+    """Though the device does not know the hash of the program that it then plays."""
+    device_model = model(LARGE_INFO)
+    device_model._boot_hash = bytes(32)
+    line = Watched(device_model)
+
+    def reset(piece: bytes) -> list[bytes]:
+        frames = FrameReader().feed(piece)
+        if frames and frames[0].type == Request.COMMIT | 0x80:
+            line.spoil_back = lambda piece: [piece]
+            device_model.reboot()
+        return [piece]
+
+    line.spoil_back = reset
+    with client(line) as device, pytest.raises(NotPlaying, match="the device restarted once"):
+        device.upload(LARGE)
 
 
 def test_two_hosts_get_an_error_that_says_so() -> None:

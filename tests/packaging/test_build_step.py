@@ -273,12 +273,14 @@ def widths_of(project: Project) -> set[str]:
 
 @pytest.mark.parametrize("guarded", [True, False])
 def test_the_snippet_of_the_page_compiles_all_objects_when_a_width_changes(tmp_path: Path, guarded: bool) -> None:
-    """From 16 to 20 bits. Without its line on DIR_OPTIONS the runtime stays as it was: a wrong program."""
+    """From 16 to 20 bits. Without its line on DIR_OPTIONS the runtime stays as it was, and does not link."""
     page = (REPOSITORY / "docs" / "build_step.md").read_text("utf-8")
     snippet = page.partition("```make\n")[2].partition("```")[0]
     guard = "$(OBJECTS): $(build/scan_OPTIONS)\n"
     assert snippet.count(guard) == 1
     project = snippet_project(tmp_path, snippet if guarded else snippet.replace(guard, ""))
+    main = project.folder / "main.c"  # of a firmware, it has the types of the sequencer
+    main.write_text('#include "dac_sequencer.h"\n' + main.read_text("utf-8"), "utf-8")
     flags = {"CFLAGS": "-g3"}  # macros stand in the objects
     done = project.call("make", **flags)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -290,7 +292,8 @@ def test_the_snippet_of_the_page_compiles_all_objects_when_a_width_changes(tmp_p
         edited(project.scan.read_text("utf-8"), "x.table.bits = 20", "dac.bits = 20", "limits.max_error_lsb = 5"),
     )
     done = project.call("make", "-j2", **flags)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert (done.returncode == 0) == guarded, done.stdout + done.stderr
+    assert ("multiple definition of `dac_objects_need_the_same_options'" in done.stderr) != guarded
     assert widths_of(project) == (objects if guarded else {"main.o", f"{NAME}.o"})
     if guarded:
         project.append(project.scan, "# a comment\n")

@@ -162,6 +162,10 @@ def _summary(scan: "PreparedScan", image: "ProgramImage", result: "UploadResult"
         text += f"; the device already had {result.resumed} bytes"
     if result.retransmissions:
         text += f"; {result.retransmissions} frames retransmitted"
+    if result.restarts:
+        from tablegen.link.outcome import restart_count
+
+        text += f"\n{restart_count(result.restarts)} It lost what it had received, and its old scan ended"
     if result.slow_baud:
         text += f"\nthe line is slow: answers come at about {result.slow_baud} baud (--baud {result.slow_baud})"
     return text

@@ -1,0 +1,93 @@
+"""The options of the runtime are one header, and objects that were compiled with different ones do not link."""
+
+import re
+from pathlib import Path
+
+import pytest
+from building import NAME, REPOSITORY, VARIANTS, build, run, run_clean
+
+from tablegen.base.resources import c_runtime
+
+FOLDER = c_runtime()[0].parent
+CONFIG = FOLDER / "dac_config.h"
+# Of each option on which types or calls between files depend another value than the default.
+OTHER_VALUES = {
+    "DAC_TABLE_STORAGE_BITS": 32,
+    "DAC_OUTPUT_STORAGE_BITS": 32,
+    "DAC_STRIDE": 1,
+    "DAC_SHAPING": 3,
+    "DAC_SPLINE": 1,
+    "DAC_REQUESTS": 128,
+    "DAC_LONG_MULTIPLY": 0,
+    "DAC_LINK_RING": 512,
+}
+MAIN = '#include "dac_sequencer.h"\nint main(void)\n{\n    return 0;\n}\n'
+CC = ["cc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{FOLDER}"]
+
+
+@pytest.fixture(scope="module")
+def main_object(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a program that was compiled with the defaults."""
+    folder = tmp_path_factory.mktemp("main")
+    (folder / "main.c").write_text(MAIN, "ascii")
+    run_clean([*CC, "-c", "main.c"], folder)
+    return folder / "main.o"
+
+
+def link(folder: Path, main_object: Path, *options: str) -> str:
+    """Compile a file of the runtime with these options and link it with the program; return what the linker says."""
+    run_clean([*CC, *options, "-c", FOLDER / "dac_fourier.c", "-o", folder / "other.o"], folder)
+    done = run(["cc", "-Wl,--gc-sections", main_object, folder / "other.o", "-o", folder / "main"])
+    assert (done.returncode == 0) == (done.stderr == "")
+    return done.stderr
+
+
+@pytest.mark.parametrize("option", OTHER_VALUES)
+def test_objects_of_different_options_do_not_link(option: str, main_object: Path, tmp_path: Path) -> None:
+    """Whether they call each other or not; and the control: they do where the options are written out the same."""
+    given = link(tmp_path, main_object, f"-D{option}={OTHER_VALUES[option]}")
+    assert "multiple definition of `dac_objects_need_the_same_" in given
+    text = run_clean(["cc", "-E", "-dM", CONFIG], tmp_path)
+    default = re.search(rf"^#define {option} (\d+)$", text, re.MULTILINE)
+    assert default
+    assert link(tmp_path, main_object, f"-D{option}={default[1]}") == ""
+
+
+def test_options_of_one_file_alone_may_differ(main_object: Path, tmp_path: Path) -> None:
+    assert link(tmp_path, main_object, "-DDAC_SMALL=1", "-DDAC_WAIT=1", "-DDAC_LINK_SLICE=8") == ""
+
+
+def test_what_the_linker_compares_takes_no_memory(main_object: Path) -> None:
+    symbols = run_clean(["nm", main_object], main_object.parent).splitlines()
+    kinds = {line.split()[-1]: line.split()[-2] for line in symbols if "dac_" in line}
+    assert set(kinds) == {"dac_objects_need_the_same_options", "dac_objects_need_the_same_link_ring"}
+    assert set("".join(kinds.values()).lower()) == {"a"}, "absolute: a number, of no section"
+
+
+def test_a_header_of_the_firmware_has_the_widths_of_the_scan(tmp_path: Path) -> None:
+    """The example of the header, with a scan of 16 bits and one of 18: no -D of a width."""
+    example = re.findall(r"^ \*     (#.*)$", CONFIG.read_text("ascii"), re.MULTILINE)
+    assert len(example) == 2
+    (tmp_path / "my_dac_config.h").write_text("\n".join(example) + "\n", "ascii")
+    unit = f'#include "dac_sequencer.h"\n#include "{NAME}.h"\nextern const dac_program scan;\n'
+    unit += f"const dac_program scan = DAC_PROGRAM({NAME.upper()}, {NAME});\n"
+    (tmp_path / "unit.c").write_text(unit, "ascii")
+    for name in ("example", "bits_18"):
+        folder = tmp_path / name
+        build(folder, VARIANTS[name])
+        options = [f"-I{folder / 'out'}", f"-I{tmp_path}", '-DDAC_CONFIG_FILE="my_dac_config.h"']
+        run_clean([*CC, *options, "-c", "unit.c"], tmp_path)
+
+
+def test_the_page_has_all_options() -> None:
+    page = (REPOSITORY / "docs" / "c.md").read_text("utf-8")
+    listed = set(re.findall(r"^\| `(DAC_[A-Z_]+)` \|", page, re.MULTILINE))
+    options = set(re.findall(r"^#ifn?def (DAC_[A-Z_]+)$", CONFIG.read_text("ascii"), re.MULTILINE))
+    assert listed == (options | {"DAC_LONG_MULTIPLY"}) - {"DAC_CONFIG_H"}
+    guarded = re.findall(
+        r"^#ifndef (DAC_[A-Z_]+)$",
+        "".join(path.read_text("ascii") for path in FOLDER.glob("dac_*.[ch]") if path != CONFIG),
+        re.MULTILINE,
+    )
+    # What the compiler decides, and the fences, which are no numbers.
+    assert {name for name in guarded if not name.endswith("_H")} == {"DAC_FEW_REGISTERS", "DAC_RELEASE"}
