@@ -6,7 +6,7 @@ a line, one of y the window over the image lines.
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Literal
+from typing import Any, Literal
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -51,6 +51,20 @@ class ErrorAnswer(Struct, frozen=True):
         if self.basis == "laws":
             return "; ".join([f"{self.axis}: not measured: {self.source}", f"by them {figures}", *parts])
         return "; ".join([f"{self.axis}: {figures}, {self.source}", *parts])
+
+    def record(self) -> dict[str, Any]:
+        """Return the answer as JSON outputs have it: its fields under their names, and the line as ``text``."""
+        return {
+            "basis": self.basis,
+            "of": self.of,
+            "percent": self.percent,
+            "nm": self.nm,
+            "pixels": self.pixels,
+            "source": self.source,
+            "limit": self.limit or None,
+            "next": self.next_step or None,
+            "text": str(self),
+        }
 
 
 def short(value: float) -> str:

@@ -1,5 +1,6 @@
 """The line that every output begins with: its figures are those of the certificate, and each branch has its words."""
 
+import json
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -117,6 +118,15 @@ def test_every_output_begins_with_it(built: tablegen.Build, tmp_path: Path) -> N
     page = (tmp_path / "r.html").read_text("utf-8")
     assert all(page.index(line) < page.index('class="verdict') for line in lines)
     assert repr(built).splitlines()[1].strip() == lines[0]
+
+
+def test_json_has_the_first_lines_as_data(built: tablegen.Build) -> None:
+    plain = json.loads(run("simulate", EXAMPLE, "--no-calibration", "--json").out)
+    assert [one["text"] for one in plain["answers"].values()] == built.brief()[:-1]
+    assert plain["duration"] == built.duration
+    x, own = plain["answers"]["x"], built.answers[0]
+    assert (x["basis"], x["of"], x["source"], x["next"]) == (own.basis, own.of, own.source, own.next_step)
+    assert (x["percent"], x["nm"], x["pixels"]) == (own.percent, own.nm, own.pixels)
 
 
 def test_show_is_brief_and_all_has_the_rest(built: tablegen.Build) -> None:
