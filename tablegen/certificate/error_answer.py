@@ -159,7 +159,11 @@ def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: R
     of: Of = "trace to retrace, rms" if refinement.before_of == "mismatch" else "rms"
     # The best of the rounds has the measurement that was made while it was played itself.
     best = refinement.best is True
-    source = "measured (refine, best round)" if best else "measured (refine) before the layer of the last round"
+    source = "measured (refine, best round)"
+    if not best:
+        source = "measured (refine) before the layer of the last round"
+        if refinement.after_percent is not None:
+            source += f", with which refine predicts {short(refinement.after_percent)} %"
     answer = _with_figures(line, count, of, refinement.before_percent, basis="measured", source=source, next_step=again)
     return _limited(answer, line, certificate, final=best)
 

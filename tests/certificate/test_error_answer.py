@@ -77,7 +77,10 @@ def test_a_measurement_goes_before_a_prediction(built: tablegen.Build) -> None:
     expected = Expectation("traces", rms={"forward": Figure(0.9)})
     one = answer(built, layer=True, refinement=layer, expected=expected)
     assert (one.basis, one.of, one.percent) == ("measured", "rms", 0.12)
-    assert "before the layer of the last round" in one.source
+    assert one.source.endswith("before the layer of the last round")
+    predicted = answer(built, layer=True, refinement=replace(layer, after_percent=0.034), expected=expected)
+    assert predicted.source == f"{one.source}, with which refine predicts 0.034 %"
+    assert predicted.percent == 0.12
     assert answer(built, layer=True, refinement=replace(layer, before_of="mismatch")).of == "trace to retrace, rms"
     best = answer(built, layer=True, refinement=replace(layer, best=True))
     assert "best round" in best.source
