@@ -12,6 +12,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.expected import forward_residual
 from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
@@ -21,7 +22,7 @@ from tablegen.planning.line_plan import LinePlan, Plan
 _CONVERTER_SHARE = 0.5  # of the error; above it a better piezo model gains little
 
 Basis = Literal["measured", "predicted", "laws", "uncompensated", "rests"]
-Of = Literal["rms", "trace to retrace, rms", "trace to retrace, at most"]
+Of = Literal["rms", "rms of one way", "trace to retrace, rms", "trace to retrace, at most"]
 
 
 class ErrorAnswer(Struct, frozen=True):
@@ -148,7 +149,11 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
     if expected is not None and expected.mismatch is not None:
         of: Of = "trace to retrace, at most"
         return _with_figures(line, count, of, expected.mismatch.value, basis="laws", source=source, next_step=refine)
-    return ErrorAnswer(axis, "laws", source, refine)
+    if line.band_limit.directions == "forward" and (residual := forward_residual(line)) is not None:
+        source += ", and no retrace shows what they do not describe, which comes on top"
+        return _with_figures(line, count, "rms of one way", residual, basis="laws", source=source, next_step=refine)
+    why = "which have no branches for the stroke that is played, so the size of the error is unknown"
+    return ErrorAnswer(axis, "laws", f"{source}, {why}", refine)
 
 
 def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:

@@ -48,13 +48,19 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
     return Section(
         "lattice",
         "A lattice, before and after (simulation)",
-        (Pictures(tuple(pictures)), Paragraph(_remark(axes), "quiet")),
+        (Pictures(tuple(pictures)), Paragraph(_remark(planned, axes), "quiet")),
         text,
     )
 
 
-def _remark(axes: tuple[PlayedAxis, ...]) -> str:
+def _remark(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> str:
     both = " Both pictures have the corrections of offset, size and rate."
+    refined = [line.axis for line in planned.plan.moving if line.layer is not None]
+    if refined:
+        both += (
+            f" Neither has what `refine` learnt of {' and '.join(refined)}, nor the errors that it corrects: the "
+            "first lines of the page say what the image has."
+        )
     if all(one.on_operator for one in axes):
         return "The operator's own error is not in the picture; the certificate has it as uncertainty." + both
     return "The picture is as right as the scanner file. `tablegen simulate` plays the scan on another scanner." + both

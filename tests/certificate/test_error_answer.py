@@ -18,6 +18,9 @@ from tablegen.certificate.error_answer import (
 )
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.config.schema import Refinement
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.playing import played_axes
+from tablegen.virtual.own_run import image_errors
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +56,26 @@ def test_laws_alone_are_not_measured(built: tablegen.Build) -> None:
     assert str(one).startswith("x: not measured: laws of the scanner file alone; ")
     assert one.nm == pytest.approx(0.01 * one.percent * built.plan.x.drive.size_nm)
     assert one.pixels == pytest.approx(one.nm / (built.plan.x.drive.window_nm / built.plan.schedule.pixels))
+
+
+def test_a_slow_axis_has_a_figure_of_its_one_way_by_the_laws(built: tablegen.Build) -> None:
+    """The figure is that of the integers on a scanner that follows the laws, and the line says what it leaves out."""
+    y = built.answers[1]
+    planned = planned_scan(Path(EXAMPLE)).planned
+    assert planned is not None
+    played = played_axes(planned)[1].emitted
+    assert played is not None
+    assert y.of == "rms of one way"
+    assert y.percent == pytest.approx(image_errors(played)[0], rel=0.1)
+    assert y.nm == pytest.approx(0.01 * y.percent * built.plan.y.drive.size_nm)
+    assert "what they do not describe, which comes on top" in str(y)
+
+
+def test_a_stroke_without_branches_has_its_reason(built: tablegen.Build, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tablegen.certificate.error_answer.forward_residual", lambda line: None)
+    y = built.answers[1]
+    assert y.percent is None
+    assert "no branches for the stroke that is played, so the size of the error is unknown" in str(y)
 
 
 def test_y_counts_image_lines(built: tablegen.Build) -> None:

@@ -367,6 +367,8 @@ b = [0.0, 1e-4, 0.0]"""
     well_formed(content, read)
     assert "chart-refinement-x" in read.ids
     assert "refine 1: trace.csv, 5 periods" in read.said
+    assert read.said.count("the first lines of the page say what the image has") == 2  # below pictures, above residuals
+    assert "computed over all 1250 ticks" in read.said
 
 
 def test_the_least_acceleration_is_shown(tmp_path: Path) -> None:
