@@ -22,7 +22,7 @@ from tablegen.planning.line_plan import LinePlan, Plan
 _CONVERTER_SHARE = 0.5  # of the error; above it a better piezo model gains little
 
 Basis = Literal["measured", "predicted", "laws", "uncompensated", "rests"]
-Of = Literal["rms", "rms of one way", "trace to retrace, rms", "trace to retrace, at most"]
+Of = Literal["rms", "rms of one way, at least", "trace to retrace, rms", "trace to retrace, at most"]
 
 
 class ErrorAnswer(Struct, frozen=True):
@@ -50,8 +50,13 @@ class ErrorAnswer(Struct, frozen=True):
             return "; ".join([f"{self.axis}: not measured: {self.source}", *parts])
         figures = f"{short(self.percent)} % of the line = {short(self.nm)} nm = {short(self.pixels)} pixel ({self.of})"
         if self.basis == "laws":
-            return "; ".join([f"{self.axis}: not measured: {self.source}", f"by them {figures}", *parts])
+            return "; ".join([f"{self.axis}: not measured; by laws alone {figures}", *parts])
         return "; ".join([f"{self.axis}: {figures}, {self.source}", *parts])
+
+    @property
+    def brief(self) -> str:
+        """The line without the next step."""
+        return str(self).removesuffix(f"; next: {self.next_step}")
 
     def record(self) -> dict[str, Any]:
         """Return the answer as JSON outputs have it: its fields under their names, and the line as ``text``."""
@@ -150,8 +155,9 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
         of: Of = "trace to retrace, at most"
         return _with_figures(line, count, of, expected.mismatch.value, basis="laws", source=source, next_step=refine)
     if line.band_limit.directions == "forward" and (residual := forward_residual(line)) is not None:
-        source += ", and no retrace shows what they do not describe, which comes on top"
-        return _with_figures(line, count, "rms of one way", residual, basis="laws", source=source, next_step=refine)
+        # What the laws do not describe comes on top, and no retrace shows it.
+        one_way: Of = "rms of one way, at least"
+        return _with_figures(line, count, one_way, residual, basis="laws", source=source, next_step=refine)
     why = "which have no branches for the stroke that is played, so the size of the error is unknown"
     return ErrorAnswer(axis, "laws", f"{source}, {why}", refine)
 
