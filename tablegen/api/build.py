@@ -342,7 +342,7 @@ class Build(Result):
         first, *_ = repr(self.plan).splitlines()
         warnings = [f"warning: {text}" for text in brief_warnings(self.plan, self.certificates)]
         head = first.removeprefix("<tablegen plan")
-        return f"build{head}", *map(str, self.answers), *warnings
+        return f"build{head}", *(answer.brief for answer in self.answers), *warnings
 
     def _repr_html_(self) -> str:
         """Return drive, error and certificate, for notebooks."""

@@ -1,6 +1,7 @@
 """A scan or a build as one HTML page, and its charts."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from tablegen.emit.write import write_files
 from tablegen.html_report.page import answers, charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.ranking import ranked
-from tablegen.html_report.subject import Subject, of_directory
+from tablegen.html_report.subject import OwnImage, Subject, of_directory
 from tablegen.html_report.verify_record import read_record
 
 
@@ -21,6 +22,8 @@ def report(
     source: str | Path,
     *,
     verified: str | Path | None = None,
+    image: str | Path | None = None,
+    channel: str | int | None = None,
     progress: Callable[[str], object] = lambda _: None,
 ) -> "ReportPage":
     """Make the HTML page of a scan or of a build: findings, certificate, charts, calibration and files.
@@ -31,6 +34,10 @@ def report(
         Scan file, or directory of a build; of a build the page has neither limits nor errors on the scanner.
     verified : str or Path, optional
         File that ``tablegen verify DIR --junit FILE`` wrote, to show it too.
+    image : str or Path, optional
+        Image file of your own, to show beside the prediction; at most 256 pixels of a side are taken into the page.
+    channel : str or int, optional
+        Title or number of its channel, in a file that has several.
     progress : callable
         Called with a text for each stage.
 
@@ -42,7 +49,7 @@ def report(
     Raises
     ------
     Rejected
-        The scan or ``verified`` is wrong.
+        The scan, ``verified`` or ``image`` is wrong.
     NotABuild
         The directory holds no build.
 
@@ -60,8 +67,18 @@ def report(
             raise Rejected([Problem(str(verified), 0, "", f"cannot be read: {error.strerror or error}")]) from None
         except ValueError as error:
             raise Rejected([Problem(str(verified), 0, "", str(error))]) from None
+    own = None if image is None else _own_image(Path(image), channel)
     subject = of_directory(source, record) if source.is_dir() else planned_scan(source, record, progress)
+    subject = replace(subject, image=own)
     return ReportPage(subject, progress)
+
+
+def _own_image(path: Path, channel: str | int | None) -> OwnImage:
+    from tablegen.images.files import read_image
+
+    read = read_image(path, None if channel is None else str(channel), "trace")
+    size_nm = None if read.width_nm is None or read.height_nm is None else (read.width_nm, read.height_nm)
+    return OwnImage(path.name, read.channel, read.heights, read.unit, size_nm, read.first_row == "bottom")
 
 
 class ReportPage(Result):

@@ -12,7 +12,7 @@ from tablegen.api.result import Result
 from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.certificate.certificate import certify
-from tablegen.certificate.error_answer import first_lines
+from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.planning.line_plan import make_plan
@@ -82,7 +82,7 @@ def simulate(
         raise ValueError(f"{setup.scanner_file.name} has no operator; identify one with calibrate_operator")
     if truth == OWN or (truth is None and operators):
         own_runs = tuple(simulate_own(setup, seed, progress))
-        return SimulatedScan(setup.scan.name, None, (), own_runs, tuple(operators), _brief(setup))
+        return SimulatedScan(setup.scan.name, None, (), own_runs, tuple(operators), *_answers(setup))
     name = truth or DEFAULT
     laboratory = Laboratory(name, setup.scanner)
     model, scanner = laboratory.truth, laboratory.scanner
@@ -96,17 +96,17 @@ def simulate(
         raise Unphysical("\n".join(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)))
     if calibrated:
         stages.append(_calibrated(setup, scanner, str(name), noise_percent, seed, progress))
-    return SimulatedScan(setup.scan.name, model, tuple(stages), brief=_brief(setup))
+    return SimulatedScan(setup.scan.name, model, tuple(stages), (), (), *_answers(setup))
 
 
-def _brief(setup: Setup) -> tuple[str, ...]:
+def _answers(setup: Setup) -> tuple[tuple[ErrorAnswer, ...], str]:
     """Return the error of each axis, and the time of an image; empty where the scan itself cannot be played."""
     try:
         plan = make_plan(setup)
         certificates = certify(plan)
     except Rejected:  # the simulation says of each model why
-        return ()
-    return tuple(first_lines(setup, plan, certificates))
+        return (), ""
+    return tuple(error_answers(setup, plan, certificates)), duration(plan.schedule)
 
 
 def _calibrated(
@@ -149,7 +149,8 @@ def _played(
 class SimulatedScan(Result):
     """A scan on a virtual scanner: ``stages`` of a built-in one or of a file, or ``own_runs`` on the own operator.
 
-    ``brief`` has the error of each axis and the time, as ``tablegen show`` prints them first.
+    ``answers`` has the error of each axis and ``duration`` the time of an image, as ``tablegen show`` prints them
+    first; both are empty where only the triangle could be played.
     ``truth`` has the parameters of the virtual scanner, None on the own operator, whose axes are ``operators``.
     """
 
@@ -158,14 +159,22 @@ class SimulatedScan(Result):
     stages: tuple[SimulationStage, ...]
     own_runs: tuple[OwnRun, ...] = ()
     operators: tuple[str, ...] = ()
-    brief: tuple[str, ...] = ()
+    answers: tuple[ErrorAnswer, ...] = ()
+    duration: str = ""
 
     @property
     def record(self) -> dict[str, Any]:
         """The errors in percent as plain data, as ``tablegen simulate --json`` prints them."""
         if self.truth is None:
-            return own_report.data(self.name, self.own_runs, self._without)
-        return report.data(self.name, self.truth, self.stages)
+            plain = own_report.data(self.name, self.own_runs, self._without)
+        else:
+            plain = report.data(self.name, self.truth, self.stages)
+        expected = {one.axis: one.record() for one in self.answers}
+        return {**plain, "answers": expected, "duration": self.duration or None}
+
+    def brief(self) -> list[str]:
+        """Return the error of each axis, and the time of an image, as ``tablegen show`` prints them first."""
+        return [*map(str, self.answers), *([self.duration] if self.duration else [])]
 
     @property
     def _without(self) -> list[str]:
@@ -177,7 +186,8 @@ class SimulatedScan(Result):
             text = own_report.text(self.name, self.own_runs, self._without)
         else:
             text = report.text(self.name, self.truth, self.stages)
-        return "\n".join([*self.brief, *([""] if self.brief else []), *text])
+        brief = self.brief()
+        return "\n".join([*brief, *([""] if brief else []), *text])
 
     def charts(self) -> PlottedCharts:
         """Return residual and scaling error of each run."""

@@ -38,6 +38,7 @@ FindingCode = Literal[
     "step-guard",
     "uncompared-inputs",
     "uncompensated-hysteresis",
+    "way-up-only",
     "wrong-length-unit",
 ]
 Axis = Literal["", "x", "y"]

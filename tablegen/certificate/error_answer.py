@@ -6,12 +6,13 @@ a line, one of y the window over the image lines.
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Literal
+from typing import Any, Literal
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.expected import forward_residual
 from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
@@ -21,7 +22,7 @@ from tablegen.planning.line_plan import LinePlan, Plan
 _CONVERTER_SHARE = 0.5  # of the error; above it a better piezo model gains little
 
 Basis = Literal["measured", "predicted", "laws", "uncompensated", "rests"]
-Of = Literal["rms", "trace to retrace, rms", "trace to retrace, at most"]
+Of = Literal["rms", "rms of one way, at least", "trace to retrace, rms", "trace to retrace, at most"]
 
 
 class ErrorAnswer(Struct, frozen=True):
@@ -49,8 +50,27 @@ class ErrorAnswer(Struct, frozen=True):
             return "; ".join([f"{self.axis}: not measured: {self.source}", *parts])
         figures = f"{short(self.percent)} % of the line = {short(self.nm)} nm = {short(self.pixels)} pixel ({self.of})"
         if self.basis == "laws":
-            return "; ".join([f"{self.axis}: not measured: {self.source}", f"by them {figures}", *parts])
+            return "; ".join([f"{self.axis}: not measured; by laws alone {figures}", *parts])
         return "; ".join([f"{self.axis}: {figures}, {self.source}", *parts])
+
+    @property
+    def brief(self) -> str:
+        """The line without the next step."""
+        return str(self).removesuffix(f"; next: {self.next_step}")
+
+    def record(self) -> dict[str, Any]:
+        """Return the answer as JSON outputs have it: its fields under their names, and the line as ``text``."""
+        return {
+            "basis": self.basis,
+            "of": self.of,
+            "percent": self.percent,
+            "nm": self.nm,
+            "pixels": self.pixels,
+            "source": self.source,
+            "limit": self.limit or None,
+            "next": self.next_step or None,
+            "text": str(self),
+        }
 
 
 def short(value: float) -> str:
@@ -134,7 +154,12 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
     if expected is not None and expected.mismatch is not None:
         of: Of = "trace to retrace, at most"
         return _with_figures(line, count, of, expected.mismatch.value, basis="laws", source=source, next_step=refine)
-    return ErrorAnswer(axis, "laws", source, refine)
+    if line.band_limit.directions == "forward" and (residual := forward_residual(line)) is not None:
+        # What the laws do not describe comes on top, and no retrace shows it.
+        one_way: Of = "rms of one way, at least"
+        return _with_figures(line, count, one_way, residual, basis="laws", source=source, next_step=refine)
+    why = "which have no branches for the stroke that is played, so the size of the error is unknown"
+    return ErrorAnswer(axis, "laws", f"{source}, {why}", refine)
 
 
 def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
@@ -145,7 +170,11 @@ def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: R
     of: Of = "trace to retrace, rms" if refinement.before_of == "mismatch" else "rms"
     # The best of the rounds has the measurement that was made while it was played itself.
     best = refinement.best is True
-    source = "measured (refine, best round)" if best else "measured (refine) before the layer of the last round"
+    source = "measured (refine, best round)"
+    if not best:
+        source = "measured (refine) before the layer of the last round"
+        if refinement.after_percent is not None:
+            source += f", with which refine predicts {short(refinement.after_percent)} %"
     answer = _with_figures(line, count, of, refinement.before_percent, basis="measured", source=source, next_step=again)
     return _limited(answer, line, certificate, final=best)
 

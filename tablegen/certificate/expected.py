@@ -65,7 +65,32 @@ def rounding_mismatch(line: LinePlan) -> float | None:
     return None if rounding is None else rounding[0]
 
 
+def forward_residual(line: LinePlan) -> float | None:
+    """Compute the rms residual of the way forward alone, about its best straight line, in percent, by the laws.
+
+    This is what a slow axis leaves in its images, which has no retrace. None as for ``rounding_mismatch``.
+    """
+    played = _played(line)
+    if played is None:
+        return None
+    x, forward, _, extent, _ = played
+    reached = extent * forward
+    return 100.0 * float(np.std(reached - np.polyval(np.polyfit(x, reached, 1), x)))
+
+
 def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
+    played = _played(line)
+    if played is None:
+        return None
+    _, forward, backward, extent, peaks = played
+    return 100.0 * extent * float(np.max(np.abs(forward - backward))), PlayedStroke(*peaks, extent)
+
+
+Peaks = tuple[tuple[float, float], tuple[float, float]]
+
+
+def _played(line: LinePlan) -> tuple[Floats, Floats, Floats, float, Peaks] | None:
+    """Compute the places on the line, where both ways are at them by the laws of the played stroke, and that stroke."""
     drive = line.drive
     if drive.shape.whole is not None or not drive.hysteresis.compensates:
         return None
@@ -77,10 +102,10 @@ def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
         return None
     x = np.linspace(*line.band_limit.window, _POINTS)
     there, back = (_share(line, target, side, x, low, high) for side in ("forward", "backward"))
-    mismatch = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
+    at = played.forward.inverse(there), 1.0 - played.backward.inverse(1.0 - back)
     extent = drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) / drive.size_nm
     forward, backward = ((one.beta, one.u_peak) for one in played.peaks)
-    return 100.0 * extent * float(np.max(np.abs(mismatch))), PlayedStroke(forward, backward, extent)
+    return x, *at, extent, (forward, backward)
 
 
 def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tablegen.cli.images.pairs import channel_option, require_readers
 from tablegen.cli.shared.common import OutputFile, OutputFolder, fail, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.progress import Progress
@@ -32,6 +33,13 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Also show the results of `tablegen verify DIR --junit FILE`.",
 )
+@click.option(
+    "--image",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Show this image of yours beside the prediction, with its scale and heights.",
+)
+@channel_option
 @click.option("--svg", type=OutputFolder(), metavar="DIR", help="Also write every chart as SVG into DIR.")
 @click.option("--png", type=OutputFolder(), metavar="DIR", help="Also write every chart as PNG; needs matplotlib.")
 @click.option("--pdf", type=OutputFolder(), metavar="DIR", help="Also write every chart as PDF; needs matplotlib.")
@@ -46,6 +54,8 @@ def report(
     source: Path,
     output: Path,
     verified: Path | None,
+    image: Path | None,
+    channel: str | None,
     svg: Path | None,
     png: Path | None,
     pdf: Path | None,
@@ -64,6 +74,7 @@ def report(
     \b
     Examples:
       tablegen report annexin_200nm.toml -o annexin.html
+      tablegen report annexin_200nm.toml --image scan.sxm --channel Z
       tablegen report build --verified verify.xml
       tablegen report annexin_200nm.toml --svg charts --figure drive-x
 
@@ -77,8 +88,12 @@ def report(
         raise click.UsageError("--figure needs --svg, --png or --pdf")
     if png or pdf:
         require("matplotlib", extra="plot", otherwise="; or write --svg, which needs nothing")
+    if channel is not None and image is None:
+        raise click.UsageError("--channel is of --image: give both")
+    if image is not None:
+        require_readers([image])
     with Progress() as progress:
-        page = _reported(source, verified, progress)
+        page = _reported(source, verified, image, channel, progress)
     charts = _select_charts(page.figures, figures)
     written(output.parent, {output.name: page.content})
     _write_charts(charts, svg, png, pdf)
@@ -90,13 +105,15 @@ def report(
     return ExitStatus.OK
 
 
-def _reported(source: Path, verified: Path | None, progress: Progress) -> "ReportPage":
+def _reported(
+    source: Path, verified: Path | None, image: Path | None, channel: str | None, progress: Progress
+) -> "ReportPage":
     from tablegen.api.report import report as reported
     from tablegen.base.input_errors import Rejected
     from tablegen.manifest.read import NotABuild
 
     try:
-        return reported(source, verified=verified, progress=progress.now)
+        return reported(source, verified=verified, image=image, channel=channel, progress=progress.now)
     except NotABuild as error:
         fail([error], ExitStatus.WRONG_INPUT)
     except Rejected as rejected:

@@ -150,6 +150,9 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+    after_percent: (
+        Annotated[float, Meta(ge=0.0, le=100.0, description="rms residual that was predicted with this layer")] | None
+    ) = None
     previous_a: (
         Annotated[Harmonics, Meta(description="cosine terms of the layer that was played while that was measured")]
         | None

@@ -26,15 +26,20 @@ def basis(planned: PlannedScan) -> Section:
     comments = [*_comments(setup.scanner_file), *_comments(setup.scan_file)]
     commented = {key.split(".branches")[0] for key, _, _ in comments}
     rows = [row(key, text, sources or "-") for key, text, sources in comments]
+    missing: dict[Tone, list[str]] = {"warn": [], "quiet": []}
     for axis in ("x", "y"):
         tables = getattr(setup.scanner, axis)
         for kind in _KINDS:
             key = f"{axis}.{kind}"
             if getattr(tables, kind, None) is None:
-                tone: Tone = "quiet" if kind in ("frequency", "resonance") else "warn"
-                rows.append(row(key, TableCell("not in the scanner file: not corrected", tone), "-"))
+                missing["quiet" if kind in ("frequency", "resonance") else "warn"].append(key)
             elif key not in commented:
                 rows.append(row(key, TableCell("no comment of `tablegen calibrate`: origin not known", "quiet"), "-"))
+    rows += [
+        row(", ".join(keys), TableCell("not in the scanner file: not corrected", tone), "-")
+        for tone, keys in missing.items()
+        if keys
+    ]
     blocks: list[Grid | Paragraph] = [
         Grid("Origin", ("", "fit", "measurements, with the beginning of their SHA-256"), tuple(rows)),
     ]

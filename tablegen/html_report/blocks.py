@@ -70,15 +70,35 @@ class ScaleBar:
 
 
 @dataclass(frozen=True)
+class HeightScale:
+    """The heights of black and white in a picture, their unit, and the address of the bar of all shades."""
+
+    low: float
+    high: float
+    unit: str
+    address: str
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Both heights as texts, the higher one with the unit."""
+        return f"{self.low:.3g}", f"{self.high:.3g} {self.unit}"
+
+
+@dataclass(frozen=True)
 class PagePicture:
-    """A picture with the ideal positions of its features, in shares of width and height from the upper left."""
+    """A picture with the ideal positions of its features, in shares of width and height from the upper left.
+
+    ``size_nm`` is its width and height, and ``heights`` what its shades mean, both for the values under the pointer.
+    """
 
     title: str
     address: str
     alternative: str
     sites: tuple[tuple[float, float], ...]
     height: float  # of the width
-    bar: ScaleBar
+    bar: ScaleBar | None
+    size_nm: tuple[float, float] | None = None
+    heights: HeightScale | None = None
 
 
 @dataclass(frozen=True)

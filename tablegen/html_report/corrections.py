@@ -56,7 +56,14 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         )
     )
     if fourier.refinement is not None:
-        rows.append(row("refinement", "learnt", f"{len(fourier.refinement.a)}", "harmonics from traces of this scan"))
+        rows.append(
+            row(
+                "refinement",
+                "learnt",
+                f"{len(fourier.refinement.a)}",
+                "harmonics from measurements of this running scan",
+            )
+        )
     if drive.resonance is not None:
         limited = len(fourier.held_harmonics)
         text = f"inverse of the resonance at {hertz(drive.resonance.hz)}"

@@ -30,13 +30,14 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
         return None
     pictures, worst = [], []
     ratio = round(min(max(_size(planned.plan.y) / _size(planned.plan.x), 0.5), 2.0), 4)
-    bar = ScaleBar.of(_size(planned.plan.x))
+    sizes = _size(planned.plan.x), _size(planned.plan.y)
+    bar = ScaleBar.of(sizes[0])
     for name, one, other in pairs:
         images, error_percent = _images(planned, one, other, ratio)
         for side, image in images:
             alternative = f"{side} image of a lattice, {name} the correction of hysteresis"
             title = f"{name} correction, {side} (simulation)"
-            pictures.append(PagePicture(title, data_address(image[0]), alternative, image[1], ratio, bar))
+            pictures.append(PagePicture(title, data_address(image[0]), alternative, image[1], ratio, bar, sizes))
         worst.append(f"{name} it by up to {error_percent:.3g} % of the image")
     grounds = [f"{'the operator' if one.on_operator else 'the laws of the scanner file'}" for one in axes]
     where = f"x on {grounds[0]}, y on {grounds[1]}" if grounds[0] != grounds[1] else f"both axes on {grounds[0]}"
@@ -48,13 +49,19 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
     return Section(
         "lattice",
         "A lattice, before and after (simulation)",
-        (Pictures(tuple(pictures)), Paragraph(_remark(axes), "quiet")),
+        (Pictures(tuple(pictures)), Paragraph(_remark(planned, axes), "quiet")),
         text,
     )
 
 
-def _remark(axes: tuple[PlayedAxis, ...]) -> str:
-    both = " Both pictures have the corrections of offset, size and rate."
+def _remark(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> str:
+    both = " All simulated pictures have the corrections of offset, size and rate."
+    refined = [line.axis for line in planned.plan.moving if line.layer is not None]
+    if refined:
+        both += (
+            f" None of them has what `refine` learnt of {' and '.join(refined)}, nor the errors that it corrects: the "
+            "first lines of the page say what the image has."
+        )
     if all(one.on_operator for one in axes):
         return "The operator's own error is not in the picture; the certificate has it as uncertainty." + both
     return "The picture is as right as the scanner file. `tablegen simulate` plays the scan on another scanner." + both

@@ -126,6 +126,33 @@
       tell(Math.min(view[0] + view[2], Math.max(view[0], now + step * view[2] / 100)));
     });
   }
+  for (const picture of document.querySelectorAll("svg.picture")) {
+    const tall = Number(picture.dataset.tall), size = (picture.dataset.size || "").split(" ").map(Number);
+    const low = Number(picture.dataset.low), high = Number(picture.dataset.high), unit = picture.dataset.unit;
+    const output = document.createElement("output"), loaded = new Image();
+    let pixels = null;
+    picture.after(output);
+    loaded.addEventListener("load", () => {
+      const canvas = document.createElement("canvas");
+      canvas.width = loaded.width; canvas.height = loaded.height;
+      const drawing = canvas.getContext("2d", {willReadFrequently: true});
+      drawing.drawImage(loaded, 0, 0);
+      pixels = drawing.getImageData(0, 0, canvas.width, canvas.height);
+    });
+    if (unit) loaded.src = picture.querySelector("image").getAttribute("href");
+    picture.addEventListener("pointermove", (event) => {
+      const box = picture.getBoundingClientRect(), scale = picture.viewBox.baseVal.width / box.width;
+      const x = (event.clientX - box.left) * scale / 1000, y = (event.clientY - box.top) * scale / tall;
+      if (x < 0 || x >= 1 || y < 0 || y >= 1) { output.textContent = ""; return; }
+      const said = size.length > 1 ? [`x ${shown(Number((x * size[0]).toPrecision(3)))} nm, y ${shown(Number(((1 - y) * size[1]).toPrecision(3)))} nm`] : [];
+      if (pixels) {
+        const at = 4 * (Math.floor(y * pixels.height) * pixels.width + Math.floor(x * pixels.width)), [red, , blue] = pixels.data.slice(at, at + 3);
+        said.push(red === blue ? `height ${(low + (high - low) * red / 255).toPrecision(3)} ${unit}` : "nothing was imaged here");
+      }
+      output.textContent = said.join(", ");
+    });
+    picture.addEventListener("pointerleave", () => { output.textContent = ""; });
+  }
   // What is folded is printed too.
   const folded = () => document.querySelectorAll("details:not([open])");
   let opened = [];

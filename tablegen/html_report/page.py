@@ -10,6 +10,7 @@ from tablegen.html_report.corrections import corrections
 from tablegen.html_report.document import document
 from tablegen.html_report.lattice import lattice
 from tablegen.html_report.lines import lines
+from tablegen.html_report.own_image import with_own_image
 from tablegen.html_report.playing import played_axes
 from tablegen.html_report.promises import certificate
 from tablegen.html_report.ranking import Finding, ranked
@@ -26,7 +27,9 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
     """Return all sections of the page, the most important first."""
     planned = subject.planned
     if planned is None:
+        own = with_own_image(subject, None)
         parts = [
+            *([] if own is None else [own]),
             request_section(subject),
             certificate(subject),
             lines(subject, None),
@@ -37,7 +40,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
     tell("simulating the scan on the scanner of the scanner file")
     axes = played_axes(planned)
     tell("drawing")
-    picture = lattice(planned, axes)
+    picture = with_own_image(subject, lattice(planned, axes))
     return [
         *([] if picture is None else [picture]),
         certificate(subject),

@@ -19,7 +19,7 @@ def certificate(subject: Subject) -> Section:
     limits = Limits() if planned is None else planned.plan.limits
     tables = [
         Grid(
-            f"{axis} axis, measured over all {entry.line.ticks} ticks",
+            f"{axis} axis, of the waveform itself, computed over all {entry.line.ticks} ticks",
             _HEAD,
             tuple(_rows(entry, limits, _slew(planned, axis))),
         )

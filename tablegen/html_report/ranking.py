@@ -1,6 +1,6 @@
 """The findings of a report: errors that spoil the image come first."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from tablegen.base.input_errors import Problem
@@ -10,6 +10,7 @@ from tablegen.html_report.subject import Subject
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import ManifestAxis
 
+_TOTALS = ("total", "uncompensated")
 _CHORD = 0.05  # of the line: the position error of a scaling error over a chord is their product
 
 
@@ -45,11 +46,18 @@ def _expected(axis: Axis, entry: ManifestAxis) -> Iterator[Finding]:
     if expected is not None and expected.mismatch_percent is not None:
         figure = expected.mismatch_percent
         yield expected_mismatch(axis, expected.basis, figure.value, figure.uncertainty)
-    for side, error in (certificate.scaling_error_percent or {}).items():
-        text = f"{axis} {side}: the waveform itself has {error.get('total', 0.0):.3g} % of scaling error"
-        if error.get("uncompensated", 0.0) > 0.0005:
-            text += f"; without correction it would be {error['uncompensated']:.3g} %"
-        yield Finding("expect", _CHORD * error.get("total", 0.0), text, code="scaling-error", axis=axis)
+    scaling = certificate.scaling_error_percent or {}
+    if scaling:
+        totals, plain = ({side: one.get(name, 0.0) for side, one in scaling.items()} for name in _TOTALS)
+        text = f"{axis}: the waveform itself has {_by_side(totals)} of scaling error"
+        if max(plain.values()) > 0.0005:
+            text += f"; without correction it would be {_by_side(plain)}"
+        yield Finding("expect", _CHORD * max(totals.values()), text, code="scaling-error", axis=axis)
+
+
+def _by_side(percent: Mapping[str, float]) -> str:
+    """Format a percentage of each direction, such as ``0.124 % forward and 0.13 % backward``."""
+    return " and ".join(f"{value:.3g} % {side}" for side, value in percent.items())
 
 
 def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding]:

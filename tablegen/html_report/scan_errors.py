@@ -39,13 +39,17 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
         Charts(tuple(charts)),
     ]
     blocks += [Paragraph(f"Not played: {why}", "warn") for why in words]
-    return Section(
-        "errors",
-        "Residual and scaling error",
-        tuple(blocks),
+    lead = (
         "A simulation: the emitted integers on the scanner that the scanner file describes. It shows the residual of a "
-        "correction if the scanner file is right; it cannot show whether it is. Each chart has a scale of its own.",
+        "correction if the scanner file is right; it cannot show whether it is. Each chart has a scale of its own."
     )
+    refined = [line.axis for line in planned.plan.moving if line.layer is not None]
+    if refined:
+        lead += (
+            f" What `refine` learnt of {' and '.join(refined)} is in no figure of this section but its own charts, as "
+            "the scanner file does not describe what it corrects: the first lines of the page say what the image has."
+        )
+    return Section("errors", "Residual and scaling error", tuple(blocks), lead)
 
 
 def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
@@ -112,8 +116,6 @@ def _refinement(line: LinePlan) -> list[Chart]:
             POSITION,
             "moved by [% of the line]",
             tuple(curves),
-            caption="Learnt from traces of the running scan. The scanner file does not know of it, so the curves of "
-            "the residual are without it.",
         )
     ]
 

@@ -18,6 +18,7 @@ from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.manifest.read import read_build
+from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
 from tablegen.waveform.series import FourierSeries
 
@@ -51,6 +52,18 @@ class PlannedScan:
         return limits.max_error_lsb is not None or limits.max_scaling_error_percent is not None
 
 
+@dataclass(frozen=True, eq=False)
+class OwnImage:
+    """An image of the user to show beside the prediction; ``size_nm`` is None where its file does not have it."""
+
+    name: str
+    channel: str
+    heights: Floats
+    unit: str
+    size_nm: tuple[float, float] | None
+    bottom_first: bool
+
+
 @dataclass(frozen=True)
 class Subject:
     """The build as its manifest describes it; ``planned`` is None for a directory."""
@@ -60,6 +73,7 @@ class Subject:
     files: tuple[FileState, ...]
     planned: PlannedScan | None = None
     verified: VerifyRecord | None = None
+    image: OwnImage | None = None
 
     @property
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:

@@ -47,13 +47,15 @@ class Imaged:
         return dict(zip(self.sides, np.split(values, len(self.sides)), strict=True))
 
 
-def imaged(line: LinePlan, share: Floats) -> Imaged:
+def imaged(line: LinePlan, share: Floats, forward_only: bool = False) -> Imaged:
     """Return the points of the imaged windows.
 
     Parameters
     ----------
     share
         Shares 0..1 of the window, shape (n,).
+    forward_only
+        True to leave out the window of the way back, where the scan has one.
 
     Returns
     -------
@@ -63,7 +65,7 @@ def imaged(line: LinePlan, share: Floats) -> Imaged:
     x = low + (high - low) * share
     sides: tuple[str, ...] = ("forward",)
     times = turn * x
-    if line.band_limit.directions == "both":
+    if line.band_limit.directions == "both" and not forward_only:
         sides, times = ("forward", "backward"), np.concatenate([times, turn + (1.0 - turn) * (1.0 - x)])
     w = np.split(line.described.value(times), len(sides))
     requested, steepness = [shape.forward.inverse(w[0])], [shape.forward.slope(shape.forward.inverse(w[0]))]
@@ -138,7 +140,7 @@ class Departure:
 
 
 def departure(line: LinePlan, measured: LineMeasurement, share: Floats | None = None) -> Departure:
-    """Compare a measured period with the request of the plan.
+    """Compare a measured period with the request of the plan, in the directions that were measured.
 
     Parameters
     ----------
@@ -150,7 +152,8 @@ def departure(line: LinePlan, measured: LineMeasurement, share: Floats | None = 
     Unphysical
         If the measured line is not that of the scan.
     """
-    points = imaged(line, np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share)
+    share = np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share
+    points = imaged(line, share, measured.forward_only)
     best = _straightened(points, measured.value(points.times), 1.0)
     if not abs(best.size_nm) > 0.0 or best.rms_percent > 100.0 * _MAX_DEPARTURE:
         raise Unphysical(

@@ -36,6 +36,11 @@ class Displacement:
     stray: int | None = None
 
     @property
+    def forward_only(self) -> bool:
+        """False: a trace has the whole period."""
+        return False
+
+    @property
     def detail(self) -> int:
         """The highest harmonic of the series."""
         return self.series.harmonics

@@ -197,6 +197,14 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate)
                 "which separate the two"
             )
         )
+    if line.axis == "y" and line.band_limit.directions == "both":
+        texts.append(
+            Remark(
+                "y was learnt on its way up, which these images show; its way down stays as it was. For both take a "
+                "trace of a sensor, or scan with frame = 'flyback', whose images all go up",
+                code="way-up-only",
+            )
+        )
     return tuple(texts + _learning_remarks(update))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.refinement.departure import Departure, departure, requested_position, straight_line
+from tablegen.refinement.departure import Departure, departure, imaged, requested_position, straight_line
 from tablegen.refinement.displacement import harmonic_basis
 from tablegen.refinement.measured import LineMeasurement
 from tablegen.waveform.series import FourierSeries
@@ -63,7 +63,8 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
     line_of = np.column_stack([np.ones_like(points.requested), points.requested])
     errors: Floats = (basis - line_of @ (straight_line(points.requested) @ basis)) / windowed.size_nm
     noisy = -gain * points.steepness * windowed.error
-    fits = _fits(points.times, harmonics)
+    # Nothing is added on a way back that was not measured: it is fitted to zero, which only shortens the matrices.
+    fits = [fit[:, : len(points.times)] for fit in _fits(imaged(line, share).times, harmonics)]
     spread = [fit @ (gain * points.steepness[:, None] * errors) for fit in fits]
     stands_out = _stands_out([fit @ noisy for fit in fits], [s @ measured.covariance @ s.T for s in spread])
     count = harmonics if stands_out else 0

@@ -14,6 +14,10 @@ class LineMeasurement(Protocol):
         """About as many harmonics as its finest detail has."""
 
     @property
+    def forward_only(self) -> bool:
+        """True if the way back was not measured, as of the slow axis in images."""
+
+    @property
     def covariance(self) -> Floats:
         """The covariance of the coefficients.
 

@@ -177,6 +177,7 @@ def _refinement(setup: Setup, line: LinePlan, update: LayerUpdate) -> Refinement
         directions=line.band_limit.directions,
         model=model_digest(setup, line.axis, line.drive),
         before_percent=float(f"{update.before.rms_percent:.3g}"),
+        after_percent=float(f"{min(update.after.rms_percent, 100.0):.3g}"),
         before_scaling_percent=float(f"{min(worst_scaling(update), _MOST_SCALING):.3g}"),
         previous_a=None if line.layer is None else line.layer.a.tolist(),
         previous_b=None if line.layer is None else line.layer.b.tolist(),
@@ -250,7 +251,13 @@ def stop(setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf 
         without = f"{rose}, which had no layer: remove [{line.axis}.refinement]"
         return {"stopped": f"{without}, or learn from this trace all the same with --force"}
     best = msgspec.structs.replace(
-        played, a=played.previous_a, b=played.previous_b, previous_a=None, previous_b=None, best=True
+        played,
+        a=played.previous_a,
+        b=played.previous_b,
+        previous_a=None,
+        previous_b=None,
+        after_percent=None,
+        best=True,
     )
     return {"stopped": f"{rose}: the layer of that round is the best, and is kept", "best": best}
 

@@ -123,6 +123,7 @@ def refine_record(result: Round, name: str, sources: Sequence[Source]) -> dict[s
     return {
         "scan": name,
         "axis": line.axis,
+        "answer": round_answer(result).record(),
         **_measurement(result, sources),
         "measured": errors(update.before),
         "predicted": errors(update.after),

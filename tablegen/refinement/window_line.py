@@ -36,6 +36,11 @@ class WindowLine:
         return max(self.degree, 1)
 
     @property
+    def forward_only(self) -> bool:
+        """True if the way back was not imaged."""
+        return self.parts == "forward"
+
+    @property
     def covariance(self) -> Floats:
         """The covariance of the coefficients.
 

@@ -62,7 +62,8 @@ def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
         for one in (getattr(run, axis) for axis in run.configured):
             residuals = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
             side = max(residuals, key=lambda name: residuals[name])
-            text = f"the {run.model} model leaves {residuals[side]:.2g} % of the line of {one.axis}, {side}"
+            error = f"the {run.model} model leaves {residuals[side]:.2g} % of the line of {one.axis}, {side}, at most"
+            text = f"on this virtual scanner {error}"
             findings.append(Finding("spoils" if residuals[side] > _LARGE_PERCENT else "expect", residuals[side], text))
             by = one.size_error_percent
             if abs(by) > _LARGE_PERCENT:

@@ -1,5 +1,6 @@
 """The line that every output begins with: its figures are those of the certificate, and each branch has its words."""
 
+import json
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ from tablegen.certificate.error_answer import (
 )
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.config.schema import Refinement
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.playing import played_axes
+from tablegen.virtual.own_run import image_errors
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +53,28 @@ def test_laws_alone_are_not_measured(built: tablegen.Build) -> None:
     assert mismatch.mismatch is not None
     assert one.basis == "laws"
     assert one.percent == mismatch.mismatch.value
-    assert str(one).startswith("x: not measured: laws of the scanner file alone; ")
+    assert str(one).startswith("x: not measured; by laws alone ")
     assert one.nm == pytest.approx(0.01 * one.percent * built.plan.x.drive.size_nm)
     assert one.pixels == pytest.approx(one.nm / (built.plan.x.drive.window_nm / built.plan.schedule.pixels))
+
+
+def test_a_slow_axis_has_a_figure_of_its_one_way_by_the_laws(built: tablegen.Build) -> None:
+    """The figure is that of the integers on a scanner that follows the laws."""
+    y = built.answers[1]
+    planned = planned_scan(Path(EXAMPLE)).planned
+    assert planned is not None
+    played = played_axes(planned)[1].emitted
+    assert played is not None
+    assert y.of == "rms of one way, at least"
+    assert y.percent == pytest.approx(image_errors(played)[0], rel=0.1)
+    assert y.nm == pytest.approx(0.01 * y.percent * built.plan.y.drive.size_nm)
+
+
+def test_a_stroke_without_branches_has_its_reason(built: tablegen.Build, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tablegen.certificate.error_answer.forward_residual", lambda line: None)
+    y = built.answers[1]
+    assert y.percent is None
+    assert "no branches for the stroke that is played, so the size of the error is unknown" in str(y)
 
 
 def test_y_counts_image_lines(built: tablegen.Build) -> None:
@@ -76,7 +99,10 @@ def test_a_measurement_goes_before_a_prediction(built: tablegen.Build) -> None:
     expected = Expectation("traces", rms={"forward": Figure(0.9)})
     one = answer(built, layer=True, refinement=layer, expected=expected)
     assert (one.basis, one.of, one.percent) == ("measured", "rms", 0.12)
-    assert "before the layer of the last round" in one.source
+    assert one.source.endswith("before the layer of the last round")
+    predicted = answer(built, layer=True, refinement=replace(layer, after_percent=0.034), expected=expected)
+    assert predicted.source == f"{one.source}, with which refine predicts 0.034 %"
+    assert predicted.percent == 0.12
     assert answer(built, layer=True, refinement=replace(layer, before_of="mismatch")).of == "trace to retrace, rms"
     best = answer(built, layer=True, refinement=replace(layer, best=True))
     assert "best round" in best.source
@@ -116,7 +142,16 @@ def test_every_output_begins_with_it(built: tablegen.Build, tmp_path: Path) -> N
         assert run(*command).out.splitlines()[:3] == lines, command
     page = (tmp_path / "r.html").read_text("utf-8")
     assert all(page.index(line) < page.index('class="verdict') for line in lines)
-    assert repr(built).splitlines()[1].strip() == lines[0]
+    assert f"{repr(built).splitlines()[1].strip()}; next: refine" == lines[0]
+
+
+def test_json_has_the_first_lines_as_data(built: tablegen.Build) -> None:
+    plain = json.loads(run("simulate", EXAMPLE, "--no-calibration", "--json").out)
+    assert [one["text"] for one in plain["answers"].values()] == built.brief()[:-1]
+    assert plain["duration"] == built.duration
+    x, own = plain["answers"]["x"], built.answers[0]
+    assert (x["basis"], x["of"], x["source"], x["next"]) == (own.basis, own.of, own.source, own.next_step)
+    assert (x["percent"], x["nm"], x["pixels"]) == (own.percent, own.nm, own.pixels)
 
 
 def test_show_is_brief_and_all_has_the_rest(built: tablegen.Build) -> None:

@@ -120,6 +120,28 @@ def test_a_second_frame_tells_drift_from_y() -> None:
     assert off[1] < 0.02
 
 
+def test_images_of_the_way_up_leave_the_way_down_of_y_as_it_was() -> None:
+    """Both ways are imaged, and the images that y is learnt from are those of its way up."""
+    scan = imaged_scan("y", 60.0)
+    both = ("y.turn = 0.85", "y.band_limit.directions = 'both'", "y.band_limit.window = [0.1, 0.9]")
+    setup = calibrated(replace(scan, edits=(*scan.edits, *both)))
+    found = refine_images(setup, "y", frames_of(setup, LATTICE, 2), Options())
+    assert set(found.update.before.residual_percent) == {"forward"}
+    assert any("y was learnt on its way up" in remark for remark in found.remarks)
+    errors = []
+    for one in (setup, found.setup):
+        true = play(one, "y", scanner().y).true
+        errors.append({side: rms(about_line(error)) for side, error in true.points.by_side(true.error).items()})
+    assert errors[1]["forward"] < 0.5 * errors[0]["forward"]
+    assert errors[1]["backward"] < 1.1 * errors[0]["backward"]
+
+
+def about_line(values: np.ndarray) -> np.ndarray:
+    """Values less their best straight line."""
+    at = np.arange(len(values))
+    return values - np.polyval(np.polyfit(at, values, 1), at)
+
+
 @pytest.mark.parametrize("plant", ["default", "duhem"])
 def test_trace_against_retrace_tells_their_difference_and_nothing_else(plant: str) -> None:
     """A sample without a period: what differs goes below a fifth in two rounds, what is shared stays as it was."""

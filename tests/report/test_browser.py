@@ -135,3 +135,31 @@ def test_values_under_the_pointer_and_zoom(page: Path, tmp_path: Path) -> None:
     assert told["finer"] != told["labels"]
     assert (told["back"], told["again"], told["gone"]) == (told["whole"], told["labels"], True)
     assert told["stepped"].startswith("time [ms]: ")
+
+
+POINTING = """<script>addEventListener("load", () => setTimeout(() => {
+  const own = [...document.querySelectorAll("svg.picture")].at(-1), told = [];
+  own.scrollIntoView();
+  for (const share of [0.25, 0.75]) {
+    const box = own.getBoundingClientRect();
+    const at = {clientX: box.left + share * box.width, clientY: box.top + 0.5 * box.width};
+    own.dispatchEvent(new PointerEvent("pointermove", at));
+    told.push(own.nextElementSibling.textContent);
+  }
+  document.title = JSON.stringify(told);
+}, 300))</script></body>"""
+
+
+def test_values_of_an_own_image_under_the_pointer(page: Path, tmp_path: Path) -> None:
+    """A step of 2 in the middle: -1 at the left and +1 at the right, levelled; places in nm of the scan file."""
+    np.save(tmp_path / "step.npy", np.where(np.arange(64) < 32, 3.0, 5.0) * np.ones((64, 1)))
+    own = tmp_path / "own.html"
+    outcome = run("report", page.with_name("scan.toml"), "-o", own, "--image", tmp_path / "step.npy")
+    assert outcome.status == 0, outcome.err
+    found = seen(changed(own, ("</body>", POINTING)), tmp_path)
+    assert found.console == []
+    title = re.search(r"<title>(.*?)</title>", found.document)
+    assert title
+    left, right = json.loads(title[1])
+    assert re.fullmatch(r"x 40 nm, y [\d.]+ nm, height -1.00 units of the file", left), left
+    assert re.fullmatch(r"x 120 nm, y [\d.]+ nm, height 1.00 units of the file", right), right

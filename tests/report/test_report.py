@@ -20,10 +20,11 @@ from sets import quick
 from tablegen.base.input_errors import Problem
 from tablegen.charts.png import grey_png
 from tablegen.html_report.blocks import ScaleBar
+from tablegen.html_report.own_image import image_remarks, own_picture
 from tablegen.html_report.page import charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.ranking import ranked
-from tablegen.html_report.subject import Subject
+from tablegen.html_report.subject import OwnImage, Subject
 
 
 def report(path: Path, *options: str | Path, status: int = 0) -> tuple[bytes, Page]:
@@ -185,7 +186,7 @@ def test_a_finding_is_given_once_by_code_and_axis(tmp_path: Path) -> None:
     assert len([one for one in weights if one[0] in ("scaling-error", "image-offset")]) == 3
     alone = [(one.code, one.axis) for one in ranked(replace(subject, planned=replace(subject.planned, broken=())))]
     assert ("image-offset", "x") in alone
-    assert alone.count(("scaling-error", "x")) == 2
+    assert alone.count(("scaling-error", "x")) == 1
 
 
 @pytest.mark.common
@@ -379,6 +380,58 @@ b = [0.0, 1e-4, 0.0]"""
     well_formed(content, read)
     assert "chart-refinement-x" in read.ids
     assert "refine 1: trace.csv, 5 periods" in read.said
+    assert read.said.count("the first lines of the page say what the image has") == 2  # below pictures, above residuals
+    assert "computed over all 1250 ticks" in read.said
+
+
+def test_an_own_image_stands_beside_the_prediction(example: Path, tmp_path: Path) -> None:
+    """Levelled, with the scale of the scan file and the range of its heights; a large one does not enlarge the page."""
+    y, x = np.mgrid[0:700, 0:900]
+    heights = np.sin(x / 20.0) + 0.1 * y
+    np.save(tmp_path / "mine.npy", heights)
+    content, read = report(example, "--image", tmp_path / "mine.npy")
+    well_formed(content, read)
+    plain, _ = report(example)
+    assert len(content) < len(plain) + 120_000
+    assert "your image: mine.npy (measured, size of the scan file)" in read.said
+    low, high = (float(re.search(rf'data-{name}="([^"]+)"', content.decode()).group(1)) for name in ("low", "high"))
+    assert (low, high) == (pytest.approx(-1.0, abs=0.1), pytest.approx(1.0, abs=0.1))
+    assert str(tmp_path) not in content.decode("utf-8")
+
+
+def test_an_own_image_of_another_size_is_remarked() -> None:
+    image = OwnImage("a.sxm", "Z", np.ones((4, 8)), "m", (50.0, 25.0), True)
+    picture = own_picture(image, (180.0, 180.0))
+    assert (picture.size_nm, picture.height) == ((50.0, 25.0), 0.5)
+    assert picture.heights is not None
+    assert picture.heights.unit == "nm"
+    (_, warning) = image_remarks(image, (180.0, 180.0))
+    assert "its file says 50 x 25 nm, and this scan images 180 x 180 nm" in warning.text
+    assert len(image_remarks(image, (50.4, 25.0))) == 1
+    unknown = own_picture(OwnImage("a.npy", "", np.full((4, 8), np.nan), "", None, False), None)
+    assert (unknown.bar, unknown.size_nm, unknown.height) == (None, None, 0.5)
+
+
+def test_an_own_image_is_shown_for_a_build_too(example: Path, tmp_path: Path) -> None:
+    assert run("build", example, "-o", tmp_path / "build", "-q").status == 0
+    np.save(tmp_path / "mine.npy", np.eye(32))
+    assert run("report", tmp_path / "build", "-o", tmp_path / "r.html", "--image", tmp_path / "mine.npy").status == 0
+    assert "<h2>Your image</h2>" in (tmp_path / "r.html").read_text("utf-8")
+
+
+def test_an_own_image_that_cannot_be_read_is_named(example: Path, tmp_path: Path) -> None:
+    (tmp_path / "no.npy").write_bytes(b"no image")
+    outcome = run("report", example, "-o", tmp_path / "r.html", "--image", tmp_path / "no.npy")
+    assert outcome.status == 2
+    assert "no.npy" in outcome.err
+    assert not (tmp_path / "r.html").exists()
+    assert run("report", example, "-o", tmp_path / "r.html", "--channel", "Z").status == 2
+
+
+def test_no_sentence_stands_four_times(found: tuple[bytes, Page]) -> None:
+    sentences = [one for one in re.split(r"(?<=[.;:])\s+|\n|  +", found[1].said) if len(one.split()) > 4]
+    assert sentences
+    assert max(map(sentences.count, sentences)) <= 3
 
 
 @pytest.mark.common
