@@ -18,21 +18,21 @@ PAGE = Path(__file__).with_name("configuration.md")
 INTRODUCTION = """\
 # The two input files
 
-This page lists all keys of the scan file and the scanner file. It is for everybody who writes these files. Start with
+This page lists all keys of the scan file and the scanner file. It is for everybody who writes these files. Begin with
 the commented pair that `tablegen init` writes; [calibration](calibration.md) explains how to measure the values of the
 scanner file. `tablegen schema scan` and `tablegen schema scanner` print JSON Schema for editors.
 `python docs/make_configuration.py` writes this page from the types of both files. Converter and amplifier can stand in
 either file, for both axes or for one: [hardware](hardware.md) says which key counts.
 
 Voltages are at the piezo unless a key says otherwise. Units are part of every key. A key without a default may be left
-out if its meaning names an alternative ("or give"). Unknown keys are errors. In addition to the ranges below, a build
-checks that the drive stays within the range of the driver and the converter, and the slew rate within that of the
+out if its description names an alternative ("or give"). Unknown keys are errors. In addition to the ranges below, a
+build checks that the drive stays within the range of the driver and the converter, and the slew rate within that of the
 amplifier. It also checks that a line and a table can carry the harmonics, and that the hysteresis is in the range in
 which its model holds. Numbers in parentheses, such as (17), are equations of the paper.
 
 ## An image in words
 
-A scan of 512 x 512 pixels over 2 um at 1 Hz lines is written as it is said:
+A scan of 512 x 512 pixels over 2 um, at one line per second:
 
 ```toml
 name = "two_um"
@@ -52,31 +52,33 @@ offset_v = 50.0
 like = "x"
 ```
 
-tablegen solves for the periods. `build` and `show` print what was chosen, in lines that begin with `chosen:`.
+tablegen computes the sizes and periods of both axes. `build` and `show` print its choices, in lines that begin with
+`chosen:`.
 
-- `image_nm` is what the imaging windows span. The lines are longer by their turnarounds: 2 um in a window of 0.1 to 0.9
-  need lines of 2.5 um. Unless `[x.band_limit] window` is given, the window of x moves by up to 0.025 at each end, so
-  that a pixel is a whole number of ticks at the line rate that was asked for.
-- `image_lines` are the lines of the image. The line periods in which y turns round and flies back are added to them:
-  about a tenth of the way up, and with `"flyback"` a twentieth of the frame more. `lines` counts line periods instead:
+- `image_nm` is the size of the imaging windows. The lines are longer by their turnarounds: 2 um in a window of 0.1 to
+  0.9 need lines of 2.5 um. Unless `[x.band_limit] window` is given, each end of the window of x moves by up to 0.025,
+  so that a pixel is a whole number of ticks at the requested line rate.
+- `image_lines` is the number of lines in the image. The line periods in which y turns and flies back are added to it:
+  about a tenth of the way up, and with `"flyback"` another twentieth of the frame. `lines` counts line periods instead:
   with 512 of them, `turn = 0.5` and a window of 0.1 to 0.9, 204 lines are imaged on the way up and 204 on the way down.
 - `frame = "flyback"`: every image goes up, and y flies back. `frame = "up-down"`: images are taken on the way up and on
   the way down, each with all `image_lines`. Without `frame`, `turn` and `directions` of y hold; their defaults are
-  those of `"up-down"`. What a command prints first says it: `30 s an image, two images a frame: up and down`.
+  those of `"up-down"`. The first lines that a command prints say which:
+  `30 s an image, two images a frame: up and down`.
 - A frame is one period of y. With `"up-down"` it has two images, so `frame_rate_hz = 1` gives two images a second.
 - `speed_um_per_s` and `speed_mm_per_s` are the speed of the tip along the forward line, inside the window.
-- Keys with `um` are those with `nm`, in micrometres: 0.3 um are 300 nm, to the last bit.
+- Keys with `um` are those with `nm`, in micrometres: 0.3 um is exactly 300 nm.
 
-Words and other keys that say the same are refused: the message names both keys, their lines and the remedy.
+Two keys that set the same quantity are refused: the message names both keys, their lines and the remedy.
 
 ```text
 scan.toml:23: x.size_nm: image_nm on line 3 sets the size of both axes already, as that of the imaging windows; leave
 out one of the two
 ```
 
-**`[y] like = "x"`** gives y all that x has, in the scan file and in the scanner file. Keys that y writes itself go
-before that, also those that say the same in another way: beside `size_v` of y, `size_nm` of x does not count. What was
-learnt on x, `[x.refinement]`, stays with x; with `frame`, the turn and directions of x do too. A fault of a key that y
+**`[y] like = "x"`** gives y all keys of x, in the scan file and in the scanner file. Keys in `[y]` take precedence,
+also if they set the same quantity in another way: with `size_v` in `[y]`, y does not take `size_nm` of x.
+`[x.refinement]` is not taken, and with `frame` the turn and directions of x are not either. An error in a key that y
 has from x is reported at the line in `[x]`.
 
 **A line scan** has `motion = "off"` in `[y]`: x runs, and y rests at its `offset_v` or `offset_nm`. All lines of a

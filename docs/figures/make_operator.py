@@ -131,7 +131,7 @@ def main() -> None:
     draw(drawn)
     parts = {
         "measured": "\n".join([*HEAD, *rows]),
-        "worse": "\n".join([*WORSE, *worst]) if worst else "There is none.",
+        "worse": "\n".join([*WORSE, *worst]) if worst else "No scan is worse.",
     }
     text = PAGE.read_text(encoding="utf-8")
     for name, part in parts.items():

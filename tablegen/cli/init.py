@@ -102,7 +102,7 @@ def init(
     scanner, and keep the scan file.
 
     With --v-max, --v-min, --nm-per-v or --gain the scanner file is that of your scanner. It then has no hysteresis,
-    which nobody has measured on it yet, and a comment says how to measure it.
+    because none has been measured yet, and a comment says how to measure it.
 
     \b
     Examples:

@@ -93,7 +93,7 @@ scanner = "{SCANNER_FILE}"         # relative to this file
 {_line(f"offset_v = {_number(0.5 * sum(wishes.driver))}", "where the image is; or offset_nm")}
 {tables}
 [y]
-{_line('like = "x"', 'the same; its own keys go before that. motion = "off" makes a line scan')}
+{_line('like = "x"', 'the same; keys of y take precedence. motion = "off" makes a line scan')}
 
 [limits]                         # optional: the build fails if the certificate exceeds a limit
 {chr(10).join(f"{name} = {most}" for name, most in limits)}
@@ -142,7 +142,7 @@ bias_v = {_number(0.5 * (low + high))}
 # With a displacement sensor: tablegen calibrate hysteresis, or tablegen calibrate operator.
 
 [y]
-like = "x"                       # all of it; tables of its own go before that
+like = "x"                       # all of it; tables of y take precedence
 """
 
 

@@ -59,8 +59,8 @@ def predict(
     DRIVE.CSV has the columns time_s and drive_v, in the order of time, at even or uneven steps. The scanner file has
     `model = "operator"` in the hysteresis table of the axis (`tablegen calibrate operator`).
 
-    Hysteresis follows the turns of the drive, creep and the resonance its course in time. The sensitivity is that of
-    the mean of the drive. The error is without its mean, since the zero of a sensor is anywhere.
+    Hysteresis depends on the turning points of the drive; creep and resonance depend on time too. The sensitivity is
+    that at the mean of the drive. The mean of the error is subtracted, because the zero of a sensor is arbitrary.
     """
     quiet_blas()
     check_plot(plot, as_json)

@@ -109,9 +109,9 @@ class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     hysteresis: Hysteresis | None = None
     frequency: Frequency | None = None
     resonance: Resonance | None = None
-    dac: Annotated[Dac, Meta(description="The converter of this axis; its keys go before those of `[dac]`.")] = Dac()
+    dac: Annotated[Dac, Meta(description="The converter of this axis; its keys take precedence over `[dac]`.")] = Dac()
     amplifier: Annotated[
-        Amplifier, Meta(description="The amplifier of this axis; its keys go before those of `[amplifier]`.")
+        Amplifier, Meta(description="The amplifier of this axis; its keys take precedence over `[amplifier]`.")
     ] = Amplifier()
 
 
@@ -119,7 +119,7 @@ class SlowScannerAxis(ScannerAxis, frozen=True, kw_only=True, forbid_unknown_fie
     """Calibration of the slow axis."""
 
     like: (
-        Annotated[Literal["x"], Meta(description="y takes all tables of `[x]`; its own keys go before them")] | None
+        Annotated[Literal["x"], Meta(description="y takes all tables of `[x]`; its own keys take precedence")] | None
     ) = None
 
 

@@ -58,9 +58,9 @@ class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             Meta(
                 gt=0.0,
                 le=1e6,
-                description="the least memory whose emitted codes err by at most this, in LSB of the converter, of "
-                "shaped output before the rounding; what is given of `mode`, `length` and `bits` is kept; default "
-                "with auto: 1, or that of `limits` if that is less, and 0.01 of shaped output",
+                description="the build chooses the table with the least memory whose codes have at most this error, in "
+                "LSB of the converter (shaped output: before the rounding). Given `mode`, `length` and `bits` stay; "
+                "default with auto: 1, or that of `limits` if that is less; 0.01 with shaped output",
             ),
         ]
         | None
@@ -85,7 +85,7 @@ class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[
             Annotated[int, Meta(ge=1, le=512)] | Literal["fewest"],
             Meta(
-                description="highest harmonic of the rate; fewest: as few as the error allows; default 32 unless "
+                description="highest harmonic of the rate; fewest: as few as the error allows; default: 32, unless "
                 "`cutoff_hz` is given"
             ),
         ]
@@ -97,9 +97,9 @@ class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             Meta(
                 ge=0.001,
                 le=10.0,
-                description="window: the least acceleration at the piezo that keeps this scaling error of the waveform,"
-                " peak to peak in the imaging window; alone: 32 harmonics, or as many as it takes. Default on "
-                "an operator, without `harmonics` and `cutoff_hz`: what the converter's steps leave",
+                description="window: play the waveform of least acceleration whose scaling error is at most this, peak "
+                "to peak in the imaging window; alone: with 32 harmonics, or as many as it takes. Default on an "
+                "operator, without `harmonics` and `cutoff_hz`: the error of the converter's steps",
             ),
         ]
         | None
@@ -154,18 +154,17 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[float, Meta(ge=0.0, le=100.0, description="rms residual that was predicted with this layer")] | None
     ) = None
     previous_a: (
-        Annotated[Harmonics, Meta(description="cosine terms of the layer that was played while that was measured")]
-        | None
+        Annotated[Harmonics, Meta(description="cosine terms of the layer with which that residual was measured")] | None
     ) = None
     previous_b: Annotated[Harmonics, Meta(description="sine terms of the same layer")] | None = None
     best: (
-        Annotated[bool, Meta(description="the round after this layer had a larger scaling error, so it was kept")]
+        Annotated[bool, Meta(description="this layer is the best: the round after it had a larger scaling error")]
         | None
     ) = None
     before_of: (
         Annotated[
             Literal["line", "mismatch"],
-            Meta(description="residual of the line, or only what trace and retrace differ by; default: line"),
+            Meta(description="residual of the line, or the difference of trace and retrace alone; default: line"),
         ]
         | None
     ) = None
@@ -201,7 +200,7 @@ class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
     like: (
         Annotated[
             Literal["x"],
-            Meta(description="y takes all keys of `[x]` but `refinement`; its own keys go before them"),
+            Meta(description="y takes all keys of `[x]` except `refinement`; its own keys take precedence"),
         ]
         | None
     ) = None
@@ -275,8 +274,8 @@ class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[
             Literal["off", "first", "second", "scanner"],
             Meta(
-                description="feeds the remainder of the rounding back, so that its error moves to high frequencies: in "
-                "first or second order, or as the resonance of the axis asks; default: off"
+                description="error feedback of the rounding, which moves its error to high frequencies: of first or "
+                "second order, or chosen for the resonance of the axis; default: off"
             ),
         ]
         | None
@@ -379,8 +378,8 @@ class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[
             Percent,
             Meta(
-                description="largest scaling error, peak to peak, and largest size error, both of the imaging window, "
-                "with what an operator expects on the scanner"
+                description="largest scaling error, peak to peak, and largest size error, both of the imaging window; "
+                "the errors that an operator expects on the scanner are added"
             ),
         ]
         | None

@@ -55,7 +55,7 @@ def test_rows_of_16_and_32_harmonics_are_measured(name: str) -> None:
 
 
 def test_what_rounder_turns_do_to_a_line_by_laws_is_measured(tmp_path: Path) -> None:
-    told = re.search(r"is (\S+) % of the line between trace and retrace with 32 harmonics, and\n(\S+) % at an", PAGE)
+    told = re.search(r"is (\S+) % of the line between trace and retrace with 32 harmonics,\sand (\S+) % with `E`", PAGE)
     assert told is not None
     for stated, edits in zip(told.groups(), ({}, {"x.band_limit.max_scaling_error_percent": "0.3"}), strict=True):
         expected = certify(plan_of(tmp_path, edits))["x"].expected

@@ -101,8 +101,9 @@ def test_a_plain_sine_takes_less_than_was_asked() -> None:
     assert least["16 bits, 65536 ticks"] <= 656
     assert least["18 bits, 1000 ticks"] <= 2048
     assert least["18 bits, 65536 ticks"] <= 2048
-    assert "With 16 bits it takes 512 bits below 1 LSB" in PAGE
-    assert "With 18 bits below 0.6 LSB it takes 1344 bits." in PAGE
+    text = " ".join(PAGE.split())
+    assert "Below 1 LSB of 16 bits it takes 512 bits;" in text
+    assert "Below 0.6 LSB of 18 bits it takes 1344 bits." in text
 
 
 def test_what_it_shows_of_a_scan_file_is_one(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def images(
              at 90; --axis must be the fast axis.
 
     \b
-    Example:
+    Examples:
       tablegen calibrate images --axis x --v-max 100 --pair 50 t1.npy r1.npy --pair 100 t2.npy r2.npy
       tablegen calibrate images --axis x --v-max 100 --pair 50 1.ibw --pair 100 2.ibw --channel Height
     """

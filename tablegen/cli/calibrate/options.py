@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-RHO_HELP = "Exponent rho of (22); used if all data have the same amplitude, otherwise fitted."
+RHO_HELP = "Decay constant rho of (22); used if all data have the same amplitude, otherwise fitted."
 
 points_option = click.option(
     "--points",
@@ -67,8 +67,8 @@ delay_pixels_option = click.option(
 columns_option = click.option(
     "--columns",
     metavar="QUANTITY=COLUMN,...",
-    help="Which column is which: a number from 1 or a name in the header, and perhaps a unit, such as "
-    "time=3,drive=2,position=1:um. Without a header, the numbers are in s, V and nm unless a unit is given.",
+    help="The column of each quantity: its number, from 1, or its name in the header; a unit may follow, such as "
+    "time=3,drive=2,position=1:um. Without a header, the values are in s, V and nm unless a unit is given.",
 )
 _drive_options = (
     click.option(

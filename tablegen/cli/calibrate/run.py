@@ -85,7 +85,7 @@ def shared_options(command: F) -> F:
             is_flag=True,
             help="Update the scanner file. With --v-max, create it if it does not exist.",
         ),
-        click.option("--force", is_flag=True, help="With --write, write a fit even if it is meaningless."),
+        click.option("--force", is_flag=True, help="With --write, also write an insignificant fit."),
         plot_option("the data and the fit", by_default=True),
         click.option(
             "--report",

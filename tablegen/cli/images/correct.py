@@ -62,7 +62,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @click.option(
     "--lattice",
     type=click.Choice(["hexagonal", "square"]),
-    help="Kind of the lattice of --lattice-nm.  [default: hexagonal, unless the frame is straight as a square one]",
+    help="Kind of the lattice of --lattice-nm.  [default: hexagonal, or square if this makes the frame straight]",
 )
 @_number("--size-v", "V", "Scan voltage of the fast axis at the piezo, peak to peak.")
 @_number("--size-nm", "NM", "Instead of --size-v: scan size by the size calibration of the scanner file.")

@@ -53,7 +53,7 @@ Exit status: 0 done, 2 wrong input or no lattice, 4 cannot write, 6 a library is
     callback=finite,
     metavar="NM",
     help="Lattice constant of the sample, or pitch of the grating, in nm; the lattice is hexagonal without --lattice. "
-    "It decides where cells of several sizes are possible.",
+    "It selects the cell if cells of several sizes are possible.",
 )
 @channel_option
 @retrace_channel_option
