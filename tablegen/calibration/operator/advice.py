@@ -7,6 +7,7 @@ import numpy as np
 
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.field import covariance
 from tablegen.compensation.operator.operator import STROKE_REACH
@@ -33,7 +34,7 @@ class NextTrace:
     rate_hz: float | None
 
 
-def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver | float) -> NextTrace:
+def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine | MeasuredLine], driver: Driver | float) -> NextTrace:
     """Return the trace that helps most; ``rate_hz`` is a second rate if all traces have the same."""
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
     unknown = _unknown(fit, np.array(reach))

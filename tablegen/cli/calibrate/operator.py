@@ -22,7 +22,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
-    from tablegen.api.calibrate_operator import CalibratedOperator
+    from tablegen.api.calibrated_operator import CalibratedOperator
     from tablegen.calibration.tables.recorder import Recorder
 
 
