@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from math import comb
 
 import numpy as np
 from scipy.optimize import nnls
@@ -37,6 +38,7 @@ from tablegen.numerics.arrays import Bools, Floats
 
 Factor = Callable[[float], float]
 _RIDGE = 1e-3  # weight of the penalty on weights, of the sensitivity
+_LEAST_SLOPE = 0.2  # of the static curve, of the sensitivity, so that the smallest loops have a slope
 _HELD_OUT = 0.25  # of the travel of a record's drive
 _HIGHEST = 0.495  # threshold; above it no play moves
 _SPACING = 1.5
@@ -224,14 +226,14 @@ class _Problem:
             gram += aa + c * al + c * c * ll
             right += a.T @ y + c * (late.T @ y)
             power += float(y @ y)
-        # The powers have either sign: their columns come twice.
-        signs = np.vstack(
-            [np.eye(count), np.hstack([np.zeros((self.basis.degree, plays)), -np.eye(self.basis.degree)])]
-        )
-        whole = signs @ gram @ signs.T + 1e-12 * np.trace(gram) * np.eye(len(signs))
+        # The static curve rises everywhere, by a least slope and curves whose derivatives are Bernstein polynomials.
+        basis, least = np.eye(count), np.zeros(count)
+        basis[plays:, plays:] = _rising_curves(self.basis.degree)
+        least[plays] = _LEAST_SLOPE
+        whole = basis @ gram @ basis.T + 1e-12 * np.trace(gram) * np.eye(count)
         root = np.linalg.cholesky(whole)
-        solution, _ = nnls(root.T, np.linalg.solve(root, signs @ right), maxiter=30 * len(signs))
-        weights = signs.T @ solution
+        solution, _ = nnls(root.T, np.linalg.solve(root, basis @ (right - gram @ least)), maxiter=30 * count)
+        weights = least + basis.T @ solution
         cost = power - 2.0 * float(right @ weights) + float(weights @ gram @ weights)
         return _Solution(loss, delay_s, weights, cost, used)
 
@@ -295,6 +297,16 @@ class _Problem:
     def predicted(self, part: _Solution) -> float:
         """Return the mean rms error of the held-out parts."""
         return float(np.sqrt(np.mean([self.errors(i, part, self.after(i))[0] ** 2 for i in range(len(self.records))])))
+
+
+def _rising_curves(degree: int) -> Floats:
+    """Return the coefficients of u, u^2, ... of curves whose derivatives are the Bernstein polynomials, a row each."""
+    rows = np.zeros((degree, degree))
+    for k in range(degree):
+        for j in range(k, degree):
+            sign = -1.0 if (j - k) % 2 else 1.0
+            rows[k, j] = sign * comb(degree - 1, j) * comb(j, k) * degree / (j + 1.0)
+    return rows
 
 
 def _free_columns(record: TimeRecord, taus_s: Floats, first: int) -> Floats:

@@ -60,6 +60,9 @@ def operator(
     Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
     trace, a number for each trace; without it, a new trace starts where time_s goes back.
 
+    Records that are no settled periods, of any drive, are fitted in time, and so are fewer than three traces: the last
+    part of each record is predicted from the part before it.
+
     A pair of images can replace a trace (--pair): of a lattice or a grating of known constant, scanned with a triangle,
     from turn to turn.
 
