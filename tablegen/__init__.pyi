@@ -44,7 +44,8 @@ from tablegen.api.result import (
     Picture as Picture,
 )
 from tablegen.api.calibrate import Calibrated as Calibrated
-from tablegen.api.calibrate_operator import CalibratedOperator as CalibratedOperator
+from tablegen.api.calibrated_operator import CalibratedOperator as CalibratedOperator
+from tablegen.api.calibrated_records import CalibratedRecords as CalibratedRecords
 from tablegen.api.read_image import (
     Image as Image,
     Channels as Channels,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any, Literal
 
@@ -40,6 +40,7 @@ def predict(
     axis: Literal["x", "y"],
     against: str | Path | None = None,
     start: Literal["settled", "rest"] = "rest",
+    delay_s: float = 0.0,
     columns: Columns | None = None,
     drive_gain: float | None = None,
     drive_offset: float | None = None,
@@ -59,6 +60,8 @@ def predict(
     start : str
         State at the first sample: "rest", at the first voltage after v_min, or "settled", after many repetitions of
         the record.
+    delay_s : float
+        Delay of the measurement against the drive in s, as ``calibrate operator`` took or fitted it.
     columns : str or dict, optional
         Which column is which, as ``--columns``.
     drive_gain, drive_offset : float, optional
@@ -74,7 +77,7 @@ def predict(
     Rejected
         A file is faulty, the axis has no operator, or the drive leaves what the operator knows.
     ValueError
-        ``axis`` or ``start`` has another value, or the gain or offset is none.
+        ``axis`` or ``start`` has another value, or the delay, gain or offset is none.
 
     Examples
     --------
@@ -91,6 +94,8 @@ def predict(
     if axis not in ("x", "y"):
         raise ValueError(f"axis {axis!r} is not x or y")
     state = Start(start)
+    if not isfinite(delay_s):
+        raise ValueError(f"a delay of {delay_s} s is none")
     recorder = Recorder(columns, drive_gain, drive_offset)
     known = _KnownAxis.read(Path(scanner), axis)
     table = recorder.read(Path(drive), [TIME, DRIVE], [DISPLACEMENT])
@@ -137,7 +142,7 @@ def predict(
                 "both need one clock, and the measurement the whole of the drive"
             )
             raise Rejected([Problem(other.file, 0, TIME.name, why)])
-        measured = np.interp(time_s, other[TIME], other[DISPLACEMENT])
+        measured = np.interp(time_s + delay_s, other[TIME], other[DISPLACEMENT])
     bound = 0.01 * extent * sqrt(rms * rms + 0.25 * size * size) if state is Start.SETTLED else None
     return Predicted(axis, state, time_s, volts, position, bound, measured)
 

@@ -40,6 +40,14 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
     show_default=True,
     help="State at the first sample: at rest after v_min, or after many repetitions of the record.",
 )
+@click.option(
+    "--delay-s",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="S",
+    help="Delay of the measurement against the drive, as `calibrate operator` took or fitted it.",
+)
 @recorder_options
 @plot_option("positions and errors over time")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
@@ -50,6 +58,7 @@ def predict(
     output: Path | None,
     against: Path | None,
     start: Literal["settled", "rest"],
+    delay_s: float,
     recorder: "Recorder",
     plot: Path | None,
     as_json: bool,
@@ -73,6 +82,7 @@ def predict(
             axis=axis,
             against=against,
             start=start,
+            delay_s=delay_s,
             columns=recorder.columns,
             drive_gain=recorder.drive_gain,
             drive_offset=recorder.drive_offset,

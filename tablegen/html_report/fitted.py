@@ -189,5 +189,44 @@ def operator_page(
     return document(f"operator of {axis}", verdict, findings, sections, "", _FOOT)
 
 
+def records_page(
+    axis: str,
+    family: str,
+    candidates: Sequence[tuple[str, float]],
+    records: Sequence[tuple[str, Sequence[float]]],
+    charts: Sequence[Chart],
+    further: str,
+    sources: Sequence[Source],
+) -> bytes:
+    """Render the page of an operator that was fitted in time.
+
+    Parameters
+    ----------
+    candidates
+        Name and mean rms of the predicted last parts, in percent of the stroke, of each model.
+    records
+        Name of each record; stroke in V, rate in Hz, rms and worst error in the fit in percent of the stroke; the time
+        in s from which it is predicted, rms and worst error there.
+    charts
+        The errors of each record over time.
+    further
+        The advice for the next measurement.
+    """
+    head = ("record", "size [V]", "rate [Hz]", "rms, fit", "worst, fit", "predicted from [s]", "rms", "worst")
+    rows = tuple(row(name, *(f"{value:.3g}" for value in figures)) for name, figures in records)
+    caption = "Percent of the stroke: in the fit, and of the last part, predicted from a fit to the part before"
+    models = Grid("Models that were compared", ("", "rms of the last parts [%]"), _candidates(candidates))
+    sections = [
+        Section("records", "Records", (Grid(caption, head, rows), Charts(tuple(charts)))),
+        Section("family", "Model", (Paragraph(f"Chosen: {family}."), models)),
+        _sources(sources),
+    ]
+    worst = max(records, key=lambda one: one[1][5])
+    verdict = TableCell(f"The last part of a record is predicted within {worst[1][5]:.2g} % rms.", "quiet")
+    note = f"the worst is {worst[0]}, {worst[1][6]:.2g} % of its stroke at most"
+    findings = [Finding("expect", 1.0, note), Finding("note", 0.0, further)]
+    return document(f"operator of {axis}", verdict, findings, sections, "", _FOOT)
+
+
 def _candidates(candidates: Sequence[tuple[str, float]]) -> tuple[tuple[TableCell, ...], ...]:
     return tuple(row(name, f"{score:.3g}") for name, score in candidates)

@@ -1,9 +1,13 @@
 """Records of a piezo by somebody else are read as they are: micrometres, and volts at the amplifier's input."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from real_files import real_folder
 
+import tablegen
+from tablegen.api.calibrated_records import CalibratedRecords
 from tablegen.calibration.record_checks import Known, trace_remarks
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
 from tablegen.calibration.tables.recorder import Recorder
@@ -32,3 +36,23 @@ def test_a_real_trace_is_read_as_it_is(name: str) -> None:
     raw = Recorder().read(path, [TIME, DRIVE, DISPLACEMENT])
     (remark,) = trace_remarks([raw], Known(Driver(100.0)), "x")
     assert remark.code == "controller-volts"
+
+
+def test_the_fall_of_a_real_amplitude_is_predicted_from_records_before_it(tmp_path: Path) -> None:
+    assert FOLDER is not None
+    full, ramp = (FOLDER / name for name in NAMES)
+    before = tmp_path / "ramp_to_17s.csv"
+    before.write_text("".join(ramp.read_text("utf-8").splitlines(keepends=True)[: 17 * 200 + 1]), "utf-8")
+    scanner = tmp_path / "stage.toml"
+    scanner.write_text('name = "stage"\nv_max = 3.6\n[x.size]\nk_nm_per_v = 12500\n[y]\nlike = "x"\n', "utf-8")
+    fit = tablegen.calibrate_operator([full, before], axis="x", scanner=scanner, drive_gain=1.0, delay_s="fit")
+    assert isinstance(fit, CalibratedRecords)
+    assert max(one.predicted_rms for one in fit.in_time.errors) < 0.3
+    fit.write(scanner)
+    predicted = tablegen.predict(scanner, ramp, axis="x", against=ramp, drive_gain=1.0, delay_s=fit.delay.value)
+    later = predicted.time_s >= 17.0
+    assert predicted.measured_nm is not None
+    error = (predicted.position_nm - predicted.measured_nm)[later]
+    error = 100.0 * (error - np.mean(error)) / np.ptp(predicted.measured_nm[predicted.time_s > 1.0])
+    assert np.sqrt(np.mean(error**2)) < 0.35
+    assert np.max(np.abs(error)) < 1.5

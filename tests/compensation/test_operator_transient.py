@@ -10,7 +10,7 @@ import pytest
 from editing import SCAN, SCANNER, edited, run
 from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record
 from replacing import replace
-from stepped_plants import Followed, bouc_wen_played, followed, plays_played
+from stepped_plants import Followed, followed, one_state_played, plays_played
 from test_operator_waveform import THRESHOLDS, WEIGHTS, operator
 
 from tablegen.calibration.laws.hysteresis import Trace
@@ -140,7 +140,7 @@ def test_the_virtual_scanner_drifts_as_the_operator_says(stroke: float, centre: 
         assert after.drift_nm(LINE_S, first, 300) == pytest.approx(drift, rel=0.08), first
 
 
-PLANTS = {"plays": plays_played(ManyPlays()), "Bouc-Wen": bouc_wen_played(BoucWen())}
+PLANTS = {"plays": plays_played(ManyPlays()), "Bouc-Wen": one_state_played(BoucWen())}
 PERIODS = {"plays": 3, "Bouc-Wen": 300}  # that a loop takes to close
 CORES = {"plays": ManyPlays(), "Bouc-Wen": BoucWen()}
 

@@ -6,15 +6,17 @@ goes on in the second.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from foreign_plants import BoucWen, ManyPlays
+from foreign_plants import CREEP_PER_DECADE, ManyPlays, OneState
 
 Floats = npt.NDArray[np.float64]
 Play = Callable[[list[Floats]], list[Floats]]  # nm of drives one after the other, from rest at 0 on
 
 _EARLIER = np.concatenate([np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)])  # up and down, then up again
+_TERMS_S = np.logspace(-3.0, 3.0, 19)  # of creep, three a decade
 
 
 def sweep(low: float, high: float, turn: float, samples: int) -> Floats:
@@ -43,8 +45,8 @@ def plays_played(core: ManyPlays) -> Play:
     return play
 
 
-def bouc_wen_played(core: BoucWen) -> Play:
-    """Bouc-Wen's equation, integrated from one drive to the next."""
+def one_state_played(core: OneState) -> Play:
+    """An equation of one state, integrated from one drive to the next."""
 
     def play(parts: list[Floats]) -> list[Floats]:
         h, before, out = 0.0, 0.0, []
@@ -116,3 +118,26 @@ def followed(
     means = off[: lines * a_line].reshape(lines, a_line).mean(axis=1)
     up = round(turn * samples)
     return Followed(means, (found[0] - settled)[:up])
+
+
+def random_triangle(seed: int, sweeps: int = 24, samples: int = 40) -> Floats:
+    """Normalised drives from 0 on, of sweeps with random turns: shape (sweeps x samples,)."""
+    random = np.random.default_rng(seed)
+    highs, lows = random.uniform(0.5, 0.97, sweeps // 2), random.uniform(0.03, 0.45, sweeps // 2)
+    turns = np.concatenate([[0.0, 0.97, 0.02], np.stack([highs, lows], axis=1).ravel()[: sweeps - 2]])
+    return np.concatenate([np.linspace(a, b, samples, endpoint=False) for a, b in pairwise(turns)])
+
+
+def recorded(core: ManyPlays | OneState, u: Floats, time_s: Floats, noise: float = 0.001, seed: int = 1) -> Floats:
+    """Noisy nm of a foreign piezo that has been up to 1 and back, now at rest at 0, with creep of 2.6 % a decade."""
+    play = plays_played(core) if isinstance(core, ManyPlays) else one_state_played(core)
+    played = play([_EARLIER, u])[1]
+    state, late = np.full(len(_TERMS_S), played[0]), np.empty(len(u))
+    late[0] = float(np.sum(state))
+    for k in range(1, len(u)):
+        decay = np.exp(-(time_s[k] - time_s[k - 1]) / _TERMS_S)
+        state = decay * state + (1.0 - decay) * 0.5 * (played[k] + played[k - 1])
+        late[k] = float(np.sum(state))
+    moved = played + CREEP_PER_DECADE / 3.0 * late
+    random = np.random.default_rng(seed).standard_normal(len(u))
+    return np.asarray(moved + noise * float(np.ptp(moved)) * random)

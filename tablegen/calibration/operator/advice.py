@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.field import covariance
 from tablegen.compensation.operator.operator import STROKE_REACH
@@ -21,6 +22,8 @@ _JITTER = 1e-5  # relative variance that every trace leaves
 _NOISE = 1e-4  # relative variance that the next trace leaves: a slope from two near points is not worth much
 _LEAST_RMS = 1e-4  # percent
 _DECADE = 8.0  # ratio of rates that separates creep from hysteresis
+
+_Line = PeriodicLine | MeasuredLine
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +38,19 @@ class NextTrace:
     left: float
     rate_hz: float | None
 
+    @property
+    def record(self) -> dict[str, float | None]:
+        """As plain data, for JSON."""
+        return {
+            "size_v": self.size_v,
+            "offset_v": self.offset_v,
+            "rate_hz": self.rate_hz,
+            "uncertainty_left_share": self.left,
+        }
+
 
 def next_trace(
-    fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver | float, scans: Sequence[tuple[float, float]] = ()
+    fit: OperatorFit, lines: Sequence[_Line], driver: Driver | float, scans: Sequence[tuple[float, float]] = ()
 ) -> NextTrace:
     """Return the trace of one of the scans that helps them all most; ``rate_hz`` is a second rate if all have one.
 
@@ -73,15 +86,18 @@ def next_trace(
     return NextTrace(stroke * driver.span, driver.volts(centre), left, other)
 
 
-def _served(lines: Sequence[PeriodicLine]) -> list[tuple[float, float]]:
+def _served(lines: Sequence[_Line]) -> list[tuple[float, float]]:
     """Return strokes and centres that the driver reaches and that a build does not refuse."""
     refused = beyond_reach(lines, _STROKES, _CENTRES)
-    return [
-        (float(s), float(c))
+    reach = [
+        (float(s), float(c), bool(refused[i, j]))
         for i, s in enumerate(_STROKES)
         for j, c in enumerate(_CENTRES)
-        if 0.5 * s <= min(c, 1.0 - c) + 1e-9 and not refused[i, j]
+        if 0.5 * s <= min(c, 1.0 - c) + 1e-9
     ]
+    # Of traces that are all small, a build serves only sizes below those of the table.
+    none = all(beyond for _, _, beyond in reach)
+    return [(s, c) for s, c, beyond in reach if none or not beyond]
 
 
 def _gain(fit: OperatorFit, traces: Floats, scans: Floats) -> Floats:
@@ -94,7 +110,7 @@ def _gain(fit: OperatorFit, traces: Floats, scans: Floats) -> Floats:
     return np.asarray(joint**2 / (np.maximum(own, 0.0) + _NOISE)[:, None], dtype=np.float64)
 
 
-def beyond_reach(lines: Sequence[PeriodicLine], strokes: Floats, centres: Floats) -> Bools:
+def beyond_reach(lines: Sequence[_Line], strokes: Floats, centres: Floats) -> Bools:
     """Return where a build refuses a scan, since nothing was measured near: shape (strokes, centres)."""
     known = np.array([line.centre for line in lines])
     largest = max(line.stroke for line in lines) + STROKE_REACH

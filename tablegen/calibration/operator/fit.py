@@ -14,6 +14,7 @@ from tablegen.calibration.operator.creep_fit import creep_of_fields
 from tablegen.calibration.operator.family import CreepOf, FamilyFit, FamilyProblem, groups_of
 from tablegen.calibration.operator.loop_errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.calibration.operator.plausible import Unsettled
 from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrink
 from tablegen.calibration.operator.units import check_units
@@ -33,7 +34,7 @@ _NOISE_OF_TWINS = 1e-4  # where two lines of one point differ slightly by their 
 _TWINS = 0.03  # of v_max: largest difference of strokes and centres of such lines
 _ROUNDS = 8  # most steps of the family's numbers; the second where a line is left out
 _ROUNDS_WITHOUT = 2
-_MIN_LINES = 3
+LEAST_LINES = 3
 _MIN_SPREAD = 2.0  # of the largest stroke over the smallest
 _MAX_NOISE_PERCENT = 1.0
 _SHARES = (0.25, 0.5, 0.75)  # of the first family, where two are mixed
@@ -86,13 +87,13 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
 
 
 def _check(lines: Sequence[PeriodicLine]) -> None:
-    if len(lines) < _MIN_LINES:
-        raise Unphysical(f"{len(lines)} traces are not enough for an operator; at least {_MIN_LINES} are needed")
+    if len(lines) < LEAST_LINES:
+        raise Unsettled(f"{len(lines)} traces are not enough for an operator; at least {LEAST_LINES} are needed")
     check_units(lines)
     strokes = [line.stroke for line in lines]
     if max(strokes) < _MIN_SPREAD * min(strokes):
         low, high = (100.0 * share for share in (min(strokes), max(strokes)))
-        raise Unphysical(
+        raise Unsettled(
             f"strokes of {low:.3g} to {high:.3g} % of v_max are too similar; the largest has to be at least "
             f"{_MIN_SPREAD:g} times the smallest"
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.hysteresis import Trace
-from tablegen.calibration.operator.plausible import check_record, check_repeats
+from tablegen.calibration.operator.plausible import Unsettled, check_record, check_repeats
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.numerics.arrays import Bools, Floats
@@ -123,9 +123,9 @@ def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
     # Whole periods from the first sample on; the grid then begins at a minimum.
     periods = int((time[-1] - time[0]) / period + _MISSING)
     if periods < 1:
-        raise Unphysical(f"{(time[-1] - time[0]) / period:.3g} of a period are recorded; at least one is needed")
+        raise Unsettled(f"{(time[-1] - time[0]) / period:.3g} of a period are recorded; at least one is needed")
     if len(time) / ((time[-1] - time[0]) / period) < _MIN_SAMPLES:
-        raise Unphysical(f"fewer than {_MIN_SAMPLES} samples a period")
+        raise Unsettled(f"fewer than {_MIN_SAMPLES} samples a period")
     settle = 1 if periods >= 3 else 0
     start = float(time[0]) + settle * period
     grid = start + period * (np.arange((periods - settle) * PHASES) / PHASES)
@@ -171,7 +171,7 @@ def _period(time: Floats, drive: Floats) -> float:
     if several:
         slopes = [float(np.polyfit(np.arange(len(at)), at, 1)[0]) for at in several]
         return float(np.mean(slopes))
-    raise Unphysical("no whole period: the drive has to rise and to fall, at least one and a half times")
+    raise Unsettled("no whole period: the drive has to rise and to fall, at least one and a half times")
 
 
 def _check_sweeps(drive: Floats) -> None:
@@ -181,7 +181,7 @@ def _check_sweeps(drive: Floats) -> None:
     for sweep in (drive[: top + 1], -drive[top:]):
         back = float(np.max(np.maximum.accumulate(sweep) - sweep)) if len(sweep) else 0.0
         if back > _BACKWARDS * span:
-            raise Unphysical(
+            raise Unsettled(
                 f"the drive goes back by {100.0 * back / span:.2g} % in the middle of a sweep; only one rise and "
                 "one fall a period are supported"
             )

@@ -13,6 +13,10 @@ _SAME = 1e-9  # of the span
 _MOST_DIFFERENCE = 0.02  # of the drive's span, rms, from period to period
 
 
+class Unsettled(Unphysical):
+    """The record, or the set of them, is no settled lines; an operator in time may still be fitted to it."""
+
+
 def check_record(trace: Trace) -> None:
     """Refuse a record that has no values, that does not move, or that was clipped.
 
@@ -35,7 +39,7 @@ def check_record(trace: Trace) -> None:
             still = np.abs(values - at) <= _SAME * span
             share, times = float(np.mean(still)), int(np.sum(np.diff(still, prepend=False) & still))
             if share > _MOST_AT_REST and int(np.sum(still)) >= _FEW * times:
-                raise Unphysical(
+                raise Unsettled(
                     f"the {name} is at its {end} value, {at:.6g}, for {100.0 * share:.2g} % of the record; "
                     "it was clipped, or stands still: record less of a stroke, or with more range"
                 )
@@ -51,13 +55,13 @@ def check_repeats(drives: Floats) -> None:
 
     Raises
     ------
-    Unphysical
+    Unsettled
         If the drive is refused.
     """
     mean = drives.mean(axis=0)
     difference = float(np.sqrt(np.mean((drives - mean) ** 2))) / float(np.ptp(mean))
     if difference > _MOST_DIFFERENCE:
-        raise Unphysical(
+        raise Unsettled(
             f"the drive differs by {100.0 * difference:.2g} % of its span from period to period; a settled line needs "
             "one that repeats"
         )

@@ -8,7 +8,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 
 _LEAST_STROKE = 0.05  # of v_max: least stroke of the largest trace
-_MOST_RATIO = 3.0  # of the sensitivities of two traces, or of a trace and the scanner file
+MOST_RATIO = 3.0  # of the sensitivities of two traces, or of a trace and the scanner file
 
 
 def check_units(lines: Sequence[PeriodicLine]) -> None:
@@ -28,7 +28,7 @@ def check_units(lines: Sequence[PeriodicLine]) -> None:
     sensitivities = [sensitivity(line) for line in lines]
     usual = float(np.median(sensitivities))
     for line, one in zip(lines, sensitivities, strict=True):
-        if not 1.0 / _MOST_RATIO < one / usual < _MOST_RATIO:
+        if not 1.0 / MOST_RATIO < one / usual < MOST_RATIO:
             raise Unphysical(
                 f"{line.name}: moves {one / usual:.3g} times as far for its drive as the other traces do; are all in "
                 "V at the piezo and nm?"
@@ -44,7 +44,7 @@ def check_size(lines: Sequence[PeriodicLine], nm_per_full_scale: float, where: s
         If the lines are refused.
     """
     usual = float(np.median([sensitivity(line) for line in lines]))
-    if not 1.0 / _MOST_RATIO < usual / nm_per_full_scale < _MOST_RATIO:
+    if not 1.0 / MOST_RATIO < usual / nm_per_full_scale < MOST_RATIO:
         raise Unphysical(
             f"the traces move {usual / nm_per_full_scale:.3g} times as far as {where} says; are they in V at the piezo "
             "and nm?"

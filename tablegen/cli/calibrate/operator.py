@@ -22,7 +22,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
-    from tablegen.api.calibrate_operator import CalibratedOperator
+    from tablegen.api.calibrated_operator import CalibratedOperator
     from tablegen.calibration.tables.recorder import Recorder
 
 
@@ -69,6 +69,9 @@ def operator(
     \b
     Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
     trace, a number for each trace; without it, a new trace starts where time_s goes back.
+
+    Records that are no settled periods, of any drive, are fitted in time, and so are fewer than three traces: the last
+    part of each record is predicted from the part before it.
 
     A pair of images can replace a trace (--pair): of a lattice or a grating of known constant, scanned with a triangle,
     from turn to turn.

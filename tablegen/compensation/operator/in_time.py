@@ -142,14 +142,18 @@ def resonant(time_s: Floats, y: Floats, response: SecondOrder, settled: bool) ->
     settled
         True if y repeats with the length of the record; else it begins at rest.
     """
+    taus_s, gains = resonance_modes(response)
+    modes = [gain * late_mode(time_s, y, tau_s, settled) for tau_s, gain in zip(taus_s, gains, strict=True)]
+    return np.asarray(np.sum(modes, axis=0).real, dtype=np.float64)
+
+
+def resonance_modes(response: SecondOrder) -> tuple[list[complex], list[complex]]:
+    """Return complex time constants in s and gains of the two modes of a resonance."""
     w, half = 2.0 * np.pi * response.frequency_hz, 0.5 / response.quality
     root = np.sqrt(complex(half * half - 1.0)) or 1e-6  # critical damping: two modes that are nearly one
     poles = w * (-half + root), w * (-half - root)
-    modes = [
-        w * w / ((pole - other) * -pole) * late_mode(time_s, y, -1.0 / pole, settled)
-        for pole, other in (poles, poles[::-1])
-    ]
-    return np.asarray(np.sum(modes, axis=0).real, dtype=np.float64)
+    gains = [complex(w * w / ((pole - other) * -pole)) for pole, other in (poles, poles[::-1])]
+    return [-1.0 / pole for pole in poles], gains
 
 
 class _Memory:
