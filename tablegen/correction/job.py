@@ -452,7 +452,8 @@ def by_fit(
         record["retrace_alone"] = True
     scan = _corrected(images, distortion, size, record)
     check_moves(distortion)
-    check_cell(fit, trace if retrace_alone else images.heights(images.reference[0]), True)
+    heights = trace if retrace_alone else images.heights(images.reference[0])
+    check_cell(fit, heights if fit.stepless is None else fit.stepless, True)
     check_agreement(scan.agreement)
     pictures = [scan.pictures[i].heights for i in images.reference]
     check_straight_cell(fit, pictures, size, lattice_nm, kind or "hexagonal", expected is not None)
