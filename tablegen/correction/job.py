@@ -447,6 +447,8 @@ def by_fit(
         "explained": round(fit.explained, 6),
         "slow_axis": "fitted" if fit.tells_y else "as taken: a grating does not tell it",
     }
+    if fit.straight_axes:
+        record["not_displaced"] = list(fit.straight_axes)
     if retrace_alone:
         distortion = distortion.mirrored()
         record["retrace_alone"] = True

@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
+from tablegen.correction.support import supported
 from tablegen.images.cell_start import cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
@@ -48,7 +49,8 @@ class PeriodicScan:
     true if y is that of the sample and not of the rows. ``indexed`` is true if the cell is that of the indexer, and not
     of the strongest spots. The strong spots alone are those of a cell with the area divided by ``strong_index``.
     ``stepless`` is the first image without the steps of terraces, None where it has none. ``several_cells`` is the
-    indexer's reason where several cells explain the image.
+    indexer's reason where several cells explain the image. Displacements along ``straight_axes`` are within their
+    errors, and left out.
     """
 
     distortion: Distortion
@@ -59,6 +61,7 @@ class PeriodicScan:
     strong_index: int = 1
     stepless: Floats | None = None
     several_cells: str = ""
+    straight_axes: str = ""
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
         """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
@@ -155,7 +158,7 @@ def periodic_scan(
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
     cell, several = cell_of(trace, retrace, expected_area)
-    scaled: list[Floats] = []
+    scaled, stepped = list[Floats](), False
     if cell is None:
         try:
             spot, bends = begin(geometry, heights, retrace_mirrored)
@@ -169,24 +172,30 @@ def periodic_scan(
         recorded = [image for image in (trace, retrace) if image is not None]
         level = [without_terraces(image) for image in recorded]
         if any(image is not None for image in level):
-            heights = [
-                np.asarray(geometry.levelled(image if one is None else one), dtype=np.float64)
-                for one, image in zip(level, recorded, strict=True)
-            ]
-            heights, scaled = _unit(heights, heights), _unit(recorded, heights)
+            levelled = [image if one is None else one for one, image in zip(level, recorded, strict=True)]
+        else:
+            levelled = recorded
+        heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in levelled]
+        heights, scaled = _unit(heights, heights), _unit(recorded, heights)
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
-        for _ in range(_STEP_ROUNDS if scaled else 0):
-            stepless = _stepless(model, state, scaled)
-            heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in stepless]
+        for _ in range(_STEP_ROUNDS):
+            without, stepped = _stepless(model, state, scaled)
+            if not stepped:
+                break
+            heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in without]
             model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
+    scan = _scan(model, state)
+    distortion, straight = supported(scan.distortion, model, state, scan.tells_y)
     return replace(
-        _scan(model, state),
+        scan,
+        distortion=distortion,
+        straight_axes=straight,
         indexed=cell is not None,
         several_cells="" if several is None else str(several),
         strong_index=strong_index(model, state),
-        stepless=_stepless(model, state, scaled)[0] if scaled else None,
+        stepless=_stepless(model, state, scaled)[0][0] if stepped else None,
     )
 
 
@@ -196,8 +205,11 @@ def _unit(images: list[Floats], level: list[Floats]) -> list[Floats]:
     return [image / spread for image in images]
 
 
-def _stepless(model: PeriodicModel, state: FitState, recorded: list[Floats]) -> list[Floats]:
-    return [without_steps(image, part) for image, part in zip(recorded, model.periodic_parts(state), strict=True)]
+def _stepless(model: PeriodicModel, state: FitState, recorded: list[Floats]) -> tuple[list[Floats], bool]:
+    """Return the recorded images without the steps that a fit leaves, and True if one has steps."""
+    pairs = zip(recorded, model.periodic_parts(state), strict=True)
+    images, stepped = zip(*(without_steps(image, part) for image, part in pairs), strict=True)
+    return list(images), any(stepped)
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:

@@ -8,7 +8,8 @@ import numpy as np
 from tablegen.images.lattice_filters import terrace_edges
 from tablegen.numerics.arrays import Floats, Ints
 
-_STEPPED_ROWS = 0.15  # share of the rows: fewer with a step are noise or specks
+_STEPPED_ROWS = 0.15  # share of the rows: fewer with a step may have it from a strong lattice
+_FEWEST_ROWS = 0.02  # the same of what the fitted lattice leaves: an edge along the rows has few, and fewer are specks
 _BESIDE = 6  # pixels on either side of a step, whose medians tell its height
 _LEAST_STEP = 6.0  # standard errors of the difference of two such medians
 _LEAST_SHARE = 0.7  # times the rms of the periodic part: a superstructure of that contrast has been indexed
@@ -34,7 +35,7 @@ def without_terraces(heights: Floats) -> Floats | None:
     return level
 
 
-def without_steps(heights: Floats, periodic: Floats) -> Floats:
+def without_steps(heights: Floats, periodic: Floats) -> tuple[Floats, bool]:
     """Subtract the steps of what a lattice leaves, and bound what remains beside the lattice.
 
     Parameters
@@ -46,8 +47,8 @@ def without_steps(heights: Floats, periodic: Floats) -> Floats:
 
     Returns
     -------
-    Floats
-        Heights without steps and outliers, of the same shape and unit.
+    tuple
+        Heights without steps and outliers, of the same shape and unit; and True if rows have steps.
     """
     remainder = _less_common_bow(heights - periodic)
     noise = 1.4826 * float(np.median(np.abs(np.diff(remainder, axis=1)))) / np.sqrt(2.0)
@@ -59,7 +60,8 @@ def without_steps(heights: Floats, periodic: Floats) -> Floats:
     parabola = np.linalg.qr(np.vander(place, 3))[0]
     remainder -= (remainder @ parabola) @ parabola.T
     spread = 1.4826 * float(np.median(np.abs(remainder)))
-    return np.asarray(periodic + np.clip(remainder, -_OUTLIER * spread, _OUTLIER * spread), dtype=np.float64)
+    stepped = len(np.unique(rows)) >= _FEWEST_ROWS * len(heights)
+    return np.asarray(periodic + np.clip(remainder, -_OUTLIER * spread, _OUTLIER * spread), np.float64), stepped
 
 
 def _less_common_bow(heights: Floats) -> Floats:

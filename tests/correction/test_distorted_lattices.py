@@ -71,11 +71,14 @@ def terraced(step: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
 
 def test_steps_are_removed_and_nothing_else() -> None:
     heights, lattice = terraced()
-    remainder = without_steps(heights, lattice) - lattice
+    level, stepped = without_steps(heights, lattice)
+    assert stepped
+    remainder = level - lattice
     assert np.std(remainder) == pytest.approx(0.1, rel=0.1)
     assert abs(np.mean(remainder[:, :50]) - np.mean(remainder[:, 90:])) < 0.02
-    plain = without_steps(terraced(0.0)[0], lattice) - lattice
-    assert np.std(plain) == pytest.approx(0.1, rel=0.1)
+    plain, stepped = without_steps(terraced(0.0)[0], lattice)
+    assert not stepped
+    assert np.std(plain - lattice) == pytest.approx(0.1, rel=0.1)
 
 
 def test_a_lattice_without_terraces_is_left_as_it_is() -> None:
