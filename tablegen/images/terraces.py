@@ -11,12 +11,11 @@ from tablegen.numerics.arrays import Floats, Ints
 _STEPPED_ROWS = 0.15  # share of the rows: fewer with a step may have it from a strong lattice
 _FEWEST_ROWS = 0.02  # the same of what the fitted lattice leaves: an edge along the rows has few, and fewer are specks
 _BESIDE = 6  # pixels on either side of a step, whose medians tell its height
-_LEAST_STEP = 6.0  # standard errors of the difference of two such medians
+_LEAST_STEP = 6.0  # times the usual difference of two such medians, by noise or by waves that were not fitted
 _LEAST_SHARE = 0.7  # times the rms of the periodic part: a superstructure of that contrast has been indexed
 _OUTLIER = 4.0  # standard deviations of the noise
 _POOLED_ROWS = 0.25  # of the frame on either side
 _ALIKE = 0.4  # of the size of a step: those of one terrace differ by less
-_MEDIAN_ERROR = 1.2533  # of a median over that of a mean
 
 
 def without_terraces(heights: Floats) -> Floats | None:
@@ -51,9 +50,7 @@ def without_steps(heights: Floats, periodic: Floats) -> tuple[Floats, bool]:
         Heights without steps and outliers, of the same shape and unit; and True if rows have steps.
     """
     remainder = _less_common_bow(heights - periodic)
-    noise = 1.4826 * float(np.median(np.abs(np.diff(remainder, axis=1)))) / np.sqrt(2.0)
-    least = max(_LEAST_STEP * noise * _MEDIAN_ERROR * np.sqrt(2.0 / _BESIDE), _LEAST_SHARE * float(np.std(periodic)))
-    rows, columns, sizes = _steps(remainder, least)
+    rows, columns, sizes = _steps(remainder, _LEAST_SHARE * float(np.std(periodic)))
     for row, column, size in zip(rows, columns, _pooled(rows, sizes, len(remainder)), strict=True):
         remainder[row, column:] -= size
     place = np.linspace(-1.0, 1.0, remainder.shape[1])
@@ -84,7 +81,8 @@ def _steps(remainder: Floats, least: float) -> tuple[Ints, Ints, Floats]:
     sharp, size = np.zeros(remainder.shape), np.zeros(remainder.shape)
     sharp[inner] = np.abs(means[:, _BESIDE:] - means[:, :-_BESIDE])  # their peak is sharper than that of medians
     size[inner] = medians[:, _BESIDE:] - medians[:, :-_BESIDE]
-    at = np.abs(size) > least
+    usual = 1.4826 * float(np.median(np.abs(size[inner])))
+    at = np.abs(size) > max(least, _LEAST_STEP * usual)
     for shift in range(1, _BESIDE + 1):  # the largest of its neighbourhood
         at[:, shift:] &= sharp[:, shift:] >= sharp[:, :-shift]
         at[:, :-shift] &= sharp[:, :-shift] > sharp[:, shift:]

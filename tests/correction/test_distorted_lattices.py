@@ -10,9 +10,6 @@ from lattice_images import three_sites
 from tablegen.base.input_errors import Unphysical
 from tablegen.images.terraces import without_steps, without_terraces
 
-STRAIN = 0.5  # percent: largest error of a side of the cell
-PIXEL = 100.0 / 128.0  # percent of the width: largest error of a displacement
-
 
 def accepted_and_wrong(seeds: Iterable[int], known: Knowledge) -> tuple[int, list[int]]:
     """How many images are corrected, and the seeds of those with another cell, or with a pixel at a wrong place."""
@@ -24,8 +21,7 @@ def accepted_and_wrong(seeds: Iterable[int], known: Knowledge) -> tuple[int, lis
         except Unphysical:
             continue
         accepted += 1
-        off = deviation(distortion, lattice, known)
-        if off.strain > STRAIN or off.displacement > PIXEL:
+        if deviation(distortion, lattice, known).wrong:
             wrong.append(seed)
     return accepted, wrong
 

@@ -119,21 +119,30 @@ def corrected(lattice: DistortedLattice, known: Knowledge) -> Distortion:
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a correction is off: the strain of the cell, and of a pixel from the best cell, in percent of the width.
+    """How far a correction is off: the strain of the cell, and a pixel from the best cell, in percent of the width.
 
-    Without a constant the strain is 0: the frame may then be any affine picture of the sample.
+    ``displacement`` is that within all but the outermost twentieths of rows and columns, ``outermost`` that of any
+    pixel. Without a constant the strain is 0: the frame may then be any affine picture of the sample.
     """
 
     strain: float
     displacement: float
+    outermost: float
+
+    @property
+    def wrong(self) -> bool:
+        """True if a side is off by 0.5 %, or a pixel by one of 128, or by two at the edge."""
+        return self.strain > 0.5 or self.displacement > 100.0 / 128.0 or self.outermost > 200.0 / 128.0
 
 
 def deviation(distortion: Distortion, lattice: DistortedLattice, known: Knowledge) -> Deviation:
     """Compare the places of all pixels in the corrected picture with those on the sample."""
-    places, truths = [], []
+    places, truths, inner = [], [], []
     for forward, image in ((True, lattice.frame.trace), (False, lattice.frame.retrace)):
         row, column, inside = distortion.sources(forward)
         inside &= (row > 0) & (row < distortion.rows - 1) & (column > 0) & (column < distortion.columns - 1)
+        inner.append((np.abs(row / distortion.rows - 0.5) < 0.45) & (np.abs(column / distortion.columns - 0.5) < 0.45))
+        inner[-1] = inner[-1][inside]
         x, y = np.meshgrid(*distortion.grid)
         places.append(np.stack([np.ones(np.sum(inside)), x[inside], y[inside]], axis=1))
         true = (image.x_nm + image.drift_nm[0], image.y_nm + image.drift_nm[1])
@@ -142,7 +151,8 @@ def deviation(distortion: Distortion, lattice: DistortedLattice, known: Knowledg
     plane = np.linalg.lstsq(place, truth, rcond=None)[0]
     error = np.abs(truth - place @ plane) / np.ptp(truth, axis=0)
     strain = float(np.max(np.abs(np.linalg.svd(plane[1:], compute_uv=False) - 1.0))) if "constant" in known else 0.0
-    return Deviation(100.0 * strain, 100.0 * float(np.max(error)))
+    inside = error[np.concatenate(inner)]
+    return Deviation(100.0 * strain, 100.0 * float(np.max(inside)), 100.0 * float(np.max(error)))
 
 
 def without_period(seed: int) -> Images:
