@@ -18,7 +18,7 @@ from tablegen.emit.write import write_files
 from tablegen.numerics.arrays import Floats
 
 _AXIS = ("size_v", "size_nm", "offset_v", "turn", "window")
-_CHOICE = ("channel", "retrace_channel", "retrace_mirrored", "frame")
+_CHOICE = ("channel", "retrace_channel", "retrace_mirrored", "frame", "frames")
 _REST = ("rate_hz", "lines", "delay_pixels")
 _BACK = "slow_back"
 
@@ -52,7 +52,8 @@ def correct(
     **how : optional
         ``size_v`` in V peak to peak at the piezo or ``size_nm``, ``offset_v``, ``turn``, ``window`` of the fast axis,
         the same with ``slow_`` of the slow one; ``rate_hz``, ``lines``, ``slow_back``, ``delay_pixels``; of files
-        ``channel``, ``retrace_channel``, ``retrace_mirrored``, ``frame``.
+        ``channel``, ``retrace_channel``, ``retrace_mirrored``, ``frame``, or ``frames``: the first one and the one
+        after the last, whose mean is corrected.
 
     Returns
     -------

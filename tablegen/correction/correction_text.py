@@ -95,6 +95,9 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
         text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
         notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
     notes += _by_file(scan)
+    if straight := scan.record.get("not_displaced"):
+        text = f"the displacement along {' and '.join(straight)} is within its errors; it was not applied"
+        notes.append(Finding("note", 0.0, text))
     first, last = scan.distortion.left_out
     rows, columns = images.shape
     if first or last:

@@ -241,7 +241,7 @@ def check_straight_cell(
     Parameters
     ----------
     fit
-        The fit; one that began without the indexer is not checked.
+        The fit; a grating, which has no cell, is not checked.
     pictures
         Straight trace, and retrace if there is one, shape (rows, columns) each; NaN where nothing was imaged.
     size_nm, constant_nm, kind
@@ -252,10 +252,15 @@ def check_straight_cell(
     Raises
     ------
     Unphysical
-        If it has another cell, or none.
+        If it has another cell, or none, or several cells explained the recorded image.
     """
-    if not fit.indexed:
+    if not fit.tells_y:
         return
+    if fit.several_cells:
+        raise Unphysical(
+            f"{fit.several_cells.partition('; ')[0]}; image more periods with less noise, give --lattice-nm with a "
+            f"file that has its size, or correct with --scanner"
+        )
     rows, columns = pictures[0].shape
     imaged = _imaged_rectangle(np.isfinite(np.sum(pictures, axis=0)))
     picture = np.mean(pictures, axis=0)[imaged]

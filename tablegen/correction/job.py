@@ -18,6 +18,7 @@ from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
+from tablegen.images.frame_registration import registered
 from tablegen.images.measured_cell import IDEAL_ANGLES
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.images.scan_angle import is_turned
@@ -80,6 +81,7 @@ class Choice:
     retrace_channel: str | None = None
     retrace_mirrored: bool = False
     frame: int | None = None
+    frames: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +89,8 @@ class Images:
     """All channels of a scan.
 
     ``reference`` are the numbers of the channels that are fitted and compared, trace first; ``left_out`` are channels
-    that cannot be read, with the reason.
+    that cannot be read, with the reason. ``frames`` are the first one of a movie and the one after the last, of which
+    the channels are the means.
     """
 
     channels: tuple[ScanImage, ...]
@@ -95,6 +98,7 @@ class Images:
     reference: tuple[int, ...]
     left_out: tuple[str, ...]
     mirrored: bool
+    frames: tuple[int, int] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -159,7 +163,9 @@ def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
     left_out: list[str] = []
     for path, forward in ((trace, True), (retrace, False)):
         if path is not None:
-            readable, without = _channels(path, choice.frame)
+            readable, without = (
+                _channels(path, choice.frame) if choice.frames is None else (_mean_channels(path, choice.frames), [])
+            )
             groups.append((readable, forward))
             left_out += without
     channels = [one for group, _ in groups for one in group]
@@ -173,7 +179,7 @@ def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
         if one.heights.shape != shape:
             sizes = " and ".join(f"{rows} x {columns}" for rows, columns in (shape, one.heights.shape))
             raise Rejected([Problem(one.file, 0, "", f"has {sizes} pixels; all channels must be of one scan")])
-    return Images(tuple(channels), tuple(ways), reference, tuple(left_out), choice.retrace_mirrored)
+    return Images(tuple(channels), tuple(ways), reference, tuple(left_out), choice.retrace_mirrored, choice.frames)
 
 
 def _channels(path: Path, frame: int | None) -> tuple[list[ScanImage], list[str]]:
@@ -192,6 +198,20 @@ def _channels(path: Path, frame: int | None) -> tuple[list[ScanImage], list[str]
         if not readable:
             raise rejected from None
         return readable, without
+
+
+def _mean_channels(path: Path, frames: tuple[int, int]) -> list[ScanImage]:
+    """Return the mean of the frames of each channel of a movie, registered by those of the first channel."""
+    first, stop = frames
+    if not 0 <= first < stop:
+        why = f"{first}:{stop} is empty; give the first frame, and the one after the last"
+        raise Rejected([Problem(str(path), 0, "frames", why)])
+    movie = [read_channels(path, number) for number in range(first, stop)]
+    shifts = registered([channels[0].heights for channels in movie]).shifts
+    return [
+        replace(frames_of_one[0], heights=registered([one.heights for one in frames_of_one], shifts, 0.0).mean)
+        for frames_of_one in zip(*movie, strict=True)
+    ]
 
 
 def _check_exchange(groups: Sequence[tuple[list[ScanImage], bool]]) -> None:
@@ -447,12 +467,15 @@ def by_fit(
         "explained": round(fit.explained, 6),
         "slow_axis": "fitted" if fit.tells_y else "as taken: a grating does not tell it",
     }
+    if fit.straight_axes:
+        record["not_displaced"] = list(fit.straight_axes)
     if retrace_alone:
         distortion = distortion.mirrored()
         record["retrace_alone"] = True
     scan = _corrected(images, distortion, size, record)
     check_moves(distortion)
-    check_cell(fit, trace if retrace_alone else images.heights(images.reference[0]), True)
+    heights = trace if retrace_alone else images.heights(images.reference[0])
+    check_cell(fit, heights if fit.stepless is None else fit.stepless, True)
     check_agreement(scan.agreement)
     pictures = [scan.pictures[i].heights for i in images.reference]
     check_straight_cell(fit, pictures, size, lattice_nm, kind or "hexagonal", expected is not None)
@@ -499,6 +522,8 @@ def _corrected(
     else:
         check_heights("image", heights[0])
     check_order(images, distortion)
+    if images.frames is not None:
+        record["frames"] = list(images.frames)
     if images.left_out:
         record["left_out"] = list(images.left_out)
     return corrected_scan(images.pictures, distortion, size, images.reference, record)

@@ -14,11 +14,13 @@ from scipy.ndimage import gaussian_filter1d
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
+from tablegen.correction.support import supported
 from tablegen.images.cell_start import cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
 from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
+from tablegen.images.terraces import without_steps, without_terraces
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
@@ -30,6 +32,7 @@ _AVERAGED = 0.45  # of a period against another wave: the standard deviation of 
 _ROW_BENDS = 20  # terms for the residual of the phase polynomial in the rows
 _FOLLOWING = 0.5  # share of the change of a phase step that the next guess follows
 _ROUNDS = 40
+_STEP_ROUNDS = 2  # fits to images without the steps that the fit before left
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
@@ -45,6 +48,9 @@ class PeriodicScan:
     per line and per frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
     true if y is that of the sample and not of the rows. ``indexed`` is true if the cell is that of the indexer, and not
     of the strongest spots. The strong spots alone are those of a cell with the area divided by ``strong_index``.
+    ``stepless`` is the first image without the steps of terraces, None where it has none. ``several_cells`` is the
+    indexer's reason where several cells explain the image. Displacements along ``straight_axes`` are within their
+    errors, and left out.
     """
 
     distortion: Distortion
@@ -53,6 +59,9 @@ class PeriodicScan:
     tells_y: bool
     indexed: bool = False
     strong_index: int = 1
+    stepless: Floats | None = None
+    several_cells: str = ""
+    straight_axes: str = ""
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
         """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
@@ -148,15 +157,59 @@ def periodic_scan(
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
-    cell = cell_of(trace, retrace, expected_area)
+    cell, several = cell_of(trace, retrace, expected_area)
+    scaled, stepped = list[Floats](), False
     if cell is None:
-        spot, bends = begin(geometry, heights, retrace_mirrored)
-        model, state, free = fit_spots(geometry, heights, spot, bends)
+        try:
+            spot, bends = begin(geometry, heights, retrace_mirrored)
+            model, state, free = fit_spots(geometry, heights, spot, bends)
+            check_fit(model, state, free)
+        except Unphysical:
+            if several is not None:
+                raise several from None
+            raise
     else:
+        recorded = [image for image in (trace, retrace) if image is not None]
+        level = [without_terraces(image) for image in recorded]
+        if any(image is not None for image in level):
+            levelled = [image if one is None else one for one, image in zip(level, recorded, strict=True)]
+        else:
+            levelled = recorded
+        heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in levelled]
+        heights, scaled = _unit(heights, heights), _unit(recorded, heights)
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
+        for _ in range(_STEP_ROUNDS):
+            without, stepped = _stepless(model, state, scaled)
+            if not stepped:
+                break
+            heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in without]
+            model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
-    return replace(_scan(model, state), indexed=cell is not None, strong_index=strong_index(model, state))
+    scan = _scan(model, state)
+    distortion, straight = supported(scan.distortion, model, state, scan.tells_y)
+    return replace(
+        scan,
+        distortion=distortion,
+        straight_axes=straight,
+        indexed=cell is not None,
+        several_cells="" if several is None else str(several),
+        strong_index=strong_index(model, state),
+        stepless=_stepless(model, state, scaled)[0][0] if stepped else None,
+    )
+
+
+def _unit(images: list[Floats], level: list[Floats]) -> list[Floats]:
+    """Divide images by the rms of levelled ones."""
+    spread = float(np.sqrt(np.mean([np.var(image) for image in level])))
+    return [image / spread for image in images]
+
+
+def _stepless(model: PeriodicModel, state: FitState, recorded: list[Floats]) -> tuple[list[Floats], bool]:
+    """Return the recorded images without the steps that a fit leaves, and True if one has steps."""
+    pairs = zip(recorded, model.periodic_parts(state), strict=True)
+    images, stepped = zip(*(without_steps(image, part) for image, part in pairs), strict=True)
+    return list(images), any(stepped)
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:

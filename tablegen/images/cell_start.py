@@ -17,8 +17,10 @@ _SAME_AREA = 0.75, 1.35  # ratios of the areas of one cell in two fits: hysteres
 _STRONG = 0.7  # of the largest amplitude
 
 
-def cell_of(trace: Floats, retrace: Floats | None, expected_area: float | None = None) -> ImageCell | None:
-    """Return the cell of the trace; None where the image has no two-dimensional lattice that the indexer finds.
+def cell_of(
+    trace: Floats, retrace: Floats | None, expected_area: float | None = None
+) -> tuple[ImageCell | None, AmbiguousCell | None]:
+    """Return the cell of the trace, None where the indexer finds none; and the reason where it finds several.
 
     Parameters
     ----------
@@ -28,9 +30,11 @@ def cell_of(trace: Floats, retrace: Floats | None, expected_area: float | None =
         Area of the sample's cell in square pixels by the size in the file.
     """
     try:
-        return find_cell(trace, retrace, expected_area)
+        return find_cell(trace, retrace, expected_area), None
+    except AmbiguousCell as reason:
+        return None, reason
     except Unphysical:
-        return None
+        return None, None
 
 
 def fit_sample_spots(

@@ -20,14 +20,30 @@ class RegisteredFrames:
     shifts: Floats
 
 
-def registered(frames: Sequence[Floats]) -> RegisteredFrames:
+def registered(
+    frames: Sequence[Floats], shifts: Floats | None = None, least_frames: float = _LEAST_FRAMES
+) -> RegisteredFrames:
     """Shift frames onto the first one, by whole pixels, and average them.
 
     Parameters
     ----------
     frames
         Heights, shape (rows, columns) each.
+    shifts
+        Shifts of another channel of the same frames, shape (frames, 2); by default they are found.
+    least_frames
+        Share of the frames that have to have a pixel; with 0 the first frame, which has all, makes it complete.
     """
+    shifts = _shifts(frames) if shifts is None else shifts
+    padded = [_moved(frame, shift) for frame, shift in zip(frames, shifts, strict=True)]
+    stack = np.array(padded)
+    count = np.sum(np.isfinite(stack), axis=0)
+    mean = np.sum(np.where(np.isfinite(stack), stack, 0.0), axis=0) / np.maximum(count, 1)
+    return RegisteredFrames(np.where(count >= least_frames * len(frames), mean, np.nan), shifts)
+
+
+def _shifts(frames: Sequence[Floats]) -> Floats:
+    """Return the shift of each frame against the first one, in whole pixels, shape (frames, 2)."""
     spectra = [_spectrum(frame) for frame in frames]
     shape = frames[0].shape
     shifts = np.zeros((len(frames), 2))
@@ -35,11 +51,7 @@ def registered(frames: Sequence[Floats]) -> RegisteredFrames:
     for number in range(1, len(frames)):
         shifts[number] = _shift(total, spectra[number], shape, shifts[number - 1])
         total += spectra[number] * _turn(shape, shifts[number])
-    padded = [_moved(frame, shift) for frame, shift in zip(frames, shifts, strict=True)]
-    stack = np.array(padded)
-    count = np.sum(np.isfinite(stack), axis=0)
-    mean = np.sum(np.where(np.isfinite(stack), stack, 0.0), axis=0) / np.maximum(count, 1)
-    return RegisteredFrames(np.where(count >= _LEAST_FRAMES * len(frames), mean, np.nan), shifts)
+    return shifts
 
 
 def _spectrum(frame: Floats) -> Complexes:

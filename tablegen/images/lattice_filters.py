@@ -4,11 +4,13 @@ The plain filter keeps all that is periodic. The slopes along the rows are the s
 leaves a few extreme slopes there, which are clipped.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from tablegen.numerics.arrays import Bools, Floats
+from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _CLIPPED = 1.0  # percent of the heights at either end
 _SLOPE_LIMIT = 3.0  # times the usual slope: the edge of a terrace has more
@@ -93,6 +95,27 @@ def without_holes(heights: Floats) -> Floats:
     return whole
 
 
+def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
+    """Find the edges of terraces along the rows of an image.
+
+    Parameters
+    ----------
+    heights
+        Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
+
+    Returns
+    -------
+    tuple
+        Levelled heights, shape (rows, columns); then of each edge its row, the first column after it, and the step
+        there, shape (edges,) each.
+    """
+    valid = _valid(heights)
+    level = _rows_levelled(np.where(valid, heights, 0.0), valid)
+    edges = [(row, end, step) for row, ends in _parts(level, valid) for end, step in ends]
+    rows, columns, steps = zip(*edges, strict=True) if edges else ((), (), ())
+    return level, np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), np.array(steps, dtype=np.float64)
+
+
 def _valid(heights: Floats) -> Bools:
     """Return True for finite pixels of rows with contrast: a scan that was stopped leaves flat rows."""
     valid = np.isfinite(heights)
@@ -115,22 +138,31 @@ def _rows_levelled(heights: Floats, valid: Bools) -> Floats:
 
 def _terraces_levelled(level: Floats, valid: Bools) -> Floats:
     """Subtract the median of each part of a row between the edges of terraces."""
-    steps, inside = _steps(level, valid)
-    edges = inside & (np.abs(steps) > _EDGE * _slope_limit(steps, inside))
     result = level.copy()
-    for row in np.flatnonzero(edges.any(axis=1)):
-        ends = [0]
-        for end in (np.flatnonzero(edges[row]) + 1).tolist():
-            before, after = level[row, max(end - _BESIDE, 0) : end], level[row, end : end + _BESIDE]
-            step = float(np.median(after) - np.median(before))
-            if abs(step) > _STEP_SHARE * abs(steps[row, end - 1]) and end - ends[-1] >= _LEAST_TERRACE:
-                ends.append(end)
-        for first, stop in zip(ends, [*ends[1:], level.shape[1]], strict=True):
+    for row, edges in _parts(level, valid):
+        ends = [0, *(end for end, _ in edges), level.shape[1]]
+        for first, stop in pairwise(ends):
             there = valid[row, first:stop]
-            if len(ends) > 1 and there.any():
+            if there.any():
                 part = level[row, first:stop]
                 result[row, first:stop] = np.where(there, part - np.median(part[there]), 0.0)
     return result
+
+
+def _parts(level: Floats, valid: Bools) -> Iterator[tuple[int, list[tuple[int, float]]]]:
+    """Yield each row with edges of terraces: the first pixel after each edge, and the step there."""
+    steps, inside = _steps(level, valid)
+    edges = inside & (np.abs(steps) > _EDGE * _slope_limit(steps, inside))
+    for row in np.flatnonzero(edges.any(axis=1)).tolist():
+        ends: list[tuple[int, float]] = []
+        for end in (np.flatnonzero(edges[row]) + 1).tolist():
+            before, after = level[row, max(end - _BESIDE, 0) : end], level[row, end : end + _BESIDE]
+            step = float(np.median(after) - np.median(before))
+            last = ends[-1][0] if ends else 0
+            if abs(step) > _STEP_SHARE * abs(steps[row, end - 1]) and end - last >= _LEAST_TERRACE:
+                ends.append((end, step))
+        if ends:
+            yield row, ends
 
 
 def _steps(level: Floats, valid: Bools) -> tuple[Floats, Bools]:

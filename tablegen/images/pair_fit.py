@@ -106,10 +106,11 @@ def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
         1.0 - float(np.mean(residual**2)) / float(np.mean(image**2)) for (_, image), residual in _both(model, state)
     ]
     if min(shares) < _MIN_EXPLAINED_VARIANCE:
-        name = "trace" if shares[0] < shares[1] else "retrace"
+        name = ("trace", "retrace")[int(np.argmin(shares))]
+        other = ", or trace and retrace are not of one scan" if len(shares) > 1 else ""
         raise Unphysical(
             f"{100.0 * max(min(shares), 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is "
-            f"something else, or trace and retrace are not of one scan"
+            f"something else{other}; crop the image to one terrace without debris, or choose another --channel"
         )
     first = float(model.q(state.parameters)[0])
     if max(_carrying(model, state), first) < MIN_PERIODS - 0.2:

@@ -291,6 +291,24 @@ class PeriodicModel:
         spots = [tuple(spot) for spot in self.spots.tolist()]
         return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
 
+    def with_images(self, images: Sequence[tuple[bool, Floats]]) -> "PeriodicModel":
+        """Return the same model of other images, of the same directions and shape."""
+        spots = [tuple(spot) for spot in self.spots.tolist()]
+        return PeriodicModel(self.geometry, images, spots, self.order, self.off, self.ripples, self.row_off)
+
+    def periodic_parts(self, state: FitState) -> list[Floats]:
+        """Return the periodic part of each image without levelling.
+
+        Returns
+        -------
+        list of Floats
+            In heights, shape (rows, columns) each.
+        """
+        rows = self._rows(state.parameters)[0]
+        return [
+            np.real((rows.T * state.amplitudes) @ self._waves(state.parameters, forward)) for forward, _ in self.images
+        ]
+
     def row_waves(self, state: FitState, spots: Ints) -> Complexes:
         """Return each spot's wave in each row of both images; its phase is the error of the polynomials.
 
@@ -366,12 +384,19 @@ class PeriodicModel:
         """Return each spot's levelled column part, times the factors of its derivatives: (parts, spots, columns)."""
         column = self.columns(parameters, forward)
         time = column.time / self.geometry.rows
-        along = self.q(parameters)[:, None] * column.x + float(parameters[LAG]) * self.s(parameters)[:, :1] * time
-        wave = np.exp(2j * pi * (self.spots @ along))
+        wave = self._waves(parameters, forward)
         ripples = self.ripples[0 if forward else 1]
         parts = np.stack([np.ones_like(time), column.x, *column.slopes, time, *ripples])
         levelled: Complexes = np.asarray(self.geometry.levelled(parts[:, None, :] * wave), dtype=np.complex128)
         return levelled
+
+    def _waves(self, parameters: Floats, forward: bool) -> Complexes:
+        """Return each spot's column part: (spots, columns)."""
+        column = self.columns(parameters, forward)
+        time = column.time / self.geometry.rows
+        along = self.q(parameters)[:, None] * column.x + float(parameters[LAG]) * self.s(parameters)[:, :1] * time
+        wave: Complexes = np.exp(2j * pi * (self.spots @ along))
+        return wave
 
     def _laid_out(self, rows: Complexes, columns: Complexes) -> tuple[Complexes, Complexes, tuple[Ints, Ints]]:
         """Return the parts as rows of two matrices, and the indices of each term: (1, each column part), (y^n, 1)."""

@@ -13,6 +13,8 @@ from tablegen.images.pair_checks import (
     check_periods,
     check_size,
 )
+from tablegen.images.pair_fit import check_fit
+from tablegen.images.periodic_model import BASES, LAG, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 
 
@@ -98,3 +100,14 @@ def test_a_mirrored_retrace_is_told_with_and_without_a_period(sample: Callable[[
     with pytest.raises(Unphysical, match="only when it is mirrored; turn it"):
         check_mirrored(trace, retrace[:, ::-1], "turn it")
     check_mirrored(trace, rough(4), "unused")  # another sample is another matter
+
+
+def test_a_trace_alone_that_is_not_periodic_is_refused_with_a_remedy() -> None:
+    geometry = Geometry(64, 64)
+    noise = np.asarray(geometry.levelled(np.random.default_rng(1).standard_normal((64, 64))), dtype=np.float64)
+    nowhere = np.zeros(64)
+    model = PeriodicModel(geometry, [(True, noise)], [(1,)], 3, (nowhere, nowhere))
+    start = np.zeros(BASES + 4)
+    start[[LAG, BASES]] = 1.0, 10.0
+    with pytest.raises(Unphysical, match=r"0 % of the trace's contrast is .* something else; crop the image to one"):
+        check_fit(model, model.at(start), np.ones(len(start), dtype=np.bool_))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from tablegen.cli.images.pairs import frames_option
 from tablegen.cli.shared.common import fail, finite, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
@@ -128,6 +129,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     help="The retrace is stored in order of time: its left pixel is the right end of the line.",
 )
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="Frame of a movie, from 0.")
+@frames_option
 @click.option("--each", is_flag=True, help="Correct each IMAGE by itself, into the directory -o.")
 @click.option(
     "--pairs",
@@ -213,6 +215,10 @@ def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:
         wrong = "--each and --pairs need a directory, -o DIRECTORY"
     elif several and options["plot"] is not None:
         wrong = "--plot is for one scan"
+    elif options["frames"] is not None and (
+        options["frame"] is not None or options["each"] or options["pairs"] or len(images) > 1
+    ):
+        wrong = "--frames is for one movie, without --frame, --each and --pairs"
     else:
         wrong = _wrong_way(options)
     for axis in ("", "slow_"):

@@ -1,12 +1,11 @@
 """``tablegen lattice``: find the lattice of an image."""
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tablegen.cli.images.pairs import channel_option, require_readers, retrace_channel_option
+from tablegen.cli.images.pairs import channel_option, frames_option, require_readers, retrace_channel_option
 from tablegen.cli.shared.common import fail, finite, quiet_blas
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
@@ -14,19 +13,6 @@ from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.api.lattice import ImageLattice
-
-
-class _Frames(click.ParamType["tuple[int, int]"]):
-    """The first frame of a movie and the one after the last, as A:B."""
-
-    name = "A:B"
-
-    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
-        """Return both numbers; a usage error shows the form."""
-        match = re.fullmatch(r"(\d{1,6}):(\d{1,6})", value) if isinstance(value, str) else None
-        if match is None or not int(match[1]) < int(match[2]):
-            self.fail(f"'{value}' is not A:B, such as 0:8 for the frames 0 to 7.", parameter, context)
-        return int(match[1]), int(match[2])
 
 
 @click.command(
@@ -57,7 +43,7 @@ Exit status: 0 done, 2 wrong input or no lattice, 4 cannot write, 6 a library is
 )
 @channel_option
 @retrace_channel_option
-@click.option("--frames", type=_Frames(), metavar="A:B", help="Frames A to B - 1 of a movie: registered and averaged.")
+@frames_option
 @plot_option("the image and its autocorrelation with the cell, and the spectrum with its spots")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def lattice(images: tuple[Path, ...], plot: Path | None, as_json: bool, **how: Any) -> int:

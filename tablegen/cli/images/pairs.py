@@ -1,7 +1,8 @@
 """Options of trace and retrace images: two files, or one that has both."""
 
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,6 +12,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 _PAIR = "--pair"
+
+
+class _Frames(click.ParamType["tuple[int, int]"]):
+    """The first frame of a movie and the one after the last, as A:B."""
+
+    name = "A:B"
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        """Return both numbers; a usage error shows the form."""
+        match = re.fullmatch(r"(\d{1,6}):(\d{1,6})", value) if isinstance(value, str) else None
+        if match is None or not int(match[1]) < int(match[2]):
+            self.fail(f"'{value}' is not A:B, such as 0:8 for the frames 0 to 7.", parameter, context)
+        return int(match[1]), int(match[2])
+
 
 pair_option = click.option(
     _PAIR,
@@ -35,6 +50,9 @@ retrace_channel_option = click.option(
 )
 frame_option = click.option(
     "--frame", type=click.IntRange(min=0), metavar="N", help="Image of a movie, counted from 0; for .asd files."
+)
+frames_option = click.option(
+    "--frames", type=_Frames(), metavar="A:B", help="Frames A to B - 1 of a movie: registered and averaged."
 )
 
 
