@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
-from tablegen.images.cell_start import cell_of, fit_cell_spots, strong_index
+from tablegen.images.cell_start import CellWaves, cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
@@ -153,7 +153,7 @@ def periodic_scan(
         spot, bends = begin(geometry, heights, retrace_mirrored)
         model, state, free = fit_spots(geometry, heights, spot, bends)
     else:
-        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
+        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, CellWaves.of(cell))
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
     return replace(_scan(model, state), indexed=cell is not None, strong_index=strong_index(model, state))
