@@ -49,7 +49,7 @@ class SampleCell:
 
 
 @dataclass(frozen=True, eq=False)
-class _Frame:
+class _FrameImages:
     """Both images of a frame, and what is known of its columns; see ``lattice_start``."""
 
     geometry: Geometry
@@ -101,7 +101,7 @@ def lattice_start(
     Unphysical
         If there is no period, not the same in both images, or several cells explain them.
     """
-    frame = _Frame(geometry, heights, modes, moves, advice)
+    frame = _FrameImages(geometry, heights, modes, moves, advice)
     if sample.cell is not None:
         return _started(frame, *_fit_cell(frame, sample.cell), sample.cell)
     try:
@@ -127,7 +127,7 @@ def lattice_start(
     return _started(frame, *fit, other)
 
 
-def _fit_cell(frame: _Frame, cell: CellWaves) -> tuple[_Begun, PeriodicModel, FitState]:
+def _fit_cell(frame: _FrameImages, cell: CellWaves) -> tuple[_Begun, PeriodicModel, FitState]:
     """Fit the visible spots of a cell."""
     spots, indices = two_spots(frame.geometry, cell)
     begun = _begun(frame, spots[0])
@@ -136,7 +136,7 @@ def _fit_cell(frame: _Frame, cell: CellWaves) -> tuple[_Begun, PeriodicModel, Fi
 
 
 def _started(
-    frame: _Frame, begun: _Begun, model: PeriodicModel, state: FitState, cell: CellWaves | None = None
+    frame: _FrameImages, begun: _Begun, model: PeriodicModel, state: FitState, cell: CellWaves | None = None
 ) -> LatticeStart:
     """Return the start of free rows from a fit with a polynomial in them."""
     x = state.parameters
@@ -145,7 +145,7 @@ def _started(
     return LatticeStart(model.spots, free_rows, begun.mismatch, model, state, cell)
 
 
-def _begun(frame: _Frame, spot: Spot) -> _Begun:
+def _begun(frame: _FrameImages, spot: Spot) -> _Begun:
     """Begin with a spot. Raise ``Unphysical`` if the retrace does not show it as the trace does."""
     geometry, heights, modes = frame.geometry, frame.heights, frame.modes
     forward, backward, turned = (
