@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.correction.support import supported
-from tablegen.images.cell_start import cell_of, fit_cell_spots, strong_index
+from tablegen.images.cell_start import CellWaves, cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
@@ -169,6 +169,7 @@ def periodic_scan(
                 raise several from None
             raise
     else:
+        waves = CellWaves.of(cell)
         recorded = [image for image in (trace, retrace) if image is not None]
         level = [without_terraces(image) for image in recorded]
         if any(image is not None for image in level):
@@ -177,13 +178,13 @@ def periodic_scan(
             levelled = recorded
         heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in levelled]
         heights, scaled = _unit(heights, heights), _unit(recorded, heights)
-        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
+        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
         for _ in range(_STEP_ROUNDS):
             without, stepped = _stepless(model, state, scaled)
             if not stepped:
                 break
             heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in without]
-            model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, cell)
+            model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
     scan = _scan(model, state)

@@ -56,7 +56,20 @@ _LEAST_LEVEL = 0.04  # of the variance, at the lattice points
 
 
 class AmbiguousCell(Unphysical):
-    """Several cells explain an image."""
+    """Several cells explain an image; ``cells`` in pixels, shape (2, 2) each, of the significant ``spots``."""
+
+    def __init__(self, cells: list[Floats], spots: Spots, extent: Floats, reason: str) -> None:
+        super().__init__(ambiguous(cells, spots, extent, reason))
+        self.cells, self.spots = cells, spots
+
+    def common_cell(self) -> Floats | None:
+        """Return the cell that has the waves of all the others; None if there is none."""
+        largest = max(self.cells, key=area)
+        for cell in self.cells:
+            change = largest @ np.linalg.inv(cell)
+            if np.max(np.abs(change - np.round(change))) > _SAME_CELL:
+                return None
+        return largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +273,7 @@ def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Flo
     if sure is None:
         raise Unphysical(_why_none(cells, strong))
     if all_of_them is not None and not same_lattice(sure, all_of_them):
-        raise AmbiguousCell(ambiguous([sure, all_of_them], every, extent, "weak spots are at the waves of one alone"))
+        raise AmbiguousCell([sure, all_of_them], every, extent, "weak spots are at the waves of one alone")
     if all_of_them is None:
         explained, informative = explained_spots(sure, every)
         waves = every.waves[informative & ~explained]
@@ -295,7 +308,7 @@ def _check_deciding(vectors: Floats, spots: Spots, views: list[_View]) -> None:
                 other = vectors[1] if u else vectors[0]
                 smaller = np.array([np.array([u, v]) @ vectors / part, other])
                 reason = "one spot alone tells them apart"
-                raise AmbiguousCell(ambiguous([vectors, smaller], spots, _extent(views[0]), reason))
+                raise AmbiguousCell([vectors, smaller], spots, _extent(views[0]), reason)
 
 
 def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
@@ -316,7 +329,7 @@ def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Flo
             larger = _supercell(vectors, waves)
             cells = [vectors] if larger is None else [vectors, larger]
             reason = "a weak spot is at a fraction of the smaller cell's waves"
-            raise AmbiguousCell(ambiguous(cells, spots, _extent(views[0]), reason))
+            raise AmbiguousCell(cells, spots, _extent(views[0]), reason)
 
 
 def _supercell(vectors: Floats, waves: Floats) -> Floats | None:
@@ -523,7 +536,7 @@ def _check_sublattice(vectors: Floats, waves: Floats, spots: Spots, extent: Floa
         parts = numbers @ np.linalg.inv(basis)
         if np.allclose(parts, np.round(parts), atol=1e-6):
             cells.append(np.linalg.inv(basis).T @ vectors)
-    raise AmbiguousCell(ambiguous(cells, spots, extent, f"all spots are those of 1/{index} of the area too"))
+    raise AmbiguousCell(cells, spots, extent, f"all spots are those of 1/{index} of the area too")
 
 
 def same_lattice(one: Floats, other: Floats) -> bool:

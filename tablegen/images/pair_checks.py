@@ -27,6 +27,10 @@ _MIRRORED = 1.5, 0.25  # ratio to the straight match, and least correlation, of 
 _LEAST_POWER = 1e-12  # of unit variance: what has less is a constant
 
 
+class FinePeriods(Unphysical):
+    """Periods finer than the columns resolve: no other cell of the sample is searched for them."""
+
+
 def check_pair(trace: Floats, retrace: Floats) -> None:
     """Check that two images can be of one scan: they have one shape, and are not the same image.
 
@@ -123,11 +127,13 @@ def check_periods(periods: float, span: float, columns: int) -> None:
 
     Raises
     ------
+    FinePeriods
+        If they are finer than the columns resolve.
     Unphysical
-        If they are too few to fit, or finer than the columns resolve.
+        If they are too few to fit.
     """
     if periods * span > MAX_PERIODS_PER_COLUMN * columns:
-        raise Unphysical(f"{periods:.3g} periods in {columns} columns are too fine; scan less, or take more pixels")
+        raise FinePeriods(f"{periods:.3g} periods in {columns} columns are too fine; scan less, or take more pixels")
     if periods < MIN_PERIODS - 0.2:
         raise Unphysical(
             f"the line has about {periods:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them"

@@ -10,7 +10,8 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Curve, Estimate
 from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measured_branch
-from tablegen.images.model_start import begin, check_signs, fit_spots, prepare_heights
+from tablegen.images.cell_start import fit_sample_spots
+from tablegen.images.model_start import check_signs, prepare_heights
 from tablegen.images.pair_checks import MIN_PERIODS
 from tablegen.images.periodic_model import FitState, PeriodicModel
 from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
@@ -74,11 +75,10 @@ def fit_pair(
     Unphysical
         If the images do not support the fit.
     """
-    geometry, heights = prepare_heights(
-        trace, np.ascontiguousarray(retrace[:, ::-1]) if retrace_mirrored else retrace, turn, window, delay_pixels
-    )
-    spot, bends = begin(geometry, heights, retrace_mirrored)
-    model, state, free = fit_spots(geometry, heights, spot, bends)
+    if retrace_mirrored:
+        retrace = np.ascontiguousarray(retrace[:, ::-1])
+    geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
+    model, state, free, _ = fit_sample_spots(geometry, heights, retrace_mirrored, trace, retrace, sizes=False)
     check_fit(model, state, free)
     return _result(model, state, free, v_scan)
 

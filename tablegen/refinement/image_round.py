@@ -11,11 +11,13 @@ from tablegen.base.warnings import Remark, spoils
 from tablegen.calibration.laws.image_sizes import KnownSample
 from tablegen.config.load import Setup
 from tablegen.fitting.estimate import Estimate, LineSize
-from tablegen.images.line_length import size_of_line
+from tablegen.images.cell_vectors import area
+from tablegen.images.line_length import Cell, size_of_line
 from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
+from tablegen.refinement.lattice_start import SampleCell
 from tablegen.refinement.learning import LayerUpdate, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
 from tablegen.refinement.round import (
@@ -53,7 +55,7 @@ class ImageRound(Round):
     @property
     def periods(self) -> float:
         """Periods in the whole line of x, of the wave that has most."""
-        return float(np.max(np.abs(self.frames[0].fit.state.q)))
+        return self.frames[0].periods
 
     @property
     def recorded(self) -> str:
@@ -89,7 +91,7 @@ def refine_images(
     plan = make_plan(setup)
     line: LinePlan = getattr(plan, axis)
     limits = learning_bound(line, options)
-    frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
+    frames = _frames(plan, pairs, images or ImageOptions(), sample)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     size = None if sample is None else _size(plan, frames, sample)
     update = learn(line, measured, options.gain, limits.used)
@@ -110,11 +112,29 @@ def refine_images(
     )
 
 
-def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> LatticeLine:
-    _check_shape(plan, trace)
-    line = lattice_line(plan, trace, retrace, images)
-    _check(line)
-    return line
+def _frames(
+    plan: Plan, pairs: Sequence[tuple[Floats, Floats]], images: ImageOptions, sample: KnownSample | None
+) -> tuple[LatticeLine, ...]:
+    """Fit each frame; all of them begin with the cell with which the first one begins."""
+    known = SampleCell()
+    if sample is not None and sample.cell is not None:
+        known = SampleCell(True, _expected_area(plan, sample.cell))
+    frames: list[LatticeLine] = []
+    for trace, retrace in pairs:
+        _check_shape(plan, trace)
+        line = lattice_line(plan, trace, retrace, images, known)
+        _check(line)
+        frames.append(line)
+        known = replace(known, cell=frames[0].start.cell)
+    return tuple(frames)
+
+
+def _expected_area(plan: Plan, cell: Cell) -> float:
+    """Return the area of the sample's cell in square pixels, by the sizes of the scan file."""
+    shares = [line.band_limit.window[1] - line.band_limit.window[0] for line in (plan.x, plan.y)]
+    column_nm = plan.x.drive.size_nm * shares[0] / plan.schedule.pixels
+    row_nm = plan.y.drive.size_nm * shares[1] / max(plan.schedule.up.count, 1)
+    return area(cell.vectors) / (column_nm * row_nm)
 
 
 def _check_shape(plan: Plan, trace: Floats) -> None:
@@ -216,7 +236,7 @@ def _remarks_of(frame: LatticeLine) -> list[Remark]:
         remarks.append(
             Remark(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
         )
-    span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
+    span = (geometry.window[1] - geometry.window[0]) * frame.periods
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
         remarks.append(
             Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")

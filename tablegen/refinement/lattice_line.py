@@ -13,13 +13,14 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
 from tablegen.refinement.departure import requested_position
 from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
-from tablegen.refinement.lattice_start import START_DEGREE, LatticeStart, lattice_start
+from tablegen.refinement.lattice_start import START_DEGREE, LatticeStart, SampleCell, lattice_start
 from tablegen.refinement.window_line import WindowLine, error_modes
 
 _DEGREES_A_PERIOD = 1.5  # of a grating, which shows the position only at the edges of its bars
 _MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
 _LEAST_DEGREES = 4
 _FAR_APART = 0.5  # periods
+_STRONG = 0.5  # of the largest amplitude
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,13 @@ class LatticeLine:
 
     @property
     def indexed(self) -> bool:
-        """False: the base waves are those of the strongest spots."""
-        return False
+        """True if the base waves are those of the indexer's cell, since the strongest spots are another one's."""
+        return self.start.cell is not None
+
+    @property
+    def periods(self) -> float:
+        """Periods in the line from turn to turn of the base wave that has most; of an indexed cell, strong wave."""
+        return float(np.max(np.abs(_ruling_waves(self.start, self.fit.state.q))))
 
     @property
     def amplitudes(self) -> Floats:
@@ -95,13 +101,17 @@ class LatticeLine:
         return matrix
 
 
-def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
+def lattice_line(
+    plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions, sample: SampleCell | None = None
+) -> LatticeLine:
     """Fit x to a pair of images.
 
     Parameters
     ----------
     trace, retrace
         Heights in any unit, shape (rows, columns), rows in the order of time, the left end first.
+    sample
+        What is known of the sample's cell.
 
     Raises
     ------
@@ -116,9 +126,9 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     moves = plan.y.program.hold == 1
     modes = column_modes(plan, geometry, START_DEGREE)
     advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
-    start = lattice_start(geometry, heights, modes, moves, advice)
+    start = lattice_start(geometry, heights, modes, moves, advice, (trace, retrace), sample or SampleCell())
     waves = len(start.state.q)
-    most = float(np.max(np.abs(start.state.q)))
+    most = float(np.max(np.abs(_ruling_waves(start, start.state.q))))
     check_periods(most, window[1] - window[0], geometry.columns)
     if start.mismatch > _FAR_APART:
         raise Unphysical(
@@ -138,6 +148,14 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
         requested, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
     )
     return LatticeLine(geometry, model, fit, window_line, start)
+
+
+def _ruling_waves(start: LatticeStart, q: Floats) -> Floats:
+    """Return the periods in the line of the base waves, or of the strong waves of an indexed cell."""
+    if start.cell is None:
+        return q
+    amplitudes = np.abs(start.state.amplitudes)
+    return np.asarray(start.spots[amplitudes > _STRONG * np.max(amplitudes)] @ q, dtype=np.float64)
 
 
 def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:

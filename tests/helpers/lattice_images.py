@@ -1,8 +1,11 @@
 """Images with and without a lattice, from physics: three sites a cell, terraces, rows that jump, drift, noise."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
+from tablegen.virtual.imaging import Surface
 
 _SITES = np.array([[0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0], [2.0 / 3.0, 2.0 / 3.0]])
 
@@ -36,6 +39,57 @@ def three_sites(seed: int, size: int = 128) -> tuple[Floats, Floats]:
     if rng.random() < 0.5:
         heights += rng.uniform(0.2, 1.0) * rng.normal(size=(size, 1))
     return heights + noise * rng.normal(size=heights.shape) + 0.01 * x - 0.01 * y, cell
+
+
+@dataclass(frozen=True, eq=False)
+class SitesOnTerrace:
+    """A sample for ``calibrating.Scanner``: three sites a cell, as of ``three_sites``, and a terrace.
+
+    Lengths are in lines of 100 V; ``step`` is the height of the terrace, where a site has 1.
+    """
+
+    seed: int
+    step: float
+    pixels: int = 128
+    lines: int = 128
+    window: tuple[float, float] = (0.0, 1.0)
+    lag: float = 1.0
+    drift: float = 0.01
+
+    def height(self, x: Floats, y: Floats) -> Floats:
+        """At x and y in lines."""
+        rng = np.random.default_rng(self.seed)
+        side, turn, begins = rng.uniform(0.1, 0.15), rng.uniform(0.0, np.pi), rng.uniform(0.0, 0.5)
+        cell = side * np.array([[np.cos(turn + a), np.sin(turn + a)] for a in (0.0, np.pi / 3.0)])
+        offsets = 0.05 * np.array([[np.cos(t), np.sin(t)] for t in begins + np.array([0.0, 2.1, 4.2])])
+        x, y = np.broadcast_arrays(x, y)
+        at = np.stack([x, y], axis=-1) @ np.linalg.inv(cell)
+        normal = rng.normal(size=2)
+        heights = self.step * ((x - 0.5) * normal[0] + (y - 0.5) * normal[1] > 0.0)
+        for site in _SITES + offsets:
+            away = at - site
+            heights += np.exp(-np.sum(((away - np.round(away)) @ cell) ** 2, axis=-1) / (2.0 * (0.09 * side) ** 2))
+        return heights
+
+
+def weak_lowest(pitch: float, times: float, turned: float, share: float) -> Surface:
+    """Return a hexagonal lattice of this pitch of its densest rows, whose strong waves are finer by ``times``.
+
+    The lowest waves have a ``share`` of the strong ones' height; the strong ones are ``turned`` by degrees.
+    """
+
+    def height(x: Floats, y: Floats) -> Floats:
+        total = np.zeros(np.broadcast(x, y).shape)
+        for n, size in enumerate((1.0, 0.9, 0.8)):
+            for length, angle, amplitude, begins in (
+                (pitch, 7.0 + 60.0 * n, share * size, 0.1 * n),
+                (pitch / times, 7.0 + 60.0 * n + turned, size, 0.3 * n + 0.05),
+            ):
+                a = np.radians(angle)
+                total = total + amplitude * np.cos(2.0 * np.pi * ((x * np.cos(a) + y * np.sin(a)) / length + begins))
+        return total
+
+    return height
 
 
 def without_lattice(seed: int, size: int = 128) -> Floats:

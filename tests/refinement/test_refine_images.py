@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from lattice_images import weak_lowest
 from refining import (
     GRATING,
     IMAGED,
@@ -21,11 +22,15 @@ from refining import (
 from replacing import replace
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.image_sizes import KnownSample
 from tablegen.config.load import Setup
+from tablegen.images.line_length import Cell
+from tablegen.planning.line_plan import make_plan
 from tablegen.refinement.departure import Departure
 from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.lattice_line import ImageOptions
 from tablegen.refinement.round import Options
+from tablegen.virtual.imaging import running_frame
 
 Pair = tuple[np.ndarray, np.ndarray]
 
@@ -70,6 +75,28 @@ def test_images_show_the_true_error_of_the_line(setup: Setup, sample: Sample) ->
     assert found.update.noise_percent < 0.03
     assert rms(off) < 3.0 * found.update.noise_percent
     assert found.worse == ""
+
+
+@pytest.mark.parametrize(("periods", "times"), [(8.0, 2.0), (7.0, 3.0)])
+def test_a_lattice_with_weak_lowest_spots_says_the_error_and_the_size(
+    setup: Setup, periods: float, times: float
+) -> None:
+    """Refused before, as waves of a frame 1.6 and 0.26 times as high as its lines are long."""
+    plan = make_plan(setup)
+    nm = plan.x.drive.size_nm
+    surface = weak_lowest(nm / periods, times, 0.0, 0.1)
+    frame = running_frame(plan, scanner().x, scanner().y, surface, IMAGED)
+    sample = KnownSample(Cell.hexagonal(nm / periods * 2.0 / 3.0**0.5))
+    pairs = [(frame.trace.heights, frame.retrace.heights)]
+    found = refine_images(setup, "x", pairs, Options(), None, sample)
+    true = play(setup, "x", scanner().x).true
+    assert rms(100.0 * (found.update.before.error - true.error)) < 0.025
+    assert found.size is not None
+    both = np.concatenate([frame.trace.x_nm[0], frame.retrace.x_nm[0]])
+    low, high = plan.x.band_limit.window
+    place = low + (high - low) * (np.arange(128) + 0.5) / 128
+    assert found.size.nm.value == pytest.approx(np.polyfit(np.tile(place, 2), both, 1)[0], rel=5e-4)
+    assert found.periods == pytest.approx(times * periods, rel=0.05)
 
 
 def test_errors_are_those_of_many_images(setup: Setup) -> None:
