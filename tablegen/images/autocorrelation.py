@@ -149,19 +149,45 @@ def significant_spots(image: FilteredImage, least: float, weakest: float = WEAKE
     weakest
         Least power over that of the strongest spot.
     """
+    return own_spots(spectrum_peaks(image, weakest), image, least, weakest)
+
+
+def spectrum_peaks(image: FilteredImage, weakest: float) -> Spots:
+    """Return the peaks of the spectrum, whatever their contrast, with the wings of stronger ones.
+
+    Parameters
+    ----------
+    weakest
+        Least power over that of the strongest peak.
+    """
     rows, columns = image.values.shape
     power, u, v = power_spectrum(image)
     searched = (u[None, :] * columns >= _STREAK) & (u[None, :] <= _FINEST) & (np.abs(v[:, None]) <= _FINEST)
     searched = searched & (np.hypot(u[None, :] * columns, v[:, None] * rows) >= _SLOWEST)
     row, column = np.nonzero(_peaks(power) & searched)
     height = power[row, column]
-    contrast = height / _background(power, row, column)
-    significant = (contrast >= least) & (height >= weakest * np.max(height, initial=0.0))
-    row, column, contrast, height = row[significant], column[significant], contrast[significant], height[significant]
-    waves = np.stack([u[column], v[row]], axis=1)
-    own = _without_wings(waves * np.array([columns, rows]), height)
+    high = height >= weakest * np.max(height, initial=0.0)
+    row, column, height = row[high], column[high], height[high]
+    return Spots(np.stack([u[column], v[row]], axis=1), height / _background(power, row, column), height)
+
+
+def own_spots(peaks: Spots, image: FilteredImage, least: float, weakest: float = WEAKEST) -> Spots:
+    """Return the peaks that stand out of their neighbourhood and are no wings of stronger ones.
+
+    Parameters
+    ----------
+    peaks
+        Peaks of the spectrum of ``image``.
+    least
+        Least power of a spot over its background.
+    weakest
+        Least power over that of the strongest peak.
+    """
+    use = (peaks.contrast >= least) & (peaks.power >= weakest * np.max(peaks.power, initial=0.0))
+    waves, contrast, power = peaks.waves[use], peaks.contrast[use], peaks.power[use]
+    own = _without_wings(waves * np.array(image.values.shape[::-1]), power)
     order = np.flatnonzero(own)[np.argsort(-contrast[own], kind="stable")]
-    return Spots(waves[order], contrast[order], height[order])
+    return Spots(waves[order], contrast[order], power[order])
 
 
 def _smoothed(power: Floats) -> Floats:
@@ -171,10 +197,9 @@ def _smoothed(power: Floats) -> Floats:
         edge[axis] = (2, 2)
         padded = np.pad(power, edge, mode="reflect")
         count = power.shape[axis]
-        power = sum(
-            (share / 16.0 * np.take(padded, range(at, at + count), axis=axis) for at, share in enumerate(_KERNEL)),
-            start=np.zeros(power.shape),
-        )
+        line = np.moveaxis(padded, axis, 0)
+        parts = (share / 16.0 * line[at : at + count] for at, share in enumerate(_KERNEL))
+        power = np.moveaxis(sum(parts, start=np.zeros(line[:count].shape)), 0, axis)
     return power
 
 
@@ -193,12 +218,15 @@ def _without_wings(periods: Floats, power: Floats) -> Bools:
 def _peaks(power: Floats) -> Bools:
     """Return True where no cell within two is higher."""
     reach = 2
-    padded = np.pad(power, reach, constant_values=-1.0)
-    highest = np.full(power.shape, -1.0)
-    for dy in range(2 * reach + 1):
-        for dx in range(2 * reach + 1):
-            highest = np.maximum(highest, padded[dy : dy + power.shape[0], dx : dx + power.shape[1]])
-    return (power >= highest) & (power > 0.0)
+    highest = power
+    for axis in (0, 1):
+        line = np.moveaxis(highest, axis, 0)
+        along = line.copy()
+        for step in range(1, reach + 1):
+            np.maximum(along[step:], line[:-step], out=along[step:])
+            np.maximum(along[:-step], line[step:], out=along[:-step])
+        highest = np.moveaxis(along, 0, axis)
+    return np.asarray((power >= highest) & (power > 0.0))
 
 
 def _background(power: Floats, row: Ints, column: Ints) -> Floats:

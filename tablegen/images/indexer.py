@@ -9,7 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.images.autocorrelation import WEAKEST, Autocorrelation, Spots, autocorrelation, significant_spots
+from tablegen.images.autocorrelation import (
+    WEAKEST,
+    Autocorrelation,
+    Spots,
+    autocorrelation,
+    own_spots,
+    significant_spots,
+    spectrum_peaks,
+)
 from tablegen.images.cell_errors import fit_cell
 from tablegen.images.cell_vectors import area, lattices_of_index, reduced, sides_and_angle, sublattice_index
 from tablegen.images.hum import hum_waves, of_hum
@@ -33,7 +41,7 @@ _MOST_AREA_RATIO = 1.75  # of the measured cell and that of the sample by the si
 _PARALLEL = 0.1  # radians
 _CORRECTED = 0.05  # share: what spots may change of the sides that the maxima have
 _OWN_SHARE = 0.6  # of the spots that are near enough to 0
-_FAINT = 0.5  # of the contrast of a significant spot
+_FAINT, _FAINTEST = 0.5, 0.3  # of the contrast of a significant spot, and of its least power
 _NEAR_SPOT = 1.2  # periods in the image: spots of two views this near are one
 _ALONG = 0.5  # of a wave along the rows: slopes show it about as well as heights
 _SLOW, _SLOW_SHARE = 4.0, 0.5  # periods in the image, and of the slowest wave of the cell: a terrace has waves below
@@ -140,7 +148,10 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
     hum = np.zeros((0, 2))
     if other is not None:
         beside = np.concatenate(
-            [_view(image, False).faint.waves for image in filtered_images(without_holes(other[region]))]
+            [
+                significant_spots(image, _FAINT * _least(image), _FAINTEST * WEAKEST).waves
+                for image in filtered_images(without_holes(other[region]))
+            ]
         )
         hum = hum_waves(_together(views, 1.0).waves, beside, (heights.shape[0], heights.shape[1]))
     if not any(len(view.spots.contrast) and view.spots.contrast[0] >= _CLEAR * view.least for view in views):
@@ -227,12 +238,17 @@ def _check(heights: Floats) -> None:
         raise Unphysical(f"{100.0 * share:.2g} % of the pixels have heights; crop the image to what was scanned")
 
 
-def _view(image: FilteredImage, with_cells: bool = True) -> _View:
+def _view(image: FilteredImage) -> _View:
     correlation = autocorrelation(image)
-    least = float(np.log(image.values.size) + _CERTAINTY)
-    faint = significant_spots(image, _FAINT * least, 0.3 * WEAKEST)
-    cells = candidates(correlation) if with_cells else []
-    return _View(image, correlation, significant_spots(image, least), faint, least, cells)
+    least, weakest = _least(image), _FAINTEST * WEAKEST
+    peaks = spectrum_peaks(image, weakest)
+    spots, faint = own_spots(peaks, image, least), own_spots(peaks, image, _FAINT * least, weakest)
+    return _View(image, correlation, spots, faint, least, candidates(correlation))
+
+
+def _least(image: FilteredImage) -> float:
+    """Return the contrast of a significant spot."""
+    return float(np.log(image.values.size) + _CERTAINTY)
 
 
 def _fitted(view: _View, vectors: Floats) -> ImageCell:

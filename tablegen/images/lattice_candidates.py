@@ -66,8 +66,11 @@ def distinct(cells: list[Candidate]) -> list[Candidate]:
 
 
 def _known(vectors: Floats, cells: list[Candidate]) -> bool:
+    if not cells:
+        return False
     side = abs(float(vectors[0, 0])) + abs(float(vectors[0, 1]))
-    return any(float(np.abs(vectors - cell.vectors).max()) < _SAME * side for cell in cells)
+    off = np.abs(np.array([cell.vectors for cell in cells]) - vectors)
+    return bool(np.min(np.max(off, axis=(1, 2))) < _SAME * side)
 
 
 def _sums(vectors: Floats, correlation: Autocorrelation, lags: Floats, heights: Floats) -> float:

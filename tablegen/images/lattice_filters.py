@@ -202,10 +202,9 @@ def _smoothed(values: Floats, width: float) -> Floats:
         edge[axis] = (reach, reach)
         padded = np.pad(values, edge, mode="reflect")
         count = values.shape[axis]
-        values = sum(
-            (share * np.take(padded, range(at, at + count), axis=axis) for at, share in enumerate(kernel.tolist())),
-            start=np.zeros(values.shape),
-        )
+        line = np.moveaxis(padded, axis, 0)
+        parts = (share * line[at : at + count] for at, share in enumerate(kernel.tolist()))
+        values = np.moveaxis(sum(parts, start=np.zeros(line[:count].shape)), 0, axis)
     return values
 
 
