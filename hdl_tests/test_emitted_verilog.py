@@ -78,6 +78,17 @@ def manifest_words(built: Build) -> list[int]:
     return [word for axis in axes for word in [*axis["table"]["words"], *fourier_words(axis)]]
 
 
+def verilog_constants(manifest: dict[str, Any]) -> dict[str, int]:
+    """All constants but names of files; those of shaping are 0 in these scans, a direct table has address bits."""
+    numbers = constants(manifest) | widths(manifest) | {"SHAPING": 0}
+    for axis in "XY":
+        numbers |= {f"{axis}_SHAPING_ORDER": 0, f"{axis}_SHAPING_ZERO": 0}
+        if not numbers[f"{axis}_INTERPOLATED"]:
+            length = numbers[f"{axis}_TABLE_LENGTH"]
+            numbers[f"{axis}_INDEX_BITS"] = next(n for n in range(2, 32) if length <= 2**n)
+    return numbers
+
+
 def widths(manifest: dict[str, Any]) -> dict[str, int]:
     """The least widths of the counters, from the definitions of their parameters."""
     scan = constants(manifest)
@@ -105,14 +116,12 @@ def test_header_parses_inside_a_module(built: Build, dialect: str) -> None:
 
 def test_constants_equal_the_manifest(built: Build) -> None:
     """Every localparam but the file names, printed by a simulation; the header defines no others."""
-    manifest, names = built.manifest, constants(built.manifest) | widths(built.manifest)
+    manifest, names = built.manifest, verilog_constants(built.manifest)
     header = built.files[f"{NAME}.vh"].decode("ascii")
     defined = [line.split("=")[0].split()[-1] for line in header.splitlines() if line.startswith("localparam")]
     prefix = f"{NAME.upper()}_"
     files = {f"{prefix}{axis}_{kind}_FILE" for axis in "XY" for kind in ("TABLE", "FOURIER")}
-    files |= {prefix + "PROGRAM_FILE"}
-    if any(axis["table"]["mode"] == "interpolated" for axis in manifest["axes"].values()):
-        files |= {prefix + "SINE_FILE"}
+    files |= {prefix + "PROGRAM_FILE", prefix + "SINE_FILE"}
     assert set(defined) == {prefix + name for name in names} | files | {prefix + "HASH"}
     assert len(defined) == len(set(defined))
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import BENCHES, REPOSITORY, VARIANTS, Build, Variant, build, run_clean
+from building import BENCHES, NAME, REPOSITORY, VARIANTS, Build, build, run_clean
 from limits import PATIENCE_S
 from sets import common
+from short_scans import CUBIC, DIRECT, model_ticks, short
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
 from tablegen.base.resources import verilog_runtime
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
@@ -40,7 +40,7 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> tuple[DualProgram, np.
     design = compile_design(
         "verilator",
         Design(
-            [*verilog_runtime(), SCANNER, BENCH],
+            [*verilog_runtime(), built.folder / f"{NAME}_top.v", SCANNER, BENCH],
             "scanner_bench",
             {"CAPTURE": str(capture), "CLOCKS": TICKS * CLOCKS_PER_TICK},
             includes=[built.folder],
@@ -55,32 +55,23 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> tuple[DualProgram, np.
 def test_it_elaborates_as_its_header_says(tmp_path: Path) -> None:
     built = build(tmp_path, VARIANTS["example"])
     program = tmp_path / "scanner.vvp"
-    sources = sorted(built.folder.glob("dac_*.v"))
+    sources = [built.folder / f"{NAME}_top.v", *sorted(built.folder.glob("dac_*.v"))]
     run_clean(["iverilog", "-g2005", f"-I{built.folder}", "-s", "scanner", "-o", program, SCANNER, *sources])
     assert program.exists()
 
 
-# Scans that take a simulator some thousand clocks to render, put into a copy as docs/start/fpga.md says.
-SHORT = {
-    **VARIANTS["short_frame"].scan,
-    "x.band_limit.harmonics": 5,
-    "y.band_limit.harmonics": 5,
-    "x.table.length": 32,
-    "y.table.length": 32,
-    "limits.max_error_lsb": 100,
-}
-CUBIC = {"mode": "cubic", "length": 16, "bits": 16}
-DIRECT = {"mode": "direct", "bits": 16}
-PLAYED: dict[str, tuple[dict[str, object], int]] = {  # the scan, and SHAPING of the copy
-    "interpolated": ({}, 0),
-    "cubic": ({"x.table": CUBIC, "y.table": CUBIC}, 0),
-    "cubic x": ({"x.table": CUBIC}, 0),
-    "shaped": ({"dac.shaping": "second"}, 2),
-    "12 bits in 16": (
-        {"dac.bits": 12, "dac.word_bits": 16, "dac.align": "left", "dac.coding": "twos-complement"},
-        0,
-    ),
-    "y at rest": ({"y": {"motion": "off", "offset_v": 50.0}}, 0),
+PLAYED: dict[str, dict[str, object]] = {
+    "interpolated": {},
+    "direct x": {"x.table": DIRECT},
+    "direct y": {"y.table": DIRECT},
+    "cubic": {"x.table": CUBIC, "y.table": CUBIC},
+    "cubic x": {"x.table": CUBIC},
+    "shaped": {"dac.shaping": "second"},
+    "18 bits": {"dac.bits": 18},
+    "24 bits": {"dac.bits": 24, "dac.coding": "twos-complement"},
+    "12 bits in 16": {"dac.bits": 12, "dac.word_bits": 16, "dac.align": "left", "dac.coding": "twos-complement"},
+    "y at rest": {"y": {"motion": "off", "offset_v": 50.0}},
+    "128 harmonics": {"x.band_limit.harmonics": 128, "x.table.length": 512},
 }
 REFUSED: dict[str, tuple[dict[str, object], str]] = {
     "18 bits": ({"dac.bits": 18}, "serves_converters_with_words_of_16_bits"),
@@ -94,52 +85,46 @@ REFUSED: dict[str, tuple[dict[str, object], str]] = {
 }
 
 
-def short(folder: Path, changes: dict[str, object]) -> Build:
-    """The short scan, with changes."""
-    kept = {key: value for key, value in SHORT.items() if key.rpartition(".")[0] not in changes}
-    if "y" in changes:
-        kept = {key: value for key, value in kept.items() if not key.startswith("y.")}
-    return build(folder, Variant({**kept, **changes}))
-
-
 def elaborated(built: Build, text: str, top: str, *sources: Path, **parameters: int | str) -> tuple[Path, str]:
     """The program of a copied example, with what Icarus says; it does not exist where Icarus refuses."""
     copy, program = built.folder / f"{top}_copy.v", built.folder / f"{top}.vvp"
     copy.write_text(text, "ascii")
     given = [f"-P{top}.{name}={value}" for name, value in parameters.items()]
     command = ["iverilog", "-g2005", f"-I{built.folder}", "-s", top, "-o", program, *given, *sources, copy]
-    runtime = [*sorted(built.folder.glob("dac_*.v")), built.folder / "program_loader.v"]
+    runtime = [*sorted(built.folder.glob("dac_*.v")), built.folder / "program_loader.v", built.folder / f"{NAME}_top.v"]
     done = subprocess.run([*command, *runtime], capture_output=True, text=True, check=False)
     return program, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("name", common(("interpolated", "cubic", "shaped"), PLAYED))
-def test_a_scan_that_it_serves_is_played(name: str, tmp_path: Path) -> None:
-    changes, shaping = PLAYED[name]
-    built, capture = short(tmp_path, changes), tmp_path / "capture.hex"
-    text = SCANNER.read_text("ascii").replace("parameter SHAPING = 0", f"parameter SHAPING = {shaping}")
-    ticks = 60
+@pytest.mark.parametrize("name", common(("interpolated", "direct x", "shaped", "18 bits"), PLAYED))
+def test_every_scan_is_played(name: str, tmp_path: Path) -> None:
+    built, capture = short(tmp_path, PLAYED[name]), tmp_path / "capture.hex"
+    ticks, converter = 60, Converter(built.plan.program.x.output.word_bits, cpol=0, cpha=0)
     program, shown = elaborated(
-        built, text, "scanner_bench", BENCH, CAPTURE=f'"{capture}"', CLOCKS=ticks * CLOCKS_PER_TICK
+        built,
+        SCANNER.read_text("ascii"),
+        "scanner_bench",
+        BENCH,
+        CAPTURE=f'"{capture}"',
+        CLOCKS=ticks * CLOCKS_PER_TICK,
     )
     assert shown == ""
     run = subprocess.run(["vvp", "-n", program], cwd=built.folder, capture_output=True, text=True, timeout=PATIENCE_S)
     assert (run.returncode, run.stdout) == (0, "")
     levels = np.frombuffer(bytes.fromhex(capture.read_text("ascii")), dtype=np.uint8).astype(np.int64)
     sclk, x_data, y_data, select_n, load_n = (levels >> i & 1 for i in range(5))
-    played = model_ticks(built.plan.program, ticks)
+    played = model_ticks(built.plan.program, ticks)[1:]
     for data, axis in ((x_data, "x"), (y_data, "y")):
         output = getattr(built.plan.program, axis).output
-        words = receive(Wires(sclk, select_n, data, load_n), AD5541A).values[:, 0].tolist()
+        words = receive(Wires(sclk, select_n, data, load_n), converter).values[:, 0].tolist()
         assert len(words) >= ticks - 1
         assert words == [int(output.word(getattr(tick, axis))) for tick in played][: len(words)]
 
 
-@pytest.mark.parametrize("top", ["scanner", "linked_scanner"])
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_scan_that_it_does_not_serve_is_refused_by_name(name: str, top: str, tmp_path: Path) -> None:
+def test_a_scan_that_the_linked_one_does_not_serve_is_refused_by_name(name: str, tmp_path: Path) -> None:
     changes, reason = REFUSED[name]
-    built = short(tmp_path, changes)
+    built, top = short(tmp_path, changes), "linked_scanner"
     program, shown = elaborated(built, SCANNER.with_name(f"{top}.v").read_text("ascii"), top)
     assert f"Unknown module type: {top}_{reason}" in shown
     assert not program.exists()
@@ -148,12 +133,18 @@ def test_a_scan_that_it_does_not_serve_is_refused_by_name(name: str, top: str, t
 @pytest.mark.parametrize(("mode", "clocks"), [("interpolated", 41), ("cubic", 90)])
 def test_ticks_that_are_too_short_are_refused(mode: str, clocks: int, tmp_path: Path) -> None:
     built = short(tmp_path, {"x.table": CUBIC} if mode == "cubic" else {})
+    reason = f"{NAME}_top_CLOCKS_PER_TICK_is_less_than_the_sequencer_takes"
     for given, refused in ((clocks - 1, True), (clocks, False)):
         program, shown = elaborated(built, SCANNER.read_text("ascii"), "scanner", CLOCKS_PER_TICK=given)
-        assert ("scanner_CLOCKS_PER_TICK_is_less_than_the_sequencer_takes" in shown, program.exists()) == (
-            refused,
-            not refused,
-        )
+        assert (reason in shown, program.exists()) == (refused, not refused)
+
+
+def test_ticks_that_are_shorter_than_a_frame_are_refused(tmp_path: Path) -> None:
+    built = short(tmp_path, {"dac.bits": 24})
+    for given, refused in ((55, True), (56, False)):
+        program, shown = elaborated(built, SCANNER.read_text("ascii"), "scanner", CLOCKS_PER_TICK=given)
+        reason = "scanner_CLOCKS_PER_TICK_is_less_than_a_frame_takes"
+        assert (reason in shown, program.exists()) == (refused, not refused)
 
 
 def test_the_player_refuses_a_shaped_scan(tmp_path: Path) -> None:
@@ -164,21 +155,11 @@ def test_the_player_refuses_a_shaped_scan(tmp_path: Path) -> None:
     assert not program.exists()
 
 
-def model_ticks(program: DualProgram, count: int) -> list[Tick]:
-    """What the model plays from its first line on."""
-    model = Sequencer(None)
-    model.commit(program)
-    assert model.step().swapped  # the first tick that it takes the program with lets it start
-    model.arm()
-    assert model.trigger()
-    return [model.step() for _ in range(count)]
-
-
 @pytest.mark.rest
 def test_the_converters_receive_the_codes_of_the_model(captured: tuple[DualProgram, np.ndarray]) -> None:
     program, levels = captured
     sclk, x_data, y_data, select_n, load_n = (levels >> i & 1 for i in range(5))
-    ticks = model_ticks(program, TICKS)
+    ticks = model_ticks(program, TICKS)[1:]
     assert {tick.faults.value for tick in ticks} == {0}
 
     last = (

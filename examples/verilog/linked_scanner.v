@@ -139,8 +139,6 @@ module linked_scanner_serves #(
     parameter SHAPING = 3,
     parameter HARMONICS = 127
 );
-    localparam ANNEXIN_200NM_SHAPING = 0;  // a shaped scan has its own, which hides this one
-
     generate
         if (1) begin : scan
             `include "annexin_200nm.vh"

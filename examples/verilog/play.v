@@ -40,8 +40,6 @@ endmodule
 
 // A shaped scan is none for it: the output of `play_axis` is rounded, and no remainder is fed back.
 module play_serves;
-    localparam ANNEXIN_200NM_SHAPING = 0;  // a shaped scan has its own, which hides this one
-
     generate
         if (1) begin : scan
             `include "annexin_200nm.vh"

@@ -1,24 +1,24 @@
-// A whole scanner on an FPGA: plays the scan of annexin_200nm.vh on two 16-bit serial converters (AD5541A and alike,
-// each with its data line, one clock and one select for both).
+// A whole scanner on an FPGA: plays the scan of annexin_200nm.vh on two serial converters that take bare words (AD5541A
+// and alike), each with its data line, one clock and one select for both.
 //
 //     tablegen build examples/annexin_200nm.toml -o build
-//     iverilog -g2005 -Ibuild -s scanner examples/verilog/scanner.v build/dac_*.v
+//     iverilog -g2005 -Ibuild -s scanner examples/verilog/scanner.v build/annexin_200nm_top.v build/dac_*.v
 //
-// It plays scans of interpolated or cubic tables of up to 127 harmonics an axis on converters with words of 16 bits, of
-// both axes the same. Others do not elaborate: scanner_serves, below, names the reason.
+// annexin_200nm_top is the sequencer of the scan, with its boot and the coding of its converters; a build writes it for
+// every scan. What follows it is yours: here a frame has the bits of a word, 16 for this scan. Converters with a frame
+// of another form need its parameters at dac_spi.
 //
-// (The memory files are looked up where the simulation or the synthesis runs.) At power-up it boots the scan from its
-// Fourier words, and computes the tables from them. While `run` is high it scans; low, it parks.
-// `image` says that a pixel may be taken: inside the imaging window, settled, and without a fault.
+// (The memory files are looked up where the simulation or the synthesis runs.) At power-up it boots the scan. While
+// `run` is high it scans; low, it parks. `image` says that a pixel may be taken: inside the imaging window, settled, and
+// without a fault.
 //
-// To let a host change the scan while it plays, connect it in place of the constants at `host_write` and the ports next
-// to it.
+// To let a host change the scan while it plays, connect it in place of the constants at `write` and the ports next to
+// it.
 
 `default_nettype none
 
 module scanner #(
-    parameter CLOCKS_PER_TICK = 100,  // a 50 MHz clock, for the 500 kHz of the scan
-    parameter SHAPING = 0             // of a shaped scan, ANNEXIN_200NM_SHAPING of its .vh
+    parameter CLOCKS_PER_TICK = 100  // a 50 MHz clock, for the 500 kHz of the scan
 ) (
     input  wire clock,
     input  wire run,
@@ -36,9 +36,16 @@ module scanner #(
 );
     `include "annexin_200nm.vh"
 
-    localparam HARMONICS = 127;
+    // Frames of both converters are as long as the wider word; a narrower one is in their low bits.
+    localparam X_BITS = ANNEXIN_200NM_X_DAC_WORD_BITS, Y_BITS = ANNEXIN_200NM_Y_DAC_WORD_BITS;
+    localparam FRAME_BITS = X_BITS > Y_BITS ? X_BITS : Y_BITS;
+    localparam FRAME_CLOCKS = 2 * FRAME_BITS + 8;  // with the defaults of dac_spi
 
-    scanner_serves #(.CLOCKS_PER_TICK(CLOCKS_PER_TICK), .SHAPING(SHAPING), .HARMONICS(HARMONICS)) this_scan ();
+    generate
+        if (CLOCKS_PER_TICK < FRAME_CLOCKS) begin : guard
+            scanner_CLOCKS_PER_TICK_is_less_than_a_frame_takes stop ();
+        end
+    endgenerate
 
     reg [15:0] divider;
     reg tick, run_1, run_2, started, start;
@@ -48,12 +55,9 @@ module scanner #(
         {run_1, run_2, started, start} = 4'd0;
     end
 
-    wire writable, write, commit, missed, missing, refused, strobe, swapped;
-    wire [2:0] region;
-    wire [15:0] address;
-    wire [31:0] data;
-    wire [ANNEXIN_200NM_X_DAC_BITS-1:0] x_code, y_code;
-    wire [ANNEXIN_200NM_X_DAC_WORD_BITS-1:0] x_word, y_word;
+    wire missed, missing, refused, strobe, swapped;
+    wire [X_BITS-1:0] x_word;
+    wire [Y_BITS-1:0] y_word;
     wire [3:0] faults;
 
     // The first tick takes the first program. A later program is taken at a line start and needs no trigger.
@@ -69,91 +73,25 @@ module scanner #(
         started <= run_2 && (started || loaded);
     end
 
-    dac_boot #(
-        .PROGRAM_FILE(ANNEXIN_200NM_PROGRAM_FILE), .FOURIER(1),
-        .X_FILE(ANNEXIN_200NM_X_FOURIER_FILE), .X_WORDS(ANNEXIN_200NM_X_FOURIER_LENGTH), .X_WORD_BITS(32),
-        .X_HARMONICS(ANNEXIN_200NM_X_HARMONICS),
-        .Y_FILE(ANNEXIN_200NM_Y_FOURIER_FILE), .Y_WORDS(ANNEXIN_200NM_Y_FOURIER_LENGTH), .Y_WORD_BITS(32),
-        .Y_HARMONICS(ANNEXIN_200NM_Y_HARMONICS)
-    ) boot (
-        .clock(clock), .reset(1'b0), .host_write(1'b0), .host_region(3'd0), .host_address(16'd0), .host_data(32'd0),
-        .host_commit(1'b0), .writable(writable), .write(write), .write_region(region), .write_address(address),
-        .write_data(data), .commit(commit), .booting(), .missing(missing)
+    annexin_200nm_top #(.LOW_AREA(1), .CLOCKS_PER_TICK(CLOCKS_PER_TICK)) sequencer (
+        .clock(clock), .reset(1'b0), .write(1'b0), .write_region(3'd0), .write_address(16'd0), .write_data(32'd0),
+        .writable(), .refused(refused), .commit(1'b0), .withdraw(1'b0), .committed(), .booting(), .missing(missing),
+        .arm(start), .arm_frames(16'd0), .trigger(start), .park(!run_2), .clear_faults(1'b0), .armed(), .running(),
+        .tick(tick), .underrun(missed), .busy(), .strobe(strobe), .x_code(), .y_code(), .x_word(x_word),
+        .y_word(y_word), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
+        .valid_marker(image), .swapped_marker(swapped), .playing(), .parked(), .faults(faults), .fault_counts()
     );
 
-    dac_sequencer #(
-        .DAC_BITS(ANNEXIN_200NM_X_DAC_BITS),
-        .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
-        .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS),
-        .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED), .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS),
-        .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS),
-        .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE), .SHAPING(SHAPING)
-    ) sequencer (
-        .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(1'b0), .committed(), .arm(start),
-        .arm_frames(16'd0),
-        .trigger(start), .park(!run_2), .clear_faults(1'b0), .armed(), .running(), .tick(tick), .underrun(missed),
-        .busy(),
-        .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line), .frame_marker(frame),
-        .pixel_marker(pixel),
-        .backward_marker(backward), .valid_marker(image), .swapped_marker(swapped), .playing(), .parked(),
-        .faults(faults),
-        .fault_counts()
-    );
+    wire [FRAME_BITS+X_BITS-1:0] x_wide = {{FRAME_BITS{1'b0}}, x_word};
+    wire [FRAME_BITS+Y_BITS-1:0] y_wide = {{FRAME_BITS{1'b0}}, y_word};
 
-    dac_coding #(
-        .BITS(ANNEXIN_200NM_X_DAC_BITS), .WORD_BITS(ANNEXIN_200NM_X_DAC_WORD_BITS),
-        .TWOS_COMPLEMENT(ANNEXIN_200NM_X_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(ANNEXIN_200NM_X_DAC_LEFT_ALIGNED)
-    ) x_coding (.code(x_code), .word(x_word));
-    dac_coding #(
-        .BITS(ANNEXIN_200NM_Y_DAC_BITS), .WORD_BITS(ANNEXIN_200NM_Y_DAC_WORD_BITS),
-        .TWOS_COMPLEMENT(ANNEXIN_200NM_Y_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(ANNEXIN_200NM_Y_DAC_LEFT_ALIGNED)
-    ) y_coding (.code(y_code), .word(y_word));
-
-    dac_spi #(.WORD_BITS(ANNEXIN_200NM_X_DAC_WORD_BITS), .FRAME_BITS(16)) converters (
-        .clock(clock), .reset(1'b0), .strobe(strobe), .x_word(x_word), .y_word(y_word), .sclk(sclk), .cs_x_n(select_n),
-        .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
+    dac_spi #(.WORD_BITS(FRAME_BITS), .FRAME_BITS(FRAME_BITS)) converters (
+        .clock(clock), .reset(1'b0), .strobe(strobe), .x_word(x_wide[FRAME_BITS-1:0]),
+        .y_word(y_wide[FRAME_BITS-1:0]), .sclk(sclk), .cs_x_n(select_n), .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data),
+        .ldac_n(load_n), .busy(), .missed(missed)
     );
 
     assign fault = faults != 4'd0 || missing || refused;
-endmodule
-
-
-// Which scans this device plays. The reason of a refusal is the name of a module that does not exist.
-module scanner_serves #(
-    parameter CLOCKS_PER_TICK = 100,
-    parameter SHAPING = 3,
-    parameter HARMONICS = 127
-);
-    localparam ANNEXIN_200NM_SHAPING = 0;  // a shaped scan has its own, which hides this one
-
-    generate
-        if (1) begin : scan
-            `include "annexin_200nm.vh"
-
-            localparam CUBIC = ANNEXIN_200NM_X_INTERPOLATED == 3 || ANNEXIN_200NM_Y_INTERPOLATED == 3;
-            localparam CLOCKS = (CUBIC ? 90 : 41) + (SHAPING != 0 ? 2 : 0);
-
-            if (ANNEXIN_200NM_X_DAC_WORD_BITS != 16 || ANNEXIN_200NM_Y_DAC_WORD_BITS != 16) begin : guard_0
-                scanner_serves_converters_with_words_of_16_bits stop ();
-            end
-            if (ANNEXIN_200NM_X_DAC_BITS != ANNEXIN_200NM_Y_DAC_BITS) begin : guard_1
-                scanner_serves_converters_of_the_same_bits stop ();
-            end
-            if (ANNEXIN_200NM_X_INTERPOLATED == 0 || ANNEXIN_200NM_Y_INTERPOLATED == 0) begin : guard_2
-                scanner_renders_no_direct_table stop ();
-            end
-            if (ANNEXIN_200NM_X_HARMONICS > HARMONICS || ANNEXIN_200NM_Y_HARMONICS > HARMONICS) begin : guard_3
-                scanner_HARMONICS_is_less_than_those_of_the_scan stop ();
-            end
-            if (ANNEXIN_200NM_SHAPING > SHAPING) begin : guard_4
-                scanner_SHAPING_is_less_than_that_of_the_scan stop ();
-            end
-            if (CLOCKS_PER_TICK < CLOCKS) begin : guard_5
-                scanner_CLOCKS_PER_TICK_is_less_than_the_sequencer_takes stop ();
-            end
-        end
-    endgenerate
 endmodule
 
 `default_nettype wire

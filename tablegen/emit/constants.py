@@ -9,6 +9,7 @@ from tablegen.fixedpoint.synthesis import FRACTION_BITS
 # Constants that may need more than 32 bits: languages that give constants a type give these a wide one in every build.
 WIDE = frozenset({"UPDATE_RATE_MILLIHZ", "PHASE_STEP", "OFFSET_WORD"})
 
+LEAST_INDEX_BITS = 2  # of a sequencer in Verilog
 DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # value of INTERPOLATED: the degree between words
 
 
@@ -25,6 +26,33 @@ def shaping_constants(content: Content) -> dict[str, int]:
     """Return the highest order of shaping, which a device must have; nothing where neither axis shapes."""
     highest = max(axis.program.output.shaping.order for axis in content.axes)
     return {"SHAPING": highest} if highest else {}
+
+
+def verilog_constants(content: Content) -> dict[str, int]:
+    """Return all numbers of a build as Verilog takes them: ``SHAPING`` and those of axes are there where it is off."""
+    constants = sequence_constants(content.schedule) | {"SHAPING": 0} | shaping_constants(content)
+    for axis in content.axes:
+        own = verilog_axis_constants(axis.program, axis.harmonics)
+        constants |= {f"{axis.axis.upper()}_{key}": value for key, value in own.items()}
+    return constants
+
+
+def verilog_axis_constants(program: Program, harmonics: int) -> dict[str, int]:
+    """Return ``axis_constants`` with the order and zero of an unshaped axis, and the index bits of a direct table."""
+    own = {"SHAPING_ORDER": 0, "SHAPING_ZERO": 0}
+    return (
+        axis_constants(program, harmonics)
+        | own
+        | _own_shaping(program.output.shaping)
+        | {"INDEX_BITS": memory_index_bits(program)}
+    )
+
+
+def memory_index_bits(program: Program) -> int:
+    """Return the address bits of a table's memory in a sequencer; a direct table need not fill its memory."""
+    if program.mode != "direct":
+        return program.index_bits
+    return max((len(program.words) - 1).bit_length(), LEAST_INDEX_BITS)
 
 
 def sequence_constants(schedule: Schedule) -> dict[str, int]:

@@ -270,6 +270,7 @@ def test_a_file_that_no_such_build_has_is_found(folder: Path) -> None:
         (f"{NAME}.h", f"#define {CAPITAL}_PIXELS 50", f"#define {CAPITAL}_PIXELS 50\n#undef {CAPITAL}_PIXELS"),
         (f"{NAME}.h", " */\n#ifndef", " */ int x; /* */\n#ifndef"),
         (f"{NAME}.vh", "Do not edit", "`define X"),
+        (f"{NAME}_top.v", ".TWOS_COMPLEMENT(0)", ".TWOS_COMPLEMENT(1)"),
     ],
 )
 def test_a_file_is_compared_with_that_of_the_version(folder: Path, name: str, old: str, new: str) -> None:

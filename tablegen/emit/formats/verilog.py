@@ -1,4 +1,4 @@
-"""Verilog-2005 constants and memory files for ``$readmemh``, with the Verilog sequencer and its loader."""
+"""Verilog-2005 constants, memory files for ``$readmemh`` and an instance, with the Verilog sequencer and its loader."""
 
 import re
 from pathlib import Path
@@ -7,11 +7,12 @@ from typing import Any
 from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.base.resources import resource_folder, verilog_runtime
 from tablegen.device.widths import least_widths
-from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants, shaping_constants
+from tablegen.emit.constants import sequence_constants, shaping_constants, verilog_axis_constants, verilog_constants
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
+from tablegen.emit.verilog_top import sine_memory, top_file
 
 # Patterns of checks are compiled on first use, since a build needs none.
 _LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"
@@ -19,16 +20,16 @@ _NUMBER = r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)"
 
 
 class Verilog(Format):
-    """The format verilog: ``NAME.vh`` and one ``.mem`` a table."""
+    """The format verilog: ``NAME.vh``, ``NAME_top.v`` and one ``.mem`` a table."""
 
     name = "verilog"
-    purpose = "Verilog-2005 for an FPGA: constants, memory files, and the sequencer dac_*.v that plays them"
-    file_names = "NAME.vh, NAME_*.mem, dac_*.v, program_loader.v"
+    purpose = "Verilog-2005 for an FPGA: constants, memory files, and the sequencer dac_*.v with an instance"
+    file_names = "NAME.vh, NAME_top.v, NAME_*.mem, dac_*.v, program_loader.v"
 
     def files(self, content: Content) -> dict[str, bytes]:
         """Render the header and the memory files."""
         header = template("verilog/tables.vh.j2", _context(content), literal, range=value_range)
-        return {f"{content.name}.vh": header, **_memories(content)}
+        return {f"{content.name}.vh": header, **top_file(content), **_memories(content)}
 
     def runtime(self) -> list[Path]:
         """List the files of the Verilog sequencer and the loader."""
@@ -111,10 +112,9 @@ def _context(content: Content) -> dict[str, Any]:
         "scanner": comment_safe(content.scanner),
         "summary": content.summary,
         "sequence": sequence_constants(content.schedule),
-        "widths": least_widths(content.schedule, content.y.program) | shaping_constants(content),
+        "widths": least_widths(content.schedule, content.y.program) | {"SHAPING": 0} | shaping_constants(content),
         "program_memory": f"{content.name}_program.mem",
-        "sine_memory": f"{content.name}_sine.mem",
-        "sine": content.sine_index_bits,
+        "sine_memory": sine_memory(content),
         "axes": [_axis(content, axis) for axis in content.axes],
     }
 
@@ -123,7 +123,7 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
     prefix = f"{content.name}_{axis.axis}"
     return {
         "PREFIX": prefix.upper(),
-        "constants": axis_constants(axis.program, axis.harmonics),
+        "constants": verilog_axis_constants(axis.program, axis.harmonics),
         "table_memory": f"{prefix}.mem",
         "fourier_memory": f"{prefix}_fourier.mem",
     }
@@ -132,11 +132,10 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
 def _constants(content: Content) -> dict[str, int | str]:
     """Return every localparam of the header: numbers, and names of files."""
     name = content.name
-    own: dict[str, int | str] = {"HASH": int(content.hash, 16), **scan_constants(content)}
+    own: dict[str, int | str] = {"HASH": int(content.hash, 16)}
+    own |= verilog_constants(content)
     own |= least_widths(content.schedule, content.y.program)
-    own["PROGRAM_FILE"] = f"{name}_program.mem"
-    if content.sine_index_bits:
-        own["SINE_FILE"] = f"{name}_sine.mem"
+    own |= {"PROGRAM_FILE": f"{name}_program.mem", "SINE_FILE": sine_memory(content)}
     for axis in "xy":
         own[f"{axis.upper()}_TABLE_FILE"] = f"{name}_{axis}.mem"
         own[f"{axis.upper()}_FOURIER_FILE"] = f"{name}_{axis}_fourier.mem"

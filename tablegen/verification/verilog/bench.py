@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tablegen.emit.constants import scan_constants
+from tablegen.emit.constants import verilog_constants
 from tablegen.emit.content import Content
 from tablegen.verification.play.stream import Words, read_capture
 
@@ -133,7 +133,7 @@ endmodule
 
 def expected_constants(content: Content) -> dict[str, str]:
     """Return the constants of the header as the bench writes them."""
-    numbers = {name: str(value) for name, value in scan_constants(content).items()}
+    numbers = {name: str(value) for name, value in verilog_constants(content).items()}
     return {"HASH": content.hash, **numbers}
 
 

@@ -1,0 +1,67 @@
+"""The instance of a scan in Verilog: the sequencer with its boot, its parameters and the words of its converters."""
+
+from typing import Any
+
+from tablegen.device.widths import least_widths
+from tablegen.emit.constants import DEGREES, memory_index_bits, shaping_constants
+from tablegen.emit.content import AxisContent, Content
+from tablegen.emit.templates import template
+
+_HARMONICS = 512  # the most that a sequencer renders
+_PORT = len("[4*COUNT_BITS-1:0]")  # characters of the widest range of a port
+
+
+def top_file(content: Content) -> dict[str, bytes]:
+    """Render ``NAME_top.v``, by its name."""
+    return {f"{content.name}_top.v": template("verilog/top.v.j2", _context(content), str)}
+
+
+def sine_memory(content: Content) -> str:
+    """Return the name of the file of the sine; empty where no table is rendered."""
+    return f"{content.name}_sine.mem" if content.sine_index_bits else ""
+
+
+def _context(content: Content) -> dict[str, Any]:
+    """Return the variables of the template."""
+    highest = max(axis.harmonics for axis in content.axes)
+    modes = {axis.program.mode for axis in content.axes}
+    dac_bits = content.x.program.output.dac_bits
+    return {
+        "version": content.version,
+        "name": content.name,
+        "hash": content.hash,
+        "widths": least_widths(content.schedule, content.y.program),
+        "shaping": shaping_constants(content).get("SHAPING", 0),
+        "cubic": "cubic" in modes,
+        "fourier": int("direct" not in modes and highest <= _HARMONICS),
+        "least_harmonics": highest,
+        "harmonics": min((1 << highest.bit_length()) - 1, _HARMONICS),  # what fills the memories
+        "program_memory": f"{content.name}_program.mem",
+        "sine_memory": sine_memory(content),
+        "dac_bits": dac_bits,
+        "code_range": _range(dac_bits),
+        "axes": [_axis(content, axis) for axis in content.axes],
+    }
+
+
+def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
+    program, output, prefix = axis.program, axis.program.output, f"{content.name}_{axis.axis}"
+    return {
+        "axis": axis.axis,
+        "letter": axis.axis.upper(),
+        "degree": DEGREES[program.mode],
+        "index_bits": memory_index_bits(program),
+        "bits": program.bits,
+        "table_words": len(program.words),
+        "table_memory": f"{prefix}.mem",
+        "harmonics": axis.harmonics,
+        "fourier_memory": f"{prefix}_fourier.mem",
+        "word_bits": output.word_bits,
+        "word_range": _range(output.word_bits),
+        "twos_complement": int(output.coding == "twos-complement"),
+        "left_aligned": int(output.align == "left"),
+    }
+
+
+def _range(bits: int) -> str:
+    return f"[{bits - 1}:0]".ljust(_PORT)
