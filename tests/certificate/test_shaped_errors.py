@@ -1,5 +1,6 @@
 """The certificate of shaped axes: errors of the position, what rounding would leave, and what shaping costs."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,10 @@ def test_a_file_of_one_period_is_refused(name: str, tmp_path: Path) -> None:
 
 
 def test_without_shaping_no_byte_says_anything_of_it(tmp_path: Path) -> None:
-    for name, content in build(tmp_path, Variant({**SMALL})).files.items():
-        if not name.startswith(("dac_", "program_loader")):  # the sequencer is the same in every build
+    """But the parameters of the Verilog, which every build has: they are 0."""
+    files = build(tmp_path, Variant({**SMALL})).files
+    constants = next(content for name, content in files.items() if name.endswith(".vh"))
+    assert set(re.findall(rb"_SHAPING\w* = 32'sd(\d+);", constants)) == {b"0"}
+    for name, content in files.items():
+        if not name.startswith(("dac_", "program_loader")) and not name.endswith((".vh", "_top.v")):
             assert b"shap" not in content.lower().replace(b'"dac_shap', b""), name  # names of its files
