@@ -9,6 +9,7 @@ from tablegen.images.lattice_filters import filtered_images
 from tablegen.numerics.arrays import Complexes, Floats
 
 _FURTHEST = 0.1  # of the image: drift from a frame to the next
+_BESIDE = 1.5  # pixels: neighbours of the maximum of the phases
 _LEAST_FRAMES = 0.5  # of all frames: pixels that fewer have are missing in the mean
 
 
@@ -65,7 +66,11 @@ def _turn(shape: tuple[int, ...], shift: Floats) -> Complexes:
 
 
 def _shift(reference: Complexes, spectrum: Complexes, shape: tuple[int, ...], near: Floats) -> Floats:
-    """Return the shift of a frame against a reference, near the shift of the frame before."""
+    """Return the shift of a frame against a reference, near the shift of the frame before.
+
+    Phases alone tell a shift from those by a period of the lattice, and noise may move their maximum by a pixel: the
+    correlation itself, in which the strong waves count most, decides between the neighbours.
+    """
     cross = np.conj(reference) * spectrum
     phase = cross / np.sqrt(np.maximum(np.abs(cross), 1e-300))
     match = np.fft.irfft2(phase, (shape[0], shape[1]))
@@ -73,6 +78,9 @@ def _shift(reference: Complexes, spectrum: Complexes, shape: tuple[int, ...], ne
     x = (np.arange(shape[1]) + shape[1] // 2) % shape[1] - shape[1] // 2
     far = np.hypot(x[None, :] - near[0], y[:, None] - near[1]) > _FURTHEST * min(shape)
     row, column = np.unravel_index(int(np.argmax(np.where(far, -np.inf, match))), match.shape)
+    beside = np.hypot(x[None, :] - x[column], y[:, None] - y[row]) < _BESIDE
+    correlation = np.fft.irfft2(cross, (shape[0], shape[1]))
+    row, column = np.unravel_index(int(np.argmax(np.where(beside, correlation, -np.inf))), match.shape)
     return np.array([x[column], y[row]], dtype=np.float64)
 
 
