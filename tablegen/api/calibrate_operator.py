@@ -115,7 +115,7 @@ def calibrate_operator(
     remarks = trace_remarks(tables, replace(known, response=response), axis) if tables else ()
     try:
         lines = _sensor_lines(tables, prior.driver)
-        if len(lines) + len(pairs) < LEAST_LINES:
+        if not pairs and len(lines) < LEAST_LINES:
             raise Unsettled(f"{len(lines)} settled traces are not enough for fields over size and offset")
         delay = fit_delay(lines, response) if delay_s == "fit" else Estimate(float(delay_s))
         lines = [line.earlier(delay.value) for line in lines]

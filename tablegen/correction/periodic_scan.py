@@ -172,14 +172,13 @@ def periodic_scan(
         waves = CellWaves.of(cell)
         recorded = [image for image in (trace, retrace) if image is not None]
         level = [without_terraces(image) for image in recorded]
-        if any(image is not None for image in level):
-            levelled = [image if one is None else one for one, image in zip(level, recorded, strict=True)]
-        else:
-            levelled = recorded
+        has_terraces = any(image is not None for image in level)
+        levelled = [image if one is None else one for one, image in zip(level, recorded, strict=True)]
         heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in levelled]
         heights, scaled = _unit(heights, heights), _unit(recorded, heights)
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
-        for _ in range(_STEP_ROUNDS):
+        # Without terraces, what a first fit leaves is its own error, and would pass for steps.
+        for _ in range(_STEP_ROUNDS if has_terraces else 0):
             without, stepped = _stepless(model, state, scaled)
             if not stepped:
                 break

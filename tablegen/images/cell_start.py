@@ -132,7 +132,7 @@ def cell_instead(
         If the indexer finds no cell, or several.
     """
     try:
-        return CellWaves.of(find_cell(trace, retrace, expected_area))
+        return CellWaves.of(_find(trace, retrace, expected_area))
     except AmbiguousCell as several:
         return _common(several, sizes)
     except Unphysical:
@@ -170,7 +170,7 @@ def other_cell(
     if not sizes and explained > _LATTICE_EXPLAINS:
         return None
     try:
-        cell = CellWaves.of(find_cell(trace, retrace, expected_area))
+        cell = CellWaves.of(_find(trace, retrace, expected_area))
     except AmbiguousCell as several:
         if not sizes and all(are_waves_of(model, state, one) for one in several.cells):
             return None
@@ -178,6 +178,19 @@ def other_cell(
     except Unphysical:
         return None
     return None if are_waves_of(model, state, cell.vectors, 1) else cell
+
+
+def _find(trace: Floats, retrace: Floats | None, expected_area: float | None) -> ImageCell:
+    """Find the cell, if need be without the area: where that contradicts the image, the size of the line says so."""
+    try:
+        return find_cell(trace, retrace, expected_area)
+    except AmbiguousCell as several:
+        if expected_area is None:
+            raise
+        try:
+            return find_cell(trace, retrace)
+        except Unphysical:
+            raise several from None
 
 
 def _common(several: AmbiguousCell, sizes: bool) -> CellWaves:
