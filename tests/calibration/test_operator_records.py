@@ -73,6 +73,7 @@ DRIVES: dict[str, tuple[Callable[[], Floats], float]] = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("drive", DRIVES)
 def test_a_record_of_any_drive_predicts_another_one(drive: str) -> None:
     make, most = DRIVES[drive]
@@ -83,6 +84,7 @@ def test_a_record_of_any_drive_predicts_another_one(drive: str) -> None:
     assert error_of_another(fit, PLAYS) < most
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("core", "most"), [(BoucWen(), 0.8), (JilesAtherton(), 0.9)])
 def test_other_families_are_met_as_well_as_plays_can(core: OneState, most: float) -> None:
     fit = fitted(trace(random_triangle(3), core), trace(chirp(), core, "chirp.csv", 2))
@@ -91,6 +93,7 @@ def test_other_families_are_met_as_well_as_plays_can(core: OneState, most: float
         assert 0.3 * errors.rms < errors.predicted_rms < 3.0 * errors.rms
 
 
+@pytest.mark.common
 def test_several_records_are_better_than_one() -> None:
     one = fitted(trace(chirp()))
     both = fitted(trace(chirp()), trace(random_triangle(3), name="other.csv", seed=2))
@@ -122,6 +125,7 @@ def test_the_state_before_a_record_is_found(begin: Begin) -> None:
     assert fit.errors[0].rms < 0.25
 
 
+@pytest.mark.common
 def test_a_start_in_no_state_of_the_model_is_left_out() -> None:
     record = trace(chirp())
     record.displacement_nm[:20] += 300.0 * np.linspace(1.0, 0.2, 20)
@@ -130,6 +134,7 @@ def test_a_start_in_no_state_of_the_model_is_left_out() -> None:
     assert errors.rms < 0.16
 
 
+@pytest.mark.common
 def test_a_late_sensor_is_found_and_named() -> None:
     record = trace(chirp())
     late = np.interp(record.time_s - 4e-4, record.time_s, record.displacement_nm)
@@ -207,6 +212,7 @@ def test_a_record_without_information_is_refused_with_its_reason(mistake: str) -
         time_record(change(record), V_MAX)
 
 
+@pytest.mark.common
 def test_records_that_contradict_each_other_are_named() -> None:
     good = [trace(random_triangle(k), name=f"{k}.csv", seed=k) for k in (3, 4)]
     other = trace(chirp(), name="chirp.csv")

@@ -26,6 +26,7 @@ def accepted_and_wrong(seeds: Iterable[int], known: Knowledge) -> tuple[int, lis
     return accepted, wrong
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("seed", [2, 8, 82])
 def test_a_distorted_lattice_is_corrected(seed: int) -> None:
     """The terraces of these made the fit fail, or moved rows by 4 pixels."""
@@ -43,6 +44,7 @@ def test_it_is_corrected_without_the_constant(known: Knowledge) -> None:
     assert accepted_and_wrong([8], known) == (1, [])
 
 
+@pytest.mark.common
 def test_without_a_size_another_cell_may_have_the_constant() -> None:
     """Its strong spots are those of a third of the area: the size would be wrong by the root of 3."""
     with pytest.raises(Unphysical, match="may be the constant of the whole cell, or of one with 1/3 of its area"):

@@ -32,6 +32,7 @@ def moved(scan: PeriodicScan, axis: int) -> float:
     return float(np.nanmax(np.abs(displacement - np.nanmean(displacement))))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_alone_moves_nothing(seed: int) -> None:
     scan = fit(0.0, seed)
@@ -40,6 +41,7 @@ def test_noise_alone_moves_nothing(seed: int) -> None:
     assert moved(scan, 1) < 0.01  # of the time within a row
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("seed", range(3))
 def test_a_fifth_of_a_pixel_is_supported_along_its_axis(seed: int) -> None:
     """The negative control: a bow of 0.2 pixels is applied, and moves no row."""
@@ -56,6 +58,7 @@ def test_the_note_says_which_axis_is_not_displaced(tmp_path: Path, monkeypatch: 
     assert "note: the displacement along x and y is within its errors; it was not applied" in text
 
 
+@pytest.mark.common
 def test_the_displacement_of_a_piezo_is_supported(tmp_path: Path) -> None:
     frame = old_frame("paper", pixels=128, lines=96)
     scan, its_fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), OldScan(), lattice_nm=60.0)
