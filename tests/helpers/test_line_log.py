@@ -65,7 +65,13 @@ def _ask(player: SequencerPlayer | LinePlayer, request: str, number: int) -> Non
 def _played(steps: list[Step]) -> list[PlayedLine]:
     log = _Log()
     player = SequencerPlayer(_BOOT, on_tick=log)
+    parking = False
     for number, (request, ticks) in enumerate([("wait", 60), *steps, ("park", 60)]):
+        if request == "commit" and parking:
+            player.advance(
+                60
+            )  # a swap on the way to the park codes begins another way there, which the check does not follow
+        parking = request == "park" or (parking and request != "commit")
         _ask(player, request, number)
         player.advance(ticks)
     return log.lines
