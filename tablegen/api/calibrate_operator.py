@@ -14,7 +14,7 @@ from tablegen.api.measured import Measured, measured_list, table_of
 from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.image_sizes import SampleImage
-from tablegen.calibration.operator.advice import next_trace
+from tablegen.calibration.operator.advice import check_scans, next_trace
 from tablegen.calibration.operator.delay import fit_delay
 from tablegen.calibration.operator.fit import LEAST_LINES, fit_operator
 from tablegen.calibration.operator.imaged_line import imaged_line
@@ -25,7 +25,7 @@ from tablegen.calibration.record_checks import trace_remarks
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
 from tablegen.calibration.tables.recorder import Columns, Recorder
 from tablegen.calibration.tables.table import MeasuredTable
-from tablegen.calibration.tables.traces import split_traces
+from tablegen.calibration.tables.traces import split_traces, trace_name
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage
 from tablegen.numerics.driver import Driver
@@ -109,6 +109,7 @@ def calibrate_operator(
     tables = [table_of(one, _NEEDED, [TRACE], recorder) for one in measured]
     pairs = [sample_image(v, at, pair[0], pair[1] if pair[1:] else None, how) for v, at, _, *pair in images]
     prior = known_scanner(scanner, axis, v_max, v_min)
+    check_scans(scans, prior.driver)
     sources: tuple[MeasuredTable | ScanImage, ...] = (*tables, *(one for _, files in pairs for one in files))
     known = prior.known(recorder, None if delay_s == "fit" else float(delay_s), absolute=True)
     response, offset_law = prior.axis_laws()
@@ -155,7 +156,7 @@ def _sensor_lines(tables: Sequence[MeasuredTable], driver: Driver) -> list[Perio
             except Unsettled as reason:
                 raise _NamedUnsettled(f"{trace.name}: {reason}") from None
             except Unphysical as reason:
-                raise _NamedUnphysical(f"{table.file}: {trace.name}: {reason}") from None
+                raise _NamedUnphysical(f"{trace_name(table, trace)}: {reason}") from None
     return lines
 
 

@@ -15,10 +15,10 @@ from tablegen.calibration.operator.advice import next_trace
 from tablegen.calibration.operator.file_of_fit import MODEL
 from tablegen.calibration.operator.record_fit import COMPLEXITIES, RecordsFit, fit_records
 from tablegen.calibration.operator.time_record import LEAST_SAMPLES, TimeRecord, time_record
-from tablegen.calibration.operator.units import MOST_RATIO
+from tablegen.calibration.operator.units import check_size
 from tablegen.calibration.tables.columns import TIME, TRACE
 from tablegen.calibration.tables.table import MeasuredTable
-from tablegen.calibration.tables.traces import split_traces
+from tablegen.calibration.tables.traces import split_traces, trace_name
 from tablegen.charts.chart import Chart, DrawnCurve, Mark
 from tablegen.charts.picture_file import PlottedCharts
 
@@ -52,12 +52,7 @@ def records_in_time(
     records = [one for table in tables for one in _records(table, prior)]
     response, offset_law = prior.axis_laws()
     if (k := prior.number("size", "k_nm_per_v")) is not None:
-        ratio = float(np.median([one.span_nm / one.stroke for one in records])) / (k * prior.driver.span)
-        if not 1.0 / MOST_RATIO < ratio < MOST_RATIO:
-            raise Unphysical(
-                f"the records move {ratio:.3g} times as far as k_nm_per_v = {k:g} of {prior.path} says; are they in V "
-                "at the piezo and nm?"
-            )
+        check_size(records, k * prior.driver.span, f"k_nm_per_v = {k:g} of {prior.path}", "records")
     fit = fit_records(records, response, lambda centre: offset_law.factor(2.0 * centre - 1.0), delay_s)
     further = next_trace(fit, fit.operator.lines, prior.driver, scans)
     every = (*remarks, *_delay_remarks(fit))
@@ -80,8 +75,7 @@ def _records(table: MeasuredTable, prior: KnownScanner) -> list[TimeRecord]:
         try:
             out.append(time_record(trace, prior.driver))
         except Unphysical as reason:
-            name = table.file if trace.name == table.source.name else f"{table.file}: {trace.name}"
-            raise Unphysical(f"{name}: {reason}") from None
+            raise Unphysical(f"{trace_name(table, trace)}: {reason}") from None
     return out
 
 

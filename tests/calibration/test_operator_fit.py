@@ -9,7 +9,7 @@ from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, JilesAtherton, ManyP
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.hysteresis import Trace
-from tablegen.calibration.operator.advice import next_trace
+from tablegen.calibration.operator.advice import check_scans, next_trace
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.loop_errors import compare
@@ -18,6 +18,7 @@ from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.plays import envelopes
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 
 pytestmark = pytest.mark.common
 
@@ -229,7 +230,7 @@ def test_the_next_trace_is_that_of_the_scans_and_says_what_it_brings() -> None:
     assert near.left < 0.1
     assert 0.3 < next_trace(fit, lines, 100.0).left < 0.99
     with pytest.raises(Unphysical, match=r"a scan of 40 V at 85 V is not within 0\.\.100 V"):
-        next_trace(fit, lines, 100.0, [(40.0, 85.0)])
+        check_scans([(45.0, 50.0), (40.0, 85.0)], Driver(100.0))
 
 
 @pytest.mark.parametrize("kind", [ManyPlays, BoucWen])

@@ -55,3 +55,15 @@ def test_a_delay_that_is_none_is_refused(text: str, traces: list[Path]) -> None:
     done = calibrated(*traces, "--delay-s", text)
     assert done.status == 2
     assert f"--delay-s {text}: seconds, or fit" in done.err
+
+
+def test_a_scan_that_the_driver_does_not_reach_is_refused_before_the_fit(traces: list[Path]) -> None:
+    done = calibrated(*traces, "--for", "200", "50")
+    assert (done.status, done.out) == (2, "")
+    assert "a scan of 200 V at 50 V is not within 0..100 V" in done.err
+
+
+def test_a_trace_is_named_once_with_its_folder(traces: list[Path], tmp_path: Path) -> None:
+    few = tmp_path / "few.csv"
+    few.write_text("".join(traces[0].read_text("utf-8").splitlines(keepends=True)[:5]), "utf-8")
+    assert calibrated(few).err.startswith(f"{few}: 4 samples")

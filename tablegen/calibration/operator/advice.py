@@ -49,6 +49,22 @@ class NextTrace:
         }
 
 
+def check_scans(scans: Sequence[tuple[float, float]], driver: Driver) -> None:
+    """Refuse scans, as voltage peak to peak and offset in V, that the driver does not reach.
+
+    Raises
+    ------
+    Unphysical
+        If one is refused.
+    """
+    for volts, offset in scans:
+        if not (volts > 0.0 and driver.beyond(offset - 0.5 * volts, offset + 0.5 * volts) <= 1e-9 * driver.span):
+            raise Unphysical(
+                f"a scan of {volts:g} V at {offset:g} V is not within {driver.v_min:g}..{driver.v_max:g} V; give its "
+                "voltage peak to peak, above 0, and its offset, both at the piezo"
+            )
+
+
 def next_trace(
     fit: OperatorFit, lines: Sequence[_Line], driver: Driver | float, scans: Sequence[tuple[float, float]] = ()
 ) -> NextTrace:
@@ -61,19 +77,8 @@ def next_trace(
     ----------
     scans
         Scan voltages peak to peak and offsets, in V; without any, all that a build serves.
-
-    Raises
-    ------
-    Unphysical
-        If the driver does not reach a scan.
     """
     driver = Driver.of(driver)
-    for volts, offset in scans:
-        if not (volts > 0.0 and driver.beyond(offset - 0.5 * volts, offset + 0.5 * volts) <= 1e-9 * driver.span):
-            raise Unphysical(
-                f"a scan of {volts:g} V at {offset:g} V is not within {driver.v_min:g}..{driver.v_max:g} V; give its "
-                "voltage peak to peak, above 0, and its offset, both at the piezo"
-            )
     points = np.array([(volts / driver.span, driver.share(offset)) for volts, offset in scans] or _served(lines))
     gain = _gain(fit, points, points)
     # Of two equal ones, such as those at equal distances to both sides, every machine takes the lower one.

@@ -50,6 +50,11 @@ class PeriodicLine:
         return float(np.max(self.drive))
 
     @property
+    def span_nm(self) -> float:
+        """The stroke of the displacement, peak to peak."""
+        return float(np.ptp(self.displacement_nm))
+
+    @property
     def stroke(self) -> float:
         """Peak to peak, of v_max."""
         return self.high - self.low

@@ -26,6 +26,7 @@ from tablegen.calibration.operator.time_columns import (
     transients,
 )
 from tablegen.calibration.operator.time_record import TimeRecord
+from tablegen.calibration.operator.units import check_alike
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
@@ -51,7 +52,6 @@ _MOST_DELAY = 0.03  # periods
 _SHARPEST = 0.02  # of the steps, at which the search ends
 _LEAD_IN, _DEPARTS, _DEPARTS_BY = 0.1, 6.0, 0.02  # of the samples; of the rms of the others; of the stroke
 _CONTRADICTS_PERCENT, _CONTRADICTS_RATIO = 1.0, 3.0  # rms of a record beside others, and over that alone
-_MOST_RATIO = 3.0  # of the sensitivities of two records
 _MOST_LINES = 12
 _LEAST_SWEEP = 0.03  # of the driver's range
 _ALIKE = 0.1  # of the driver's range: strokes and centres of sweeps that make one line
@@ -130,7 +130,7 @@ def fit_records(
     Unphysical
         If the records contradict each other, or are too short for any operator.
     """
-    _check_sensitivities(records)
+    check_alike(records, "records")
     count = sum(len(record.time_s) for record in records)
     usable = [one for one in COMPLEXITIES if _ROWS_PER_WEIGHT * one.weights <= count] or [COMPLEXITIES[0]]
     begins = [_begin_of(record, usable[0].basis, response) for record in records]
@@ -334,17 +334,6 @@ def _begin_of(record: TimeRecord, basis: PlayBasis, response: Response | None) -
         return problem.solve(problem.whole, _LOSS_STEP, 0.0).cost
 
     return min(Begin, key=cost)
-
-
-def _check_sensitivities(records: Sequence[TimeRecord]) -> None:
-    sensitivities = [record.span_nm / record.stroke for record in records]
-    usual = float(np.median(sensitivities))
-    for record, one in zip(records, sensitivities, strict=True):
-        if not 1.0 / _MOST_RATIO < one / usual < _MOST_RATIO:
-            raise Unphysical(
-                f"{record.name}: moves {one / usual:.3g} times as far for its drive as the other records do; are all "
-                "in V at the piezo and nm?"
-            )
 
 
 def _check_contradictions(problem: _Problem, whole: _Solution) -> None:

@@ -24,3 +24,8 @@ def split_traces(table: MeasuredTable) -> list[Trace]:
         Trace(name + label if several else name, time[rows], table[DRIVE][rows], table[DISPLACEMENT][rows])
         for label, rows in groups
     ]
+
+
+def trace_name(table: MeasuredTable, trace: Trace) -> str:
+    """Return the name of a trace in messages: its file with the folder, and its number where there are several."""
+    return table.file + trace.name.removeprefix(table.source.name)
