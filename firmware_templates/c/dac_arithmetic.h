@@ -17,7 +17,7 @@ typedef int64_t dac_wide;
 /* One advance: 96-bit addition. The step is ceil(2^n / period), n = 79 + index bits, or 82 + index bits of a cubic
  * table, so that after k < period advances the position exceeds the exact k 2^n / period by less than k, and
  * k < 2^64 / period: floors to 2^64 are exact. */
-static inline void dac_advance(dac_position *at, const dac_position *step)
+DAC_CODE_ATTR static inline void dac_advance(dac_position *at, const dac_position *step)
 {
     const uint64_t low = at->low + step->low;
     at->high += step->high + (low < step->low ? 1u : 0u);
@@ -27,7 +27,8 @@ static inline void dac_advance(dac_position *at, const dac_position *step)
 /* The sample between two words: guard bits below the LSB of a word, rounded to nearest, ties up. `half` is
  * DAC_HALF(guard). */
 #define DAC_HALF(guard) ((dac_wide)1 << (14u - (guard)))
-static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard, dac_wide half)
+DAC_CODE_ATTR static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard,
+                                             dac_wide half)
 {
     const dac_wide rise = ((dac_wide)(there - here) * (dac_wide)fraction + half) >> (15u - guard);
     return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
@@ -39,7 +40,7 @@ static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, u
 #if DAC_LONG_MULTIPLY || defined(__riscv_mul)
 typedef int32_t dac_factor; /* the fraction times 2^13, so that the upper word of a product is the sum's */
 #define DAC_FACTOR(fraction) (int32_t)((fraction) << 13)
-static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor half)
+DAC_CODE_ATTR static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor half)
 {
     /* Compilers do not use these instructions here: they know too much about the factors. */
 #if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FEATURE_DSP)
@@ -60,7 +61,7 @@ typedef struct {
     int32_t upper, lower; /* 9 bits each: products with a value, and their sum, stay below 2^31 */
 } dac_factor;
 #define DAC_FACTOR(fraction) {(int32_t)((fraction) >> 9), (int32_t)((fraction) & 0x1ffu)}
-static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor by)
+DAC_CODE_ATTR static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor by)
 {
     int32_t sum = value * by.upper + (value * by.lower >> 9);
 #if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__)
@@ -80,7 +81,7 @@ typedef struct {
     int32_t b0, b1, b2, b3;
 } dac_segment;
 
-static inline dac_segment dac_segment_of(const dac_word *words)
+DAC_CODE_ATTR static inline dac_segment dac_segment_of(const dac_word *words)
 {
     const int32_t first = words[0], second = words[1], third = words[2], fourth = words[3], ends = first + third;
     const dac_segment s = {
@@ -93,7 +94,7 @@ static inline dac_segment dac_segment_of(const dac_word *words)
 }
 
 /* Returns the sample at a fraction of 18 bits. */
-static inline int32_t dac_spline_eval(const dac_segment *s, uint32_t fraction)
+DAC_CODE_ATTR static inline int32_t dac_spline_eval(const dac_segment *s, uint32_t fraction)
 {
     const dac_factor by = DAC_FACTOR(fraction);
     return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, by), by), by);
@@ -101,7 +102,7 @@ static inline int32_t dac_spline_eval(const dac_segment *s, uint32_t fraction)
 #endif
 
 /* Returns the word that the converter takes for a code. */
-static inline dac_output dac_encode(const dac_axis *axis, int32_t code)
+DAC_CODE_ATTR static inline dac_output dac_encode(const dac_axis *axis, int32_t code)
 {
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
 }

@@ -10,20 +10,20 @@ bool dac_axis_serves(const dac_converter *c)
         && c->power_up_code >= 0 && c->power_up_code < INT32_C(1) << c->bits;
 }
 
-bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target)
+DAC_CODE_ATTR bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target)
 {
     const int32_t rise = target - axis->code, most = bank->max_step;
     axis->code += rise > most ? most : rise < -most ? -most : rise;
     return axis->code == target;
 }
 
-static inline int32_t code_of(const dac_bank_axis *bank, int32_t sample)
+DAC_CODE_ATTR static inline int32_t code_of(const dac_bank_axis *bank, int32_t sample)
 {
     return (int32_t)(((int64_t)bank->gain * sample + bank->offset) >> bank->gain_q); /* 28 bits or fewer */
 }
 
 /* The code of this tick, before the clamp. */
-static inline int32_t unclamped(dac_axis *axis, const dac_bank_axis *bank)
+DAC_CODE_ATTR static inline int32_t unclamped(dac_axis *axis, const dac_bank_axis *bank)
 {
     const int32_t sample = dac_sample_at(bank, axis->at.high);
 #if DAC_SHAPING
@@ -35,7 +35,7 @@ static inline int32_t unclamped(dac_axis *axis, const dac_bank_axis *bank)
     return code_of(bank, sample);
 }
 
-bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
+DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 {
     const int32_t code = unclamped(axis, bank);
     const int32_t clamped = code < bank->code_min ? bank->code_min : code > bank->code_max ? bank->code_max : code;
@@ -61,8 +61,8 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 #if DAC_LONG_MULTIPLY
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
-static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
-                                  dac_output *out, uint32_t ticks, bool cubic)
+DAC_CODE_ATTR static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                                dac_output *out, uint32_t ticks, bool cubic)
 {
     const dac_word *const table = bank->table;
     /* Read again for every sample: a constant would take two registers, which the loop does not have. */
@@ -117,8 +117,8 @@ static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uin
     return done;
 }
 
-static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                     uint32_t ticks)
+DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                   dac_output *out, uint32_t ticks)
 {
 #if DAC_SPLINE
     if (bank->cubic)
@@ -139,8 +139,8 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
 }
 #endif
 
-static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                     uint32_t ticks)
+DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                   dac_output *out, uint32_t ticks)
 {
 #if DAC_SPLINE
     if (bank->cubic)
@@ -159,7 +159,7 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 #define PLAY(bank) play
 #endif
 
-uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks)
+DAC_CODE_ATTR uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks)
 {
     const uint64_t step = bank->holds ? 0 : ((uint64_t)bank->step.high << 32 | bank->step.low >> 32) + 1;
     uint32_t done = 0;
@@ -177,7 +177,7 @@ uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out
     return done;
 }
 
-void dac_axis_skip(dac_axis *axis, const dac_bank_axis *bank, uint32_t ticks)
+DAC_CODE_ATTR void dac_axis_skip(dac_axis *axis, const dac_bank_axis *bank, uint32_t ticks)
 {
     if (bank->holds)
         return;

@@ -42,6 +42,10 @@
 #define DAC_REQUESTS 8 /* requests that may wait for a tick: a power of two, at most 128 */
 #endif
 
+#ifndef DAC_CODE_ATTR
+#define DAC_CODE_ATTR /* where the functions of the consumer are placed, for example a section in RAM */
+#endif
+
 #ifndef DAC_WAIT
 #define DAC_WAIT 8 /* ticks that are played one by one after a refused run, before the next run is tried */
 #endif

@@ -24,7 +24,7 @@ struct dac_pair {
 #endif
 
 /* Returns the sample at a position, given by its upper word. */
-static inline int32_t dac_sample_at(const dac_bank_axis *bank, uint32_t high)
+DAC_CODE_ATTR static inline int32_t dac_sample_at(const dac_bank_axis *bank, uint32_t high)
 {
 #if DAC_SPLINE
     if (bank->cubic) {
@@ -47,7 +47,7 @@ typedef struct {
 } dac_track;
 
 /* Returns the track as it is one tick before position `at`. */
-static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_t step)
+DAC_CODE_ATTR static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_t step)
 {
     const dac_word *const words = table + (at >> 50);
     const bool goes_on = (at - step) >> 50 == at >> 50;
@@ -61,7 +61,7 @@ static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_
 }
 
 /* Moves to the next tick, and returns its sample. */
-static inline int32_t dac_track_next(dac_track *track)
+DAC_CODE_ATTR static inline int32_t dac_track_next(dac_track *track)
 {
     const uint32_t before = (uint32_t)(track->way >> 32);
 
@@ -74,13 +74,13 @@ static inline int32_t dac_track_next(dac_track *track)
 #endif
 
 /* Returns the ticks of the next block, which one check covers. */
-static inline uint32_t dac_block_of(uint32_t ticks)
+DAC_CODE_ATTR static inline uint32_t dac_block_of(uint32_t ticks)
 {
     return ticks < DAC_RUN ? ticks : DAC_RUN;
 }
 
 /* Returns true if a window with this lower end is inside the limits. */
-static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
+DAC_CODE_ATTR static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 {
     return (uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room;
 }
@@ -88,10 +88,10 @@ static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 /* For functions that take constants, such as the order of the shaping: each caller gets a copy made for its own. */
 #if defined(__GNUC__)
 #define DAC_ALWAYS_INLINE static inline __attribute__((always_inline))
-#define DAC_NOINLINE static __attribute__((noinline)) /* a loop that shares no registers with its caller */
+#define DAC_NOINLINE DAC_CODE_ATTR static __attribute__((noinline)) /* a loop that shares no register with its caller */
 #else
 #define DAC_ALWAYS_INLINE static inline
-#define DAC_NOINLINE static
+#define DAC_NOINLINE DAC_CODE_ATTR static
 #endif
 
 /* The remainders here have half a code more, so that none is negative. What is fed back has half a code more then too,

@@ -7,7 +7,7 @@ enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
 enum { NOTHING = 2 };         /* value of `playing` before the first program */
 #define UNKNOWN UINT32_MAX /* position of the pixels after ticks that were played without markers */
 
-static void clear_faults(dac_sequencer *s)
+DAC_CODE_ATTR static void clear_faults(dac_sequencer *s)
 {
     s->faults = 0;
     for (int i = 0; i < DAC_FAULTS; i++)
@@ -117,7 +117,7 @@ dac_status dac_sequencer_status(const dac_sequencer *s)
 
 /* Functions of the consumer. */
 
-void dac_sequencer_report(dac_sequencer *s, uint8_t fault)
+DAC_CODE_ATTR void dac_sequencer_report(dac_sequencer *s, uint8_t fault)
 {
     for (int i = 0; i < DAC_FAULTS; i++)
         if (((unsigned)fault >> i & 1u) != 0 && s->fault_counts[i] != UINT32_MAX)
@@ -125,14 +125,14 @@ void dac_sequencer_report(dac_sequencer *s, uint8_t fault)
     s->faults = (uint8_t)(s->faults | (fault & 15u));
 }
 
-static void to_start(dac_axis *axis)
+DAC_CODE_ATTR static void to_start(dac_axis *axis)
 {
     axis->at.low = 0;
     axis->at.high = 0;
 }
 
 /* Begins with remainders of 0, if there are any. */
-static void forget(dac_axis *axis)
+DAC_CODE_ATTR static void forget(dac_axis *axis)
 {
 #if DAC_SHAPING
     axis->shaper.back = axis->shaper.newest = axis->shaper.older = UINT32_C(1) << (27 - axis->bits);
@@ -142,7 +142,7 @@ static void forget(dac_axis *axis)
 }
 
 /* Starts at line 0 of the active program. Without one, swap() does so again with the program that waits. */
-static void begin(dac_sequencer *s)
+DAC_CODE_ATTR static void begin(dac_sequencer *s)
 {
     s->tick = 0;
     s->line = 0;
@@ -155,7 +155,7 @@ static void begin(dac_sequencer *s)
     s->catching_up = true;
 }
 
-static void trigger(dac_sequencer *s)
+DAC_CODE_ATTR static void trigger(dac_sequencer *s)
 {
     if (!s->armed || s->running || (s->now == NULL && !s->waiting))
         return;
@@ -166,12 +166,12 @@ static void trigger(dac_sequencer *s)
     begin(s);
 }
 
-static void park(dac_sequencer *s)
+DAC_CODE_ATTR static void park(dac_sequencer *s)
 {
     s->armed = s->running = false;
 }
 
-static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
+DAC_CODE_ATTR static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
 {
     switch (what) {
     case COMMIT:
@@ -205,7 +205,7 @@ static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
     }
 }
 
-void dac_sequencer_answer(dac_sequencer *s)
+DAC_CODE_ATTR void dac_sequencer_answer(dac_sequencer *s)
 {
     const uint8_t head = s->head;
     uint8_t tail = s->tail;
@@ -222,7 +222,7 @@ void dac_sequencer_answer(dac_sequencer *s)
 }
 
 /* Activates the committed program, if this tick allows it. */
-static bool swap(dac_sequencer *s)
+DAC_CODE_ATTR static bool swap(dac_sequencer *s)
 {
     if (!s->waiting || (s->running && s->tick != 0))
         return false;
@@ -236,13 +236,13 @@ static bool swap(dac_sequencer *s)
     return true;
 }
 
-static bool in(const dac_window *window, uint32_t at)
+DAC_CODE_ATTR static bool in(const dac_window *window, uint32_t at)
 {
     return at - window->first < window->count;
 }
 
 /* Returns the number of ticks from `tick` to the next edge of a window or the turn, at most `most`. */
-static uint32_t until_edge(const dac_schedule *plan, uint32_t tick, uint32_t most)
+DAC_CODE_ATTR static uint32_t until_edge(const dac_schedule *plan, uint32_t tick, uint32_t most)
 {
     const uint32_t edges[] = {plan->turn_tick, plan->forward.first, plan->forward.first + plan->forward.count,
                               plan->backward.first, plan->backward.first + plan->backward.count};
@@ -254,7 +254,7 @@ static uint32_t until_edge(const dac_schedule *plan, uint32_t tick, uint32_t mos
 
 /* Of the ticks from s->tick on, up to `most` of them and to the next at which more than pixels changes; returns how
  * many. `clean`: nothing that this tick or an earlier one did spoils the image. */
-static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *markers, uint32_t most)
+DAC_CODE_ATTR static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *markers, uint32_t most)
 {
     const dac_schedule *const plan = &s->now->schedule;
     const uint32_t tick = s->tick;
@@ -288,7 +288,7 @@ static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *markers, uint32_t mo
     return most;
 }
 
-static void go_on(dac_sequencer *s, uint32_t ticks)
+DAC_CODE_ATTR static void go_on(dac_sequencer *s, uint32_t ticks)
 {
     const dac_bank *const bank = s->now;
 
@@ -311,7 +311,7 @@ static void go_on(dac_sequencer *s, uint32_t ticks)
         s->running = false;
 }
 
-static uint8_t play(dac_sequencer *s)
+DAC_CODE_ATTR static uint8_t play(dac_sequencer *s)
 {
     const dac_bank *const bank = s->now;
     uint8_t markers;
@@ -330,7 +330,7 @@ static uint8_t play(dac_sequencer *s)
     return markers;
 }
 
-static uint8_t rest(dac_sequencer *s)
+DAC_CODE_ATTR static uint8_t rest(dac_sequencer *s)
 {
     const dac_bank *const bank = s->now;
     bool parked = true;
@@ -343,7 +343,7 @@ static uint8_t rest(dac_sequencer *s)
 }
 
 /* Plays one tick, after the requests were processed. */
-static void one_tick(dac_sequencer *s, dac_tick *out)
+DAC_CODE_ATTR static void one_tick(dac_sequencer *s, dac_tick *out)
 {
     const uint8_t swapped = swap(s) ? DAC_SWAPPED : 0;
 
@@ -354,14 +354,14 @@ static void one_tick(dac_sequencer *s, dac_tick *out)
     out->y = dac_encode(&s->y, s->y.code);
 }
 
-void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
+DAC_CODE_ATTR void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
 {
     dac_sequencer_answer(s);
     one_tick(s, out);
 }
 
 /* Plays as many ticks as both axes can in one run, at most `most`; the codes are not coded yet. */
-static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t most)
+DAC_CODE_ATTR static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t most)
 {
     const dac_bank *const bank = s->now;
 #if DAC_SHAPING
@@ -387,7 +387,7 @@ static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t mos
 }
 
 /* Sets the markers of ticks that were played in a run, and advances to the tick after them. */
-static void pass(dac_sequencer *s, uint8_t *markers, uint32_t ticks)
+DAC_CODE_ATTR static void pass(dac_sequencer *s, uint8_t *markers, uint32_t ticks)
 {
     s->catching_up = false;
     if (markers == NULL) {
@@ -405,7 +405,7 @@ static void pass(dac_sequencer *s, uint8_t *markers, uint32_t ticks)
     s->markers = markers[-1];
 }
 
-static void encode(const dac_axis *axis, dac_output *out, uint32_t ticks)
+DAC_CODE_ATTR static void encode(const dac_axis *axis, dac_output *out, uint32_t ticks)
 {
     if (axis->flip == 0 && axis->shift == 0)
         return;
@@ -413,7 +413,7 @@ static void encode(const dac_axis *axis, dac_output *out, uint32_t ticks)
         *out = dac_encode(axis, (int32_t)*out);
 }
 
-void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks)
+DAC_CODE_ATTR void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks)
 {
     uint32_t done, most = UINT32_C(1) << 16, wait = 0;
 

@@ -4,11 +4,11 @@
  * equals its integer model. C99, no heap, no C library. The compiler must provide int64_t, and an arithmetic >> of
  * negative numbers; C99 does not require these, but every compiler for such controllers has them.
  *
- *     static const dac_program scan = DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm);
+ *     #include "annexin_200nm_program.h"
  *     static dac_sequencer sequencer;
  *
- *     dac_sequencer_init(&sequencer, &x_converter, &y_converter);
- *     dac_sequencer_load(&sequencer, &scan);
+ *     dac_sequencer_init(&sequencer, &annexin_200nm_x_converter, &annexin_200nm_y_converter);
+ *     dac_sequencer_load(&sequencer, &annexin_200nm_program);
  *     dac_sequencer_commit(&sequencer);
  *     ... start a timer, or a DMA channel, whose interrupt calls dac_sequencer_step() or dac_sequencer_fill()
  *     dac_sequencer_arm(&sequencer, 0);
@@ -104,8 +104,10 @@ typedef struct {
     dac_axis_program x, y;
 } dac_program;
 
-/* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). */
-#define DAC_PROGRAM(NAME, name)                                                                                       \
+/* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). The names may be macros,
+ * as of -DUP=ANNEXIN_200NM -Dlow=annexin_200nm: DAC_PROGRAM(UP, low). NAME_program.c of a build has it as an object. */
+#define DAC_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name)
+#define DAC_PROGRAM_OF(NAME, name)                                                                                    \
     {                                                                                                                 \
         {NAME##_LINE_TICKS, NAME##_FRAME_LINES, NAME##_PIXELS, NAME##_SETTLE_LINES, NAME##_TURN_TICK,                 \
          {NAME##_FORWARD_FIRST_TICK, NAME##_FORWARD_TICKS}, {NAME##_BACKWARD_FIRST_TICK, NAME##_BACKWARD_TICKS},      \
@@ -113,7 +115,8 @@ typedef struct {
         DAC_AXIS_PROGRAM(NAME##_X, name##_x_table), DAC_AXIS_PROGRAM(NAME##_Y, name##_y_table)                        \
     }
 /* Initialiser for one axis of a program, with the emitted table or your own. */
-#define DAC_AXIS_PROGRAM(AXIS, words)                                                                                 \
+#define DAC_AXIS_PROGRAM(AXIS, words) DAC_AXIS_PROGRAM_OF(AXIS, words)
+#define DAC_AXIS_PROGRAM_OF(AXIS, words)                                                                              \
     {                                                                                                                 \
         words, AXIS##_TABLE_LENGTH, DAC_STORAGE_BITS(words), AXIS##_TABLE_BITS,                                       \
         AXIS##_INDEX_BITS + (AXIS##_INTERPOLATED == 3 ? DAC_CUBIC : 0), AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,       \
@@ -167,7 +170,8 @@ typedef struct {
     int32_t power_up_code; /* straight binary: output of the converter before the first write */
 } dac_converter;
 /* Initialiser for the converter that a header was made for: DAC_CONVERTER(ANNEXIN_200NM_X, 0). */
-#define DAC_CONVERTER(AXIS, power_up_code)                                                                            \
+#define DAC_CONVERTER(AXIS, power_up_code) DAC_CONVERTER_OF(AXIS, power_up_code)
+#define DAC_CONVERTER_OF(AXIS, power_up_code)                                                                         \
     {                                                                                                                 \
         AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS, AXIS##_DAC_TWOS_COMPLEMENT, AXIS##_DAC_LEFT_ALIGNED, power_up_code     \
     }

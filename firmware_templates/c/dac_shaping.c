@@ -6,7 +6,7 @@
 
 #if DAC_SHAPING
 
-int32_t dac_shaping_code(dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
+DAC_CODE_ATTR int32_t dac_shaping_code(dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
 {
     const unsigned bits = bank->remainder_bits;
     const int64_t sum = (int64_t)bank->gain * sample + bank->offset - ((int64_t)1 << (bank->gain_q - 1));
@@ -175,8 +175,8 @@ DAC_ALWAYS_INLINE bool feed(dac_axis *axis, const dac_bank_axis *bank, const uin
 }
 
 #define FEEDER(name, order, bits, fours)                                                                              \
-    static bool name(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,          \
-                     dac_output *out)                                                                                 \
+    DAC_CODE_ATTR static bool name(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values,                 \
+                                   const uint32_t *end, dac_output *out)                                              \
     {                                                                                                                 \
         return feed(axis, bank, values, end, out, order, bits, fours);                                                \
     }
@@ -188,7 +188,7 @@ FEEDER(feed_second, 2, 12, true)
 FEEDER(feed_scanner, 3, 12, true)
 #endif
 
-static dac_feeder feeder_of(const dac_bank_axis *bank)
+DAC_CODE_ATTR static dac_feeder feeder_of(const dac_bank_axis *bank)
 {
     (void)bank;
 #if DAC_SHAPING > 2
@@ -227,8 +227,8 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
 }
 #endif
 
-uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                          uint32_t ticks)
+DAC_CODE_ATTR uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                        dac_output *out, uint32_t ticks)
 {
 #if DAC_SPLINE
     if (bank->cubic)
@@ -248,8 +248,8 @@ uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at
 #define PLAY(order, bits) play(axis, bank, at, step, out, ticks, order, bits, false)
 #endif
 
-uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                          uint32_t ticks)
+DAC_CODE_ATTR uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                        dac_output *out, uint32_t ticks)
 {
 #if !defined(__OPTIMIZE_SIZE__) /* what is small has one loop for all converters and orders */
     if (bank->remainder_bits == 12) {

@@ -9,7 +9,7 @@
 #     tablegen_build(SCAN TARGET NAME [OUTPUT DIRECTORY])
 #
 # builds the scan file into DIRECTORY (by default tablegen/NAME in the binary directory), and makes a library NAME of
-# its C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c. Who links to it finds the headers, and
+# its C sources: NAME.c, NAME_program.c (not if header-only), and the runtime dac_*.c. Who links to it finds the headers, and
 # is compiled with the DAC_TABLE_STORAGE_BITS and DAC_OUTPUT_STORAGE_BITS that the scan needs, with its DAC_SHAPING, and
 # with DAC_SPLINE for cubic tables.
 #

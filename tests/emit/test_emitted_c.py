@@ -44,7 +44,7 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 def sources(built: Build) -> list[Path]:
     """What has to be compiled beside a program that includes the header."""
-    return [built.folder / name for name in built.files if name.endswith(".c")]
+    return [built.folder / name for name in built.files if name == f"{NAME}.c"]
 
 
 def compile_player(built: Build, options: list[str]) -> Path:

@@ -115,8 +115,8 @@ MUTANTS: tuple[Mutant, ...] = (
                 "s->line != bank->schedule.frame_lines",
             ),
             "a scan plays on": (
-                "        s->running = false;\n}\n\nstatic uint8_t play",
-                "        s->frames_left = 1;\n}\n\nstatic uint8_t play",
+                "        s->running = false;\n}\n\nDAC_CODE_ATTR static uint8_t play",
+                "        s->frames_left = 1;\n}\n\nDAC_CODE_ATTR static uint8_t play",
             ),
             "a clamp is no fault": ("        dac_sequencer_report(s, DAC_FAULT_CLAMP);", "        (void)0;"),
             "a clamp is a slew fault": ("DAC_FAULT_CLAMP);", "DAC_FAULT_SLEW);"),

@@ -21,6 +21,13 @@ OTHER_VALUES = {
     "DAC_LONG_MULTIPLY": 0,
     "DAC_LINK_RING": 512,
 }
+# Functions that only the producer calls.
+PRODUCER = {
+    "power_up", "request", "settled", "dac_axis_serves", "dac_sequencer_init", "dac_sequencer_writable",
+    "dac_sequencer_idle", "dac_sequencer_commit", "dac_sequencer_withdraw", "dac_sequencer_arm",
+    "dac_sequencer_trigger", "dac_sequencer_park", "dac_sequencer_reset", "dac_sequencer_clear_faults",
+    "dac_sequencer_status",
+}  # fmt: skip
 MAIN = '#include "dac_sequencer.h"\nint main(void)\n{\n    return 0;\n}\n'
 CC = ["cc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{FOLDER}"]
 
@@ -91,3 +98,64 @@ def test_the_page_has_all_options() -> None:
     )
     # What the compiler decides, and the fences, which are no numbers.
     assert {name for name in guarded if not name.endswith("_H")} == {"DAC_FEW_REGISTERS", "DAC_RELEASE"}
+
+
+SECTION = '__attribute__((section("{}")))'
+
+
+def test_tables_and_the_functions_of_the_consumer_go_where_the_firmware_wants_them(tmp_path: Path) -> None:
+    """A header of the firmware names two sections; no function of the consumer is left in another one."""
+    build(tmp_path, VARIANTS["example"])
+    (tmp_path / "my_dac_config.h").write_text(
+        f"#define DAC_TABLE_ATTR {SECTION.format('.tables')}\n#define DAC_CODE_ATTR {SECTION.format('.fast')}\n",
+        "ascii",
+    )
+    options = [f"-I{tmp_path}", "-ffunction-sections", '-DDAC_CONFIG_FILE="my_dac_config.h"']
+    sections: dict[str, str] = {}
+    for source in (
+        tmp_path / "out" / f"{NAME}.c",
+        *(FOLDER / f"dac_{name}.c" for name in ("axis", "shaping", "sequencer")),
+    ):
+        for order in (0, 3):
+            run_clean([*CC, *options, f"-DDAC_SHAPING={order}", "-c", source, "-o", "unit.o"], tmp_path)
+            symbols = run_clean(["objdump", "--syms", "unit.o"], tmp_path)
+            sections |= {
+                name: where for where, name in re.findall(r" [FO] (\S+)\s+\S+ (?:\.hidden )?(\w+)$", symbols, re.M)
+            }
+    assert {sections[f"{NAME}_{table}"] for table in ("x_table", "y_table", "x_fourier", "y_fourier", "sine")} == {
+        ".tables"
+    }
+    elsewhere = {name for name, section in sections.items() if section.startswith(".text")}
+    assert elsewhere <= PRODUCER, "functions that the consumer calls, outside the section"
+    assert sections["dac_sequencer_fill"] == sections["dac_axis_run"] == sections["dac_shaping_play"] == ".fast"
+
+
+def test_a_program_is_an_object_whose_names_may_come_from_the_build(tmp_path: Path) -> None:
+    """``NAME_program`` equals what the macro makes, also where the macro gets its names from macros."""
+    build(tmp_path, VARIANTS["example"])
+    main = f"""#include <string.h>
+#include "{NAME}.h"
+#include "{NAME}_program.h"
+static const dac_program macro = DAC_PROGRAM(UPPER, LOWER);
+static const dac_converter x = DAC_CONVERTER(UPPER_X, 0);
+int main(void)
+{{
+    const dac_axis_program *a = &macro.y, *b = &{NAME}_program.y;
+    return !(a->table == b->table && a->offset_word == b->offset_word && a->max_step == b->max_step
+             && memcmp(&macro.schedule, &{NAME}_program.schedule, sizeof macro.schedule) == 0
+             && x.bits == {NAME}_x_converter.bits && x.word_bits == {NAME}_x_converter.word_bits);
+}}
+"""
+    (tmp_path / "main.c").write_text(main, "ascii")
+    names = [f"-DUPPER={NAME.upper()}", f"-DUPPER_X={NAME.upper()}_X", f"-DLOWER={NAME}", f"-I{tmp_path / 'out'}"]
+    own = [tmp_path / "out" / f"{NAME}{suffix}.c" for suffix in ("", "_program")]
+    run_clean([*CC, *names, "main.c", *own, "-o", "main"], tmp_path)
+    run_clean([tmp_path / "main"], tmp_path)
+
+
+def test_the_object_of_another_width_does_not_compile(tmp_path: Path) -> None:
+    build(tmp_path, VARIANTS["bits_18"])
+    unit = tmp_path / "out" / f"{NAME}_program.c"
+    assert "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in run([*CC, "-c", unit, "-o", tmp_path / "o"]).stderr
+    wide = [f"-DDAC_{name}_STORAGE_BITS=32" for name in ("TABLE", "OUTPUT")]
+    run_clean([*CC, *wide, "-c", unit, "-o", tmp_path / "o"], tmp_path)

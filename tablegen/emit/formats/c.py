@@ -1,6 +1,7 @@
 """C99 tables and constants, with the C sequencer and the device's end of the serial link."""
 
 import re
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -32,18 +33,19 @@ _ARRAY = r"(?s)\b(\w+)\[\w*\] = \{(.*?)\};"
 
 
 class C(Format):
-    """The format c: ``NAME.h`` and ``NAME.c``, or the header alone."""
+    """The format c: ``NAME.h``, ``NAME.c`` and the objects ``NAME_program``; or the header alone."""
 
     name = "c"
     purpose = "C99 for firmware: tables, constants, and the sequencer dac_*.c that plays them"
-    file_names = "NAME.h, NAME.c (unless header_only), dac_*.h, dac_*.c"
+    file_names = "NAME.h, NAME.c, NAME_program.* (unless header_only), dac_*.h, dac_*.c"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """Render the header, and the arrays in a file of their own unless the build is header-only."""
+        """Render the header; unless the build is header-only, the arrays and the program in files of their own."""
         context = _context(content)
         files = {f"{content.name}.h": template("c/tables.h.j2", context, literal)}
         if not content.header_only:
             files[f"{content.name}.c"] = template("c/tables.c.j2", context, literal)
+            files |= _program_files(context)
         return files
 
     def runtime(self) -> list[Path]:
@@ -55,13 +57,16 @@ class C(Format):
         return [*self.runtime(), *(resource_folder("firmware_templates") / "c").glob("*.j2")]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
-        """Compare the constants of the header, and the words of the arrays."""
+        """Compare the constants of the header, the words of the arrays, and the text of the program's files."""
         constants, different = wrong_constants(folder, content)
         words, flipped = wrong_arrays(folder, content)
-        return [
+        comparisons = [
             Comparison("header", f"{constants} constants", different),
             Comparison("arrays", f"{words} words", flipped),
         ]
+        if not content.header_only:
+            comparisons.append(Comparison("program", "2 files", wrong_program(folder, content)))
+        return comparisons
 
 
 FORMAT = C()
@@ -116,6 +121,30 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
                 for at, word, right in differs[:1]
             ]
     return count, wrong
+
+
+def wrong_program(folder: Path, content: Content) -> list[str]:
+    """Return where the files of the program differ from what a build of this content has, behind the banner."""
+    wrong = []
+    for name, right in _program_files(_context(content)).items():
+        try:
+            text = read_text(folder / name, BUILD_FILE, errors="replace")
+        except OSError as error:
+            wrong.append(f"{name}: cannot be read: {error.strerror or error}")
+            continue
+        expected = right.decode("ascii").partition("*/")[2].splitlines()
+        lines = text.partition("*/")[2].splitlines()
+        if lines != expected:
+            pairs = zip_longest(lines, expected, fillvalue="")
+            line, other = next(pair for pair in pairs if pair[0] != pair[1])
+            wrong.append(f"{name}: a line is {line.strip()[:60]!r}, it is {other.strip()[:60]!r} by the manifest")
+    return wrong
+
+
+def _program_files(context: dict[str, Any]) -> dict[str, bytes]:
+    """Render the files that define the program and its converters as objects."""
+    names = {f"{context['name']}_program.{suffix}": f"c/program.{suffix}.j2" for suffix in ("h", "c")}
+    return {name: template(source, context, literal) for name, source in names.items()}
 
 
 def _context(content: Content) -> dict[str, Any]:

@@ -42,7 +42,7 @@ class CProgram:
 def c_program(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[CProgram, list[str]]:
     """Return the C program of the build in ``folder``, copied to ``work``, and a list of what is missing."""
     names = stored.runtime(".c", ".h")
-    own, absent = copies(folder, sorted({f"{stored.manifest.name}.h", arrays_file(stored_content(stored))}), work / "c")
+    own, absent = copies(folder, _own_files(stored), work / "c")
     runtime, missing = copies(folder, names, work / "runtime")
     absent += missing
     if not names:
@@ -58,6 +58,13 @@ def header_constants(content: Content) -> dict[str, int]:
     own = {f"{content.name.upper()}_{key}": value for key, value in scan_constants(content).items()}
     digits = {f"{content.name.upper()}_HASH[{at}]": ord(digit) for at, digit in enumerate(content.hash)}
     return own | digits
+
+
+def _own_files(stored: StoredBuild) -> list[str]:
+    """Return the names of the C files that were made for this scan alone."""
+    name = stored.manifest.name
+    program = {f"{name}_program.h", f"{name}_program.c"} & set(stored.manifest.files)
+    return sorted({f"{name}.h", arrays_file(stored_content(stored)), *program})
 
 
 def _choices(stored: StoredBuild) -> dict[str, int]:
@@ -97,7 +104,17 @@ def _bench_program(stored: StoredBuild, fourier: bool) -> str:
         f'#include "{name}.h"',
         '#include "stream_bench.h"',
         "",
-        f"const dac_program bench_program = DAC_PROGRAM({capital}, {name});",
+        # The emitted objects; a header-only build has none.
+        *(
+            [f'#include "{name}_program.h"']
+            if f"{name}_program.h" in stored.manifest.files
+            else [
+                f"static const dac_program {name}_program = DAC_PROGRAM({capital}, {name});",
+                f"static const dac_converter {name}_x_converter = DAC_CONVERTER({capital}_X, 0);",
+                f"static const dac_converter {name}_y_converter = DAC_CONVERTER({capital}_Y, 0);",
+            ]
+        ),
+        f"const dac_program *const bench_program = &{name}_program;",
     ]
     rendered = []
     for axis, content in stored.axes:
@@ -105,7 +122,7 @@ def _bench_program(stored: StoredBuild, fourier: bool) -> str:
         of = f"{capital}_{axis.upper()}"
         words = f"{name}_{axis}_fourier, {of}_HARMONICS" if rendered[-1] else "NULL, 0"
         lines += [
-            f"const dac_converter bench_{axis}_converter = DAC_CONVERTER({of}, 0);",
+            f"const dac_converter *const bench_{axis}_converter = &{name}_{axis}_converter;",
             f"const bench_axis bench_{axis} = {{{words}}};",
         ]
     lines += [

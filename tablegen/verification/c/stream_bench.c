@@ -109,7 +109,7 @@ static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axi
 
 static void emitted(dac_program *p, unsigned idle)
 {
-    *p = bench_program;
+    *p = *bench_program;
     p->x.table = rendered(&p->x, &bench_x, x_table[idle]);
     p->y.table = rendered(&p->y, &bench_y, y_table[idle]);
 }
@@ -117,12 +117,12 @@ static void emitted(dac_program *p, unsigned idle)
 static void shape(uint64_t word)
 {
     (void)word;
-    x_converter = bench_x_converter;
-    y_converter = bench_y_converter;
-    x_bits = bench_program.x.bits;
-    x_index_bits = bench_program.x.index_bits;
-    y_bits = bench_program.y.bits;
-    y_index_bits = bench_program.y.index_bits;
+    x_converter = *bench_x_converter;
+    y_converter = *bench_y_converter;
+    x_bits = bench_program->x.bits;
+    x_index_bits = bench_program->x.index_bits;
+    y_bits = bench_program->y.bits;
+    y_index_bits = bench_program->y.index_bits;
 }
 
 #else

@@ -33,8 +33,8 @@ typedef struct {
     unsigned harmonics;
 } bench_axis;
 
-extern const dac_program bench_program;
-extern const dac_converter bench_x_converter, bench_y_converter;
+extern const dac_program *const bench_program;
+extern const dac_converter *const bench_x_converter, *const bench_y_converter;
 extern const bench_axis bench_x, bench_y;
 /* The constants of the header, and the characters of its hash. */
 enum { BENCH_HASH_DIGITS = 64 };
