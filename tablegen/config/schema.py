@@ -404,6 +404,18 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         | None
     ) = None
     header_only: Annotated[bool, Meta(description="C: put the tables into the header instead of a .c file")] = False
+    clock_hz: (
+        Annotated[
+            float,
+            Meta(
+                gt=0.0,
+                le=1e10,
+                description="Verilog: clock of the FPGA. It has to be a whole multiple of update_rate_hz, to 0.01 %, "
+                "and fast enough for the sequencer",
+            ),
+        ]
+        | None
+    ) = None
 
 
 class ScanOfMany(Struct, frozen=True, kw_only=True):

@@ -40,6 +40,7 @@ class Content(Struct, frozen=True, eq=False):
     x: AxisContent
     y: AxisContent
     header_only: bool
+    clocks_per_tick: int = 0
     version: str = ""
     scanner: str = ""
     summary: tuple[str, ...] = ()

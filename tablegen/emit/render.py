@@ -67,7 +67,8 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
                 raise UnknownFormat(f"{each.name!r} writes {name!r} beside {other!r}, which some disks take for one")
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
-    files[MANIFEST] = manifest_file(record, digest, [each.name for each in chosen_formats], certificates, files)
+    names = [each.name for each in chosen_formats]
+    files[MANIFEST] = manifest_file(record, digest, names, certificates, files, plan.clocks_per_tick)
     return files
 
 
@@ -139,6 +140,7 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
         x=axis(plan.x),
         y=axis(plan.y),
         header_only=plan.header_only,
+        clocks_per_tick=plan.clocks_per_tick,
         version=__version__,
         scanner=plan.scanner,
         summary=tuple(map(comment_safe, summary(plan, certificates))),  # they name files, in any characters

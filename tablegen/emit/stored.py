@@ -22,5 +22,6 @@ def stored_content(stored: StoredBuild) -> Content:
         x=axis("x", stored.program.x),
         y=axis("y", stored.program.y),
         header_only=f"{name}.c" not in stored.manifest.files,
+        clocks_per_tick=stored.manifest.clocks_per_tick,
         version=stored.manifest.tablegen,
     )

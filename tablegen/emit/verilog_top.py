@@ -30,6 +30,7 @@ def _context(content: Content) -> dict[str, Any]:
         "version": content.version,
         "name": content.name,
         "hash": content.hash,
+        "clocks_per_tick": content.clocks_per_tick,
         "widths": least_widths(content.schedule, content.y.program),
         "shaping": shaping_constants(content).get("SHAPING", 0),
         "cubic": "cubic" in modes,

@@ -426,3 +426,4 @@ class Manifest(Struct):
     sequence: ManifestSequence
     axes: ManifestAxes
     formats: list[Annotated[str, Meta(min_length=1, max_length=64)]] = []
+    clocks_per_tick: Annotated[int, Meta(ge=0, lt=1 << 31)] = 0

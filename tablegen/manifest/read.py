@@ -156,14 +156,17 @@ def _a_program(folder: Path) -> Path | None:
         return None
 
 
+_BESIDE_THE_PLAN = ("tablegen", "hash", "formats", "clocks_per_tick", "files")
+
+
 def _wrong_names(manifest: Manifest) -> list[str]:
     why = why_not_a_name(manifest.name)
     return [] if why is None else [f"name: {why}"]
 
 
 def _hash(plain: dict[str, Any]) -> str:
-    """Compute the hash of the plan: of everything but version, hash, files and certificates."""
-    record = {key: value for key, value in plain.items() if key not in ("tablegen", "hash", "formats", "files")}
+    """Compute the hash of the plan: of everything that decides what is played."""
+    record = {key: value for key, value in plain.items() if key not in _BESIDE_THE_PLAN}
     record["axes"] = {
         axis: {key: value for key, value in content.items() if key != "certificate"}
         if isinstance(content, dict)

@@ -29,11 +29,12 @@ def manifest_file(
     formats: Sequence[str],
     certificates: dict[str, Certificate],
     files: Mapping[str, bytes],
+    clocks_per_tick: int = 0,
 ) -> bytes:
     """Write the plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
 
-    ``formats`` stand in it unless they are those that a build has by default. ``require_readable`` belongs before the
-    disk.
+    ``formats`` stand in it unless they are those that a build has by default, ``clocks_per_tick`` unless it is 0.
+    ``require_readable`` belongs before the disk.
     """
     axes = {
         axis: {**content, "certificate": certificate_record(certificates[axis])}
@@ -44,6 +45,7 @@ def manifest_file(
         "hash": digest,
         **{key: value for key, value in record.items() if key != "axes"},
         **({"formats": list(formats)} if sorted(formats) != sorted(DEFAULT_FORMATS) else {}),
+        **({"clocks_per_tick": clocks_per_tick} if clocks_per_tick else {}),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
         "axes": axes,
     }

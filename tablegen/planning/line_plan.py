@@ -16,6 +16,7 @@ from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.axis_table import make_table
+from tablegen.planning.clock import clocks_per_tick
 from tablegen.planning.drive import Drive, make_drive
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.harmonic_choice import HarmonicChoice
@@ -109,6 +110,7 @@ class Plan(Struct, frozen=True, eq=False):
     limits: Limits
     header_only: bool
     formats: tuple[str, ...] = DEFAULT_FORMATS
+    clocks_per_tick: int = 0  # of an FPGA; 0: not known
 
     def __repr__(self) -> str:
         ticks, rate = self.schedule.ticks, float(self.schedule.line_rate)
@@ -153,6 +155,7 @@ def make_plan(setup: Setup) -> Plan:
     assert x is not None
     assert y is not None
     schedule = replace(schedule, settle_lines=settle_lines(setup, {"x": x.drive, "y": y.drive}, schedule, problems))
+    clocks = clocks_per_tick(setup, schedule, (x.program, y.program), problems)
     problems.stop_if_any()
     scan = setup.scan
     return Plan(
@@ -164,6 +167,7 @@ def make_plan(setup: Setup) -> Plan:
         scan.limits,
         scan.emit.header_only,
         tuple(scan.emit.formats or DEFAULT_FORMATS),
+        clocks,
     )
 
 

@@ -105,6 +105,7 @@ def _memories(content: Content) -> dict[str, bytes]:
 def _context(content: Content) -> dict[str, Any]:
     """Return the variables of the template."""
     return {
+        "clocks_per_tick": content.clocks_per_tick,
         "version": content.version,
         "name": content.name,
         "NAME": content.name.upper(),
@@ -135,6 +136,7 @@ def _constants(content: Content) -> dict[str, int | str]:
     own: dict[str, int | str] = {"HASH": int(content.hash, 16)}
     own |= verilog_constants(content)
     own |= least_widths(content.schedule, content.y.program)
+    own |= {"CLOCKS_PER_TICK": content.clocks_per_tick}
     own |= {"PROGRAM_FILE": f"{name}_program.mem", "SINE_FILE": sine_memory(content)}
     for axis in "xy":
         own[f"{axis.upper()}_TABLE_FILE"] = f"{name}_{axis}.mem"
