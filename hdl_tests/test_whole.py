@@ -38,7 +38,8 @@ COMMIT = (
 Place = tuple[int, int]  # region and address
 USED = [*range(len(SCAN_WORDS)), *(PAGE_WORDS * page + at for page in (1, 2) for at in range(len(AXIS_WORDS)))]
 
-UNUSED = [(PROGRAM, at) for at in range(4 * PAGE_WORDS) if at not in USED]
+UNUSED = [(PROGRAM, at) for at in range(3 * PAGE_WORDS) if at not in USED]
+BEYOND = 0x5555  # a word that no memory is to hold
 
 
 def words_of(program: DualProgram, x: FourierWords | None, y: FourierWords | None) -> dict[Place, int]:
@@ -54,6 +55,27 @@ def words_of(program: DualProgram, x: FourierWords | None, y: FourierWords | Non
         region, values = (region, rendered_words.in_order) if rendered_words else (table, own.words)
         words |= {(region, at): int(word) for at, word in enumerate(values)}
     return words
+
+
+def nowhere(shape: SequencerShape, fourier: bool) -> list[Place]:
+    """Places that a device has not; with fewer bits of region and address each would be one of its words."""
+    ends = {PROGRAM: 3 * PAGE_WORDS, X_TABLE: 1 << shape.x_index_bits, Y_TABLE: 1 << shape.y_index_bits}
+    ends |= dict.fromkeys((X_FOURIER, Y_FOURIER), 2 * HARMONICS + 1 if fourier else 0)
+    ends |= dict.fromkeys(range(5, 8), 0)
+    return [(region, at) for region, end in ends.items() for at in (end, end + 3, *(1 << bit for bit in range(6, 16)))]
+
+
+def write_nowhere(script: Script, shape: SequencerShape, fourier: bool) -> None:
+    """Each is refused, and nothing is written."""
+    script.wait_writable()
+    for at, (region, address) in enumerate(nowhere(shape, fourier)):
+        if at % 5 == 0:
+            script.request("clear_faults")
+            script.wait(1)
+        script.write(region, [BEYOND], address)
+        script.refused = True
+        script.wait(1)
+    script.request("clear_faults")
 
 
 def write(script: Script, words: dict[Place, int]) -> None:
@@ -109,7 +131,10 @@ def script_of(shape: SequencerShape, low_area: int, fourier: bool) -> Script:
 
     program, x, y, clocks = some()
     missing(words_of(program, x, y), {(X_FOURIER if fourier else X_TABLE, 0)})  # of the first program too
+    write_nowhere(script, shape, fourier)
+    refuse(script)  # nothing of it counts
     script.load(program, x, y)
+    write_nowhere(script, shape, fourier)
     commit(program, clocks)
     script.request("arm", "trigger")
     refuse(script)  # registers of what plays, and the table of nothing
@@ -170,6 +195,16 @@ MUTANTS = [
     WholeMutant("a word of a direct table may be missing", TABLE, "count >= needed", "count + 1 >= needed", "direct"),
     WholeMutant("a word of Fourier words may be missing", TABLE, "harmonics, 1'b1}", "harmonics, 1'b0}", "fourier"),
     WholeMutant("Fourier words do not count", TABLE, "(RENDERS && write_fourier)", "1'b0", "fourier"),
+    WholeMutant("what does not exist is written", SEQUENCER, "writable && exists;", "writable;", "lines"),
+    WholeMutant("what does not exist is not refused", SEQUENCER, "!(writable && exists)", "!writable", "lines"),
+    WholeMutant("a page more exists", SEQUENCER, "WORDS = 16'd48", "WORDS = 16'd64", "lines"),
+    WholeMutant("a table of x has no end", SEQUENCER, "write_address >> X_INDEX_BITS == 0", "1'b1", "lines"),
+    WholeMutant("a table of y has no end", SEQUENCER, "write_address >> Y_INDEX_BITS == 0", "1'b1", "lines"),
+    WholeMutant("a table of x is twice as long", SEQUENCER, ">> X_INDEX_BITS ==", ">> (X_INDEX_BITS + 1) ==", "lines"),
+    WholeMutant("Fourier words without a renderer", SEQUENCER, "FOURIER != 0 && (write_r", "(write_r", "lines"),
+    WholeMutant("other regions exist", SEQUENCER, "write_region == Y_FOURIER) &&", "1'b1) &&", "fourier"),
+    WholeMutant("a Fourier word more exists", SEQUENCER, "<= LAST_FOURIER", "<= LAST_FOURIER + 1", "fourier"),
+    WholeMutant("the last Fourier word is none", SEQUENCER, "<= LAST_FOURIER", "< LAST_FOURIER", "fourier"),
 ]  # fmt: skip
 
 

@@ -17,7 +17,8 @@ module sequencer_properties
     wire uut__banks__draining;
 
     // What the host has written, from the ports alone.
-    wire accepted = write && writable;
+    wire exists = write_region == 3'd0 ? write_address < 16'd48 : write_region <= 3'd2 && write_address < 16'd8;
+    wire accepted = write && writable && exists;
     wire register = accepted && write_region == 3'd0;
     reg x_colour, y_colour, other;  // the bank that is not written
     reg [1:0] x_words, y_words;
@@ -56,13 +57,13 @@ module sequencer_properties
         if (uut__x_table_write || uut__y_table_write || uut__x_write || uut__y_write || uut__scan_write)
             assert (!committed && !uut__banks__draining);
     end
-    // f. A program that does not fit is not committed, and that is said. A refused write is said; a commit stays until it is taken, withdrawn or reset.
+    // f. A program that does not fit is not committed, and that is said. A refused write is said, and one to a place that does not exist; a commit stays until it is taken, withdrawn or reset.
     wire uut__fits;
     reg before, refused_write, refused_commit, was_committed, may_go;
     initial before = 0;
     always @(posedge clock) begin
         before <= 1;
-        refused_write <= write && !writable;
+        refused_write <= write && !accepted;
         refused_commit <= uut__host_commit && !uut__fits;
         was_committed <= committed;
         may_go <= uut__take || withdraw || reset;
