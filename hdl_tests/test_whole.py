@@ -65,17 +65,17 @@ def nowhere(shape: SequencerShape, fourier: bool) -> list[Place]:
     return [(region, at) for region, end in ends.items() for at in (end, end + 3, *(1 << bit for bit in range(6, 16)))]
 
 
-def write_nowhere(script: Script, shape: SequencerShape, fourier: bool) -> None:
+def write_nowhere(script: Script, shape: SequencerShape, fourier: bool, pace: int) -> None:
     """Each is refused, and nothing is written."""
     script.wait_writable()
-    for at, (region, address) in enumerate(nowhere(shape, fourier)):
-        if at % 5 == 0:
-            script.request("clear_faults")
-            script.wait(1)
+    script.come_to_rest()
+    for region, address in nowhere(shape, fourier):
         script.write(region, [BEYOND], address)
         script.refused = True
         script.wait(1)
-    script.request("clear_faults")
+        script.state(f"write to {address} of {region}", rests=True)
+        script.request("clear_faults")
+    script.tick_every(pace)
 
 
 def write(script: Script, words: dict[Place, int]) -> None:
@@ -131,10 +131,10 @@ def script_of(shape: SequencerShape, low_area: int, fourier: bool) -> Script:
 
     program, x, y, clocks = some()
     missing(words_of(program, x, y), {(X_FOURIER if fourier else X_TABLE, 0)})  # of the first program too
-    write_nowhere(script, shape, fourier)
+    write_nowhere(script, shape, fourier, PACE[low_area])
     refuse(script)  # nothing of it counts
     script.load(program, x, y)
-    write_nowhere(script, shape, fourier)
+    write_nowhere(script, shape, fourier, PACE[low_area])
     commit(program, clocks)
     script.request("arm", "trigger")
     refuse(script)  # registers of what plays, and the table of nothing
