@@ -22,7 +22,16 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, program_words
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.play.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
+from tablegen.verification.play.stream import (
+    PROGRAM,
+    X_FOURIER,
+    X_TABLE,
+    Y_FOURIER,
+    Y_TABLE,
+    Script,
+    read_capture,
+    read_states,
+)
 from tablegen.verification.verilog.sequencer_bench import BenchRun, SequencerBench
 
 pytestmark = pytest.mark.common
@@ -208,8 +217,8 @@ MUTANTS = [
 ]  # fmt: skip
 
 
-def played(case: str, folder: Path, mutant: WholeMutant | None = None) -> BenchRun:
-    """The script of a case, in Icarus."""
+def played(case: str, folder: Path, mutant: WholeMutant | None = None) -> tuple[BenchRun, bool]:
+    """The script of a case, in Icarus; and whether every write to nowhere was refused."""
     shape, low_area, fourier = CASES[case]
     folder.mkdir(exist_ok=True)
     sources = list(verilog_runtime())
@@ -217,23 +226,29 @@ def played(case: str, folder: Path, mutant: WholeMutant | None = None) -> BenchR
         changed = folder / f"{mutant.file}.v"
         changed.write_text(mutant.source, "utf-8")
         sources[sources.index(mutant.path)] = changed
-    parameters: dict[str, int | str] = {"LOW_AREA": low_area}
+    states = folder / "states.hex"
+    parameters: dict[str, int | str] = {"LOW_AREA": low_area, "STATES": str(states)}
     if fourier:
         parameters |= {"PLAIN_MULTIPLIER": 1, **with_sine(folder, shape, HARMONICS)}
     bench = SequencerBench("icarus", shape, folder, parameters, sources)
-    return bench.play(script_of(shape, low_area, fourier))
+    script = script_of(shape, low_area, fourier)
+    run = bench.play(script)
+    stored = read_states([int(word) for word in read_capture(states)])
+    return run, [state.flags for state in stored] == [state.flags for _, state in script.states]
 
 
 @pytest.mark.parametrize("case", common(("lines", "direct", "fourier"), CASES))
 def test_a_part_of_a_program_is_refused_and_the_rest_makes_it_whole(case: str, tmp_path: Path) -> None:
-    run = played(case, tmp_path)
+    run, refuses = played(case, tmp_path)
     assert run.equal, run
+    assert refuses
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.breaks)
 def test_a_mutant_is_found(mutant: WholeMutant, tmp_path: Path) -> None:
-    assert not played(mutant.where, tmp_path, mutant).equal
+    run, refuses = played(mutant.where, tmp_path, mutant)
+    assert not (run.equal and refuses)
 
 
 def test_every_word_of_the_map_is_counted() -> None:
