@@ -249,7 +249,12 @@ MUTANTS = {
     "fault_not_counted": ("valid", "dac_faults", "{{COUNT_BITS-1{1'b0}}, happens[i]}", "0"),
     "slew_fault_not_flagged": ("valid", "dac_verdict", "runs && !reached && !was", "runs && !reached && !runs && !was"),
     # f. refusals are said, a commit is kept
-    "refusal_not_said": ("sequencer", "dac_sequencer", "(write && !(writable && exists)) ||", "(write && committed) ||"),
+    "refusal_not_said": (
+        "sequencer",
+        "dac_sequencer",
+        "(write && !(writable && exists)) ||",
+        "(write && committed) ||",
+    ),
     "commit_of_what_does_not_fit": ("sequencer", "dac_sequencer", "rendered = sound_commit", "rendered = host_commit"),
     "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits)", ""),
     "commit_lost": ("scan", "dac_bank", "withdraw || take", "withdraw || take || (committed && !bank)"),

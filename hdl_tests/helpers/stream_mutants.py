@@ -510,7 +510,9 @@ def _scan() -> Iterator[Mutant]:
         "accepted_write = write && writable && exists;",
         "accepted_write = write && exists;",
     )
-    yield Mutant("refused writes are not reported", "dac_sequencer", "((write && !writable) ||", "(", "direct")
+    yield Mutant(
+        "refused writes are not reported", "dac_sequencer", "((write && !(writable && exists)) ||", "(", "direct"
+    )
     yield Mutant(
         "refused writes are reported for ever",
         "dac_sequencer",
