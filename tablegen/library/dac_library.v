@@ -4,8 +4,8 @@
 // RAM, or a flash behind a controller of yours. `memory_read` is high for a clock with an address; `memory_ready` is
 // high for a clock, one or more clocks later, with the word. Every record has a CRC. A record with a wrong one, or a
 // number that there is not, is not committed: `failed` is high until the next `pick`, and the idle bank is emptied by
-// `withdraw`. The same where the sequencer refuses the commit: `busy` is high until `committed` is, or `writable` without
-// it. What plays goes on either way; a commit is taken as every commit is.
+// `withdraw`. The same where the sequencer refuses the commit: `busy` is high until `committed` is, or `writable`
+// without it. What plays goes on either way; a commit is taken as every commit is.
 //
 // A word takes 35 clocks and the time of the memory.
 
@@ -105,7 +105,7 @@ module dac_library #(
                 bit_number <= bit_number + 5'd1;
                 if (bit_number == 5'd31) state <= STEP;
             end
-            ANSWER: // not on the clock of the commit; a commit that is taken up keeps writable low until committed is high
+            ANSWER: // from the clock after the commit; the sequencer keeps writable low until it has an answer
                 if (!commit && (committed || writable)) begin
                     state <= IDLE;
                     failed <= !committed;
