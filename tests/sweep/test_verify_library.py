@@ -11,6 +11,9 @@ import pytest
 from editing import run
 from libraries import NAMES, write_library
 
+from tablegen.verification.build_report import Report
+from tablegen.verification.library_report import verify_library
+
 TABLES, FOURIER = "lines_library_tables.mem", "lines_library_fourier.mem"
 OFFSET_WORD = 2 + 16 + 4  # of a record: two counts, the words of the scan, those of x
 
@@ -178,3 +181,13 @@ def test_a_damaged_index_is_status_2_with_its_remedy(library: Path, text: str, w
     assert (status, out) == (2, "")
     assert err.startswith(f"{path}: {why}")
     assert err.endswith("; write the library again with `tablegen sweep`\n")
+
+
+def test_what_no_program_has_played_is_listed_once(stored: Path) -> None:
+    """Modules of the runtime that one program plays are played; files of a program are its own."""
+
+    def verify_program(program: Path) -> Report:
+        unplayed = {"narrow": ["dac_spline.v", "narrow_top.v"], "broad": ["dac_spline.v", "dac_axis.v"]}
+        return Report(program.name, [], None, [], unplayed=unplayed.get(program.name, ["dac_spline.v"]))
+
+    assert verify_library(stored, verify_program).unplayed == ["dac_library.v", "dac_spline.v", "narrow_top.v"]
