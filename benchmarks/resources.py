@@ -94,7 +94,12 @@ CASES = {
     "spi_20": Case("SPI, 20 bits in frames of 24", "dac_spi", "HX8K", {"WORD_BITS": 20, "FRAME_BITS": 24}),
     "axi": Case("AXI-Stream", "dac_axi_stream", "HX8K"),
     "loader": Case(
-        "serial link", "program_loader", "HX8K", {**_TOP, "FOURIER": 1, "HARMONICS": 63}, most_cells=900, least_mhz=77
+        "serial link",
+        "program_loader",
+        "HX8K",
+        {**_TOP, "FOURIER": 1, "HARMONICS": 63, "UPDATE_RATE": 500_000},
+        most_cells=900,
+        least_mhz=77,
     ),
     **{
         f"axis_{family}_{name}": Case(

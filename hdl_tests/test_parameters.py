@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from building import REPOSITORY, tool
-from test_lint import MODULES, SOURCES, lint
+from test_lint import MODULES, NEEDED, SOURCES, lint
 
 MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
@@ -53,6 +53,12 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({**CUBIC, "Y_WORD_BITS": 24}, "Y_WORD_BITS_of_a_cubic_table_is_not_8_to_21"),
         ({"X_POWER_UP_CODE": 65536}, "X_POWER_UP_CODE_has_more_than_DAC_BITS"),
         ({"Y_POWER_UP_CODE": 256, "DAC_BITS": 8}, "Y_POWER_UP_CODE_has_more_than_DAC_BITS"),
+        ({"LOW_AREA": 1, "PLAIN_MULTIPLIER": 1}, "PLAIN_MULTIPLIER_has_no_use_in_LOW_AREA_without_FOURIER"),
+        ({"FOURIER": 1, "X_INTERPOLATED": 0, "Y_INTERPOLATED": 0}, "FOURIER_renders_no_direct_table"),
+        (
+            {"FOURIER": 1, "HARMONICS": 16, "X_INDEX_BITS": 5, "Y_INDEX_BITS": 4},
+            "HARMONICS_is_not_less_than_half_of_the_longer_table",
+        ),
     ],
     "program_loader": [
         ({"CLOCKS_PER_BIT": 7}, "CLOCKS_PER_BIT_is_not_8_to_65536"),
@@ -84,6 +90,7 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"Y_CODE_MAX": 65536}, "Y_CODE_MIN_to_Y_CODE_MAX_is_no_range_of_DAC_BITS"),
         ({"X_MAX_STEP": 0}, "X_MAX_STEP_is_not_1_to_the_highest_code"),
         ({"Y_MAX_STEP": 65536}, "Y_MAX_STEP_is_not_1_to_the_highest_code"),
+        ({"UPDATE_RATE": 0}, "UPDATE_RATE_is_not_set"),
     ],
     "dac_boot": [
         ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
@@ -145,6 +152,8 @@ LEGAL: dict[str, list[Values]] = {
         {**SMALL, "TICK_BITS": 3, "LINE_BITS": 1, "PERIOD_BITS": 1, "COUNT_BITS": 2, "LOW_AREA": 1},
         {**SMALL, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "FOURIER": 1, "HARMONICS": 1, "X_INTERPOLATED": 0},
         {**LARGE, "TICK_BITS": 30, "LINE_BITS": 16, "PERIOD_BITS": 31, "COUNT_BITS": 32, "X_POWER_UP_CODE": TOP},
+        {**SMALL, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 5, "FOURIER": 1, "HARMONICS": 15},
+        {"LOW_AREA": 1, "PLAIN_MULTIPLIER": 1, "FOURIER": 1},
         {**SMALL, "SHAPING": 1},
         {**LARGE, "SHAPING": 3, "PLAIN_MULTIPLIER": 1},
         {**SMALL, **CUBIC, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "TICK_BITS": 3, "PERIOD_BITS": 1},
@@ -180,7 +189,7 @@ LEGAL: dict[str, list[Values]] = {
 
 def icarus(top: str, values: Values, folder: Path) -> str:
     """What it says; nothing where it compiles."""
-    given = [f"-P{top}.{name}={value}" for name, value in values.items()]
+    given = [f"-P{top}.{name}={value}" for name, value in (NEEDED.get(top, {}) | dict(values)).items()]
     command = ["iverilog", "-g2005", "-Wall", "-o", folder / "out", "-s", top, *given, *SOURCES]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode == 0) == (done.stderr == ""), done.stderr
@@ -206,7 +215,7 @@ def unfilled(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def yosys(top: str, values: Values, modules: Path) -> str:
-    given = " ".join(f"-chparam {name} {value}" for name, value in values.items())
+    given = " ".join(f"-chparam {name} {value}" for name, value in (NEEDED.get(top, {}) | dict(values)).items())
     script = f"read_verilog -defer {modules}/*.v; hierarchy -check -top {top} {given}"
     done = subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
     assert (done.returncode == 0) == ("ERROR" not in done.stderr), done.stderr
@@ -256,7 +265,7 @@ def test_every_parameter_has_its_guard_and_every_guard_its_case(top: str) -> Non
     text = (MODULES / f"{top}.v").read_text("utf-8")
     found = MODULE.search(text)
     assert found is not None
-    parameters = set(re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2])) - {"UPDATE_RATE", "BOOT_HASH"}
+    parameters = set(re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2])) - {"BOOT_HASH"}
     guards = GUARD.findall(text)
     assert guards
     for name in parameters:

@@ -45,10 +45,10 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "fourier_renderer": ("dac_fourier", {"MULTIPLIER": 1}),
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
-    "loader": ("program_loader", {"FOURIER": 1}),
+    "loader": ("program_loader", {"FOURIER": 1, "UPDATE_RATE": 500_000}),
     "loader_direct": (
         "program_loader",
-        {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "DAC_BITS": 24, "MEMORY_BYTES": 8192},
+        {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "DAC_BITS": 24, "MEMORY_BYTES": 8192, "UPDATE_RATE": 500_000},
     ),
 }
 

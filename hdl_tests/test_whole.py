@@ -22,7 +22,16 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, program_words
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.play.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
+from tablegen.verification.play.stream import (
+    PROGRAM,
+    X_FOURIER,
+    X_TABLE,
+    Y_FOURIER,
+    Y_TABLE,
+    Script,
+    read_capture,
+    read_states,
+)
 from tablegen.verification.verilog.sequencer_bench import BenchRun, SequencerBench
 
 pytestmark = pytest.mark.common
@@ -38,7 +47,8 @@ COMMIT = (
 Place = tuple[int, int]  # region and address
 USED = [*range(len(SCAN_WORDS)), *(PAGE_WORDS * page + at for page in (1, 2) for at in range(len(AXIS_WORDS)))]
 
-UNUSED = [(PROGRAM, at) for at in range(4 * PAGE_WORDS) if at not in USED]
+UNUSED = [(PROGRAM, at) for at in range(3 * PAGE_WORDS) if at not in USED]
+BEYOND = 0x5555  # a word that no memory is to hold
 
 
 def words_of(program: DualProgram, x: FourierWords | None, y: FourierWords | None) -> dict[Place, int]:
@@ -54,6 +64,27 @@ def words_of(program: DualProgram, x: FourierWords | None, y: FourierWords | Non
         region, values = (region, rendered_words.in_order) if rendered_words else (table, own.words)
         words |= {(region, at): int(word) for at, word in enumerate(values)}
     return words
+
+
+def nowhere(shape: SequencerShape, fourier: bool) -> list[Place]:
+    """Places that a device has not; with fewer bits of region and address each would be one of its words."""
+    ends = {PROGRAM: 3 * PAGE_WORDS, X_TABLE: 1 << shape.x_index_bits, Y_TABLE: 1 << shape.y_index_bits}
+    ends |= dict.fromkeys((X_FOURIER, Y_FOURIER), 2 * HARMONICS + 1 if fourier else 0)
+    ends |= dict.fromkeys(range(5, 8), 0)
+    return [(region, at) for region, end in ends.items() for at in (end, end + 3, *(1 << bit for bit in range(6, 16)))]
+
+
+def write_nowhere(script: Script, shape: SequencerShape, fourier: bool, pace: int) -> None:
+    """Each is refused, and nothing is written."""
+    script.wait_writable()
+    script.come_to_rest()
+    for region, address in nowhere(shape, fourier):
+        script.write(region, [BEYOND], address)
+        script.refused = True
+        script.wait(1)
+        script.state(f"write to {address} of {region}", rests=True)
+        script.request("clear_faults")
+    script.tick_every(pace)
 
 
 def write(script: Script, words: dict[Place, int]) -> None:
@@ -109,7 +140,10 @@ def script_of(shape: SequencerShape, low_area: int, fourier: bool) -> Script:
 
     program, x, y, clocks = some()
     missing(words_of(program, x, y), {(X_FOURIER if fourier else X_TABLE, 0)})  # of the first program too
+    write_nowhere(script, shape, fourier, PACE[low_area])
+    refuse(script)  # nothing of it counts
     script.load(program, x, y)
+    write_nowhere(script, shape, fourier, PACE[low_area])
     commit(program, clocks)
     script.request("arm", "trigger")
     refuse(script)  # registers of what plays, and the table of nothing
@@ -170,11 +204,21 @@ MUTANTS = [
     WholeMutant("a word of a direct table may be missing", TABLE, "count >= needed", "count + 1 >= needed", "direct"),
     WholeMutant("a word of Fourier words may be missing", TABLE, "harmonics, 1'b1}", "harmonics, 1'b0}", "fourier"),
     WholeMutant("Fourier words do not count", TABLE, "(RENDERS && write_fourier)", "1'b0", "fourier"),
+    WholeMutant("what does not exist is written", SEQUENCER, "writable && exists;", "writable;", "lines"),
+    WholeMutant("what does not exist is not refused", SEQUENCER, "!(writable && exists)", "!writable", "lines"),
+    WholeMutant("a page more exists", SEQUENCER, "WORDS = 16'd48", "WORDS = 16'd64", "lines"),
+    WholeMutant("a table of x has no end", SEQUENCER, "write_address >> X_INDEX_BITS == 0", "1'b1", "lines"),
+    WholeMutant("a table of y has no end", SEQUENCER, "write_address >> Y_INDEX_BITS == 0", "1'b1", "lines"),
+    WholeMutant("a table of x is twice as long", SEQUENCER, ">> X_INDEX_BITS ==", ">> (X_INDEX_BITS + 1) ==", "lines"),
+    WholeMutant("Fourier words without a renderer", SEQUENCER, "FOURIER != 0 && (write_r", "(write_r", "lines"),
+    WholeMutant("other regions exist", SEQUENCER, "write_region == Y_FOURIER) &&", "1'b1) &&", "fourier"),
+    WholeMutant("a Fourier word more exists", SEQUENCER, "<= LAST_FOURIER", "<= LAST_FOURIER + 1", "fourier"),
+    WholeMutant("the last Fourier word is none", SEQUENCER, "<= LAST_FOURIER", "< LAST_FOURIER", "fourier"),
 ]  # fmt: skip
 
 
-def played(case: str, folder: Path, mutant: WholeMutant | None = None) -> BenchRun:
-    """The script of a case, in Icarus."""
+def played(case: str, folder: Path, mutant: WholeMutant | None = None) -> tuple[BenchRun, bool]:
+    """The script of a case, in Icarus; and whether every write to nowhere was refused."""
     shape, low_area, fourier = CASES[case]
     folder.mkdir(exist_ok=True)
     sources = list(verilog_runtime())
@@ -182,23 +226,29 @@ def played(case: str, folder: Path, mutant: WholeMutant | None = None) -> BenchR
         changed = folder / f"{mutant.file}.v"
         changed.write_text(mutant.source, "utf-8")
         sources[sources.index(mutant.path)] = changed
-    parameters: dict[str, int | str] = {"LOW_AREA": low_area}
+    states = folder / "states.hex"
+    parameters: dict[str, int | str] = {"LOW_AREA": low_area, "STATES": str(states)}
     if fourier:
         parameters |= {"PLAIN_MULTIPLIER": 1, **with_sine(folder, shape, HARMONICS)}
     bench = SequencerBench("icarus", shape, folder, parameters, sources)
-    return bench.play(script_of(shape, low_area, fourier))
+    script = script_of(shape, low_area, fourier)
+    run = bench.play(script)
+    stored = read_states([int(word) for word in read_capture(states)])
+    return run, [state.flags for state in stored] == [state.flags for _, state in script.states]
 
 
 @pytest.mark.parametrize("case", common(("lines", "direct", "fourier"), CASES))
 def test_a_part_of_a_program_is_refused_and_the_rest_makes_it_whole(case: str, tmp_path: Path) -> None:
-    run = played(case, tmp_path)
+    run, refuses = played(case, tmp_path)
     assert run.equal, run
+    assert refuses
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.breaks)
 def test_a_mutant_is_found(mutant: WholeMutant, tmp_path: Path) -> None:
-    assert not played(mutant.where, tmp_path, mutant).equal
+    run, refuses = played(mutant.where, tmp_path, mutant)
+    assert not (run.equal and refuses)
 
 
 def test_every_word_of_the_map_is_counted() -> None:

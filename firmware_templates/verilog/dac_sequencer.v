@@ -76,12 +76,16 @@ module dac_sequencer #(
 );
     localparam [2:0] PROGRAM = 3'd0, X_TABLE = 3'd1, Y_TABLE = 3'd2, X_FOURIER = 3'd3, Y_FOURIER = 3'd4;
     localparam [3:0] AXIS_HARMONICS = 4'd10;
+    localparam [15:0] PROGRAM_WORDS = 16'd48;
+    localparam [31:0] LAST = 2 * HARMONICS;
+    localparam [15:0] LAST_FOURIER = LAST[15:0];
     localparam [11:0] SCAN_PAGE = 12'd0, X_PAGE = 12'd1, Y_PAGE = 12'd2;
     localparam SPLINE = X_INTERPOLATED == 3 || Y_INTERPOLATED == 3 ? 1 : 0;
     localparam LATENCY =
         (SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15) + (PLAIN_MULTIPLIER ? 12 : 19) + (SHAPING != 0 ? 1 : 0);
     localparam SPACING = SPLINE ? 11 : SHAPING == 3 ? 6 : 1;  // least clocks from tick to tick
     localparam MARKERS_AT = 3;
+    localparam LONGER_BITS = X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS;
     localparam X_PERIOD_BITS = TICK_BITS + 1;  // the period of x is a line
 
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
@@ -153,6 +157,16 @@ module dac_sequencer #(
         if (Y_INTERPOLATED == 3 && Y_WORD_BITS > 21) begin : guard_21
             dac_sequencer_Y_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
         end
+        // In low area only the renderer has a product to be multiplied in blocks.
+        if (LOW_AREA != 0 && PLAIN_MULTIPLIER != 0 && FOURIER == 0) begin : guard_22
+            dac_sequencer_PLAIN_MULTIPLIER_has_no_use_in_LOW_AREA_without_FOURIER stop ();
+        end
+        if (FOURIER != 0 && X_INTERPOLATED == 0 && Y_INTERPOLATED == 0) begin : guard_23
+            dac_sequencer_FOURIER_renders_no_direct_table stop ();
+        end
+        if (FOURIER != 0 && HARMONICS >= 1 << (LONGER_BITS - 1)) begin : guard_24
+            dac_sequencer_HARMONICS_is_not_less_than_half_of_the_longer_table stop ();
+        end
     endgenerate
 
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
@@ -162,7 +176,13 @@ module dac_sequencer #(
         host_write = 0;
         host_commit = 0;
     end
-    wire accepted_write = write && writable;
+    // A write to a place that does not exist is refused: cut to the bits of a memory, its address would be another one.
+    wire exists =
+        write_region == PROGRAM ? write_address < PROGRAM_WORDS :
+        write_region == X_TABLE ? write_address >> X_INDEX_BITS == 0 :
+        write_region == Y_TABLE ? write_address >> Y_INDEX_BITS == 0 :
+        FOURIER != 0 && (write_region == X_FOURIER || write_region == Y_FOURIER) && write_address <= LAST_FOURIER;
+    wire accepted_write = write && writable && exists;
     reg scan_write, x_write, y_write;
     initial begin
         scan_write = 1'b0;
@@ -186,7 +206,7 @@ module dac_sequencer #(
         region <= write_region;
         address <= write_address;
         data <= write_data;
-        if ((write && !writable) || (host_commit && !fits) || unrendered)
+        if ((write && !(writable && exists)) || (host_commit && !fits) || unrendered)
             refused <= 1'b1;
         else if (clear_faults || reset)
             refused <= 1'b0;
@@ -427,7 +447,7 @@ module dac_sequencer #(
             assign y_table_write = host_write && region == Y_TABLE;
             assign table_address = address;
             assign table_data = data[23:0];
-            wire unused_parameters = &{X_FOURIER, Y_FOURIER, AXIS_HARMONICS, HARMONICS[0], SINE_FILE};
+            wire unused_parameters = &{X_FOURIER, Y_FOURIER, AXIS_HARMONICS, LAST_FOURIER, SINE_FILE};
         end
     endgenerate
 endmodule

@@ -36,7 +36,7 @@ module program_loader #(
     parameter [31:0] Y_CODE_MIN = 0,
     parameter [31:0] Y_CODE_MAX = (1 << DAC_BITS) - 1,
     parameter [31:0] Y_MAX_STEP = (1 << DAC_BITS) - 1,
-    parameter [31:0] UPDATE_RATE = 0,    // ticks a second; 0: not known
+    parameter [31:0] UPDATE_RATE = 0,    // ticks a second; has to be set
     parameter [255:0] BOOT_HASH = 0      // SHA-256 of the plan that it boots with; 0: not known
 ) (
     input  wire        clock,
@@ -199,6 +199,9 @@ module program_loader #(
         end
         if (Y_INTERPOLATED == 3 && Y_WORD_BITS > 21) begin : guard_23
             program_loader_Y_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
+        end
+        if (UPDATE_RATE == 32'd0) begin : guard_24
+            program_loader_UPDATE_RATE_is_not_set stop ();
         end
     endgenerate
 

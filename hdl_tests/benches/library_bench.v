@@ -49,7 +49,7 @@ module library_bench #(
     dac_library #(.PROGRAMS(LINES_LIBRARY_PROGRAMS), .ADDRESS_BITS(ADDRESS_BITS)) picker (
         .clock(clock), .reset(1'b0), .pick(pick), .number(number), .busy(busy), .failed(failed),
         .memory_read(memory_read), .memory_address(memory_address), .memory_ready(memory_ready),
-        .memory_data(memory_data), .writable(writable), .write(write), .write_region(region),
+        .memory_data(memory_data), .writable(writable), .committed(committed), .write(write), .write_region(region),
         .write_address(address), .write_data(data), .commit(commit), .withdraw(withdraw)
     );
 
@@ -96,7 +96,6 @@ module library_bench #(
             while (busy) @(negedge clock);
             @(negedge clock);
             if (failed) $fwrite(file, "f\n");
-            else if (refused) $fwrite(file, "r\n");
             else begin
                 waited = 0;
                 while (!committed && waited < 300000) begin

@@ -14,7 +14,8 @@ module library_writes_bench #(
     parameter MEMORY_WORDS = 1,
     parameter MEMORY_CLOCKS = 1,   // from memory_read to memory_ready
     parameter PROGRAMS = 1,
-    parameter BUSY = 0
+    parameter BUSY = 0,
+    parameter REFUSED = 0          // 1: no commit is taken up
 );
     reg clock = 1'b0, pick = 1'b0;
     reg [15:0] number = 16'd0;
@@ -36,9 +37,12 @@ module library_writes_bench #(
     reg memory_ready = 1'b0;
     reg [31:0] memory_data = 32'd0;
     reg [15:0] clocks = 16'd0;
-    wire writable = BUSY == 0 || clocks[6:4] == 3'd0;
+    reg answers = 1'b0, committed = 1'b0;  // the clocks after a commit
+    wire writable = !answers && (BUSY == 0 || clocks[6:4] == 3'd0);
     always @(posedge clock) begin
         clocks <= clocks + 16'd1;
+        answers <= commit;
+        committed <= answers && REFUSED == 0;
         if (delay != 0) delay <= delay - 8'd1;
         else if (memory_read) delay <= MEMORY_CLOCKS;
         memory_ready <= delay == 1 || (MEMORY_CLOCKS == 0 && memory_read);
@@ -48,7 +52,7 @@ module library_writes_bench #(
     dac_library #(.PROGRAMS(PROGRAMS), .ADDRESS_BITS(20)) picker (
         .clock(clock), .reset(1'b0), .pick(pick), .number(number), .busy(busy), .failed(failed),
         .memory_read(memory_read), .memory_address(memory_address), .memory_ready(memory_ready),
-        .memory_data(memory_data), .writable(writable), .write(write), .write_region(region),
+        .memory_data(memory_data), .writable(writable), .committed(committed), .write(write), .write_region(region),
         .write_address(address), .write_data(data), .commit(commit), .withdraw(withdraw)
     );
 

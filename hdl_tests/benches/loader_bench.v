@@ -32,7 +32,7 @@ module loader_bench #(
     parameter Y_CODE_MIN = 0,
     parameter Y_CODE_MAX = 65535,
     parameter Y_MAX_STEP = 65535,
-    parameter UPDATE_RATE = 0,
+    parameter UPDATE_RATE = 500000,
     parameter SHAPING = 0,
     parameter BOOT_PROGRAM = "",  // none: it starts without one
     parameter BOOT_X = "",

@@ -50,6 +50,15 @@ module play_properties
         if (!LOW_AREA && strobe) assert (playing == ran[LATENCY-1]);
     end
 
+`ifdef PIPELINED
+    // What makes it inductive: the ticks on their way, in the sequencer and here.
+    wire [LATENCY-2:0] uut__pipelined__ticks_now, uut__pipelined__runnings_now;
+    always @* begin
+        assert (uut__pipelined__ticks_now == ticks[LATENCY-2:0]);
+        assert (((uut__pipelined__runnings_now ^ ran) & ticks[LATENCY-2:0]) == 0);
+    end
+`endif
+
     // Not vacuous: a scan of one frame plays to its end.
     reg played;
     initial played = 0;

@@ -17,7 +17,8 @@ module sequencer_properties
     wire uut__banks__draining;
 
     // What the host has written, from the ports alone.
-    wire accepted = write && writable;
+    wire exists = write_region == 3'd0 ? write_address < 16'd48 : write_region <= 3'd2 && write_address < 16'd8;
+    wire accepted = write && writable && exists;
     wire register = accepted && write_region == 3'd0;
     reg x_colour, y_colour, other;  // the bank that is not written
     reg [1:0] x_words, y_words;
@@ -56,13 +57,13 @@ module sequencer_properties
         if (uut__x_table_write || uut__y_table_write || uut__x_write || uut__y_write || uut__scan_write)
             assert (!committed && !uut__banks__draining);
     end
-    // f. A program that does not fit is not committed, and that is said. A refused write is said; a commit stays until it is taken, withdrawn or reset.
+    // f. A program that does not fit is not committed, and that is said. A refused write is said, and one to a place that does not exist; a commit stays until it is taken, withdrawn or reset.
     wire uut__fits;
     reg before, refused_write, refused_commit, was_committed, may_go;
     initial before = 0;
     always @(posedge clock) begin
         before <= 1;
-        refused_write <= write && !writable;
+        refused_write <= write && !accepted;
         refused_commit <= uut__host_commit && !uut__fits;
         was_committed <= committed;
         may_go <= uut__take || withdraw || reset;
@@ -74,6 +75,19 @@ module sequencer_properties
         if (was_committed && may_go) assert (!committed);
     end
 
+    // A write of a register reaches the page that it names.
+    wire [2:0] uut__region;
+    wire [15:0] uut__address;
+    wire [31:0] uut__data;
+    wire [11:0] page = uut__address[15:4];
+    wire program_write = uut__host_write && uut__region == 3'd0;
+    always @* begin
+        assert (uut__scan_write == (program_write && page == 12'd0));
+        assert (uut__x_write == (program_write && page == 12'd1));
+        assert (uut__y_write == (program_write && page == 12'd2));
+    end
+
+`ifndef PROPERTIES_ALONE
     // What makes it inductive.
     wire [LATENCY:0] uut__pipelined__loads_now;
     always @* begin
@@ -83,9 +97,6 @@ module sequencer_properties
         assert (!uut__host_commit || !committed);
         assert (!(uut__host_commit || uut__host_write) || !uut__banks__draining);
     end
-    wire [2:0] uut__region;
-    wire [15:0] uut__address;
-    wire [31:0] uut__data;
 
     // The stages: each holds the colour of the playing bank once the load has passed it, and until then that of the
     // other one, which nobody writes meanwhile.
@@ -108,12 +119,7 @@ module sequencer_properties
     wire [1:0] y_kept = uut__pipelined__y_axis__words & ~to_other;
     wire [1:0] y_expected = uut__host_write && uut__region == 3'd2
         ? (uut__data[0] ? y_kept | to_other : y_kept) : uut__pipelined__y_axis__words;
-    wire [11:0] page = uut__address[15:4];
-    wire program_write = uut__host_write && uut__region == 3'd0;
     always @* begin
-        assert (uut__scan_write == (program_write && page == 12'd0));
-        assert (uut__x_write == (program_write && page == 12'd1));
-        assert (uut__y_write == (program_write && page == 12'd2));
         assert (uut__bank == other);
         assert (x_words[other] == y_words[other]);
         assert ((x_pending ? uut__data[0] : uut__pipelined__x_axis__idle) == x_colour);
@@ -126,6 +132,53 @@ module sequencer_properties
         assert (uut__pipelined__x_axis__middle == middle && uut__pipelined__y_axis__middle == middle);
         assert (uut__pipelined__x_axis__last == last && uut__pipelined__y_axis__last == last);
     end
+
+    // The colours on their way to the code, at any place of the pipeline: those of the playing bank once the load is
+    // ahead of them, until then of the other one. So a step of one clock is enough.
+    localparam READ_AT = 3;
+    wire [READ_AT-1:0] uut__pipelined__x_axis__banks, uut__pipelined__y_axis__banks;
+    wire [LAST+3:0] uut__pipelined__x_axis__first_met, uut__pipelined__x_axis__word_met;
+    wire [LAST+3:0] uut__pipelined__x_axis__middle_met, uut__pipelined__x_axis__last_met;
+    wire [LAST+3:0] uut__pipelined__y_axis__first_met, uut__pipelined__y_axis__word_met;
+    wire [LAST+3:0] uut__pipelined__y_axis__middle_met, uut__pipelined__y_axis__last_met;
+    wire [LATENCY-1:0] met;  // the colour of a code so many clocks before it is out
+    genvar i;
+    generate
+        for (i = 0; i < LATENCY; i = i + 1) begin : colours
+            assign met[i] = loads[i:0] != 0 ? was : now;
+        end
+        for (i = 0; i < READ_AT; i = i + 1) begin : read
+            always @* begin
+                assert (uut__pipelined__x_axis__banks[i] == (loads[i:0] != 0 ? !other : other));
+                assert (uut__pipelined__y_axis__banks[i] == (loads[i:0] != 0 ? !other : other));
+            end
+        end
+        for (i = 1; i < LATENCY; i = i + 1) begin : of_first
+            always @* begin
+                assert (uut__pipelined__x_axis__first_met[i-1] == met[i]);
+                assert (uut__pipelined__y_axis__first_met[i-1] == met[i]);
+            end
+        end
+        for (i = READ_AT; i < LATENCY; i = i + 1) begin : of_word
+            always @* begin
+                assert (uut__pipelined__x_axis__word_met[i-READ_AT] == met[i]);
+                assert (uut__pipelined__y_axis__word_met[i-READ_AT] == met[i]);
+            end
+        end
+        for (i = MIDDLE + 1; i < LATENCY; i = i + 1) begin : of_middle
+            always @* begin
+                assert (uut__pipelined__x_axis__middle_met[i-MIDDLE-1] == met[i]);
+                assert (uut__pipelined__y_axis__middle_met[i-MIDDLE-1] == met[i]);
+            end
+        end
+        for (i = LAST + 1; i < LATENCY; i = i + 1) begin : of_last
+            always @* begin
+                assert (uut__pipelined__x_axis__last_met[i-LAST-1] == met[i]);
+                assert (uut__pipelined__y_axis__last_met[i-LAST-1] == met[i]);
+            end
+        end
+    endgenerate
+`endif
 endmodule
 
 `default_nettype wire

@@ -32,7 +32,8 @@
 
     dac_sequencer #(
         .DAC_BITS(8), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(4),
-        .LINE_BITS(2), .PERIOD_BITS(8), .COUNT_BITS(2), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .LOW_AREA(LOW_AREA),
+        .LINE_BITS(2), .PERIOD_BITS(8), .COUNT_BITS(2), .LOW_AREA(LOW_AREA),
+        .PLAIN_MULTIPLIER(LOW_AREA && !FOURIER ? 0 : PLAIN_MULTIPLIER), .HARMONICS(3),
         .FOURIER(FOURIER), .SHAPING(SHAPING), .X_INTERPOLATED(CUBIC ? 3 : 1), .Y_INTERPOLATED(CUBIC ? 3 : 1)
     ) uut (
         .clock(clock), .reset(reset), .write(write), .write_region(write_region), .write_address(write_address),

@@ -507,10 +507,12 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "refused writes have an effect",
         "dac_sequencer",
-        "accepted_write = write && writable;",
-        "accepted_write = write;",
+        "accepted_write = write && writable && exists;",
+        "accepted_write = write && exists;",
     )
-    yield Mutant("refused writes are not reported", "dac_sequencer", "((write && !writable) ||", "(", "direct")
+    yield Mutant(
+        "refused writes are not reported", "dac_sequencer", "((write && !(writable && exists)) ||", "(", "direct"
+    )
     yield Mutant(
         "refused writes are reported for ever",
         "dac_sequencer",

@@ -4,7 +4,7 @@ import os
 import signal
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Literal
@@ -107,6 +107,9 @@ def verify(
 ) -> int:
     """Verify that the sequencer of the build in DIR plays the scan that its manifest describes, bit for bit.
 
+    If DIR is a library of tablegen sweep, every program of it is verified in this way, and the index is compared with
+    the programs.
+
     This compiles and runs the code in DIR. Do not verify a directory whose code you would not run.
 
     First the command checks the files: that DIR has all files of such a build, their SHA-256, the constants and tables
@@ -138,10 +141,11 @@ def verify(
     Examples:
       tablegen verify build
       tablegen verify build --target c
+      tablegen verify library --target files
       tablegen verify build --sim verilator --junit verify.xml
 
     \b
-    Exit status: 0 verified, 2 DIR does not contain a build, 4 cannot write, 5 a check failed,
+    Exit status: 0 verified, 2 DIR contains neither a build nor a library, 4 cannot write, 5 a check failed,
     6 a simulator, compiler or library is missing.
     """
     for option, value in (("--sim", simulator), ("--axis", axis)):
@@ -235,14 +239,14 @@ def _terminated_as_interrupted() -> Iterator[None]:
 
 
 def _digest(folder: Path) -> str:
-    """Return the SHA-256 of the manifest; empty if it cannot be read, which is reported elsewhere."""
+    """Return the SHA-256 of the manifest, or of a library's index; empty if neither can be read."""
     from tablegen.base.reading import file_sha256
-    from tablegen.manifest.format import MANIFEST
+    from tablegen.manifest.format import INDEX, MANIFEST
 
-    try:
-        return file_sha256(folder / MANIFEST)
-    except OSError:
-        return ""
+    for name in (MANIFEST, INDEX):
+        with suppress(OSError):
+            return file_sha256(folder / name)
+    return ""
 
 
 def _write(path: Path, report: "Report", digest: str) -> bool:

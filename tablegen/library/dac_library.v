@@ -4,7 +4,8 @@
 // RAM, or a flash behind a controller of yours. `memory_read` is high for a clock with an address; `memory_ready` is
 // high for a clock, one or more clocks later, with the word. Every record has a CRC. A record with a wrong one, or a
 // number that there is not, is not committed: `failed` is high until the next `pick`, and the idle bank is emptied by
-// `withdraw`. What plays goes on either way; a commit is taken as every commit is.
+// `withdraw`. The same where the sequencer refuses the commit: `busy` is high until `committed` is, or `writable`
+// without it. What plays goes on either way; a commit is taken as every commit is.
 //
 // A word takes 35 clocks and the time of the memory.
 
@@ -25,6 +26,7 @@ module dac_library #(
     input  wire                    memory_ready,
     input  wire [31:0]             memory_data,
     input  wire                    writable,       // from the sequencer; a pick waits while it is low
+    input  wire                    committed,      // from the sequencer
     output wire                    write,
     output reg  [2:0]              write_region,
     output reg  [15:0]             write_address,
@@ -45,6 +47,7 @@ module dac_library #(
     localparam [31:0] LAST_PROGRAM = PROGRAMS - 1, POLYNOMIAL = 32'hEDB88320;
     localparam [2:0] START = 3'd0, X_COUNT = 3'd1, Y_COUNT = 3'd2, PROGRAM = 3'd3, X = 3'd4, Y = 3'd5, CHECK = 3'd6;
     localparam [2:0] IDLE = 3'd0, WAIT = 3'd1, READ = 3'd2, WRITE = 3'd3, SUM = 3'd4, STEP = 3'd5;
+    localparam [2:0] ANSWER = 3'd6;
 
     reg [2:0] state, part;     // what is being done, with a word of which part of the record
     reg [16:0] left;           // words of the part, with this one
@@ -102,9 +105,15 @@ module dac_library #(
                 bit_number <= bit_number + 5'd1;
                 if (bit_number == 5'd31) state <= STEP;
             end
+            ANSWER: // from the clock after the commit; the sequencer keeps writable low until it has an answer
+                if (!commit && (committed || writable)) begin
+                    state <= IDLE;
+                    failed <= !committed;
+                    withdraw <= !committed;
+                end
             default: begin // STEP: the word is done, and turned round to where it was
                 memory_read <= part != CHECK;
-                state <= part == CHECK ? IDLE : READ;
+                state <= part != CHECK ? READ : word == ~crc ? ANSWER : IDLE;
                 memory_address <= part == START ? word[ADDRESS_BITS-1:0] : memory_address + 1'b1;
                 write_address <= write_address + 16'd1;
                 left <= left - 17'd1;

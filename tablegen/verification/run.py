@@ -10,6 +10,7 @@ from tablegen.library.whole import whole_build
 from tablegen.manifest.read import read_build
 from tablegen.verification.build_report import Report, Target, verify_build
 from tablegen.verification.files_target import FilesTarget
+from tablegen.verification.library_report import is_library, read_index, verify_library
 
 TargetName = Literal["verilog", "c", "cortex-m", "files"]
 DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000, "files": 0}
@@ -28,12 +29,12 @@ def verify(
     other_version: bool = False,
     progress: Callable[[str | Callable[[], str]], None] = lambda _: None,
 ) -> Report:
-    """Hold a build's files, and what its own sequencer plays, against its manifest.
+    """Hold a build's files, and what its own sequencer plays, against its manifest; or all builds of a library.
 
     Parameters
     ----------
     folder : str or Path
-        Directory of a build, or of a program of a library. What it holds is compiled and run.
+        Directory of a build, of a library, or of a program of one. What it holds is compiled and run.
     target : {"files", "c", "cortex-m", "verilog"}, optional
         What plays it: "verilog" where the build has it, else "c", else "files", which plays nothing.
     simulator, axis, fourier : optional
@@ -68,6 +69,24 @@ def verify(
     []
     """
     folder = Path(folder)
+    if is_library(folder):
+
+        def verify_program(program: Path) -> Report:
+            """Verify a program in a directory of its own."""
+            return verify(
+                program,
+                target,
+                simulator=simulator,
+                axis=axis,
+                fourier=fourier,
+                ticks=ticks,
+                seed=seed,
+                keep=None if keep is None else Path(keep) / program.name,
+                other_version=other_version,
+                progress=progress,
+            )
+
+        return verify_library(folder, verify_program)
     player, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
         most = most_ticks if ticks is None else ticks
@@ -87,7 +106,7 @@ def default_target(folder: Path) -> TargetName:
 
 
 def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
-    """Return the clocks in which the Verilog of a build renders its tables once.
+    """Return the clocks in which the Verilog of a build, or of all programs of a library, renders its tables once.
 
     Raises
     ------
@@ -96,6 +115,8 @@ def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"
     """
     from tablegen.verification.play.placement import Placement
 
+    if is_library(folder):
+        return sum(rendering_clocks(folder / program.name, axis) for program in read_index(folder).programs)
     stored, placement = read_build(folder), Placement(axis, fourier=True)
     tables = [
         (len(one.words), content.fourier.harmonics if placement.renders(one) else 0)

@@ -292,8 +292,8 @@ SEQUENCER: tuple[Edit, ...] = (
     Edit(
         "an unfit commit is not said",
         "dac_sequencer",
-        "(write && !writable) || (host_commit && !fits) || unrendered",
-        "(write && !writable) || unrendered",
+        "(write && !(writable && exists)) || (host_commit && !fits) || unrendered",
+        "(write && !(writable && exists)) || unrendered",
     ),
     Edit(
         "pages of 8 registers alias",

@@ -34,7 +34,7 @@ PROGRAMS: Mapping[str, tuple[str, ...]] = {
     "qemu-user": ("qemu-mips",),
     "simavr": ("simavr",),
     "srecord": ("srec_cat",),
-    "yosys": ("yosys", "yosys-smtbmc"),
+    "yosys": ("yosys",),
     "z3": ("z3",),
 }
 # Packages without a program: what shows that a test needs them.

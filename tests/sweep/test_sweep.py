@@ -384,8 +384,13 @@ def test_programs_that_one_runtime_cannot_play_have_no_index(tmp_path: Path) -> 
     assert len(index_of(tmp_path / "out")["programs"]) == 2
 
 
-@pytest.mark.parametrize("index", [True, False])
-@pytest.mark.parametrize("command", [["verify"], ["upload", "--port", "none"], ["report"]])
+@pytest.mark.parametrize(
+    ("command", "index"),
+    [
+        (["verify"], False),
+        *((command, index) for command in (["upload", "--port", "none"], ["report"]) for index in (True, False)),
+    ],
+)
 def test_a_library_is_not_a_build_and_its_programs_are_named(library: Path, command: list[str], index: bool) -> None:
     """One line, with something to do; also where a sweep was interrupted before its index."""
     out = library / "out"
