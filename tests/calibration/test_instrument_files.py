@@ -18,8 +18,10 @@ from image_writers import gwy, npy
 from instrument_files import asd, createc, h5_jpk, h5_jpk_steps, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
 from mutating import damaged
 
+import tablegen
 from tablegen.api.image_input import sample_image
 from tablegen.base.input_errors import Rejected
+from tablegen.correction.job import Choice, read_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
 from tablegen.images.formats.channel import Channel, rotation_deg, split_direction
@@ -50,7 +52,7 @@ def put(folder: Path, name: str, content: bytes) -> Path:
     return path
 
 
-def why(path: Path, *arguments: str, read: Callable[..., object] = read_image) -> str:
+def why(path: Path, *arguments: str | None, read: Callable[..., object] = read_image) -> str:
     with pytest.raises(Rejected) as caught:
         read(path, *arguments)
     (problem,) = caught.value.problems
@@ -528,6 +530,32 @@ def test_channels_of_one_name_are_chosen_by_number_and_pair_in_their_order(tmp_p
     for number, heights in (("0", (T, R)), ("2", (P, Q))):
         for image, one in zip(read_pair(path, channel=number), heights, strict=True):
             assert np.max(np.abs(image.heights * 1e9 - one)) < 1e-5
+
+
+def test_a_trace_with_two_retraces_is_refused_until_one_is_chosen(tmp_path: Path) -> None:
+    labels = {"HeightTrace": T * 1e-9, "HeightRetrace": R * 1e-9, "OtherRetrace": P * 1e-9}
+    content = ibw(labels, NOTE).replace(b"OtherRetrace" + bytes(20), b"HeightRetrace" + bytes(19))
+    path = put(tmp_path, "a.ibw", content)
+    said = "has 1 x the trace and 2 x the retrace of 'Height': 1 (HeightRetrace), 2 (HeightRetrace); choose one by its"
+    assert said in why(path, None, "Height", read=read_pair)
+    assert said in why(path, "Height", read=tablegen.read_image)
+    assert said in why(path, "Height", read=lambda path, name: sample_image(1.0, None, path, None, {"channel": name}))
+    assert said in why(path, read=lambda path: read_scan(path, None, Choice()))
+    assert read_scan(path, None, Choice(retrace_channel="2")).reference == (0, 2)
+    trace = tablegen.read_image(path, "Height", retrace_channel=1)
+    assert trace.retrace is not None
+    assert np.max(np.abs(trace.retrace.heights * 1e9 - R)) < 1e-5
+
+
+def test_a_correction_of_two_channels_of_one_name_is_by_their_number(tmp_path: Path) -> None:
+    two = sxm({"Z": (T * 1e-9, R * 1e-9), "I": (P * 1e-9, Q * 1e-9)}).replace(b"\tI\t", b"\tZ\t")
+    path = put(tmp_path, "a.sxm", two)
+    for number, reference in (("0", (0, 1)), ("2", (2, 3)), ("3", (3,))):
+        assert read_scan(path, None, Choice(channel=number)).reference == reference
+    for channel in (None, "Z"):
+        said = why(path, channel, read=lambda path, name: read_scan(path, None, Choice(channel=name)))
+        assert "a.sxm: has more than one channel 'Z" in said
+        assert ": 0 (Z forward), 2 (Z forward); choose " in said
 
 
 def test_files_of_an_electrochemical_cell(tmp_path: Path) -> None:
