@@ -428,7 +428,7 @@ class Calibrated(Result):
 
     def _lines(self) -> Sequence[str]:
         values = ", ".join(f"{key} {_estimate_text(one)}" for key, one in list(self.parameters.items())[:4])
-        residual = f"left {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
+        residual = f"residual {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
         what = f"{self.axis}.{self.kind} from {self.fit.points} points"
         files = f"from {', '.join(one.name for one in self.sources)}"
         third = f"means nothing: {self.doubts[0]}" if self.doubts else files

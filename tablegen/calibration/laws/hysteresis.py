@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.base.warnings import Remark, spoils
 from tablegen.calibration.laws.trace import TraceFit, fit_trace
+from tablegen.calibration.laws.triangle import Triangle
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Curve, Estimate, Fit
 from tablegen.fitting.growth import Growth, fit_growth
@@ -87,12 +88,30 @@ def fit_hysteresis(
             fit = fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm, settle_periods, drift_order, delay_s)
             low, high = fit.triangle.v_low, fit.triangle.v_high
             if driver.beyond(low, high) > 0.02 * driver.span:
+                _check_triangle(fit.triangle)
                 raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
         except Unphysical as reason:
             raise Unphysical(f"{trace.name}: {reason}" if trace.name else str(reason)) from None
         fits.append(fit)
         remarks += [text.under(trace.name) for text in _remarks(fit)]
     return combined(fits, driver.span, rho, remarks)
+
+
+def _check_triangle(triangle: Triangle) -> None:
+    """Check that the drive is a triangle, whose ends are then those of the drive.
+
+    The triangle nearest a sine is 22 % higher than the sine, so that it leaves a range that the sine fills.
+
+    Raises
+    ------
+    Unphysical
+        If it is another waveform.
+    """
+    if triangle.departure > _MAX_DRIVE_DEPARTURE:
+        raise Unphysical(
+            f"the drive is not a triangle: it departs from the nearest one by {100.0 * triangle.departure:.2g} % rms, "
+            "as a sine does; record a triangle, or give it to `calibrate operator`, which takes any record"
+        )
 
 
 def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[Remark]) -> HysteresisFit:
@@ -172,7 +191,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         remarks.append(
             spoils(
                 f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
-                "the fit assumes a triangle",
+                "the fit assumes a triangle; `calibrate operator` takes any record",
                 100.0 * fit.triangle.departure,
             )
         )
