@@ -342,7 +342,8 @@ class Calibrated(Result):
     @property
     def record(self) -> dict[str, Any]:
         """The fit as plain data, as ``tablegen calibrate --json`` prints it."""
-        return record(self.fit, self.axis, self.sources)
+        data = record(self.fit, self.axis, self.sources)
+        return data | {"findings": [one.record() for one in self.findings()]}
 
     def content(self, scanner: Path, driver: Driver | float | None = None, force: bool = False) -> dict[str, bytes]:
         """Return names and contents of the files that change beside ``scanner``, its own the last; nothing is written.

@@ -147,7 +147,10 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
         if offsets:
             listed = ", ".join(f"{volts:g}" for volts in sorted(set(offsets)))
             remarks.append(
-                Remark(f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset")
+                Remark(
+                    f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset",
+                    code="mixed-offsets",
+                )
             )
         branches.append(TurnFit(Estimate(turn, spread), sides[0], sides[1], tuple(group), offsets))
     return HysteresisFit(
@@ -193,10 +196,13 @@ def _remarks(fit: TraceFit) -> list[Remark]:
                 f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
                 "the fit assumes a triangle; `calibrate operator` takes any record",
                 100.0 * fit.triangle.departure,
+                code="drive-shape",
             )
         )
     if fit.inverted:
-        remarks.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
+        remarks.append(
+            Remark("the displacement falls where the drive rises; its sign was inverted", code="inverted-sensor")
+        )
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
         remarks.append(
@@ -204,6 +210,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
                 f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of "
                 f"the sensor known, and the record settled?",
                 worst,
+                code="poor-fit",
             )
         )
     if fit.correlated > 3.0:
@@ -211,16 +218,25 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             Remark(
                 f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
                 f"model and drift do not describe; standard errors were widened "
-                f"by a factor of {fit.correlated**0.5:.2g}"
+                f"by a factor of {fit.correlated**0.5:.2g}",
+                code="widened-errors",
             )
         )
     if fit.strays:
         numbers = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {numbers}); they were used"))
+        remarks.append(
+            Remark(
+                f"{len(fit.strays)} samples are far off the curve (number {numbers}); they were used",
+                code="outlying-samples",
+            )
+        )
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
             remarks.append(
-                spoils(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
+                spoils(
+                    f"u_peak {name} is not determined by this trace; average more periods or drive it further",
+                    code="undetermined-parameter",
+                )
             )
     return remarks
 
