@@ -114,8 +114,8 @@ class _Header:
             raise ValueError("ends in its header; copy it again")
         if end > _MAX_HEADER:
             raise ValueError(f"has a header of more than {_MAX_HEADER >> 20} MiB; is it damaged?")
-        taken, self._at = self._content[self._at : end], end
-        return taken
+        start, self._at = self._at, end
+        return self._content[start:end]
 
     def _number(self, size: int = 4) -> int:
         return int.from_bytes(self._bytes(size), "big")
