@@ -342,7 +342,8 @@ class Calibrated(Result):
     @property
     def record(self) -> dict[str, Any]:
         """The fit as plain data, as ``tablegen calibrate --json`` prints it."""
-        return record(self.fit, self.axis, self.sources)
+        data = record(self.fit, self.axis, self.sources)
+        return data | {"findings": [one.record() for one in self.findings()]}
 
     def content(self, scanner: Path, driver: Driver | float | None = None, force: bool = False) -> dict[str, bytes]:
         """Return names and contents of the files that change beside ``scanner``, its own the last; nothing is written.
@@ -428,7 +429,7 @@ class Calibrated(Result):
 
     def _lines(self) -> Sequence[str]:
         values = ", ".join(f"{key} {_estimate_text(one)}" for key, one in list(self.parameters.items())[:4])
-        residual = f"left {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
+        residual = f"residual {self.fit.rms_percent:.2g} % rms of {self.fit.before_percent:.3g} %"
         what = f"{self.axis}.{self.kind} from {self.fit.points} points"
         files = f"from {', '.join(one.name for one in self.sources)}"
         third = f"means nothing: {self.doubts[0]}" if self.doubts else files

@@ -134,6 +134,7 @@ class CalibratedRecords(CalibratedOperator):
             "delay_s": {"value": self.delay.value, "standard_error": error if isfinite(error) else None},
             "records": records,
             "remarks": list(self.remarks),
+            "findings": [one.record() for one in self.findings()],
             "next_trace": further.record,
             "sources": [{"file": one.source.name, "sha256": one.source.sha256} for one in self.measured],
         }

@@ -92,12 +92,12 @@ def _scan_image(image: ImageSource, direction: Direction, how: dict[str, Any]) -
 
 
 def _has_retrace(path: Path, channel: str | None) -> bool:
-    """Return True if a file has the retrace of the trace that would be read."""
+    """Return True if a file has the retrace of the trace that would be read, or does not say which one it is."""
     try:
         channels = channels_of(path)
         return partner(channels, choose(channels, channel, "trace")) is not None
     except (Rejected, ValueError):
-        return False  # the reader reports the fault
+        return True  # the reader of pairs reports the fault
 
 
 def known_sample(

@@ -100,10 +100,9 @@ def _name(channel: str | int | None) -> str | None:
 def _has_both(path: Path, channel: str | None) -> bool:
     all_channels = channels_of(path)
     try:
-        trace = choose(all_channels, channel, "trace")
+        return partner(all_channels, choose(all_channels, channel, "trace")) is not None
     except ValueError:
-        return False  # the reader reports the fault
-    return trace.direction != "retrace" and partner(all_channels, trace) is not None
+        return True  # the reader of pairs reports the fault
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,7 +18,10 @@ def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[
         True if measured values are written in place of a law.
     """
     part = "image" if fit.images else "row"
-    findings = [Finding("limit", 0.0, text, "\u2717 means nothing", "warning") for text in doubts(fit, points)]
+    findings = [
+        Finding("limit", 0.0, text, "\u2717 means nothing", "warning", "insignificant-fit")
+        for text in doubts(fit, points)
+    ]
     findings += [
         Finding(
             "spoils",
@@ -26,6 +29,7 @@ def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[
             f"{place}: far from the other points, but used. Remove the {part} if the measurement was wrong",
             "! outlier",
             "outlier",
+            "outlying-samples",
         )
         for row, place in zip(fit.outliers, places, strict=True)
     ]

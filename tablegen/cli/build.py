@@ -9,6 +9,7 @@ from tablegen.cli.depfile import Depfile
 from tablegen.cli.shared.common import (
     OutputFile,
     OutputFolder,
+    check_place,
     fail,
     format_option,
     planned,
@@ -31,7 +32,7 @@ _NAMES_SHOWN = 8
 @click.option(
     "-o",
     "--output",
-    type=OutputFolder(),
+    type=OutputFolder(always=False),
     default=Path("build"),
     show_default=True,
     metavar="DIR",
@@ -93,6 +94,8 @@ def build(
     """
     _check_usage(only_check, depfile, depfile_target, plot)
     check_plot(plot)
+    if not only_check and not output.exists():
+        check_place(output)
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     try:
         built = planned(scan, list(formats) or None, strict)

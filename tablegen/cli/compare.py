@@ -57,14 +57,14 @@ def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path 
         if output is not None or plot is not None:
             progress.now("playing both and drawing")
             comparison.charts()
+    if output is not None:
+        written(output.parent, {output.name: comparison.page()})
     if as_json:
         click.echo(json.dumps(comparison.both.record(everything), indent=2, allow_nan=False))
     else:
         click.echo(comparison.summary(everything))
     if plot is not None and comparison.charts().charts:
         show_plot(plot, comparison.charts)
-    if output is not None:
-        written(output.parent, {output.name: comparison.page()})
     return ExitStatus.OK if comparison.same else ExitStatus.STALE
 
 

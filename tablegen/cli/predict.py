@@ -87,8 +87,8 @@ def predict(
             drive_gain=recorder.drive_gain,
             drive_offset=recorder.drive_offset,
         )
-    click.echo(predicted.to_json() if as_json else predicted.summary())
-    show_plot(plot, predicted.charts)
     if output is not None:
         written(output.parent, {output.name: predicted.csv()})
+    click.echo(predicted.to_json() if as_json else predicted.summary())
+    show_plot(plot, predicted.charts)
     return ExitStatus.OK

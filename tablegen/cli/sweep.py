@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.shared.common import OutputFolder, fail, format_option, scan_argument, strict_option
+from tablegen.cli.shared.common import OutputFolder, check_place, fail, format_option, scan_argument, strict_option
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @click.option(
     "-o",
     "--output",
-    type=OutputFolder(),
+    type=OutputFolder(always=False),
     default=Path("library"),
     show_default=True,
     metavar="DIR",
@@ -85,6 +85,8 @@ def sweep(
     from tablegen.cli.shared.progress_bar import Bar
 
     quiet_blas()
+    if not (only_check or only_list or output.exists()):
+        check_place(output)
     from tablegen.emit.write import CannotWrite, NoPlace
     from tablegen.sweeping.sweep import build_library
 

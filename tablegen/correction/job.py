@@ -18,6 +18,7 @@ from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
+from tablegen.images.formats.channel import Channel, Direction, channel_list, choose, partner, quote
 from tablegen.images.frame_registration import registered
 from tablegen.images.measured_cell import IDEAL_ANGLES
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
@@ -227,43 +228,75 @@ def _check_exchange(groups: Sequence[tuple[list[ScanImage], bool]]) -> None:
 
 
 def _reference(channels: Sequence[ScanImage], ways: Sequence[bool], choice: Choice, first: int) -> tuple[int, ...]:
-    """Return the trace and the retrace that are fitted and compared; one of them if there is no other."""
+    """Return the trace and the retrace that are fitted and compared; one of them if there is no other.
 
-    def numbered(name: str, among: range, way: bool | None) -> int:
-        numbers = [i for i in among if channels[i].channel == name and way in (None, ways[i])]
-        numbers = numbers or [i for i in among if channels[i].signal == name and way in (None, ways[i])]
-        numbers = numbers or [i for i in among if str(channels[i].number) == name]
-        if len(numbers) != 1:
-            there = ", ".join(f"{channels[i].number} ({channels[i].channel})" for i in among)
-            why = f"has {'no' if not numbers else 'more than one'} channel '{name}'; there is {there}"
-            raise Rejected([Problem(channels[among[0]].file, 0, "", why)])
-        return numbers[0]
+    Parameters
+    ----------
+    channels, ways
+        The channels of one file or two, and whether each is a trace.
+    first
+        Number of channels of the first file.
 
-    everything = range(len(channels))
-    whole = range(first) if first < len(channels) else everything
-    rest = range(first, len(channels)) if first < len(channels) else everything
-    if choice.channel is not None:
-        trace = numbered(choice.channel, whole, True if any(ways[i] for i in whole) else None)
-    else:
-        ranked = sorted(whole, key=lambda i: (not ways[i], not _partners(channels, ways, i), not _height(channels[i])))
-        trace = ranked[0]
-    if choice.retrace_channel is not None:
-        return trace, numbered(choice.retrace_channel, rest, None)
-    partners = _partners(channels, ways, trace)
-    return (trace, partners[0]) if partners else (trace,)
+    Raises
+    ------
+    Rejected
+        If the choice fits none of them, or several.
+    """
+    listed = [_as_channel(one, way) for one, way in zip(channels, ways, strict=True)]
+    whole = listed[:first]
+    rest = listed[first:] or listed
+    try:
+        trace = _trace(listed, whole) if choice.channel is None else choose(whole, choice.channel, "trace")
+    except ValueError as reason:
+        raise Rejected([Problem(channels[0].file, 0, "", str(reason))]) from None
+    try:
+        if choice.retrace_channel is not None:
+            retraces = [choose(rest, choice.retrace_channel, "retrace")]
+        elif len(retraces := _retraces(listed, trace)) > 1:
+            retraces = [partner(listed, trace) or retraces[0]]
+    except ValueError as reason:
+        raise Rejected([Problem(channels[-1].file, 0, "", str(reason))]) from None
+    return tuple(listed.index(one) for one in (trace, *retraces))
 
 
-def _partners(channels: Sequence[ScanImage], ways: Sequence[bool], of: int) -> list[int]:
+def _as_channel(image: ScanImage, way: bool) -> Channel:
+    """Return a channel that was read, with the direction that it is taken for."""
+    direction: Direction = "trace" if way else "retrace"
+    shape = image.heights.shape
+    return Channel(image.number, image.channel, shape, lambda _: image.heights, image.signal, direction)
+
+
+def _trace(listed: Sequence[Channel], whole: Sequence[Channel]) -> Channel:
+    """Return the best trace of the first file: one with a retrace, which is a height.
+
+    Raises
+    ------
+    ValueError
+        If the file has another channel of that name, which would do as well.
+    """
+
+    def rank(one: Channel) -> tuple[bool, bool, bool]:
+        return one.direction != "trace", not _retraces(listed, one), not _height(one)
+
+    best = min(whole, key=rank)
+    alike = [one for one in whole if one.title == best.title and rank(one) == rank(best)]
+    if len(alike) > 1:
+        of_name = channel_list(alike)
+        raise ValueError(f"has more than one channel {quote(best.title)}: {of_name}; choose with --channel")
+    return best
+
+
+def _retraces(listed: Sequence[Channel], trace: Channel) -> list[Channel]:
     """Return channels of the other direction with the same signal, or the only one there is."""
-    if not ways[of]:
+    if trace.direction != "trace":
         return []
-    others = [i for i, way in enumerate(ways) if not way]
-    same = [i for i in others if channels[i].signal == channels[of].signal]
-    return same or (others if len(others) == 1 and sum(ways) == 1 else [])
+    others = [one for one in listed if one.direction == "retrace"]
+    same = [one for one in others if one.signal == trace.signal]
+    return same or (others if len(others) == 1 and len(listed) == 2 else [])
 
 
-def _height(channel: ScanImage) -> bool:
-    return any(word in channel.channel.lower() for word in ("height", "topo", "zsensor", "z sensor"))
+def _height(channel: Channel) -> bool:
+    return any(word in channel.title.lower() for word in ("height", "topo", "zsensor", "z sensor"))
 
 
 def by_scanner(images: Images, scanner: Path, conditions: OldScan) -> StraightScan:

@@ -86,11 +86,15 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
         steep = _steepest(v, beta, error, rho)
         fit = _height(v, beta, error, steep or rho, remarks)
         remarks.append(
-            Remark(f"the residual hardly grows with the amplitude: rho is only known to be large, and set to {steep:g}")
+            Remark(
+                f"the residual hardly grows with the amplitude: rho is only known to be large, and set to {steep:g}",
+                code="undetermined-parameter",
+            )
             if steep
             else spoils(
                 f"rho is not determined by these amplitudes and was set to {rho:g}; it takes two or "
-                f"more, best from 0.2 to 1 of v_max"
+                f"more, best from 0.2 to 1 of v_max",
+                code="undetermined-parameter",
             )
         )
     beta_max, estimate = fit
@@ -103,7 +107,12 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
         )
     top = float(np.max(v))
     if top < 0.6:
-        remarks.append(spoils(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there"))
+        remarks.append(
+            spoils(
+                f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there",
+                code="extrapolated-parameter",
+            )
+        )
     misfit = beta_max.value * _share(v, estimate.value) - beta
     off_errors = sqrt(float(np.sum((misfit / error) ** 2)) / freedom)
     off_share = sqrt(float(np.sum(misfit**2)) / freedom) / float(np.max(np.abs(beta)))
@@ -191,7 +200,7 @@ def _variance(
     if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANCE_LEVEL:
         return 1.0
     text = f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened{more}"
-    remarks.append(spoils(text, percent))
+    remarks.append(spoils(text, percent, code="poor-fit"))
     return total / freedom * few_points(freedom) ** 2
 
 

@@ -55,7 +55,7 @@ def _parameters(fit: Fit) -> Section:
     )
     what = "position error, % of the scan" if isinstance(fit, HysteresisFit) else "scale error, %"
     residuals = (
-        f"{what}: up to {fit.before_percent:.2f} without the correction; left {fit.rms_percent:.2g} rms, "
+        f"{what}: up to {fit.before_percent:.2f} without the correction; residual {fit.rms_percent:.2g} rms, "
         f"{fit.largest_percent:.2g} at most, of {fit.points} points"
     )
     blocks: list[Block] = [
@@ -78,7 +78,7 @@ def _traces(fit: HysteresisFit) -> Grid:
     for branch in fit.branches:
         for trace in branch.traces:
             rows += [_trace(branch.turn.value, trace, i, side) for i, side in enumerate(("forward", "backward"))]
-    head = ("turn, direction", "V_scan", "noise [%]", "drift [%]", "beta", "u_peak", "left [%, peak to peak]")
+    head = ("turn, direction", "V_scan", "noise [%]", "drift [%]", "beta", "u_peak", "residual [%, peak to peak]")
     return Grid("Each trace by itself", head, tuple(rows))
 
 

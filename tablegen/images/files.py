@@ -29,6 +29,7 @@ from tablegen.images.formats.channel import (
 )
 from tablegen.images.formats.createc import CREATEC_MAGICS, createc_channels
 from tablegen.images.formats.gwyddion import gwy_channels
+from tablegen.images.formats.gxsm import gxsm_channels
 from tablegen.images.formats.h5_jpk import h5_jpk_channels
 from tablegen.images.formats.igor import ibw_channels
 from tablegen.images.formats.iso28600 import ISO_MAGIC, iso_channels
@@ -287,6 +288,7 @@ _READERS: dict[str, Callable[[bytes, str], list[Channel]]] = {
     **dict.fromkeys((".stp", ".top"), wsxm_channels),
     ".nid": nid_channels,
     ".mdt": mdt_channels,
+    ".nc": gxsm_channels,
     ".jpk": jpk_channels,
     ".jpk-qi-image": jpk_channels,
     ".h5-jpk": h5_jpk_channels,

@@ -26,12 +26,17 @@ def timing_remarks(images: Iterable[object], turn: float, window: tuple[float, f
         name = image.source.name
         if image.turn is not None and abs(image.turn - turn) > _SAME_TURN:
             text = f"{name}: the file states a turn of {image.turn:.4g}, and the fit has {turn:.4g}"
-            remarks[spoils(f"{text}; give --turn {image.turn:.4g}")] = None
+            remarks[spoils(f"{text}; give --turn {image.turn:.4g}", code="image-timing")] = None
         if (
             image.window is not None
             and max(abs(a - b) for a, b in zip(image.window, window, strict=True)) > _SAME_WINDOW
         ):
             theirs, ours = ("{:.4g} to {:.4g}".format(*one) for one in (image.window, window))
             advice = "give --window {:.4g} {:.4g}, and the voltage of the whole sweep".format(*image.window)
-            remarks[spoils(f"{name}: the file states a window of {theirs}, and the fit has {ours}; {advice}")] = None
+            remarks[
+                spoils(
+                    f"{name}: the file states a window of {theirs}, and the fit has {ours}; {advice}",
+                    code="image-timing",
+                )
+            ] = None
     return list(remarks)

@@ -63,10 +63,10 @@ def angle_remarks(images: Iterable[object], axis: str) -> list[Remark]:
             continue
         name = image.source.name
         if text := _conflict(image, axis):
-            remarks[spoils(f"{name}: {text}")] = None
+            remarks[spoils(f"{name}: {text}", code="scan-angle")] = None
         elif is_turned(image):
             why = "the file does not say which end of the line had the higher voltage"
-            remarks[Remark(f"{name}: {angle_text(image.angle_deg)}, as --axis {axis}; {why}")] = None
+            remarks[Remark(f"{name}: {angle_text(image.angle_deg)}, as --axis {axis}; {why}", code="scan-angle")] = None
     return list(remarks)
 
 
@@ -76,7 +76,7 @@ def running_scan_remarks(images: Iterable[ScanImage]) -> list[Remark]:
     for image in images:
         if is_turned(image) and image.angle_deg is not None:
             text = f"{image.source.name}: {angle_text(image.angle_deg)}; the lines of a scan file are along x"
-            remarks[spoils(f"{text}. Take the images at 0 degrees")] = None
+            remarks[spoils(f"{text}. Take the images at 0 degrees", code="scan-angle")] = None
     return list(remarks)
 
 

@@ -204,6 +204,7 @@ def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
             f"corrects it at every size, or ask for {requested * requested / nm:.5g} nm to have {requested:.5g} nm "
             f"here",
             100.0 * abs(nm / requested - 1.0),
+            code="size-error",
         )
     ]
 
@@ -214,7 +215,8 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate)
         texts.append(
             spoils(
                 "a drift that becomes faster or slower counts as an error of y; give two consecutive frames, "
-                "which separate the two"
+                "which separate the two",
+                code="uneven-drift",
             )
         )
     if line.axis == "y" and line.band_limit.directions == "both":
@@ -234,23 +236,35 @@ def _remarks_of(frame: LatticeLine) -> list[Remark]:
     explained = min(fit.explained)
     if explained < _LITTLE_EXPLAINED:
         remarks.append(
-            Remark(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+            Remark(
+                f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects",
+                code="aperiodic-contrast",
+            )
         )
     span = (geometry.window[1] - geometry.window[0]) * frame.periods
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
         remarks.append(
-            Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
+            Remark(
+                f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels",
+                code="few-pixels",
+            )
         )
     if frame.start.mismatch > _FAR_APART:
         remarks.append(
             spoils(
                 f"trace and retrace are {frame.start.mismatch:.2g} periods apart, and beyond half a period they would "
-                f"be taken for the next one; calibrate first, or take a sample of a longer period"
+                f"be taken for the next one; calibrate first, or take a sample of a longer period",
+                code="period-slip",
             )
         )
     if fit.loud:
         row_numbers = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
-        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {row_numbers}); they counted less"))
+        remarks.append(
+            Remark(
+                f"{len(fit.loud)} rows differ from the others (row {row_numbers}); they counted less",
+                code="outlying-samples",
+            )
+        )
     return remarks
 
 
@@ -303,7 +317,8 @@ def refine_mismatch(
     remarks = [
         spoils(
             "only the mismatch of trace and retrace was measured and is corrected, half in each; an error that both "
-            "share stays, and is in none of these figures"
+            "share stays, and is in none of these figures",
+            code="mismatch-only",
         ),
         *_learning_remarks(update),
     ]
@@ -324,10 +339,20 @@ def refine_mismatch(
 def _learning_remarks(update: LayerUpdate) -> list[Remark]:
     remarks: list[Remark] = []
     if update.harmonics == 0:
-        remarks.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
+        remarks.append(
+            Remark(
+                "the error is within the noise of the images: there is nothing more to learn from them",
+                code="noise-limit",
+            )
+        )
     elif mostly_noise(update):
-        remarks.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
-    return [*remarks, Remark("images do not show that the build of this scan file was running")]
+        remarks.append(
+            Remark("most of the remaining error is noise: give several frames, or stop refining", code="noise-limit")
+        )
+    return [
+        *remarks,
+        Remark("images do not show that the build of this scan file was running", code="unverified-build"),
+    ]
 
 
 def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:

@@ -281,6 +281,7 @@ def _remarks(
                 f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
                 f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining",
                 100.0 * abs(by),
+                code="size-error",
             )
         )
     if update.before.size_nm < 0.0:
@@ -290,25 +291,35 @@ def _remarks(
         remarks.append(spoils(turned + doubt, code=code) if phase.drive is None else Remark(turned, code=code))
     if measured.stray is not None:
         at = float(time_s[measured.stray])
-        remarks.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))
+        remarks.append(
+            Remark(f"the reading at {at:.9g} s is far off the others; it adds noise", code="outlying-samples")
+        )
     if update.harmonics == 0:
         remarks.append(
-            Remark("the error is within the noise of the sensor: there is nothing more to learn from this trace")
+            Remark(
+                "the error is within the noise of the sensor: there is nothing more to learn from this trace",
+                code="noise-limit",
+            )
         )
     elif mostly_noise(update):
-        remarks.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
+        remarks.append(
+            Remark("most of the remaining error is noise: record more periods, or stop refining", code="noise-limit")
+        )
     if measured.correlated > 3.0:
         remarks.append(
             Remark(
                 f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, "
                 f"hum or what the harmonics leave; standard errors were widened "
-                f"by a factor of {measured.correlated**0.5:.2g}"
+                f"by a factor of {measured.correlated**0.5:.2g}",
+                code="widened-errors",
             )
         )
     if measured.periods < 1.99:
-        remarks.append(Remark("drift cannot be determined from a single period; record several"))
+        remarks.append(Remark("drift cannot be determined from a single period; record several", code="few-periods"))
     if phase.drive is None:
-        remarks.append(Remark("without drive_v it is not checked that the trace belongs to this build"))
+        remarks.append(
+            Remark("without drive_v it is not checked that the trace belongs to this build", code="unverified-build")
+        )
     return tuple(remarks)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tablegen.base.data_files import Source
+from tablegen.base.warnings import of_remarks, worst_first
 from tablegen.certificate.error_answer import ErrorAnswer, Of, measured_answer
 from tablegen.config.frame import lines_inside
 from tablegen.refinement.departure import Departure
@@ -142,6 +143,7 @@ def refine_record(result: Round, name: str, sources: Sequence[Source]) -> dict[s
         "worse": result.worse or None,
         "stopped": result.stopped or None,
         "remarks": list(result.remarks),
+        "findings": [one.record() for one in worst_first(of_remarks(result.remarks))],
     }
 
 

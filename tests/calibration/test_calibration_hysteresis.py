@@ -208,6 +208,14 @@ def test_a_drive_that_is_no_triangle_is_said() -> None:
     assert any("the drive departs from a triangle by" in remark for remark in fit.remarks)
 
 
+def test_a_sine_that_fills_the_range_is_refused_for_its_shape() -> None:
+    """The triangle nearest to it is higher, and would leave the driver's range."""
+    trace = Scanner().trace(100.0)
+    sine = 50.0 - 50.0 * np.cos(2.0 * np.pi * trace.time_s / 0.02)
+    with pytest.raises(Unphysical, match=r"not a triangle: .* 4\.2 % rms, as a sine does; .* `calibrate operator`"):
+        fit_hysteresis([replace(trace, drive_v=sine, displacement_nm=10.0 * sine)], V_MAX)
+
+
 def test_the_triangle_is_found_in_noise() -> None:
     trace = Scanner(turn=0.7).trace(80.0, 5.3, 4000, noise(4000, 3, 0.01))
     found = find_triangle(trace.time_s, trace.drive_v)

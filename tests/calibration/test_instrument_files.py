@@ -15,15 +15,34 @@ import pytest
 from gwyfile.objects import GwyContainer, GwyDataField
 from igor2 import binarywave
 from image_writers import gwy, npy
-from instrument_files import asd, createc, h5_jpk, h5_jpk_steps, ibw, iso28600, jpk, mdt, nid, park, spm, sxm, wsxm
+from instrument_files import (
+    asd,
+    createc,
+    gxsm,
+    h5_jpk,
+    h5_jpk_steps,
+    ibw,
+    iso28600,
+    jpk,
+    mdt,
+    nid,
+    park,
+    spm,
+    sxm,
+    wsxm,
+)
 from mutating import damaged
+from scipy.io import netcdf_file
 
+import tablegen
 from tablegen.api.image_input import sample_image
 from tablegen.base.input_errors import Rejected
+from tablegen.correction.job import Choice, read_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
 from tablegen.images.formats.channel import Channel, rotation_deg, split_direction
 from tablegen.images.formats.createc import createc_channels
+from tablegen.images.formats.gxsm import gxsm_channels
 from tablegen.images.formats.h5_jpk import h5_jpk_channels
 from tablegen.images.formats.hdf5 import Hdf5Object, hdf5_members, hdf5_object
 from tablegen.images.formats.igor import ibw_channels
@@ -50,7 +69,7 @@ def put(folder: Path, name: str, content: bytes) -> Path:
     return path
 
 
-def why(path: Path, *arguments: str, read: Callable[..., object] = read_image) -> str:
+def why(path: Path, *arguments: str | None, read: Callable[..., object] = read_image) -> str:
     with pytest.raises(Rejected) as caught:
         read(path, *arguments)
     (problem,) = caught.value.problems
@@ -340,6 +359,7 @@ TURNED = {
     "a.dat": createc([T]),
     "a.nid": nid({"Z-Axis": (T, R)}),
     "a.tiff": park(T, angle_deg=90.0),
+    "a.nc": gxsm(T, angle_deg=90.0),
 }
 
 
@@ -466,6 +486,7 @@ OTHERS: dict[str, tuple[bytes, str, float, float, str, str | None]] = {
     "curves.nid": (nid({"Z-Axis": (T, R)}, bits=16, curves=True), "Z-Axis", 1e9, 2e-3, "m", None),
     "a.mdt": (mdt({"1F:Height": T, "1B:Height": R, "2F:Phase": P}), "Height", 1.0, 6e-3, "nm", None),
     "dots.mdt": (mdt({"1F:Height": T}, dots=2), "Height", 1.0, 6e-3, "nm", None),
+    "a.nc": (gxsm(T), "Topography", 0.1, 1e-3, "Å", None),
     "a.tiff": (park(T), "Height", 1.0, 6e-3, "nm", "bottom"),
     "down.tif": (park(T, kind=2, up=False), "Height", 1.0, 1e-5, "nm", "top"),
     "long.tif": (park(T, kind=1), "Height", 1.0, 6e-3, "nm", "bottom"),
@@ -530,6 +551,56 @@ def test_channels_of_one_name_are_chosen_by_number_and_pair_in_their_order(tmp_p
             assert np.max(np.abs(image.heights * 1e9 - one)) < 1e-5
 
 
+def test_a_trace_with_two_retraces_is_refused_until_one_is_chosen(tmp_path: Path) -> None:
+    labels = {"HeightTrace": T * 1e-9, "HeightRetrace": R * 1e-9, "OtherRetrace": P * 1e-9}
+    content = ibw(labels, NOTE).replace(b"OtherRetrace" + bytes(20), b"HeightRetrace" + bytes(19))
+    path = put(tmp_path, "a.ibw", content)
+    said = "has 1 x the trace and 2 x the retrace of 'Height': 1 (HeightRetrace), 2 (HeightRetrace); choose one by its"
+    assert said in why(path, None, "Height", read=read_pair)
+    assert said in why(path, "Height", read=tablegen.read_image)
+    assert said in why(path, "Height", read=lambda path, name: sample_image(1.0, None, path, None, {"channel": name}))
+    assert said in why(path, read=lambda path: read_scan(path, None, Choice()))
+    assert read_scan(path, None, Choice(retrace_channel="2")).reference == (0, 2)
+    trace = tablegen.read_image(path, "Height", retrace_channel=1)
+    assert trace.retrace is not None
+    assert np.max(np.abs(trace.retrace.heights * 1e9 - R)) < 1e-5
+
+
+def test_a_correction_of_two_channels_of_one_name_is_by_their_number(tmp_path: Path) -> None:
+    two = sxm({"Z": (T * 1e-9, R * 1e-9), "I": (P * 1e-9, Q * 1e-9)}).replace(b"\tI\t", b"\tZ\t")
+    path = put(tmp_path, "a.sxm", two)
+    for number, reference in (("0", (0, 1)), ("2", (2, 3)), ("3", (3,))):
+        assert read_scan(path, None, Choice(channel=number)).reference == reference
+    for channel in (None, "Z"):
+        said = why(path, channel, read=lambda path, name: read_scan(path, None, Choice(channel=name)))
+        assert "a.sxm: has more than one channel 'Z" in said
+        assert ": 0 (Z forward), 2 (Z forward); choose " in said
+
+
+def test_files_of_gxsm_as_scipy_has_them(tmp_path: Path) -> None:
+    """A backward line begins at its right end; the values are those that another reader of NetCDF finds."""
+    pair = [put(tmp_path, f"{back}.nc", gxsm(heights, back)) for back, heights in ((False, T), (True, R))]
+    for image, heights, path in zip(read_pair(*pair), (T, R), pair, strict=True):
+        assert np.max(np.abs(0.1 * image.heights - heights)) < 1e-3
+        with netcdf_file(str(path), mmap=False) as other:
+            field, step = other.variables["FloatField"][0, 0], float(other.variables["dz"].getValue())
+        stored = image.heights[:, ::-1] if image.direction == "retrace" else image.heights
+        assert np.array_equal(stored, step * field.astype(float))
+    movie = put(tmp_path, "movie.nc", gxsm(T, frames=3))
+    assert [one.frames for one in channels_of(movie)] == [3]
+    assert np.max(np.abs(0.1 * read_image(movie, frame=2).heights - T - 0.02)) < 1e-3
+
+
+def test_files_of_gxsm_without_scale_or_unit_and_of_other_layouts(tmp_path: Path) -> None:
+    content = gxsm(T)
+    plain = read_image(put(tmp_path, "a.nc", content.replace(b"\0\0\0\x02dz", b"\0\0\0\x02dw")))
+    assert (plain.unit, plain.width_nm) == ("LSB", pytest.approx(500.0))
+    display = read_image(put(tmp_path, "b.nc", content.replace(b"var_unit", b"own_unit")))
+    assert (display.unit, display.width_nm) == ("", None)  # a unit of the display says nothing about the number
+    assert "is of NetCDF 4; convert it" in why(put(tmp_path, "c.nc", b"\x89HDF\r\n\x1a\n" + bytes(100)))
+    assert "has no FloatField or H over" in why(put(tmp_path, "d.nc", content.replace(b"FloatField", b"WordsField")))
+
+
 def test_files_of_an_electrochemical_cell(tmp_path: Path) -> None:
     content = spm({"Height": (T, R)}, aspect="48:40").replace(b"\\*File list\r", b"\\*EC File list\r", 1)
     content = content.replace(b"\x1a\0\0\0", b"\x1a", 1)  # the data stay where the header says
@@ -591,6 +662,7 @@ READERS: dict[str, tuple[bytes, Callable[[bytes, str], list[Channel]]]] = {
     "mdt": (mdt({"1F:Height": SMALL, "1B:Height": SMALL}), mdt_channels),
     "park": (park(SMALL), park_channels),
     "h5-jpk": (h5_jpk(), h5_jpk_channels),
+    "nc": (gxsm(SMALL, frames=2), gxsm_channels),
 }
 NOT_NEEDED = {"iso": 1, "dat": 40, "dat1": 32, "mdt": 0}  # bytes behind the last pixel that may be missing
 
@@ -629,6 +701,26 @@ def test_damage_is_refused_or_read_and_never_worse(kind: str) -> None:
             changed = [summed(one, "<i", 4, 320 + 96) if len(one) > 400 else one for one in changed]
         read = [read_or_refused(reader, one) for one in changed]
     assert 0 < sum(read) < len(read)
+
+
+@pytest.mark.parametrize(("name", "content"), [("a.h5-jpk", h5_jpk()), ("a.nc", gxsm(T))])
+def test_bits_that_flipped_are_refused_with_the_name_of_the_file(name: str, content: bytes, tmp_path: Path) -> None:
+    """As a user meets it: a file that ends early or has other bits, all of whose channels are read."""
+    path = tmp_path / name
+    reasons: list[str] = []
+    for seed in range(40):
+        chance = random.Random(seed)
+        changed = bytearray(content if seed % 2 else content[: chance.randrange(len(content))])
+        for _ in range(min(chance.randrange(1, 20), len(changed))):
+            changed[chance.randrange(len(changed))] ^= 1 << chance.randrange(8)
+        path.write_bytes(changed)
+        try:
+            for one in channels_of(path)[:9]:
+                read_image(path, str(one.number), frame=0)
+        except Rejected as rejected:
+            reasons += map(str, rejected.problems)
+    assert 20 <= len(reasons) < 40
+    assert all(name in reason for reason in reasons)
 
 
 WORLD = 2_000_000_000
@@ -687,6 +779,13 @@ HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     "park": ("park", lambda c: c.replace(struct.pack("<2i", 4, 3), struct.pack("<2i", WORLD, 3)), "of 2000000000 x 3"),
     "park, kind": ("park", lambda c: c[:-232] + b"\x07" + c[-231:], "pixels of the kind 7"),
     "park, swapped": ("park", lambda _: park(SMALL, swapped=True), "was scanned with x and y exchanged"),
+    "nc, pixels": ("nc", lambda c: c.replace(b"dimx\0\0\0\4", b"dimx\x7f\0\0\0"), "has an image of 2130706432 x 3"),
+    "nc, frames": ("nc", lambda c: c.replace(b"time\0\0\0\2", b"time\x7f\0\0\0"), "in the middle of 'FloatField'"),
+    "nc, no frames": ("nc", lambda c: c.replace(b"time\0\0\0\2", b"time\0\0\0\0"), "has no frames"),
+    "nc, header": ("nc", lambda c: c[:15] + b"\1\0\x50\0\0" + bytes(5 << 20), "a header of more than 4 MiB"),
+    "nc, axis": ("nc", lambda c: c.replace(b"Field\0\0\0\0\0\4\0\0\0\0", b"Field\0\0\0\0\0\4\0\0\0\x63"), "not there"),
+    "nc, records": ("nc", lambda c: c[:7] + b"\5" + c[8:], "has records of NetCDF"),
+    "nc, list": ("nc", lambda c: c[:12] + b"\x7f" + c[13:], "has a header that is not one of NetCDF"),
     "asd, version": ("asd1", lambda c: with_numbers(c, 0, 9), "of version 0, 1 or 2"),
 }  # fmt: skip
 

@@ -543,3 +543,12 @@ def test_options_of_a_recorder_that_are_wrong(arguments: list[str], reason: str,
     outcome = run("calibrate", "hysteresis", "--axis", "x", "--v-max", "100", TRACES[0], *arguments)
     assert outcome.status == 2
     assert reason in outcome.err
+
+
+def test_remarks_have_codes_in_json(lab: Path) -> None:
+    """`remarks` are the sentences as before, `findings` the same with codes, the worst first."""
+    write_csv(lab / "offset.csv", offset_v=[25.0, 50.0, 75.0], apparent_nm=[16.0, 17.7, 16.5])
+    data = json.loads(calibrate("offset", "--json").out)
+    assert {one["code"] for one in data["findings"]} >= {"few-points", "extrapolated-parameter"}
+    assert {one["text"] for one in data["findings"]} >= set(data["remarks"]) > set()
+    assert all(set(one) == {"code", "axis", "text"} and one["code"] for one in data["findings"])

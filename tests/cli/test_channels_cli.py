@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from calibrating import Scanner, grating
-from editing import Outcome, run
+from editing import Outcome, run, write_pair
 from image_writers import npy
 from instrument_files import asd, ibw, jpk, spm, sxm
 
@@ -70,6 +70,37 @@ def test_what_is_no_pair_is_said(lab: Path) -> None:
         outcome = one(*words)
         assert outcome.status == 2
         assert said in outcome.err
+
+
+SEVERAL = {
+    "correct by a fit": "correct two.sxm --fit --pitch-nm 16",
+    "correct by a scanner": "correct two.sxm --scanner scanner.toml --size-v 60",
+    "lattice": "lattice two.sxm",
+    "calibrate images": "calibrate images --axis x --v-max 100 --pair 100 two.sxm",
+    "calibrate operator": "calibrate operator --axis x --v-max 100 --pitch-nm 16 --pair 50 50 10 two.sxm",
+    "calibrate size": "calibrate size --axis x --v-max 100 --pitch-nm 16 --image 100 two.sxm",
+    "refine": "refine scan.toml --axis x --pitch-nm 16 --images two.sxm",
+    "report": "report scan.toml -o page.html --image two.sxm",
+}
+
+
+@pytest.mark.parametrize("command", SEVERAL)
+def test_two_channels_of_one_name_are_refused_with_their_numbers(command: str, lab: Path) -> None:
+    """Each command lists both, with the name and without it."""
+    write_pair(lab)
+    heights = np.load(lab / "t.npy"), np.load(lab / "r.npy")
+    two = sxm({"Z": heights, "I": heights[::-1]}).replace(b"\tI\t", b"\tZ\t")
+    (lab / "two.sxm").write_bytes(two)
+    outcome = run(*SEVERAL[command].split(), "--channel", "Z")
+    assert outcome.status == 2
+    assert (
+        "two.sxm: has more than one channel 'Z': 0 (Z forward), 2 (Z forward); choose one by its number" in outcome.err
+    )
+    outcome = run(*SEVERAL[command].split())
+    assert outcome.status == 2
+    assert "two.sxm: has " in outcome.err
+    assert all(part in outcome.err for part in ("0 (Z forward)", "2 (Z forward)", "; choose with --channel"))
+    assert not (lab / "page.html").exists()
 
 
 def test_what_is_in_a_file(lab: Path) -> None:

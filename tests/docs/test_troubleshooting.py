@@ -1,5 +1,6 @@
 """docs/troubleshooting.md: its messages are those of the program, and so are its statuses."""
 
+import ast
 import re
 from typing import get_args
 
@@ -54,3 +55,17 @@ def test_the_codes_of_findings_are_those_of_the_program() -> None:
     assert re.findall(r"^\| `([a-z-]+)` \|", table, re.MULTILINE) == sorted(codes) == codes
     users = "\n".join(text for path, text in SOURCES.items() if path.name != "warnings.py")
     assert [code for code in codes if f'"{code}"' not in users] == []
+
+
+def test_every_remark_of_a_measurement_has_a_code() -> None:
+    """A call that makes a remark gives its code: the last argument, or by name."""
+    makers = {"Remark": 4, "spoils": 3}  # positions of all their arguments
+    without = [
+        f"{path.name}:{node.lineno}"
+        for path, text in SOURCES.items()
+        if path.name != "warnings.py" and any(f"{maker}(" in text for maker in makers)
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in makers
+        if len(node.args) < makers[node.func.id] and all(key.arg != "code" for key in node.keywords)
+    ]
+    assert without == []

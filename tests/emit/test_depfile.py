@@ -246,7 +246,7 @@ def test_a_build_that_cannot_write_leaves_none(scan: Path) -> None:
 def test_a_depfile_that_cannot_be_written_is_an_error(scan: Path) -> None:
     outcome = run("build", scan, "-o", scan.parent / "out", "--depfile", scan / "build.d")
     assert (outcome.status, outcome.out) == (4, "")
-    assert outcome.messages == [f"{scan / 'build.d'}: Not a directory"]
+    assert outcome.messages == [f"{scan / 'build.d'}: {scan} is no directory"]
 
 
 def test_it_is_written_anew_when_nothing_else_is(scan: Path) -> None:

@@ -4,6 +4,7 @@ Heights are rows x columns, row 0 first in time and the left end of the line at 
 writer stores them as the instrument does.
 """
 
+import io
 import json
 import struct
 import zlib
@@ -12,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.io import netcdf_file
 
 from tablegen.numerics.arrays import Floats
 
@@ -296,6 +298,35 @@ def nid(signals: Both, nm: tuple[float, float] = (500.0, 250.0), bits: int = 32,
             body += np.round(both[way] / 200.0 * 2.0**bits).astype(f"<i{bits // 8}").tobytes()
     text += "[DataSet-Info]\r\nRotation=90\u00b0\r\n"
     return (text + sets).encode("latin-1") + b"#!" + body
+
+
+def gxsm(
+    heights: Floats,
+    back: bool = False,
+    nm: tuple[float, float] = (500.0, 250.0),
+    angle_deg: float = 0.0,
+    frames: int = 1,
+) -> bytes:
+    """GXSM as scipy writes NetCDF: integers of 0.01 Ångström, a backward line from its right end."""
+    file = io.BytesIO()
+    with netcdf_file(file, "w") as out:
+        for name, length in {"time": frames, "value": 1, "dimy": heights.shape[0], "dimx": heights.shape[1]}.items():
+            out.createDimension(name, length)
+        out.createDimension("text", 40)
+        field = out.createVariable("FloatField", "f", ("time", "value", "dimy", "dimx"))
+        stored = np.round(heights[:, ::-1] if back else heights, 3) * 1000.0
+        field[:] = np.stack([stored + 10.0 * frame for frame in range(frames)])[:, None]
+        field.long_name = "Topography"
+        out.createVariable("basename", "c", ("text",))[:] = f"/data/scan001-{'Xm' if back else 'Xp'}-Topo.nc".ljust(
+            40, "\0"
+        )
+        values = {"rangex": 10.0 * nm[0], "rangey": 10.0 * nm[1], "rangez": 1.0, "dz": 0.01, "alpha": angle_deg}
+        for name, value in values.items():
+            one = out.createVariable(name, "d", ())
+            one[...] = value
+            one.unit, one.var_unit = "nm", "Ang"  # the unit of the display, and that of the value
+        out.flush()
+        return file.getvalue()
 
 
 def mdt(channels: Mapping[str, Floats], nm: tuple[float, float] = (500.0, 250.0), dots: int = 0) -> bytes:

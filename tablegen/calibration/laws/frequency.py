@@ -48,7 +48,10 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
     if reference_hz is None:
         reference_hz = float(np.min(frequency_hz))
         remarks.append(
-            Remark(f"the reference is the lowest frequency, {reference_hz:g} Hz; give that of the size calibration")
+            Remark(
+                f"the reference is the lowest frequency, {reference_hz:g} Hz; give that of the size calibration",
+                code="assumed-value",
+            )
         )
     decades = np.log10(frequency_hz / reference_hz)
     scale = float(np.mean(gain))
@@ -73,21 +76,29 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
                 f"the gain rises by {-100.0 * alpha.value:.3g} % a decade, where (23) has it fall; leave out what "
                 f"is near the resonance (--to-hz), above a tenth of it"
             )
-        remarks.append(Remark("the gain does not fall with frequency; alpha is set to 0"))
+        remarks.append(Remark("the gain does not fall with frequency; alpha is set to 0", code="assumed-value"))
         alpha = Estimate(0.0, alpha.standard_error)
     if alpha.value > _LARGEST_ALPHA:
         raise Unphysical(f"alpha = {alpha.value:.3g} is not a loss of a few percent per decade; are these gains?")
     expected = solution.values[1] * scale * (1.0 - raw * decades)
     if solution.freedom == 0:
-        remarks.append(Remark("two points fit exactly, so errors cannot be estimated; measure more frequencies"))
+        remarks.append(
+            Remark("two points fit exactly, so errors cannot be estimated; measure more frequencies", code="few-points")
+        )
     if "alpha" in solution.undetermined:
-        remarks.append(spoils("alpha is not determined by these points; measure over two decades or more"))
+        remarks.append(
+            spoils(
+                "alpha is not determined by these points; measure over two decades or more",
+                code="undetermined-parameter",
+            )
+        )
     if _rises(frequency_hz, solution.residuals, solution.jacobian):
         remarks.append(
             spoils(
                 "the gain bends up towards high frequencies, as below a resonance; leave those out (--to-hz), what is "
                 "above a tenth of the resonance",
                 float(np.max(np.abs(100.0 * (gain / expected - 1.0)))),
+                code="poor-fit",
             )
         )
     line = np.geomspace(float(np.min(frequency_hz)), float(np.max(frequency_hz)), 101)

@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.base.warnings import Remark, spoils
 from tablegen.calibration.laws.trace import TraceFit, fit_trace
+from tablegen.calibration.laws.triangle import Triangle
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Curve, Estimate, Fit
 from tablegen.fitting.growth import Growth, fit_growth
@@ -87,12 +88,30 @@ def fit_hysteresis(
             fit = fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm, settle_periods, drift_order, delay_s)
             low, high = fit.triangle.v_low, fit.triangle.v_high
             if driver.beyond(low, high) > 0.02 * driver.span:
+                _check_triangle(fit.triangle)
                 raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
         except Unphysical as reason:
             raise Unphysical(f"{trace.name}: {reason}" if trace.name else str(reason)) from None
         fits.append(fit)
         remarks += [text.under(trace.name) for text in _remarks(fit)]
     return combined(fits, driver.span, rho, remarks)
+
+
+def _check_triangle(triangle: Triangle) -> None:
+    """Check that the drive is a triangle, whose ends are then those of the drive.
+
+    The triangle nearest a sine is 22 % higher than the sine, so that it leaves a range that the sine fills.
+
+    Raises
+    ------
+    Unphysical
+        If it is another waveform.
+    """
+    if triangle.departure > _MAX_DRIVE_DEPARTURE:
+        raise Unphysical(
+            f"the drive is not a triangle: it departs from the nearest one by {100.0 * triangle.departure:.2g} % rms, "
+            "as a sine does; record a triangle, or give it to `calibrate operator`, which takes any record"
+        )
 
 
 def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[Remark]) -> HysteresisFit:
@@ -128,7 +147,10 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
         if offsets:
             listed = ", ".join(f"{volts:g}" for volts in sorted(set(offsets)))
             remarks.append(
-                Remark(f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset")
+                Remark(
+                    f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset",
+                    code="mixed-offsets",
+                )
             )
         branches.append(TurnFit(Estimate(turn, spread), sides[0], sides[1], tuple(group), offsets))
     return HysteresisFit(
@@ -172,12 +194,15 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         remarks.append(
             spoils(
                 f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
-                "the fit assumes a triangle",
+                "the fit assumes a triangle; `calibrate operator` takes any record",
                 100.0 * fit.triangle.departure,
+                code="drive-shape",
             )
         )
     if fit.inverted:
-        remarks.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
+        remarks.append(
+            Remark("the displacement falls where the drive rises; its sign was inverted", code="inverted-sensor")
+        )
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
         remarks.append(
@@ -185,6 +210,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
                 f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of "
                 f"the sensor known, and the record settled?",
                 worst,
+                code="poor-fit",
             )
         )
     if fit.correlated > 3.0:
@@ -192,16 +218,25 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             Remark(
                 f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
                 f"model and drift do not describe; standard errors were widened "
-                f"by a factor of {fit.correlated**0.5:.2g}"
+                f"by a factor of {fit.correlated**0.5:.2g}",
+                code="widened-errors",
             )
         )
     if fit.strays:
         numbers = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {numbers}); they were used"))
+        remarks.append(
+            Remark(
+                f"{len(fit.strays)} samples are far off the curve (number {numbers}); they were used",
+                code="outlying-samples",
+            )
+        )
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
             remarks.append(
-                spoils(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
+                spoils(
+                    f"u_peak {name} is not determined by this trace; average more periods or drive it further",
+                    code="undetermined-parameter",
+                )
             )
     return remarks
 

@@ -116,7 +116,8 @@ def sizes_of(
             Remark(
                 f"the angle of the bars is that of the rows, for a frame as high as its pixels, its file or --aspect "
                 f"say within {100.0 * ASPECT_ERROR:.0f} %, and a drift of some {100.0 * DRIFT_ERROR:.0f} % of the "
-                f"line; --angle-deg gives it where it is known"
+                f"line; --angle-deg gives it where it is known",
+                code="assumed-value",
             )
         )
     nm = np.array([one.size.nm.value for one in sizes])
@@ -176,35 +177,56 @@ def _groups(sizes: Sequence[ImageSize]) -> list[tuple[float, list[ImageSize]]]:
 def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
     remarks: list[Remark] = []
     if not shows_turns(line.geometry):
-        remarks.append(spoils("the turns are not in the image; the ends of the line are extrapolated"))
+        remarks.append(
+            spoils(
+                "the turns are not in the image; the ends of the line are extrapolated", code="extrapolated-parameter"
+            )
+        )
     if not line.both:
-        remarks.append(Remark("without a retrace nothing shows whether columns were cropped, or are late"))
+        remarks.append(
+            Remark("without a retrace nothing shows whether columns were cropped, or are late", code="image-timing")
+        )
     index = strong_index(line.model, line.state) if line.indexed else 1
     if index > 1:
         remarks.append(
             Remark(
                 f"the strong spots are those of a cell with 1/{index} of the area; the constant was taken for that of "
-                f"the whole cell"
+                f"the whole cell",
+                code="assumed-value",
             )
         )
     if line.widened > 3.0:
         widened = f"standard errors were widened by a factor of {line.widened:.3g}"
-        remarks.append(Remark(f"{widened}, for what is not only noise"))
+        remarks.append(Remark(f"{widened}, for what is not only noise", code="widened-errors"))
     if line.explained < 0.5:
         remarks.append(
-            Remark(f"{100.0 * line.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+            Remark(
+                f"{100.0 * line.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects",
+                code="aperiodic-contrast",
+            )
         )
     if size.nm.standard_error > _LOOSE_SHARE * size.nm.value:
         percent = 100.0 * size.nm.standard_error / size.nm.value
-        remarks.append(spoils("the size is uncertain by more than a percent; scan more periods, or average", percent))
+        remarks.append(
+            spoils(
+                "the size is uncertain by more than a percent; scan more periods, or average",
+                percent,
+                code="undetermined-parameter",
+            )
+        )
     finest = (
         line.geometry.columns
         / (line.geometry.window[1] - line.geometry.window[0])
         / float(np.max(np.abs(line.waves[:, 0])))
     )
     if finest < _MIN_PIXELS_PER_PERIOD:
-        remarks.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels"))
+        remarks.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels", code="few-pixels"))
     if line.strays:
         numbers = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
-        remarks.append(Remark(f"{len(line.strays)} lines differ from the others (row {numbers}); they were used"))
+        remarks.append(
+            Remark(
+                f"{len(line.strays)} lines differ from the others (row {numbers}); they were used",
+                code="outlying-samples",
+            )
+        )
     return remarks

@@ -69,13 +69,19 @@ def fit_images(
             raise Unphysical(f"{name}images of {one.v_scan:g} V and of {other.v_scan:g} V are the same")
     volts = [pair.v_scan for pair in pairs]
     if len(set(volts)) < len(volts):
-        remarks.append(spoils("some pairs have the same voltage; the piezo voltage peak to peak of each is needed"))
+        remarks.append(
+            spoils(
+                "some pairs have the same voltage; the piezo voltage peak to peak of each is needed",
+                code="pair-voltages",
+            )
+        )
     for less, more in pairwise(sorted(fits, key=lambda fit: fit.v_scan)):
         if more.periods < less.periods and more.registration_percent < less.registration_percent:
             remarks.append(
                 spoils(
                     f"{more.v_scan:g} V have fewer periods in the line and less hysteresis than {less.v_scan:g} V; "
-                    f"are the voltages those of their pairs?"
+                    f"are the voltages those of their pairs?",
+                    code="pair-voltages",
                 )
             )
     return combined(fits, driver.span, rho, remarks)
@@ -90,27 +96,45 @@ def _remarks(fit: ImageFit) -> list[Remark]:
                 f"the harmonic model leaves {worst:.2g} % of the line; was the drive the triangle itself, is --window "
                 f"what the columns span, and does the feedback follow?",
                 worst,
+                code="poor-fit",
             )
         )
     if fit.widened > 3.0:
         remarks.append(
             Remark(
                 f"the rest is not only noise, but also what the model does not describe; standard errors were "
-                f"widened by a factor of {fit.widened:.3g}; a --window that is not that of the images does that too"
+                f"widened by a factor of {fit.widened:.3g}; a --window that is not that of the images does that too",
+                code="widened-errors",
             )
         )
     if fit.pixels_a_period < _MIN_PIXELS_PER_PERIOD:
         remarks.append(
-            Remark(f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels")
+            Remark(
+                f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels",
+                code="few-pixels",
+            )
         )
     if fit.explained < 0.5:
         remarks.append(
-            Remark(f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+            Remark(
+                f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects",
+                code="aperiodic-contrast",
+            )
         )
     if fit.strays:
         numbers = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        remarks.append(Remark(f"{len(fit.strays)} lines differ from the others (row {numbers}); they were used"))
+        remarks.append(
+            Remark(
+                f"{len(fit.strays)} lines differ from the others (row {numbers}); they were used",
+                code="outlying-samples",
+            )
+        )
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
-            remarks.append(spoils(f"u_peak {name} is not determined by these images; scan more periods, or average"))
+            remarks.append(
+                spoils(
+                    f"u_peak {name} is not determined by these images; scan more periods, or average",
+                    code="undetermined-parameter",
+                )
+            )
     return remarks

@@ -146,20 +146,34 @@ def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[Remark]:
     remarks: list[Remark] = []
     if solution.freedom == 0 and solution.absolute_errors:
         remarks.append(
-            Remark("three points fit exactly: errors are those of the images alone; measure at two more offsets")
+            Remark(
+                "three points fit exactly: errors are those of the images alone; measure at two more offsets",
+                code="few-points",
+            )
         )
     elif solution.freedom == 0:
-        remarks.append(Remark("three points fit exactly, so errors cannot be estimated; measure at two more offsets"))
+        remarks.append(
+            Remark(
+                "three points fit exactly, so errors cannot be estimated; measure at two more offsets",
+                code="few-points",
+            )
+        )
     low, high = float(np.min(p)), float(np.max(p))
     bottom = "v_min" if driver.v_min else "0 V"
     for name, gap, volts in (("m_minus", low + 1.0, bottom), ("m_plus", 1.0 - high, "v_max")):
         if gap > 0.4:
             remarks.append(
-                spoils(f"{name} is extrapolated over {50.0 * gap:.0f} % of the range; measure at some 7 % from {volts}")
+                spoils(
+                    f"{name} is extrapolated over {50.0 * gap:.0f} % of the range; measure at some 7 % from {volts}",
+                    code="extrapolated-parameter",
+                )
             )
     for name in ("m_minus", "m_plus"):
         if name in solution.undetermined:
             remarks.append(
-                spoils(f"{name} is not determined by these points; spread the offsets over most of {driver}")
+                spoils(
+                    f"{name} is not determined by these points; spread the offsets over most of {driver}",
+                    code="undetermined-parameter",
+                )
             )
     return remarks

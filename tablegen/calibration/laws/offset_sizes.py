@@ -74,7 +74,8 @@ def fit_offset_sizes(
         remarks.append(
             Remark(
                 f"scan voltages of {volts[0]:g} to {volts[-1]:g} V hardly show how m changes with the size; "
-                f"take some further apart"
+                f"take some further apart",
+                code="undetermined-parameter",
             )
         )
     return OffsetSizesFit(

@@ -56,7 +56,9 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     phase = None
     remarks: list[Remark] = []
     if phase_deg is None:
-        remarks.append(Remark("without phase_deg the delay is not determined; delay_s is set to 0"))
+        remarks.append(
+            Remark("without phase_deg the delay is not determined; delay_s is set to 0", code="assumed-value")
+        )
     else:
         phase = _unwrapped(phase_deg[order], remarks)
     solution = _best(f, g, phase)
@@ -69,11 +71,19 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     frequency, q = (_of_logarithm(solution.estimate(name)) for name in ("frequency_hz", "quality"))
     delay = Estimate(0.0) if phase is None else _delay(solution, at, remarks)
     for name in solution.undetermined:
-        remarks.append(spoils(f"{name} is not determined by these points; measure more of them around the resonance"))
+        remarks.append(
+            spoils(
+                f"{name} is not determined by these points; measure more of them around the resonance",
+                code="undetermined-parameter",
+            )
+        )
     near = np.abs(f - at) <= at / quality
     if np.sum(near) < 3:
         remarks.append(
-            spoils(f"fewer than three points lie on the resonance, within {at / quality:.3g} Hz of {at:.5g} Hz")
+            spoils(
+                f"fewer than three points lie on the resonance, within {at / quality:.3g} Hz of {at:.5g} Hz",
+                code="few-points",
+            )
         )
     line = np.geomspace(float(f[0]), float(f[-1]), 301)
     model, model_phase = _response(line, solution.values)
@@ -84,13 +94,13 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
             "one resonance does not describe this response; take the measurement itself: "
             "--write --points writes it beside the scanner file and names it there"
         )
-        remarks.append(spoils(text, rms))
+        remarks.append(spoils(text, rms, code="poor-fit"))
     decibels = 20.0 * np.log10(g), 20.0 * np.log10(model)
     if phase is not None:
         phase_error = float(np.degrees(np.sqrt(np.mean((lag - phase) ** 2))))
         if phase_error > _POOR_DEGREES:
             text = f"the phase is missed by {phase_error:.2g} degrees rms; are the points near enough to follow it?"
-            remarks.append(spoils(text, 100.0 * float(np.radians(phase_error))))  # of a harmonic
+            remarks.append(spoils(text, 100.0 * float(np.radians(phase_error)), code="poor-fit"))  # of a harmonic
     curves = [Curve("gain", "frequency [Hz]", "gain [dB]", (f, decibels[0]), (line, decibels[1]))]
     if phase is not None:
         degrees = (line, np.degrees(model_phase))
@@ -116,7 +126,11 @@ def _unwrapped(phase_deg: Floats, remarks: list[Remark]) -> Floats:
     phase = np.unwrap(np.radians(phase_deg))
     turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
     if turned % 2:
-        remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were subtracted"))
+        remarks.append(
+            Remark(
+                "the response is inverted at the lowest frequency; 180 degrees were subtracted", code="inverted-sensor"
+            )
+        )
     return np.asarray(phase - pi * turned)
 
 
@@ -128,7 +142,7 @@ def _delay(solution: Solution, resonance_hz: float, remarks: list[Remark]) -> Es
         return delay
     if not -delay.value <= 2.0 * delay.standard_error:
         raise Unphysical(f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg")
-    remarks.append(Remark("no delay is measurable; delay_s is set to 0"))
+    remarks.append(Remark("no delay is measurable; delay_s is set to 0", code="assumed-value"))
     return Estimate(0.0, delay.standard_error)
 
 

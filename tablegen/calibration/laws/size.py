@@ -105,7 +105,8 @@ def fit_size(
         remarks.append(
             Remark(
                 f"the threshold is not determined by these points and was set to {fixed:g}; it takes four sizes or "
-                f"more, some of them above 0.6 of v_max and some below 0.4"
+                f"more, some of them above 0.6 of v_max and some below 0.4",
+                code="undetermined-parameter",
             )
         )
     k, beta = (solution.estimate(name) for name in _NAMES[:2])
@@ -247,19 +248,33 @@ def _unit(v: Floats, beta: float, threshold: float) -> Floats:
 def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[Remark]:
     remarks: list[Remark] = []
     if solution.absolute_errors and len(solution.residuals) == len(solution.names):
-        remarks.append(Remark("as many sizes as parameters: errors are those of the images alone; measure more sizes"))
+        remarks.append(
+            Remark(
+                "as many sizes as parameters: errors are those of the images alone; measure more sizes",
+                code="few-points",
+            )
+        )
     elif solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
         remarks.append(
-            Remark("as many points as parameters fit exactly, so errors cannot be estimated; measure more points")
+            Remark(
+                "as many points as parameters fit exactly, so errors cannot be estimated; measure more points",
+                code="few-points",
+            )
         )
     if not float(np.min(v)) * 0.8 <= at_base <= float(np.max(v)) * 1.25:
         low, high = float(np.min(actual_nm)), float(np.max(actual_nm))
         remarks.append(
             spoils(
                 f"the base size of {base_nm:g} nm lies outside the {low:.4g}..{high:.4g} nm that were measured; "
-                f"k is extrapolated"
+                f"k is extrapolated",
+                code="extrapolated-parameter",
             )
         )
     for name in solution.undetermined:
-        remarks.append(spoils(f"{name} is not determined by these points; spread the sizes over most of the range"))
+        remarks.append(
+            spoils(
+                f"{name} is not determined by these points; spread the sizes over most of the range",
+                code="undetermined-parameter",
+            )
+        )
     return remarks

@@ -56,7 +56,7 @@ def images(
 
     \b
     Files:   .asd, .ibw, .spm and .000 to .999, .jpk, .jpk-qi-image, .sxm, .gwy,
-             .h5-jpk, .stp, .top, .nid, .mdt,
+             .h5-jpk, .stp, .top, .nid, .mdt, .nc,
              .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
     Columns: pixels at equal time steps within --window of each sweep.
     Rows:    scan lines in order of time. Both images have the left end of the line at the

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import click
 
 from tablegen.cli.images.samples import check_sample, named_images
-from tablegen.cli.shared.common import OutputFile, fail, require, written
+from tablegen.cli.shared.common import OutputFile, check_place, fail, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
@@ -63,7 +63,7 @@ def shared_options(command: F) -> F:
         click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured."),
         click.option(
             "--scanner",
-            type=OutputFile(),
+            type=OutputFile(always=False),
             metavar="FILE",
             help="Scanner file. The command reads v_max and v_min from it.",
         ),
@@ -123,6 +123,8 @@ def shared_options(command: F) -> F:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and further threads would only spin
         require(*_REQUIRED_MODULES, extra="calibrate")
         check_plot(plot, as_json)
+        if write and scanner is not None:
+            check_place(scanner.resolve() if scanner.is_symlink() else scanner)
         common = Common(axis, scanner, v_max, v_min, write, force, plot, no_plot, report, as_json)
         return command(common=common, **rest)
 

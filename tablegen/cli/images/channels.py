@@ -19,7 +19,7 @@ def channels(files: tuple[Path, ...], as_json: bool) -> int:
 
     \b
     Files: .asd, .ibw, .spm and .000 to .999, .jpk, .jpk-qi-image, .sxm, .gwy,
-           .h5-jpk, .stp, .top, .nid, .mdt,
+           .h5-jpk, .stp, .top, .nid, .mdt, .nc,
            .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
 
     The options --channel and --retrace-channel of other commands take the number, or the name. A name without the

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from tablegen.cli.images.pairs import frames_option
-from tablegen.cli.shared.common import fail, finite, require, written
+from tablegen.cli.shared.common import check_place, fail, finite, require, written
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
@@ -169,6 +169,8 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
     check_plot(options["plot"], options["as_json"])
     jobs = _jobs(images, options)
     targets = _targets(jobs, options, suffix)
+    if options["output"] is not None:
+        check_place(options["output"] / "image" if several else options["output"])
     records: list[dict[str, Any]] = []
     refused: list[object] = []  # the other images of a batch are still corrected
     bar = Bar(unit="images") if several else None

@@ -9,7 +9,7 @@ import click
 from tablegen.cli.calibrate.options import recorder_options, refuse_recorder
 from tablegen.cli.images.refine_images import ImageArguments, image_options
 from tablegen.cli.images.samples import CommandOfRunningImages
-from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
+from tablegen.cli.shared.common import OutputFile, check_place, fail, finite, require, scan_argument, written
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
@@ -139,6 +139,8 @@ def refine(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     require("scipy", "tomlkit", extra="calibrate")
     check_plot(plot, as_json)
+    if write:
+        check_place(scan.resolve() if scan.is_symlink() else scan)
     files = images.names if trace is None else str(trace)
     with Progress() as progress:
         progress.now("reading and learning")

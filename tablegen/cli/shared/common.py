@@ -1,5 +1,6 @@
 """Code that several commands share: from a path to a certified plan, with exit statuses and messages."""
 
+import errno
 import importlib.util
 import os
 from math import isfinite
@@ -32,31 +33,54 @@ format_option = click.option(
 
 
 class OutputFile(click.Path):
-    """A file to write: a new one, or one that is replaced; never a pipe, a device or a directory."""
+    """A file to write: a new one, or one that is replaced; never a pipe, a device or a directory.
 
-    def __init__(self) -> None:
+    Its directory is checked before any work, unless ``always`` is false: another option then decides whether the file
+    is written, and the command calls ``check_place``.
+    """
+
+    def __init__(self, always: bool = True) -> None:
         super().__init__(path_type=Path)
+        self._always = always
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
         """Return the path; a usage error names what exists there."""
         path = Path(os.fsdecode(super().convert(value, parameter, context)))
         if other := other_than_file(path):
             self.fail(f"'{path}' is {other}, where a file has to go.", parameter, context)
+        if self._always:
+            check_place(path)
         return path
 
 
 class OutputFolder(click.Path):
-    """A directory to write into: a new one, or one that is there."""
+    """A directory to write into: a new one, or one that is there.
 
-    def __init__(self) -> None:
+    A new one is checked before any work, unless ``always`` is false, as for ``OutputFile``. One that is there may be up
+    to date.
+    """
+
+    def __init__(self, always: bool = True) -> None:
         super().__init__(path_type=Path, file_okay=False)
+        self._always = always
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
         """Return the path; a usage error names what exists there."""
         path = Path(os.fsdecode(super().convert(value, parameter, context)))
         if (other := other_than_file(path)) not in (None, "a directory"):
             self.fail(f"'{path}' is {other}, where a directory has to go.", parameter, context)
+        if self._always and not path.exists():
+            check_place(path)
         return path
+
+
+def check_place(path: Path) -> None:
+    """End the command if no file or directory can be written at a path, whose directories may have to be made."""
+    folder = next(one for one in path.absolute().parents if os.path.lexists(one))
+    if not folder.is_dir():
+        fail([f"{path}: {folder} is no directory"], ExitStatus.CANNOT_WRITE)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        fail([f"{path}: nothing can be written in {folder}: {os.strerror(errno.EACCES)}"], ExitStatus.CANNOT_WRITE)
 
 
 def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:

@@ -95,7 +95,7 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
             raise ValueError(f"has several channels, {there}; choose with --channel")
         return matches[0]
     matches = (
-        [one for one in channels if one.title == name]
+        _of_direction([one for one in channels if one.title == name], direction)
         or _of_direction([one for one in channels if one.signal == name], direction)
         or [one for one in channels if str(one.number) == name]
     )
@@ -111,6 +111,11 @@ def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
     """Return the retrace of the same signal; None if there is none.
 
     Of a signal that a file has several times, the traces and the retraces belong together in their order.
+
+    Raises
+    ------
+    ValueError
+        If there are several retraces, and not as many traces; the message lists them.
     """
     if trace.direction != "trace":
         return None
@@ -120,9 +125,12 @@ def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
     )
     if len(retraces) == 1:
         return retraces[0]
-    if len(traces) == len(retraces) and trace in traces:
-        return retraces[traces.index(trace)]
-    return None
+    if not retraces or trace not in traces:
+        return None
+    if len(traces) != len(retraces):
+        what = f"has {len(traces)} x the trace and {len(retraces)} x the retrace of {quote(trace.signal)}"
+        raise ValueError(f"{what}: {channel_list(retraces)}; choose one by its number, with --retrace-channel")
+    return retraces[traces.index(trace)]
 
 
 def _of_direction(channels: Sequence[Channel], direction: Direction | None) -> list[Channel]:
