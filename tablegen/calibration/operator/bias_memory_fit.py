@@ -167,7 +167,7 @@ def _lines(before: Stretch, now: Stretch, operator: Operator, factor_at: Callabl
     step_nm = sum(term.nm for term in transient_between(unit, *lines, factor).bias)
     skipped = min(int(_SKIPPED * count) + 2, _MOST_SKIPPED)
     left = (now.means_nm - after.off_nm(period_s, count, 0.0))[skipped:]
-    since = period_s * (np.arange(skipped, count) + 0.5)
+    since = np.asarray(period_s * (np.arange(skipped, count) + 0.5), dtype=np.float64)
     left -= float(np.mean(left))
     return _Lines(since, left, step_nm, period_s, operator.creep)
 
