@@ -33,6 +33,7 @@ FindingCode = Literal[
     "rounded-pixels",
     "scaling-error",
     "sensor-delay",
+    "shaped-travel",
     "size-error",
     "standard-errors",
     "step-guard",
