@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from editing import run
-from foreign_plants import BIAS, SIX, V_MAX, BoucWen, ForeignPlant, ManyPlays, record
+from foreign_plants import SIX, V_MAX, BoucWen, ForeignPlant, ManyPlays, record, triangle
 from msgspec import structs
 from stepped_plants import scan_through_steps
 from test_operator_waveform import operator
@@ -136,10 +137,15 @@ def test_records_without_a_change_are_refused(centres: tuple[float, ...], lines:
 PLANTS = {"plays": ForeignPlant(ManyPlays()), "Bouc-Wen": ForeignPlant(BoucWen())}
 
 
-def factor(centre: float) -> float:
-    """m of (1) of the plants."""
-    mean = 2.0 * centre - 1.0
-    return 1.0 / (1.0 + BIAS[0] * mean + BIAS[1] * mean * mean)
+@cache
+def small_extent(name: str, centre: float) -> float:
+    """nm of a small scan, to which m of (1) refers."""
+    return float(np.ptp(PLANTS[name].settled(triangle(200, centre, 0.1), 100.0)))
+
+
+def offset_law(name: str) -> Callable[[float], float]:
+    """m of (1): the apparent size at a centre over that in the middle."""
+    return lambda centre: small_extent(name, 0.5) / small_extent(name, centre)
 
 
 @cache
@@ -147,11 +153,11 @@ def calibrated(name: str) -> tuple[Operator, BiasMemoryFit]:
     """An operator of six traces, and the memory of a record of 40 s up and one of 40 s down."""
     plant = PLANTS[name]
     traces = [Trace(f"{k}", *record(plant, *at, 100.0, k, samples=400)) for k, at in enumerate(SIX)]
-    fitted = fit_operator([periodic_line(trace, V_MAX) for trace in traces], None, factor).operator
+    fitted = fit_operator([periodic_line(trace, V_MAX) for trace in traces], None, offset_law(name)).operator
     fitted = replace(fitted, creep=fitted.creep.down_to(0.01))
     steps = [scan_through_steps(plant, step, 0.2, (30, 4000), 20.0, noise_nm=0.5) for step in (UP, UP[::-1])]
     parts = [stretches(Trace("step", *step), Driver(V_MAX)) for step in steps]
-    return fitted, fit_bias_memory(parts, fitted, factor)
+    return fitted, fit_bias_memory(parts, fitted, offset_law(name))
 
 
 def drifts(means_nm: Floats) -> Floats:
@@ -170,7 +176,7 @@ def test_frames_after_a_step_of_20_v_drift_as_predicted(name: str, centres: tupl
     lines = [SettledLine.about(0.1, at, 0.5, LINE_S) for at in centres]
 
     def predicted(memory: BiasMemory | None) -> Floats:
-        after = transient_between(replace(fitted, bias_memory=memory), *lines, factor(centres[1]))
+        after = transient_between(replace(fitted, bias_memory=memory), *lines, offset_law(name)(centres[1]))
         return drifts(after.off_nm(LINE_S, 1600, 0.0))
 
     assert float(np.max(np.abs(predicted(late.memory) - measured))) < 0.5
