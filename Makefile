@@ -11,7 +11,7 @@
 # make fuzz      a million inputs for the C link, plain and with splines and shaping, with sanitizers, on from the corpus
 # make bench     tablegen beside what others use, into benchmarks/results.md (ONLY=line: that section)
 # make cost      what a build costs, against importing numpy, and whether that is within its limits
-# make figures   the pictures of the README and the docs
+# make figures   the pictures of the README and the docs; STAGE=FOLDER has the records of the real stage
 # make notebooks the notebooks, run again, with what they show
 # make site      the documentation as a site with a search, into build/site
 # make man       the manual pages of all commands, into build/man
@@ -152,6 +152,7 @@ figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_operator.py
 	$(BIN)/python docs/figures/make_correct.py
 	$(BIN)/python docs/figures/make_gallery.py
+	$(BIN)/python docs/figures/make_evidence.py $(STAGE)
 	@.ci/system-packages chromium
 	$(BIN)/python docs/figures/make_report.py
 

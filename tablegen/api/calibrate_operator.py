@@ -15,6 +15,7 @@ from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.image_sizes import SampleImage
 from tablegen.calibration.operator.advice import check_scans, next_trace
+from tablegen.calibration.operator.bias_memory_fit import BiasMemoryFit, fit_bias_memory, stretches
 from tablegen.calibration.operator.delay import fit_delay
 from tablegen.calibration.operator.fit import LEAST_LINES, fit_operator
 from tablegen.calibration.operator.imaged_line import imaged_line
@@ -26,6 +27,9 @@ from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
 from tablegen.calibration.tables.recorder import Columns, Recorder
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces, trace_name
+from tablegen.compensation.models.operator import SLOWEST_HZ
+from tablegen.compensation.offset import OffsetLaw
+from tablegen.compensation.operator.operator import Operator
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage
 from tablegen.numerics.driver import Driver
@@ -47,6 +51,7 @@ def calibrate_operator(
     drive_gain: float | None = None,
     drive_offset: float | None = None,
     scans: Sequence[tuple[float, float]] = (),
+    steps: Measured | Sequence[Measured] = (),
     progress: Callable[[str], object] = lambda _: None,
     **how: Any,
 ) -> CalibratedOperator:
@@ -72,6 +77,9 @@ def calibrate_operator(
         V at the piezo for a recorded V, and V at the piezo for 0 V: of a recorder at the controller's output.
     scans : sequence of (volts, offset_v), optional
         Scans that the next trace is to help, in V peak to peak and V; without any, all that a build serves.
+    steps : path, mapping of arrays, or a sequence of them, optional
+        Records of a running scan through changes of its offset, columns as ``traces``: they show whether the
+        sensitivity follows the offset late.
     progress : callable
         Called with a text for each stage.
     **how : optional
@@ -107,6 +115,7 @@ def calibrate_operator(
         raise TypeError('delay_s="fit" is for traces of a sensor; images have delay_pixels')
     recorder = Recorder(columns, drive_gain, drive_offset)
     tables = [table_of(one, _NEEDED, [TRACE], recorder) for one in measured]
+    step_tables = [table_of(one, _NEEDED, [TRACE], recorder) for one in measured_list(steps)]
     pairs = [sample_image(v, at, pair[0], pair[1] if pair[1:] else None, how) for v, at, _, *pair in images]
     prior = known_scanner(scanner, axis, v_max, v_min)
     check_scans(scans, prior.driver)
@@ -126,7 +135,7 @@ def calibrate_operator(
         progress("fitting the families, with and without each trace")
         fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
     except Unsettled as reason:
-        if pairs:
+        if pairs or step_tables:
             raise
         progress("fitting in time")
         return records_in_time(tables, prior, None if delay_s == "fit" else float(delay_s), remarks, str(reason), scans)
@@ -134,9 +143,36 @@ def calibrate_operator(
         raise
     except Unphysical as reason:
         raise Unphysical(f"{', '.join(one.file for one in sources)}: {reason}") from None
-    return CalibratedOperator(
-        fit, axis, tuple(lines), prior.driver, delay, next_trace(fit, lines, prior.driver, scans), sources, remarks
-    )
+    further = next_trace(fit, lines, prior.driver, scans)
+    late = None
+    if step_tables:
+        progress("fitting the memory of the bias")
+        late = _bias_memory(step_tables, fit.operator, prior.driver, offset_law)
+        fit = replace(fit, operator=replace(fit.operator, bias_memory=late.memory))
+        sources += tuple(step_tables)
+    return CalibratedOperator(fit, axis, tuple(lines), prior.driver, delay, further, sources, remarks, late)
+
+
+def _bias_memory(
+    tables: Sequence[MeasuredTable], operator: Operator, driver: Driver, offset_law: OffsetLaw
+) -> BiasMemoryFit:
+    """Fit the memory of the bias to records of scans whose offset changes."""
+    records = []
+    for table in tables:
+        for trace in split_traces(table):
+            try:
+                records.append(stretches(trace, driver))
+            except Unphysical as reason:
+                raise Unphysical(f"{trace_name(table, trace)}: {reason}") from None
+    late = replace(operator, creep=operator.creep.down_to(SLOWEST_HZ))
+
+    def factor_at(centre: float) -> float:
+        return offset_law.factor(2.0 * centre - 1.0) / offset_law.factor(2.0 * operator.centre - 1.0)
+
+    try:
+        return fit_bias_memory(records, late, factor_at)
+    except Unphysical as reason:
+        raise Unphysical(f"{', '.join(one.file for one in tables)}: {reason}") from None
 
 
 class _NamedUnphysical(Unphysical):

@@ -6,11 +6,14 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import asdict
+
 from tablegen.api.result import Result
 from tablegen.base.data_files import Source
 from tablegen.base.reading import CONFIGURATION, read_text
 from tablegen.base.warnings import Finding, Remark, of_remarks, worst_first
 from tablegen.calibration.operator.advice import NextTrace
+from tablegen.calibration.operator.bias_memory_fit import BiasMemoryFit
 from tablegen.calibration.operator.file_of_fit import MODEL, operator_file
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.loop_errors import LineErrors
@@ -32,7 +35,8 @@ class CalibratedOperator(Result):
     """An operator of one axis, its errors of every trace, and the files that it is written to.
 
     ``fit`` has the operator and its residuals, ``lines`` the traces as one settled period each, ``delay`` that of the
-    sensor in s, ``next_trace`` the measurement that helps most, ``measured`` the tables and images.
+    sensor in s, ``next_trace`` the measurement that helps most, ``measured`` the tables and images, ``bias_memory`` the
+    fit to records through a change of offset, where there were any.
     """
 
     fit: OperatorFit
@@ -43,6 +47,7 @@ class CalibratedOperator(Result):
     next_trace: NextTrace
     measured: tuple[MeasuredTable | ScanImage, ...]
     record_remarks: tuple[Remark, ...] = ()
+    bias_memory: BiasMemoryFit | None = None
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -99,6 +104,7 @@ class CalibratedOperator(Result):
             "family": self.fit.family,
             "candidates_percent": dict(self.fit.candidates),
             "creep_loss_per_decade": self.fit.operator.creep.loss_per_decade,
+            **_bias_record(self.bias_memory),
             "delay_s": {"value": self.delay.value, "standard_error": error if isfinite(error) else None},
             "traces": traces,
             "remarks": list(self.remarks),
@@ -126,6 +132,7 @@ class CalibratedOperator(Result):
             f"family   {self.family}  (mean rms of a trace left out: {scores})",
             f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
             *_delay_text(self.delay),
+            *_bias_text(self.bias_memory),
             "",
             f"{'':41}  {'in the fit':<23}   left out",
             f"size [V]  offset [V]  rate [Hz]  noise [%]{_MEASURES}  {_MEASURES}  size [%]  trace",
@@ -218,6 +225,31 @@ class CalibratedOperator(Result):
         (beside, operator), (own, text) = self.content(scanner).items()
         changed = write_files(scanner.parent, {beside: operator})
         return changed + write_files(scanner.resolve().parent, {own: text})
+
+
+def _bias_record(fit: BiasMemoryFit | None) -> dict[str, Any]:
+    """Return the memory of the bias as plain data; nothing without a record of a change."""
+    if fit is None:
+        return {}
+    return {
+        "bias_memory": None if fit.memory is None else asdict(fit.memory),
+        "bias_memory_rms_nm": fit.rms_nm,
+        "creep_alone_rms_nm": fit.without_nm,
+    }
+
+
+def _bias_text(fit: BiasMemoryFit | None) -> list[str]:
+    """Return a line on the memory of the bias; none without a record of a change."""
+    if fit is None:
+        return []
+    if fit.memory is None:
+        return [f"bias     no memory: creep alone leaves {fit.without_nm:.2g} nm rms of the lines after the change"]
+    late = fit.memory
+    return [
+        f"bias     {100.0 * late.rise_share:.3g} % of a step up follow with {late.rise_time_s:.3g} s, "
+        f"{100.0 * late.fall_share:.3g} % of one down with {late.fall_time_s:.3g} s; leaves {fit.rms_nm:.2g} nm rms, "
+        f"creep alone {fit.without_nm:.2g} nm"
+    ]
 
 
 def _delay_text(delay: Estimate) -> list[str]:

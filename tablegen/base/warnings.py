@@ -50,6 +50,7 @@ FindingCode = Literal[
     "scaling-error",
     "scan-angle",
     "sensor-delay",
+    "shaped-travel",
     "size-error",
     "standard-errors",
     "step-guard",

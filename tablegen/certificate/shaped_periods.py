@@ -76,6 +76,11 @@ class Changes(Struct, frozen=True):
         share = count / max(len(steps), 1)
         return cls(100.0 * share, float(np.sum(steps)) / count if count else 0.0)
 
+    @property
+    def travel(self) -> float:
+        """The mean change of all ticks, in codes."""
+        return 0.01 * self.percent * self.mean_step
+
 
 class ShapedPeriods:
     """The periods of a shaped axis since its program began; ``codes`` has the shape (periods, ticks).

@@ -11,7 +11,7 @@ SIZE_CHANGE = 0.5  # of the size: the smaller scan before
 
 
 class CreepTerm(Struct, frozen=True):
-    """A term of creep: ``nm`` are still to come at the change, ``after_nm`` at the end of the first sweep.
+    """A term of what comes late: ``nm`` are still to come at the change, ``after_nm`` at the end of the first sweep.
 
     Either falls by exp(-t / ``tau_s``); the second includes what the memory of hysteresis has added meanwhile.
     """
@@ -22,16 +22,19 @@ class CreepTerm(Struct, frozen=True):
 
 
 class Transient(Struct, frozen=True, eq=False):
-    """The creep after a change, and the distance of hysteresis from its settled loop in the first sweep forward.
+    """Creep and bias memory after a change, and the distance of hysteresis from its settled loop in the first sweep.
 
     ``memory_nm`` is the first sweep less settled ones, at ``memory_s`` after its beginning, both (n,). Creep with time
-    constants above ``measured_s`` is extrapolated.
+    constants above ``measured_s`` is extrapolated. ``bias`` is the measured memory of the bias; where
+    none was measured, ``unknown_nm`` is how far the position may drift in all if the sensitivity follows late.
     """
 
     late: tuple[CreepTerm, ...]
     measured_s: float
     memory_s: Floats
     memory_nm: Floats
+    bias: tuple[CreepTerm, ...] = ()
+    unknown_nm: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self.memory_s, self.memory_nm)
@@ -46,24 +49,24 @@ class Transient(Struct, frozen=True, eq=False):
 
         With ``slower_than_s`` only terms of creep with longer time constants count.
         """
-        off = self._off_nm(line_s, first + count + 1, slower_than_s)
+        off = self.off_nm(line_s, first + count + 1, slower_than_s)
         return float(abs(off[first + count] - off[first]))
 
     def lines(self, line_s: float, count: int, bound_nm: float, most: int) -> int:
         """Return after how many lines no ``count`` lines drift by more than a bound; at most ``most`` + 1."""
-        off = self._off_nm(line_s, most + 1 + count, 0.0)
+        off = self.off_nm(line_s, most + 1 + count, 0.0)
         beyond = np.flatnonzero(np.abs(off[count:] - off[: most + 1]) > bound_nm)
         return int(beyond[-1]) + 1 if len(beyond) else 0
 
-    def _off_nm(self, line_s: float, lines: int, slower_than_s: float) -> Floats:
+    def off_nm(self, line_s: float, lines: int, slower_than_s: float) -> Floats:
         """Return how far the mean of each of the first lines is from the settled one.
 
-        Hysteresis counts only without ``slower_than_s``.
+        Hysteresis and the memory of the bias count only without ``slower_than_s``.
         """
         sweep_s = float(self.memory_s[-1])
         within = min(-int(-sweep_s // line_s), lines)  # lines that begin before the first sweep ends
         off = np.zeros(lines)
-        for term in self.late:
+        for term in self.late if slower_than_s > 0.0 else (*self.late, *self.bias):
             if term.tau_s > slower_than_s:
                 share = line_s / term.tau_s
                 of_line = (1.0 - exp(-share)) / share if share > 1e-9 else 1.0

@@ -20,7 +20,8 @@ class Settling(Struct, frozen=True):
     ``MOST_LINES`` + 1. ``drift_nm`` is that of a frame without them, after the change of offset, ``size_drift_nm``
     after that of the size, and ``late_nm`` that of the frame after ``lines``, the larger of both. The part
     ``extrapolated_nm`` of it comes from creep slower than a period of the slowest trace, ``slowest_s``. ``memory_nm``
-    is by how much hysteresis bends the first period.
+    is by how much hysteresis bends the first period. ``unknown_nm`` is how far the image may drift besides, in all,
+    where no record shows whether the sensitivity follows the offset late.
     """
 
     lines: int
@@ -32,6 +33,7 @@ class Settling(Struct, frozen=True):
     extrapolated_nm: float
     slowest_s: float
     memory_nm: float
+    unknown_nm: float
 
 
 def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
@@ -63,6 +65,7 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
         drifts(written_lines, slowest_s)[of],
         slowest_s,
         max(after.most_memory_nm for after in transients),
+        max(after.unknown_nm for after in transients),
     )
 
 
@@ -101,5 +104,10 @@ def settling_text(settled: Settling) -> list[str]:
         out.append(
             f"after {min(settled.lines, MOST_LINES)} lines drifts {settled.late_nm:.3g} nm, {share:.2g} % of it slower "
             f"than the slowest trace, {settled.slowest_s:.3g} s: extrapolated"
+        )
+    if settled.unknown_nm >= settled.bound_nm:
+        out.append(
+            f"may drift by up to {settled.unknown_nm:.3g} nm more after a change of offset, within minutes, if the "
+            "sensitivity follows the offset late: `calibrate operator --step` measures it"
         )
     return out

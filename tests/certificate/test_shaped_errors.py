@@ -12,6 +12,7 @@ from replacing import replace
 from tablegen.base.input_errors import Document, Unphysical
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.certificate.scan_notes import scan_findings, shaped_travel
 from tablegen.certificate.shaped_periods import Changes, errors_behind_response
 from tablegen.certificate.summary import certificate_lines
 from tablegen.config.load import load
@@ -133,3 +134,32 @@ def test_without_shaping_no_byte_says_anything_of_it(tmp_path: Path) -> None:
     for name, content in files.items():
         if not name.startswith(("dac_", "program_loader")) and not name.endswith((".vh", "_top.v")):
             assert b"shap" not in content.lower().replace(b'"dac_shap', b""), name  # names of its files
+
+
+def test_codes_that_go_to_and_fro_are_noted(certified: Certified) -> None:
+    """Hysteresis follows them, and no error of the position contains that."""
+    codes = {
+        shaping: [one.axis for one in scan_findings(*both) if one.code == "shaped-travel"]
+        for shaping, both in certified.items()
+    }
+    assert codes["off"] == []
+    assert codes["scanner"] == ["x", "y"]
+    plan, certificates = certified["scanner"]
+    shaped = certificates["x"].shaped
+    assert shaped is not None
+    played = plan.x.program.played(0, 2 * plan.x.program.ticks)
+    rounded = np.tile(plan.x.program.rounded.codes(np.arange(plan.x.program.ticks)), 2)
+    extra = np.sum(np.abs(np.diff(played))) / np.sum(np.abs(np.diff(rounded))) - 1.0
+    (finding,) = shaped_travel("x", shaped.changes, shaped.rounded.changes)
+    stated = re.search(r"([\d.e+]+) % further in all than without shaping", finding.text)
+    assert stated is not None
+    assert float(stated[1]) == pytest.approx(100.0 * extra, rel=0.1)  # of other periods
+
+
+@pytest.mark.parametrize(("travel", "noted"), [(1.009, 0), (1.011, 1)])
+def test_a_travel_of_less_than_a_percent_is_no_matter(travel: float, noted: int) -> None:
+    assert len(shaped_travel("x", Changes(100.0, travel), Changes(100.0, 1.0))) == noted
+
+
+def test_codes_that_never_change_have_no_travel() -> None:
+    assert shaped_travel("y", Changes(70.0, 1.0), Changes(0.0, 0.0)) == []

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from foreign_plants import CREEP_PER_DECADE, ManyPlays, OneState
+from foreign_plants import BIAS, CREEP_PER_DECADE, V_MAX, ForeignPlant, ManyPlays, OneState
 
 Floats = npt.NDArray[np.float64]
 Play = Callable[[list[Floats]], list[Floats]]  # nm of drives one after the other, from rest at 0 on
@@ -141,3 +141,48 @@ def recorded(core: ManyPlays | OneState, u: Floats, time_s: Floats, noise: float
     moved = played + CREEP_PER_DECADE / 3.0 * late
     random = np.random.default_rng(seed).standard_normal(len(u))
     return np.asarray(moved + noise * float(np.ptp(moved)) * random)
+
+
+def scan_through_steps(
+    plant: ForeignPlant,
+    centres: tuple[float, ...],
+    stroke: float,
+    lines: tuple[int, ...],
+    memory_s: float | None,
+    noise_nm: float = 0.0,
+    line_s: float = 0.01,
+    samples: int = 20,
+) -> tuple[Floats, Floats, Floats]:
+    """Times in s, volts and nm of a triangle whose offset changes; the first one has lasted for ever.
+
+    Its sensitivity follows the mean drive by ``memory_s``, or at once. ``plant`` has plays or one state.
+    """
+    core = plant.core
+    play = plays_played(core) if isinstance(core, ManyPlays) else one_state_played(core)  # type: ignore[arg-type]
+    closed = min(3 if isinstance(core, ManyPlays) else 60, *lines)
+    periods = [sweep(at - 0.5 * stroke, at + 0.5 * stroke, 0.5, samples) for at in centres]
+    rest = np.concatenate([_EARLIER, np.linspace(0.0, periods[0][0], 20)])
+    played = play([rest, *(one for period in periods for one in [period] * closed)])[1:]
+    moved = []
+    for k, count in enumerate(lines):
+        own = played[k * closed : (k + 1) * closed]
+        moved += [own[-1]] * count if k == 0 else [*own, *[own[-1]] * (count - closed)]
+    u = np.concatenate([np.tile(period, count) for period, count in zip(periods, lines, strict=True)])
+    y, dt = np.concatenate(moved), line_s / samples
+    bias = np.repeat(centres, np.array(lines) * samples)
+    if memory_s is not None:
+        forget = float(np.exp(-dt / memory_s))
+        for k in range(1, len(bias)):
+            bias[k] += (bias[k - 1] - bias[k]) * forget
+    mean = 2.0 * bias - 1.0
+    y *= 1.0 + BIAS[0] * mean + BIAS[1] * mean * mean
+    shares, decay = plant.creep / 3.0, np.exp(-dt / plant.times_s)
+    powers = decay[:, None] ** np.arange(samples - 1, -1, -1)
+    state = ((powers * (1.0 - decay[:, None])) @ y[:samples]) / (1.0 - decay**samples)
+    late = np.empty(len(y))
+    for k, here in enumerate(y.tolist()):
+        state = decay * state + (1.0 - decay) * here
+        late[k] = float(np.sum(state))
+    at_once = 1.0 / abs(1.0 + np.sum(shares / (1.0 + 200j * np.pi * plant.times_s)))
+    noise = noise_nm * np.random.default_rng(5).standard_normal(len(y))
+    return dt * np.arange(len(y)), V_MAX * u, np.asarray(at_once * (y + shares * late) + noise)

@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 
+from msgspec.structs import asdict
+
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.compensation.models.operator import OperatorModel
 from tablegen.compensation.operator.bouc_wen import NO_BOUC_WEN
 from tablegen.compensation.operator.file import (
     VERSION,
+    BiasMemoryTable,
     BoucWenTable,
     CreepTable,
     LengthsTable,
@@ -28,6 +31,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
     """Format an operator file; ``sources`` has a line for the origin of each trace."""
     operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
     plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
+    late = operator.bias_memory
     lines = []
     for i, line in enumerate(operator.lines):
         row = fit.rows[i]
@@ -61,6 +65,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
             slowest_s=creep.slowest_s,
             reference_hz=creep.reference_hz,
         ),
+        bias_memory=None if late is None else BiasMemoryTable(**asdict(late)),
         plays=PlaysTable(
             thresholds=plays.thresholds.tolist(),
             weights=plays.weights.tolist(),

@@ -48,6 +48,15 @@ if TYPE_CHECKING:
     help="Scan that the next trace is to help: its voltage peak to peak and its offset, in volts at the piezo. Repeat "
     "the option for each scan.  [default: all that a build serves]",
 )
+@click.option(
+    "--step",
+    "steps",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="STEP.CSV",
+    help="Record of a running scan through a change of its offset, with the columns of the traces: shows whether the "
+    "sensitivity follows the offset late, and how the image drifts then. Repeat the option for each record.",
+)
 def operator(
     common: Common,
     recorder: "Recorder",
@@ -55,6 +64,7 @@ def operator(
     delay_s: str,
     images: tuple[tuple[float, float, float, Path, Path], ...],
     scans: tuple[tuple[float, float], ...],
+    steps: tuple[Path, ...],
     **sample: Any,
 ) -> int:
     """Fit an operator, a model of the piezo at every size and offset, to sensor traces, to images, or to both.
@@ -108,6 +118,7 @@ def operator(
             drive_gain=recorder.drive_gain,
             drive_offset=recorder.drive_offset,
             scans=scans,
+            steps=steps,
             progress=progress.now,
             **scanner_options(common),
             **sample,

@@ -27,6 +27,7 @@ from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
+from tablegen.compensation.transient import Transient
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
@@ -35,7 +36,7 @@ from tablegen.waveform.window_fit import fit_window
 # An operator serves centres this far from any that was measured, of v_max.
 CENTRE_REACH = 0.4
 _BEND_UNKNOWN = 0.7  # of what a loop grows by its bend; on simulated piezos of four kinds it was wrong by less
-_SLOWEST_HZ = 0.01  # of frames over which drift is followed
+SLOWEST_HZ = 0.01  # of frames over which drift is followed
 SIDES = ("forward", "backward")
 
 
@@ -213,7 +214,7 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
             f"[{request.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
             "size"
         )
-    late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
+    late = replace(operator, creep=operator.creep.down_to(SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = solution.v_amplitude * request.driver.span / request.v_amplitude
 
@@ -226,15 +227,24 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     identification = OperatorIdentification(
         traces=operator.lines,
         expectation=_expectation(operator, solution, _uncertainty(operator, request, solution)),
-        transients=(
-            after_offset(late, solution.stroke, solution.centre, factor, request.turn, 1.0 / request.rate_hz),
-            after_size(late, solution.stroke, solution.centre, factor, request.turn, 1.0 / request.rate_hz),
-        ),
+        transients=_transients(late, request, solution, factor),
         operator=operator,
         factor=factor,
         between=between,
     )
     return WholeLine.of(series, request.turn, trade=trade, identification=identification)
+
+
+def _transients(
+    operator: Operator, request: LineRequest, solution: LearntWaveform, factor: float
+) -> tuple[Transient, Transient]:
+    """Return what follows a change of offset, and a smaller scan."""
+    line = (solution.stroke, solution.centre, factor, request.turn, 1.0 / request.rate_hz)
+
+    def factor_ratio(centre: float) -> float:
+        return request.factor_at(centre) / request.factor_at(solution.mean)
+
+    return after_offset(operator, *line, factor_ratio), after_size(operator, *line)
 
 
 def _expectation(operator: Operator, solution: LearntWaveform, by: ExpectedErrors) -> Expectation:

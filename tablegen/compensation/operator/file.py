@@ -12,6 +12,7 @@ from msgspec import Meta, Struct, ValidationError, convert
 from tablegen.base.input_errors import Problem, Problems, Rejected
 from tablegen.base.toml import read_toml
 from tablegen.compensation.identification import MeasuredLine
+from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.bouc_wen import BoucWen
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
@@ -86,6 +87,15 @@ class LineTable(_Table, frozen=True, kw_only=True):
     in_fit_percent: Annotated[list[_Number], Meta(min_length=4, max_length=4)]
 
 
+class BiasMemoryTable(_Table, frozen=True, kw_only=True):
+    """The memory of the bias; see ``BiasMemory``. Shares of the change of the mean position."""
+
+    rise_share: Annotated[float, Meta(ge=-1.0, le=1.0)]
+    rise_time_s: _Time
+    fall_share: Annotated[float, Meta(ge=-1.0, le=1.0)]
+    fall_time_s: _Time
+
+
 class OperatorFile(_Table, frozen=True, kw_only=True):
     """The whole file. Strokes, centres and thresholds are shares of v_max - v_min."""
 
@@ -95,6 +105,7 @@ class OperatorFile(_Table, frozen=True, kw_only=True):
     v_min: Annotated[float, Meta(ge=-1e5, le=0.0)] = 0.0
     centre: _Share
     creep: CreepTable
+    bias_memory: BiasMemoryTable | None = None
     plays: PlaysTable
     bouc_wen: BoucWenTable
     lengths: LengthsTable
@@ -178,7 +189,11 @@ def _operator(file: OperatorFile) -> Operator:
         )
         for line in file.lines
     )
-    return Operator(family, residual, size, creep, file.centre, lines)
+    late = file.bias_memory
+    bias_memory = None
+    if late is not None:
+        bias_memory = BiasMemory(late.rise_share, late.rise_time_s, late.fall_share, late.fall_time_s)
+    return Operator(family, residual, size, creep, file.centre, lines, bias_memory)
 
 
 def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
@@ -193,6 +208,9 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
         out.append(f"v_min = {float(file.v_min)!r}")
     out += [f"centre = {_float(file.centre)}", "", "[creep]"]
     out += [f"{name} = {_float(getattr(file.creep, name))}" for name in file.creep.__struct_fields__]
+    if file.bias_memory is not None:
+        out += ["", "[bias_memory]"]
+        out += [f"{name} = {_float(getattr(file.bias_memory, name))}" for name in file.bias_memory.__struct_fields__]
     out += [
         "",
         "[plays]",

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.identification import MeasuredLine
+from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
@@ -26,7 +27,7 @@ class Operator:
 
     ``residual`` has rows of 2 K + 2 Chebyshev coefficients, those of the rising branch first: measured less family, of
     positions from 0 to 1. ``size`` has one column: the measured extent over ``expected_extent``, less 1. ``centre`` is
-    the one at which most lines were measured, of v_max.
+    the one at which most lines were measured, of v_max. ``bias_memory`` is None where it was not measured.
     """
 
     family: Family
@@ -35,6 +36,7 @@ class Operator:
     creep: LogarithmicCreep
     centre: float
     lines: tuple[MeasuredLine, ...]
+    bias_memory: BiasMemory | None = None
 
     def loop(self, low: float, high: float, factor: float = 1.0, mean: float | None = None) -> Loop:
         """Return the settled loop between two normalised drives, of a drive with a ``mean``; default: their middle.

@@ -3,14 +3,17 @@
 Hysteresis remembers only where a settled loop turned last (return-point memory), whatever its family. So the way
 from one line to another goes along loops that the operator knows: that of the line before, the branch that rises from
 0 V, where the axis has rested before, and the new line's. Creep adds its share of the change late, by exp(-t / tau)
-for each term.
+for each term, and so does the memory of the bias after a change of offset.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.operator.bias_memory import late_terms
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
 from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, CreepTerm, Transient
@@ -38,12 +41,33 @@ class SettledLine:
 
 
 def after_offset(
-    operator: Operator, stroke: float, centre: float, factor: float, turn: float, period_s: float
+    operator: Operator,
+    stroke: float,
+    centre: float,
+    factor: float,
+    turn: float,
+    period_s: float,
+    factor_ratio: Callable[[float], float] | None = None,
 ) -> Transient:
-    """Return the transient after a line whose centre was ``OFFSET_CHANGE`` nearer to the middle, or beyond it."""
+    """Return the transient after a line whose centre was ``OFFSET_CHANGE`` nearer to the middle, or beyond it.
+
+    ``factor_ratio`` is the factor at a centre over that at the new line, where (1) is known.
+    """
     before = centre - OFFSET_CHANGE if centre >= 0.5 else centre + OFFSET_CHANGE
     lines = [SettledLine.about(stroke, at, turn, period_s) for at in (before, centre)]
-    return transient_between(operator, lines[0], lines[1], factor)
+    after = transient_between(operator, lines[0], lines[1], factor)
+    if operator.bias_memory is not None or factor_ratio is None or factor_ratio(before) == 1.0:
+        return after  # it is known, or (1) says nothing of the sensitivity
+    return replace(after, unknown_nm=_late_sensitivity_nm(operator, before, centre, factor, factor_ratio(before)))
+
+
+def _late_sensitivity_nm(operator: Operator, before: float, centre: float, factor: float, ratio: float) -> float:
+    """Return how far the position moves if it is first as sensitive as at the centre before: in proportion from 0 V."""
+    highest = max([centre, *(line.centre + 0.5 * line.stroke for line in operator.lines)])
+    virgin = _loop(operator, 0.0, highest)
+    here, there = (_at_rest(operator, at) for at in (centre, before))
+    position = virgin.extent_nm * float(virgin.position(np.array([centre]), True)[0]) * here / factor
+    return abs(position * (1.0 - there / (here * ratio)))
 
 
 def after_size(
@@ -84,7 +108,18 @@ def transient_between(operator: Operator, before: SettledLine, now: SettledLine,
         nm = scale * share * step
         late.append(CreepTerm(nm, decay * nm - (1.0 - decay) * share * mean, tau_s))
     measured_s = max((1.0 / line.rate_hz for line in operator.lines), default=0.0)
-    return Transient(tuple(late), measured_s, sweep_s * along, scale * memory)
+    whole = scale * (low + 0.5 * (settled.extent_nm + last.extent_nm))
+    bias = _bias_terms(operator, 0.5 * (now.low + now.high - before.low - before.high), whole, sweep_s)
+    return Transient(tuple(late), measured_s, sweep_s * along, scale * memory, bias)
+
+
+def _bias_terms(operator: Operator, step: float, whole_nm: float, sweep_s: float) -> tuple[CreepTerm, ...]:
+    """Return what the memory of the bias lacks of a step of the offset, which moves the mean by ``whole_nm``."""
+    share, time_s = (0.0, 0.0) if operator.bias_memory is None else operator.bias_memory.late(step)
+    if not share:
+        return ()
+    terms = [(share * whole_nm * part, tau_s) for part, tau_s in late_terms(operator.creep, time_s)]
+    return tuple(CreepTerm(nm, exp(-sweep_s / tau_s) * nm, tau_s) for nm, tau_s in terms)
 
 
 def _loop(operator: Operator, low: float, high: float) -> Loop:
