@@ -38,6 +38,7 @@ FindingCode = Literal[
     "step-guard",
     "uncompared-inputs",
     "uncompensated-hysteresis",
+    "unmeasured-response",
     "way-up-only",
     "wrong-length-unit",
 ]
