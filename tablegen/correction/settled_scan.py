@@ -141,17 +141,17 @@ class ScannerModel:
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
         )
-        loop_and_creep = hysteresis.loop(
+        parts = hysteresis.loop(
             request,
             driver.share(low),
             driver.share(high),
             ModelProblems(axis, Document("the image", None), self.file, problems),
         )
         problems.stop_if_any()
-        if loop_and_creep is None:
+        if parts is None:
             raise Rejected(problems.entries)
-        loop, creep = loop_and_creep
-        return settled(loop, driver.share(drive), scan.rate_hz, creep, response)
+        loop, creep, dynamics = parts
+        return settled(loop, driver.share(drive), scan.rate_hz, creep, dynamics)
 
 
 def _scan_share(surface: OffsetSurface, p: float, gain: float, amplitude: float) -> float:

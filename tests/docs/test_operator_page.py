@@ -41,6 +41,8 @@ def keys(described: Any, before: str = "") -> list[str]:
     """Dotted names of all values of a table."""
     if isinstance(described, types.ListType) and isinstance(described.item_type, types.StructType):
         described = described.item_type
+    if isinstance(described, types.UnionType):  # a table that may be missing
+        described = next((one for one in described.types if isinstance(one, types.StructType)), described)
     if not isinstance(described, types.StructType):
         return [before[:-1]]
     return [key for field in described.fields for key in keys(field.type, f"{before}{field.encode_name}.")]

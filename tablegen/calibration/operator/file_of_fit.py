@@ -13,6 +13,7 @@ from tablegen.compensation.operator.file import (
     LineTable,
     OperatorFile,
     PlaysTable,
+    ResponseTable,
     operator_text,
 )
 from tablegen.numerics.driver import Driver
@@ -28,6 +29,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
     """Format an operator file; ``sources`` has a line for the origin of each trace."""
     operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
     plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
+    sweep = operator.sweep
     lines = []
     for i, line in enumerate(operator.lines):
         row = fit.rows[i]
@@ -76,6 +78,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
             bend=list(loop.bend),
         ),
         lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),
+        response=None if sweep is None else ResponseTable(loss_deg=360.0 * sweep.loss_turns, creep=bool(sweep.creep)),
         lines=lines,
     )
     return operator_text(file, [*_HEAD, *sources]).encode("utf-8")

@@ -51,6 +51,7 @@ class OperatorIdentification(Identification, frozen=True, kw_only=True, eq=False
 
     def piezo(self, driver: Driver, response: Response | None, seed: tuple[int, ...] | None = None) -> OperatorPiezo:
         """Return the piezo that does what the operator says, or that departs from it at random."""
+        response = self.operator.dynamics(response)
         operator, factor = self.operator, self.factor
         if seed is not None:
             operator = departing(operator, seed)
@@ -100,8 +101,8 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 
     def loop(
         self, request: LineRequest, low: float, high: float, problems: ModelProblems
-    ) -> tuple[Loop, LogarithmicCreep] | None:
-        """Return the loop of the operator, of the size that it gives."""
+    ) -> tuple[Loop, LogarithmicCreep, Response | None] | None:
+        """Return the loop of the operator, of the size that it gives, its creep, and the dynamics behind them."""
         operator = self._read(request, problems)
         if operator is None:
             return None
@@ -109,7 +110,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
             _check_sense(operator, request)
             _check_reach(operator, high - low, 0.5 * (low + high), request.driver)
             here, factor = _at(operator, request)
-            return here.loop(low, high, factor, request.v_share), here.creep
+            return here.loop(low, high, factor, request.v_share), here.creep, operator.dynamics(request.response)
         return None
 
     def _read(self, request: LineRequest, problems: ModelProblems) -> Operator | None:
@@ -146,7 +147,7 @@ def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
 
 
 def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> WholeLine | None:
-    centre = request.v_share
+    centre, dynamics = request.v_share, operator.dynamics(request.response)
     operator, factor = _at(operator, request)
     at_offset = request.factor_at(centre)
 
@@ -170,11 +171,11 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
 
     straight = LineShape(request.turn, BranchShape(), BranchShape())
     start = fit_window(straight, request.harmonics, request.window, request.both)
-    solution = learn_waveform(operator, line, start, through, response)
+    solution = learn_waveform(operator, line, start, through, dynamics)
     trade: AccelerationTrade | None = None
     if request.allowed is not None:
         try:
-            traded = minimum_acceleration_waveform(operator, line, solution, request.allowed.percent, through, response)
+            traded = minimum_acceleration_waveform(operator, line, solution, request.allowed.percent, through, dynamics)
             solution = traded.waveform
             trade = AccelerationTrade(request.allowed.percent, traded.straight_series, traded.beside_percent)
         except Unphysical as reason:
