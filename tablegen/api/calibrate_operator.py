@@ -17,7 +17,7 @@ from tablegen.calibration.laws.image_sizes import SampleImage
 from tablegen.calibration.operator.advice import check_scans, next_trace
 from tablegen.calibration.operator.bias_memory_fit import BiasMemoryFit, fit_bias_memory, stretches
 from tablegen.calibration.operator.delay import fit_delay
-from tablegen.calibration.operator.fit import LEAST_LINES, fit_operator
+from tablegen.calibration.operator.fit import LEAST_LINES, fit_operator, sweep_loss_of
 from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
 from tablegen.calibration.operator.plausible import Unsettled
@@ -127,7 +127,7 @@ def calibrate_operator(
         lines = _sensor_lines(tables, prior.driver)
         if not pairs and len(lines) < LEAST_LINES:
             raise Unsettled(f"{len(lines)} settled traces are not enough for fields over size and offset")
-        delay = fit_delay(lines, response) if delay_s == "fit" else Estimate(float(delay_s))
+        delay = fit_delay(lines, sweep_loss_of(lines, response)[1]) if delay_s == "fit" else Estimate(float(delay_s))
         lines = [line.earlier(delay.value) for line in lines]
         lines += _image_lines([(image, row[2]) for (image, _), row in zip(pairs, images, strict=True)], prior, how)
         if (k := prior.number("size", "k_nm_per_v")) is not None:

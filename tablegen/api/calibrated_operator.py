@@ -21,6 +21,7 @@ from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.scanner_file import Change, new_file, updated, with_own_hysteresis
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.charts.picture_file import PlottedCharts
+from tablegen.compensation.operator.sweep_loss import SweepLoss
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage
@@ -97,7 +98,7 @@ class CalibratedOperator(Result):
             }
             for line, fit, out in zip(self.lines, self.fit.in_fit, self.fit.left_out, strict=True)
         ]
-        error, further = self.delay.standard_error, self.next_trace
+        error, further, sweep = self.delay.standard_error, self.next_trace, self.fit.operator.sweep
         return {
             "kind": MODEL,
             "axis": self.axis,
@@ -105,6 +106,7 @@ class CalibratedOperator(Result):
             "candidates_percent": dict(self.fit.candidates),
             "creep_loss_per_decade": self.fit.operator.creep.loss_per_decade,
             **_bias_record(self.bias_memory),
+            "response_loss": None if sweep is None else {"deg": 360.0 * sweep.loss_turns, "creep": bool(sweep.creep)},
             "delay_s": {"value": self.delay.value, "standard_error": error if isfinite(error) else None},
             "traces": traces,
             "remarks": list(self.remarks),
@@ -131,6 +133,7 @@ class CalibratedOperator(Result):
             "",
             f"family   {self.family}  (mean rms of a trace left out: {scores})",
             f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
+            *_sweep_text(self.fit.operator.sweep),
             *_delay_text(self.delay),
             *_bias_text(self.bias_memory),
             "",
@@ -153,7 +156,8 @@ class CalibratedOperator(Result):
             f"next trace: {further.size_v:.3g} V at {further.offset_v:.3g} V would help most; "
             f"it leaves {100.0 * further.left:.0f} % of the uncertainty"
         ]
-        if further.rate_hz is not None:
+        sweep = self.fit.operator.sweep
+        if further.rate_hz is not None and not (sweep and sweep.creep):
             text.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would separate creep from hysteresis")
         return text
 
@@ -250,6 +254,14 @@ def _bias_text(fit: BiasMemoryFit | None) -> list[str]:
         f"{100.0 * late.fall_share:.3g} % of one down with {late.fall_time_s:.3g} s; leaves {fit.rms_nm:.2g} nm rms, "
         f"creep alone {fit.without_nm:.2g} nm"
     ]
+
+
+def _sweep_text(sweep: SweepLoss | None) -> list[str]:
+    """Return a line on what the response of the scanner file contains beside dynamics; none where it is nothing."""
+    if sweep is None:
+        return []
+    creep = "this creep and " if sweep.creep else ""
+    return [f"response without {creep}a lag of {360.0 * sweep.loss_turns:.2g} degrees, which the operator has itself"]
 
 
 def _delay_text(delay: Estimate) -> list[str]:

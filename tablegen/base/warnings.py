@@ -58,6 +58,7 @@ FindingCode = Literal[
     "uncompensated-hysteresis",
     "undetermined-parameter",
     "uneven-drift",
+    "unmeasured-response",
     "unverified-build",
     "way-up-only",
     "widened-errors",

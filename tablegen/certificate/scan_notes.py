@@ -10,6 +10,7 @@ from tablegen.planning.line_plan import Plan
 from tablegen.planning.settling import settling
 
 _TRAVEL = 0.01  # of the travel of rounded codes; a simulated Bouc-Wen piezo then leaves some 0.05 % of the line more
+_UNMEASURED_PERCENT = 0.01  # of the line: content above the measured response, from which it is worth a note
 _TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to 20 % of the line
 
 
@@ -79,6 +80,15 @@ def note_findings(plan: Plan) -> list[Finding]:
             )
             percent = 100.0 * settles.bound_nm / line.drive.size_nm
             findings.append(Finding("expect", percent, text, code="offset-drift", axis=axis_name(line.axis)))
+        if (beyond := line.drive.shape.identification.unmeasured_percent) >= _UNMEASURED_PERCENT:
+            assert line.drive.response is not None
+            text = (
+                f"{beyond:.2g} % of the line of {line.axis}, rms, are harmonics of its position above "
+                f"{line.drive.response.highest_hz:.6g} Hz, where the response was not measured; they are taken to "
+                "have the gain measured there, and any phase. Measure the response further up"
+            )
+            axis = axis_name(line.axis)
+            findings.append(Finding("expect", beyond, text, code="unmeasured-response", axis=axis))
         if not line.drive.hysteresis.compensates and not line.drive.resting:
             text = f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it"
             axis = axis_name(line.axis)

@@ -53,20 +53,21 @@ class Identification(Struct, frozen=True, kw_only=True, eq=False):
     """The piezo as a model knows it, at the offset and the rate of one line.
 
     ``traces`` are those that the model was identified on, ``expectation`` are the expected errors of the line on the
-    scanner, ``transients`` those after a change of offset and after one of size.
+    scanner, ``transients`` those after a change of offset and after one of size. ``unmeasured_percent`` is the rms, in
+    percent of the line, of what the position has above the highest frequency at which the response was measured.
     """
 
     traces: tuple[MeasuredLine, ...] = ()
     expectation: Expectation | None = None
     transients: tuple[Transient, Transient] | None = None
+    unmeasured_percent: float = 0.0
 
     def piezo(
-        self, driver: Driver, response: Response | None, harmonics: int, seed: tuple[int, ...] | None = None
+        self, driver: Driver, response: Response | None, seed: tuple[int, ...] | None = None
     ) -> SettledAxis | None:
         """Return the piezo of this model for simulations; None where the model cannot play one.
 
-        Dynamics act on the first ``harmonics`` of a period. With a ``seed`` the piezo departs from the model at random,
-        by the model's own uncertainty.
+        With a ``seed`` the piezo departs from the model at random, by the model's own uncertainty.
         """
         return None
 

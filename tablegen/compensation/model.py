@@ -16,6 +16,7 @@ from tablegen.compensation.line import LineRequest, LineShape
 from tablegen.compensation.model_problems import ModelProblems
 
 if TYPE_CHECKING:
+    from tablegen.compensation.dynamics import Response
     from tablegen.compensation.operator.creep import LogarithmicCreep
     from tablegen.compensation.operator.loop import Loop
 
@@ -85,11 +86,11 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
 
     def loop(
         self, request: LineRequest, low: float, high: float, problems: ModelProblems
-    ) -> "tuple[Loop, LogarithmicCreep] | None":
-        """Return the loop of a settled drive between two shares of v_max, and its creep; its mean is the offset.
+    ) -> "tuple[Loop, LogarithmicCreep, Response | None] | None":
+        """Return the loop of a settled drive between two shares of v_max, its creep, and the dynamics behind both.
 
-        The loop is ``request.size_nm`` long. None where ``problems`` grew. By default it is that of the line's
-        sweeps, without creep.
+        The mean of the drive is the offset. The loop is ``request.size_nm`` long. None where ``problems`` grew. By
+        default it is that of the line's sweeps, without creep.
         """
         from tablegen.compensation.operator.creep import NO_CREEP  # here: a build of a law asks for none
         from tablegen.compensation.operator.loop import POINTS, Loop
@@ -99,7 +100,7 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
             return None
         u = np.arange(POINTS) / (POINTS - 1)
         rising, falling = line.forward.inverse(u), 1.0 - line.backward.inverse(1.0 - u)
-        return Loop(low, high, rising, falling, request.size_nm), NO_CREEP
+        return Loop(low, high, rising, falling, request.size_nm), NO_CREEP, request.response
 
     def described(self, line: LineShape) -> str:
         """Return the applied hysteresis in a line of text."""

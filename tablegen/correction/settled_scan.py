@@ -22,7 +22,6 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import dynamics_of, offset_surface, outside_driver, size_law_of
 
 _COUNT = 8192  # drives of a period
-_HARMONICS = 512  # on which creep and dynamics act
 _ROUNDS = 30  # of a contraction that reduces an error to less than a tenth
 _BEYOND = 1e-3  # of the driver's range: by how much a drive may leave the driver's range in its last digits
 
@@ -142,17 +141,17 @@ class ScannerModel:
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
         )
-        loop_and_creep = hysteresis.loop(
+        parts = hysteresis.loop(
             request,
             driver.share(low),
             driver.share(high),
             ModelProblems(axis, Document("the image", None), self.file, problems),
         )
         problems.stop_if_any()
-        if loop_and_creep is None:
+        if parts is None:
             raise Rejected(problems.entries)
-        loop, creep = loop_and_creep
-        return settled(loop, driver.share(drive), scan.rate_hz, creep, response, _HARMONICS)
+        loop, creep, dynamics = parts
+        return settled(loop, driver.share(drive), scan.rate_hz, creep, dynamics)
 
 
 def _scan_share(surface: OffsetSurface, p: float, gain: float, amplitude: float) -> float:

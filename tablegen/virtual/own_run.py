@@ -118,7 +118,7 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
 def own_piezo(line: LinePlan, seed: tuple[int, ...] | None = None) -> SettledAxis | None:
     """Return the piezo by which a line was made, or none; with a ``seed``, one that departs from it."""
     drive = line.drive
-    return drive.shape.identification.piezo(drive.driver, drive.response, line.series.harmonics, seed)
+    return drive.shape.identification.piezo(drive.driver, drive.response, seed)
 
 
 def errors_on(line: LinePlan, plants: Sequence[SettledAxis]) -> tuple[tuple[float, ...], ...]:

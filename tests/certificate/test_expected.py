@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
-from operator_files import REVERSIBLE, THRESHOLDS, WEIGHTS, operator_file
+from operator_files import REVERSIBLE, THRESHOLDS, WEIGHTS, operator_file, write_operator_scan
 from replacing import replace
 
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.converter_errors import converter_errors
 from tablegen.certificate.expected import expected_of, rounding_mismatch
 from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.certificate.scan_notes import note_findings
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import certificate_lines, summary
 from tablegen.compensation.expectation import Figure
@@ -242,6 +243,26 @@ def test_a_scan_that_is_far_from_all_traces_names_the_one_that_is_missing(tmp_pa
 
 
 @pytest.mark.common
+@pytest.mark.parametrize(("highest_hz", "notes"), [(1700.0, 1), (1e6, 0)])
+def test_harmonics_of_the_position_above_the_measured_response_are_noted(
+    tmp_path: Path, highest_hz: float, notes: int
+) -> None:
+    scan = write_operator_scan(tmp_path, operator_file(), "x.band_limit.harmonics = 16")
+    rows = [f"{f:.6g},{1.0 + 1e-5 * f:.6g},{-1e-3 * f:.6g}" for f in (100.0, 1000.0, highest_hz)]
+    (tmp_path / "response.csv").write_text("\n".join(["hz,gain,phase_deg", *rows]) + "\n", encoding="utf-8")
+    text = edited((tmp_path / "scanner.toml").read_text("utf-8"), "- [x.resonance]", "+ [x.resonance]")
+    (tmp_path / "scanner.toml").write_text(f"{text}response = 'response.csv'\n", encoding="utf-8")
+    plan = make_plan(load(scan))
+    codes = [one for one in note_findings(plan) if one.code == "unmeasured-response"]
+    assert len(codes) == notes
+    if notes:
+        beyond = plan.x.drive.shape.identification.unmeasured_percent
+        assert codes[0].text.startswith(
+            f"{beyond:.2g} % of the line of x, rms, are harmonics of its position above 1700"
+        )
+        assert codes[0].percent == beyond
+
+
 def test_too_few_harmonics_are_said_with_a_remedy_that_holds(tmp_path: Path) -> None:
     (text,) = warned(with_operator(tmp_path, "x.band_limit.harmonics = 6"))
     assert "x.band_limit.harmonics: on the scanner the x axis is expected to have a scaling error of " in text

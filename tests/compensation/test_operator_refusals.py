@@ -28,7 +28,7 @@ def test_a_size_that_the_law_refuses_and_the_operator_makes(tmp_path: Path) -> N
     found = refusals(tmp_path, "x.size_nm = 1265.0")
     assert found == [
         "x.size_nm: 1265 nm needs 1.001 of v_max; at most 1263.56 nm fit",
-        "x.hysteresis.file: the operator makes 1265 nm with 97.21 V, and [x.size] refuses them: the two "
+        "x.hysteresis.file: the operator makes 1265 nm with 97.27 V, and [x.size] refuses them: the two "
         "contradict each other; calibrate `size` again, or lower the size",
     ]
 

@@ -5,7 +5,7 @@ import pytest
 from replacing import replace
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.compensation.dynamics import SecondOrder
+from tablegen.compensation.dynamics import Measured, Response, SecondOrder, capped_inverse
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
@@ -13,7 +13,7 @@ from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import FIXED_BENDS, Plays, envelopes
-from tablegen.compensation.operator.scan_line import TargetLine, learn_waveform
+from tablegen.compensation.operator.scan_line import LearntWaveform, TargetLine, learn_waveform
 from tablegen.numerics.arrays import Floats
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -80,18 +80,72 @@ def test_creep_and_dynamics_are_undone() -> None:
     response = SecondOrder(40e3, 12.0, 4e-6)
     real, imaginary = response.inverse(np.arange(1.0, HARMONICS + 1.0) * 500.0)
 
-    def dynamics(f_hz: Floats) -> tuple[Floats, Floats]:
-        real, imaginary = response.inverse(f_hz)
-        return real / (real**2 + imaginary**2), -imaginary / (real**2 + imaginary**2)
-
     def inverse(series: FourierSeries) -> FourierSeries:
         return series.times(real, imaginary)
 
-    found = learn_waveform(operator(late), wanted(), straight(0.5), inverse, dynamics)
+    found = learn_waveform(operator(late), wanted(), straight(0.5), inverse, response)
     without = learn_waveform(operator(), wanted(), straight(0.5), same, None)
     assert max(found.expected.rms) < 0.03
     assert found.expected.mismatch < 0.1
     assert float(np.max(np.abs(found.series.b - without.series.b))) > 1e-3
+
+
+FAST_HZ, FEW = 5e3, 12  # the highest harmonic of the drive is on the resonance, those of the loop are beyond it
+
+
+def fast(dynamics: Response) -> LearntWaveform:
+    """A line of few harmonics at a high rate, through the inverse of the dynamics."""
+    real, imaginary, _ = capped_inverse(dynamics, np.arange(1.0, FEW + 1.0) * FAST_HZ, 20.0)
+    start = fit_window(LineShape(0.5, BranchShape(), BranchShape()), FEW, WINDOW, both=True)
+
+    def inverse(series: FourierSeries) -> FourierSeries:
+        return series.times(real, imaginary)
+
+    return learn_waveform(operator(), wanted(rate_hz=FAST_HZ), start, inverse, dynamics)
+
+
+def left_by(waveform: LearntWaveform, dynamics: Response) -> tuple[float, float]:
+    """Rms and mismatch in percent of the line that stepped plays leave behind dynamics on all of their harmonics."""
+    count = 4096
+    real, imaginary, _ = capped_inverse(dynamics, np.arange(1.0, FEW + 1.0) * FAST_HZ, 20.0)
+    u = 0.5 + waveform.v_amplitude * (waveform.series.times(real, imaginary).on_grid(count) - 0.5)
+    spectrum = np.fft.rfft(stepped(u))
+    real, imaginary = dynamics.inverse(FAST_HZ * np.arange(1.0, count // 2 + 1.0))
+    spectrum[1:] /= real + 1j * imaginary
+    position = np.fft.irfft(spectrum, count)
+    t = np.arange(count) / count
+    x = np.where(t <= 0.5, 2.0 * t, 2.0 - 2.0 * t)
+    inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
+    slope, offset = np.polyfit(x[inside], position[inside], 1)
+    error = 100.0 * ((position - offset) / slope - x)
+    half = error[: count // 2][inside[: count // 2]], error[count // 2 :][inside[count // 2 :]][::-1]
+    apart = np.abs(half[0][: len(half[1])] - half[1])
+    return max(float(np.sqrt(np.mean(side * side))) for side in half), float(np.max(apart))
+
+
+def test_the_loop_has_more_harmonics_than_the_drive() -> None:
+    dynamics = SecondOrder(60e3, 14.0, 2e-6)
+    waveform = fast(dynamics)
+    rms, mismatch = left_by(waveform, dynamics)
+    assert max(waveform.expected.rms) == pytest.approx(rms, rel=0.05)
+    assert waveform.expected.mismatch == pytest.approx(mismatch, rel=0.1)
+    assert rms > 0.05  # not what the drive's own harmonics leave, which is far less
+    assert waveform.unmeasured_percent == 0.0
+
+
+def test_harmonics_above_the_measured_response_are_bounded() -> None:
+    dynamics = SecondOrder(60e3, 14.0, 2e-6)
+    f = np.geomspace(50.0, 80e3, 4000)
+    real, imaginary = dynamics.inverse(f)
+    h = 1.0 / (real + 1j * imaginary)
+    measured = Measured(f, np.abs(h), np.unwrap(np.angle(h)) / (2.0 * np.pi))
+    waveform = fast(measured)
+    rms, mismatch = left_by(waveform, dynamics)
+    expected, beyond = waveform.expected, waveform.unmeasured
+    assert 0.001 < waveform.unmeasured_percent < 0.5
+    assert 0.0 < beyond.mismatch < 2.0 * mismatch
+    assert abs(max(expected.rms) - rms) < max(beyond.rms) + 0.005
+    assert abs(expected.mismatch - mismatch) < beyond.mismatch + 0.02
 
 
 def test_the_expected_size_is_the_wanted_one() -> None:

@@ -42,7 +42,7 @@ def keys(described: Any, before: str = "") -> list[str]:
     if isinstance(described, types.ListType) and isinstance(described.item_type, types.StructType):
         described = described.item_type
     if isinstance(described, types.UnionType):  # a table that may be missing
-        described = next(one for one in described.types if not isinstance(one, types.NoneType))
+        described = next((one for one in described.types if isinstance(one, types.StructType)), described)
     if not isinstance(described, types.StructType):
         return [before[:-1]]
     return [key for field in described.fields for key in keys(field.type, f"{before}{field.encode_name}.")]

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from tablegen.numerics.arrays import tree_sum, tree_sum_down
 from tablegen.numerics.elementary import exp, log10
+from tablegen.numerics.fourier import filtered
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sinc, sine, sine_and_cosine, sine_and_cosine_of, spherical_bessel_1
 
@@ -90,3 +91,20 @@ def test_cholesky_against_lapack(size: int) -> None:
 def test_cholesky_refuses_what_is_not_positive_definite() -> None:
     with pytest.raises(ArithmeticError, match="pivot 1 of 2"):
         Cholesky(np.array([[1.0, 2.0], [2.0, 1.0]]))
+
+
+@pytest.mark.parametrize("count", [4, 1024])
+def test_a_filter_of_harmonics_is_that_of_a_fast_transform(count: int) -> None:
+    random = np.random.default_rng(count)
+    values, (real, imaginary) = random.standard_normal(count), random.standard_normal((2, count // 2 - 1))
+    spectrum = np.fft.rfft(values)
+    spectrum[1:-1] *= real + 1j * imaginary
+    out = filtered(values, real, imaginary)
+    np.testing.assert_allclose(out, np.fft.irfft(spectrum, count), atol=1e-14)
+    np.testing.assert_allclose(filtered(values, real * 0.0 + 1.0, imaginary * 0.0), values, atol=1e-14)
+
+
+@pytest.mark.parametrize(("count", "factors"), [(2, 0), (12, 5), (16, 8)])
+def test_a_filter_of_another_length_is_refused(count: int, factors: int) -> None:
+    with pytest.raises(ValueError, match=f"{count} values and {factors} factors; a power of 2"):
+        filtered(np.zeros(count), np.ones(factors), np.zeros(factors))

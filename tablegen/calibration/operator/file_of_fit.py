@@ -16,6 +16,7 @@ from tablegen.compensation.operator.file import (
     LineTable,
     OperatorFile,
     PlaysTable,
+    ResponseTable,
     operator_text,
 )
 from tablegen.numerics.driver import Driver
@@ -32,6 +33,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
     operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
     plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
     late = operator.bias_memory
+    sweep = operator.sweep
     lines = []
     for i, line in enumerate(operator.lines):
         row = fit.rows[i]
@@ -81,6 +83,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
             bend=list(loop.bend),
         ),
         lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),
+        response=None if sweep is None else ResponseTable(loss_deg=360.0 * sweep.loss_turns, creep=bool(sweep.creep)),
         lines=lines,
     )
     return operator_text(file, [*_HEAD, *sources]).encode("utf-8")

@@ -17,14 +17,16 @@ from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.plausible import Unsettled
 from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrink
+from tablegen.calibration.operator.sweep_loss_fit import fit_sweep_loss
 from tablegen.calibration.operator.units import check_units
-from tablegen.compensation.dynamics import Response
+from tablegen.compensation.dynamics import Measured, Response
 from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths, through
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import NO_PLAYS
+from tablegen.compensation.operator.sweep_loss import SweepLoss
 from tablegen.numerics.arrays import Floats
 
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
@@ -67,23 +69,35 @@ class OperatorFit:
 def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, factor: Factor) -> OperatorFit:
     """Fit an operator to lines; ``factor`` is m of (1) at a centre, in shares of v_max.
 
+    A measured response that contains creep gives the creep of the operator, and counts without it.
+
     Raises
     ------
     Unphysical
         If the lines are too few, too similar, or too noisy.
     """
     _check(lines)
-    still = [line.without(response, None) for line in lines]
+    sweep, dynamics = sweep_loss_of(lines, response)
+    still = [line.without(dynamics, None) for line in lines]
     main = _main_centre(still)
     names = (*FAMILIES, NONE)
-    alone = [_candidate(name, still, main, factor) for name in names]
+    creep_of = _creep_of(lines, None if sweep is None else sweep.creep)
+    alone = [_candidate(name, still, main, factor, creep_of) for name in names]
     fits = [_with_best_lengths(one, still, factor) for one in alone]
     scores = [one.candidates[one.family] for one in fits[: len(FAMILIES)]]
     if max(scores) < _WORTH_MIXING * min(scores):
         fits += [_with_best_lengths(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
     best = min(fits, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
     candidates = {name: value for one in fits for name, value in one.candidates.items()}
-    return replace(best, candidates=candidates)
+    return replace(best, candidates=candidates, operator=replace(best.operator, sweep=sweep))
+
+
+def sweep_loss_of(lines: Sequence[PeriodicLine], response: Response | None) -> tuple[SweepLoss | None, Response | None]:
+    """Return the creep and the loss angle that a response contains, or None, and the dynamics without both."""
+    if not lines or not isinstance(response, Measured):
+        return None, response
+    sweep = fit_sweep_loss(response, _creep_of(lines))
+    return sweep, response if sweep is None else sweep.without(response)
 
 
 def _check(lines: Sequence[PeriodicLine]) -> None:
@@ -113,8 +127,10 @@ def _main_centre(lines: Sequence[PeriodicLine]) -> float:
     return float(np.mean([line.centre for line, group in zip(lines, groups, strict=True) if group == most]))
 
 
-def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
-    """Return a function from a loss per decade to creep over the decades of the lines."""
+def _creep_of(lines: Sequence[PeriodicLine], known: LogarithmicCreep | None = None) -> CreepOf:
+    """Return a function from a loss per decade to creep over the decades of the lines; ``known`` for any loss."""
+    if known is not None:
+        return lambda _: known
     low = min(line.rate_hz for line in lines)
     high = max(line.rate_hz for line in lines)
     reference = float(np.exp(np.mean([np.log(line.rate_hz) for line in lines])))
@@ -190,9 +206,8 @@ class _Candidate:
         return _Candidate(name, self.whole.weighted(share, other.whole), [a.weighted(share, b) for a, b in both])
 
 
-def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor) -> _Candidate:
+def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor, creep_of: CreepOf) -> _Candidate:
     """Fit one family, with the creep that goes with it."""
-    creep_of = _creep_of(lines)
 
     def fitted(some: Sequence[PeriodicLine], near: _Fitted | None) -> _Fitted:
         if name == NONE:

@@ -28,7 +28,6 @@ from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWavef
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
 from tablegen.compensation.transient import Transient
-from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -51,15 +50,14 @@ class OperatorIdentification(Identification, frozen=True, kw_only=True, eq=False
     factor: float
     between: float
 
-    def piezo(
-        self, driver: Driver, response: Response | None, harmonics: int, seed: tuple[int, ...] | None = None
-    ) -> OperatorPiezo:
+    def piezo(self, driver: Driver, response: Response | None, seed: tuple[int, ...] | None = None) -> OperatorPiezo:
         """Return the piezo that does what the operator says, or that departs from it at random."""
+        response = self.operator.dynamics(response)
         operator, factor = self.operator, self.factor
         if seed is not None:
             operator = departing(operator, seed)
             factor *= 1.0 + self.between * float(np.random.default_rng((*seed, 1)).standard_normal())
-        return OperatorPiezo(operator, factor, driver, response, harmonics)
+        return OperatorPiezo(operator, factor, driver, response)
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -104,8 +102,8 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 
     def loop(
         self, request: LineRequest, low: float, high: float, problems: ModelProblems
-    ) -> tuple[Loop, LogarithmicCreep] | None:
-        """Return the loop of the operator, of the size that it gives."""
+    ) -> tuple[Loop, LogarithmicCreep, Response | None] | None:
+        """Return the loop of the operator, of the size that it gives, its creep, and the dynamics behind them."""
         operator = self._read(request, problems)
         if operator is None:
             return None
@@ -113,7 +111,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
             _check_sense(operator, request)
             _check_reach(operator, high - low, 0.5 * (low + high), request.driver)
             here, factor = _at(operator, request)
-            return here.loop(low, high, factor, request.v_share), here.creep
+            return here.loop(low, high, factor, request.v_share), here.creep, operator.dynamics(request.response)
         return None
 
     def _read(self, request: LineRequest, problems: ModelProblems) -> Operator | None:
@@ -150,7 +148,7 @@ def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
 
 
 def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> WholeLine | None:
-    centre = request.v_share
+    centre, dynamics = request.v_share, operator.dynamics(request.response)
     operator, factor = _at(operator, request)
     at_offset = request.factor_at(centre)
 
@@ -166,24 +164,6 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     def through(series: FourierSeries) -> FourierSeries:
         return series
 
-    def dynamics(f_hz: Floats) -> tuple[Floats, Floats]:
-        """Return H(f) from the inverse of the response.
-
-        Parameters
-        ----------
-        f_hz
-            Frequencies in Hz, shape (n,).
-
-        Returns
-        -------
-        real, imaginary
-            Dimensionless, each of shape (n,).
-        """
-        assert response is not None
-        real, imaginary = response.inverse(f_hz)
-        square = real * real + imaginary * imaginary
-        return real / square, -imaginary / square
-
     if response is not None:
         real, imaginary, _ = capped_inverse(response, n, boost)
 
@@ -192,13 +172,11 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
 
     straight = LineShape(request.turn, BranchShape(), BranchShape())
     start = fit_window(straight, request.harmonics, request.window, request.both)
-    solution = learn_waveform(operator, line, start, through, None if response is None else dynamics)
+    solution = learn_waveform(operator, line, start, through, dynamics)
     trade: AccelerationTrade | None = None
     if request.allowed is not None:
         try:
-            traded = minimum_acceleration_waveform(
-                operator, line, solution, request.allowed.percent, through, None if response is None else dynamics
-            )
+            traded = minimum_acceleration_waveform(operator, line, solution, request.allowed.percent, through, dynamics)
             solution = traded.waveform
             trade = AccelerationTrade(request.allowed.percent, traded.straight_series, traded.beside_percent)
         except Unphysical as reason:
@@ -227,6 +205,7 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     identification = OperatorIdentification(
         traces=operator.lines,
         expectation=_expectation(operator, solution, _uncertainty(operator, request, solution)),
+        unmeasured_percent=solution.unmeasured_percent,
         transients=_transients(late, request, solution, factor),
         operator=operator,
         factor=factor,
@@ -248,14 +227,17 @@ def _transients(
 
 
 def _expectation(operator: Operator, solution: LearntWaveform, by: ExpectedErrors) -> Expectation:
-    """Return the expected errors of a learnt waveform, uncertain by others, in percent."""
-    errors = solution.expected
+    """Return the expected errors of a learnt waveform, uncertain by others, in percent.
+
+    What the response is not measured for is added, since nobody knows how both fall together.
+    """
+    errors, beyond = solution.expected, solution.unmeasured
     return Expectation(
         "traces",
-        {side: Figure(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
-        {side: Figure(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
-        Figure(errors.mismatch, by.mismatch),
-        Figure(errors.size, by.size),
+        {side: Figure(errors.rms[i], by.rms[i] + beyond.rms[i]) for i, side in enumerate(SIDES)},
+        {side: Figure(errors.scaling[i], by.scaling[i] + beyond.scaling[i]) for i, side in enumerate(SIDES)},
+        Figure(errors.mismatch, by.mismatch + beyond.mismatch),
+        Figure(errors.size, by.size + beyond.size),
         100.0 * operator.distance(solution.stroke, solution.centre),
     )
 

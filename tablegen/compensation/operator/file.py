@@ -19,6 +19,7 @@ from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, through
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import BENDS, Plays
+from tablegen.compensation.operator.sweep_loss import SweepLoss
 
 VERSION = 1
 _Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -70,6 +71,13 @@ class LengthsTable(_Table, frozen=True, kw_only=True):
     noise: Annotated[float, Meta(ge=1e-12, le=1.0)]
 
 
+class ResponseTable(_Table, frozen=True, kw_only=True):
+    """What the measured response contains beside dynamics; see ``SweepLoss``. ``creep`` is that of the file."""
+
+    loss_deg: Annotated[float, Meta(ge=-30.0, le=30.0)]
+    creep: bool
+
+
 class LineTable(_Table, frozen=True, kw_only=True):
     """A trace: its stroke and centre, the residual of the family, and the errors of a fit without the trace."""
 
@@ -109,6 +117,7 @@ class OperatorFile(_Table, frozen=True, kw_only=True):
     plays: PlaysTable
     bouc_wen: BoucWenTable
     lengths: LengthsTable
+    response: ResponseTable | None = None
     lines: Annotated[list[LineTable], Meta(min_length=1, max_length=1000)]
 
 
@@ -193,7 +202,10 @@ def _operator(file: OperatorFile) -> Operator:
     bias_memory = None
     if late is not None:
         bias_memory = BiasMemory(late.rise_share, late.rise_time_s, late.fall_share, late.fall_time_s)
-    return Operator(family, residual, size, creep, file.centre, lines, bias_memory)
+    sweep = None
+    if file.response is not None:
+        sweep = SweepLoss(file.response.loss_deg / 360.0, creep if file.response.creep else None)
+    return Operator(family, residual, size, creep, file.centre, lines, bias_memory, sweep)
 
 
 def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
@@ -223,6 +235,9 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
     out += [f"{name} = {_float(getattr(file.bouc_wen, name))}" for name in file.bouc_wen.__struct_fields__[:-1]]
     out += [f"bend = {numbers(file.bouc_wen.bend)}", "", "[lengths]"]
     out += [f"{name} = {_float(getattr(file.lengths, name))}" for name in file.lengths.__struct_fields__]
+    if file.response is not None:
+        creep = "true" if file.response.creep else "false"
+        out += ["", "[response]", f"loss_deg = {_float(file.response.loss_deg)}", f"creep = {creep}"]
     for line in file.lines:
         out += ["", "[[lines]]", f"name = {_text(line.name)}"]
         for name in line.__struct_fields__[1:]:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from math import ceil
 
 from tablegen.base.figures import at_least
+from tablegen.compensation.dynamics import Response
 from tablegen.compensation.line import WholeLine
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.scan_line import LearntWaveform, Linear, TargetLine, ThroughInverse, learn_waveform
+from tablegen.compensation.operator.scan_line import LearntWaveform, TargetLine, ThroughInverse, learn_waveform
 from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, least_percent, minimum_acceleration_series
 from tablegen.waveform.series import FourierSeries
 
@@ -38,7 +39,7 @@ def minimum_acceleration_waveform(
     straight: LearntWaveform,
     percent: float,
     inverse: ThroughInverse,
-    dynamics: Linear | None,
+    dynamics: Response | None,
 ) -> MinimumAccelerationLine:
     """Return the waveform of minimum acceleration, in place of the learnt one, within ``percent`` of scaling error.
 

@@ -7,12 +7,14 @@ import numpy as np
 from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.dynamics import Measured, Response
 from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
+from tablegen.compensation.operator.sweep_loss import SweepLoss
 from tablegen.numerics.arrays import Floats
 
 SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
@@ -27,7 +29,8 @@ class Operator:
 
     ``residual`` has rows of 2 K + 2 Chebyshev coefficients, those of the rising branch first: measured less family, of
     positions from 0 to 1. ``size`` has one column: the measured extent over ``expected_extent``, less 1. ``centre`` is
-    the one at which most lines were measured, of v_max. ``bias_memory`` is None where it was not measured.
+    the one at which most lines were measured, of v_max. ``bias_memory`` is None where it was not measured; ``sweep`` is
+    what the axis' measured response contains of hysteresis and creep.
     """
 
     family: Family
@@ -37,6 +40,11 @@ class Operator:
     centre: float
     lines: tuple[MeasuredLine, ...]
     bias_memory: BiasMemory | None = None
+    sweep: SweepLoss | None = None
+
+    def dynamics(self, response: Response | None) -> Response | None:
+        """Return the dynamics behind the operator: a measured response without what the operator has itself."""
+        return self.sweep.without(response) if self.sweep and isinstance(response, Measured) else response
 
     def loop(self, low: float, high: float, factor: float = 1.0, mean: float | None = None) -> Loop:
         """Return the settled loop between two normalised drives, of a drive with a ``mean``; default: their middle.

@@ -52,13 +52,12 @@ class DepartingField(Field):
 
 @dataclass(frozen=True, eq=False)
 class OperatorPiezo:
-    """An axis that does what an operator says; creep and dynamics up to ``harmonics``; nm from the lower turn on."""
+    """An axis that does what an operator says, with its creep and dynamics; nm from the lower turn on."""
 
     operator: Operator
     factor: float
     driver: Driver
     response: Response | None
-    harmonics: int
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Return the settled position in the middle of each tick of a period.
@@ -82,7 +81,7 @@ class OperatorPiezo:
         u = self.driver.share(volts)
         loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
         rate_hz = 1.0 / (len(u) * tick_s)
-        return settled(loop, u, rate_hz, self.operator.creep, self.response, self.harmonics)
+        return settled(loop, u, rate_hz, self.operator.creep, self.response)
 
 
 def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:

@@ -1,20 +1,23 @@
 """The waveform that an operator's axis follows straight: learnt on the operator, before anything is built.
 
-A round plays the waveform on the operator: the settled loop of its stroke, then creep and dynamics. The distance of
-the position from the target line inside the imaging windows, over the slope of the branch, is projected on the
-harmonics with a penalty on n^4, and added; the amplitude is scaled to the size. Turns are rounded, so that the stroke
-differs from the line; the loop is that of the stroke.
+A round plays the waveform on the operator: the settled loop of its stroke, then creep and dynamics, which act on all
+harmonics of the position, since a loop has many more of them than its drive. The distance of the position from the
+target line inside the imaging windows, over the slope of the branch, is projected on the harmonics with a penalty on
+n^4, and added; the amplitude is scaled to the size. Turns are rounded, so that the stroke differs from the line; the
+loop is that of the stroke.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.numerics.arrays import Bools, Floats, tree_sum
+from tablegen.numerics.fourier import filtered
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import sine_and_cosine
 from tablegen.waveform.series import FourierSeries
@@ -30,7 +33,6 @@ _FIRST_ROUNDS = 4
 _BEYOND = 0.01  # of v_max: what a round may leave the driver's range by
 _ROUNDING = 2.0**40  # coefficients are multiples of its inverse: the last bits of a round do not matter then
 
-Linear = Callable[[Floats], tuple[Floats, Floats]]  # real and imaginary part of a response at frequencies in Hz
 Factor = Callable[[float], float]
 ThroughInverse = Callable[[FourierSeries], FourierSeries]  # what has to arrive at the piezo for a target
 
@@ -66,18 +68,27 @@ class ExpectedErrors:
     mismatch: float
     size: float
 
+    def most_different(self, others: "list[ExpectedErrors]") -> "ExpectedErrors":
+        """Return the largest distance of each error from that of other positions, 0 without others."""
+        rows = [np.abs(np.hstack(astuple(other)) - np.hstack(astuple(self))) for other in others]
+        a, b, c, d, mismatch, size = np.max(rows, axis=0).tolist() if rows else [0.0] * 6
+        return ExpectedErrors((a, b), (c, d), mismatch, size)
+
 
 @dataclass(frozen=True, eq=False)
 class LearntWaveform:
     """The waveform, about 0..1, of which 1 is ``v_amplitude`` of v_max; its errors; and its turns.
 
-    ``mean`` is that of the drive over a period, of v_max; ``grown`` by which share the loop is larger since its turns
-    are not even about that.
+    ``unmeasured`` bounds the errors by what the position has above the highest frequency of a measured response, which
+    is ``unmeasured_percent`` of the line, rms. ``mean`` is that of the drive over a period, of v_max; ``grown`` by
+    which share the loop is larger since its turns are not even about that.
     """
 
     series: FourierSeries
     v_amplitude: float
     expected: ExpectedErrors
+    unmeasured: ExpectedErrors
+    unmeasured_percent: float
     stroke: float
     centre: float
     mean: float
@@ -90,7 +101,7 @@ def learn_waveform(
     target: TargetLine,
     start: FourierSeries,
     inverse: ThroughInverse,
-    dynamics: Linear | None,
+    dynamics: Response | None,
     learn: bool = True,
 ) -> LearntWaveform:
     """Learn the waveform that the operator follows straight, starting from ``start``, in its harmonics.
@@ -115,10 +126,19 @@ def learn_waveform(
         settled = before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * target.size_nm
         if settled and amplitude == due:  # a line that is held at the ends of the driver settles at another size
             at = 0.5 * (played.loop.low + played.loop.high)
-            expected = learner.expected(played.position)
+            expected, unmeasured = learner.expected(played.position), learner.unmeasured(played)
             stroke, mean = played.loop.high - played.loop.low, played.mean
             return LearntWaveform(
-                _rounded(series), amplitude, expected, stroke, at, mean, played.loop.grown(mean), turn
+                _rounded(series),
+                amplitude,
+                expected,
+                expected.most_different([learner.expected(played.position + by) for by in unmeasured]),
+                100.0 * max((float(np.std(by)) for by in unmeasured), default=0.0) / (2.0 * target.size_nm),
+                stroke,
+                at,
+                mean,
+                played.loop.grown(mean),
+                turn,
             )
         before = inside
         amplitude *= target.size_nm / line[0]
@@ -145,7 +165,7 @@ class _Learner:
     """The data that the rounds share: the grid of times, the projection, and the operator behind its dynamics."""
 
     def __init__(
-        self, operator: Operator, target: TargetLine, harmonics: int, inverse: ThroughInverse, dynamics: Linear | None
+        self, operator: Operator, target: TargetLine, harmonics: int, inverse: ThroughInverse, dynamics: Response | None
     ) -> None:
         self._operator, self._target, self._harmonics, self._inverse = operator, target, harmonics, inverse
         self._count = max(_MIN_GRID, 1 << (_GRID_PER_HARMONIC * harmonics - 1).bit_length())
@@ -156,13 +176,16 @@ class _Learner:
         inside = (self._x >= low) & (self._x <= high)
         self.imaged: Bools = inside & (self._going | target.both)
         self._sines, self._cosines = sine_and_cosine(times)
-        n = np.arange(1.0, harmonics + 1.0)
-        real, imaginary = operator.creep.response(n * target.rate_hz)
+        f_hz = np.arange(1.0, self._count // 2) * target.rate_hz
+        real, imaginary = operator.creep.response(f_hz)
         if dynamics is not None:
-            r, i = dynamics(n * target.rate_hz)
-            real, imaginary = real * r - imaginary * i, real * i + imaginary * r
+            r, i = dynamics.inverse(np.minimum(f_hz, dynamics.highest_hz))
+            square = r * r + i * i
+            real, imaginary = (real * r + imaginary * i) / square, (imaginary * r - real * i) / square
         self._real, self._imaginary = real, imaginary
         self._late = bool(np.any(real != 1.0) or np.any(imaginary != 0.0))
+        self._beyond: Bools = f_hz > (np.inf if dynamics is None else dynamics.highest_hz)
+        n = np.arange(1.0, harmonics + 1.0)
         k = np.arange(self._count)[self.imaged]
         at = (np.arange(1, harmonics + 1)[:, None] * k) % self._count
         # Denser towards the edges of a window, as Chebyshev's points are, or the error piles up there.
@@ -218,7 +241,7 @@ class _Learner:
         rising = (k - bottom) % self._count < (top - bottom) % self._count
         place = np.where(rising, loop.position(u, True), loop.position(u, False))
         if self._late:
-            place = place + self._analysed(place).times(self._real - 1.0, self._imaginary).on_grid(self._count)
+            place = filtered(place, self._real, self._imaginary)
         return _Played(u, mean, loop, rising, loop.extent_nm * place)
 
     def line_of(self, position: Floats) -> tuple[float, float]:
@@ -281,15 +304,21 @@ class _Learner:
             (rms[0], rms[1]), (scaling[0], scaling[1]), mismatch, 100.0 * (slope / self._target.size_nm - 1.0)
         )
 
-    def _analysed(self, place: Floats) -> FourierSeries:
-        """Return the harmonics of a position; the same bits on every machine, unlike those of a fast transform."""
-        a, b = np.empty(self._harmonics), np.empty(self._harmonics)
-        k = np.arange(self._count)
-        for n in range(1, self._harmonics + 1):
-            at = (n * k) % self._count
-            a[n - 1] = 2.0 * float(tree_sum(place * self._cosines[at])) / self._count
-            b[n - 1] = 2.0 * float(tree_sum(place * self._sines[at])) / self._count
-        return FourierSeries(0.0, a, b)
+    def unmeasured(self, played: _Played) -> list[Floats]:
+        """Return what the position may differ by, in nm, since the response is not measured at its highest harmonics.
+
+        These act as at the last frequency that was measured. They may have any phase; a gain that is larger than there
+        is another resonance, which nothing tells.
+        """
+        if not np.any(self._beyond):
+            return []
+        none = np.zeros(len(self._beyond))
+        size = played.position - np.mean(played.position)
+        content, quarter = (
+            filtered(size, np.where(self._beyond, re, 0.0), np.where(self._beyond, im, 0.0))
+            for re, im in ((none + 1.0, none), (none, none + 1.0))
+        )
+        return [-2.0 * content, quarter - content, -quarter - content]
 
 
 def _rounded(series: FourierSeries) -> FourierSeries:
