@@ -17,6 +17,7 @@ from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.correction.support import supported
 from tablegen.images.cell_start import CellWaves, cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
+from tablegen.images.missing import completed
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
 from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
@@ -48,9 +49,10 @@ class PeriodicScan:
     per line and per frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
     true if y is that of the sample and not of the rows. ``indexed`` is true if the cell is that of the indexer, and not
     of the strongest spots. The strong spots alone are those of a cell with the area divided by ``strong_index``.
-    ``stepless`` is the first image without the steps of terraces, None where it has none. ``several_cells`` is the
-    indexer's reason where several cells explain the image. Displacements along ``straight_axes`` are within their
-    errors, and left out.
+    ``stepless`` is the first image without the steps of terraces, None where it has none. ``without_gaps``
+    are the images with the fitted values in place of missing pixels, None where none is missing. ``several_cells`` is
+    the indexer's reason where several cells explain the image. Displacements along ``straight_axes`` are within their
+    errors, and left out. ``frame_share`` is the part of the frame that the rows are.
     """
 
     distortion: Distortion
@@ -60,8 +62,10 @@ class PeriodicScan:
     indexed: bool = False
     strong_index: int = 1
     stepless: Floats | None = None
+    without_gaps: tuple[Floats, ...] | None = None
     several_cells: str = ""
     straight_axes: str = ""
+    frame_share: float = 1.0
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
         """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
@@ -110,7 +114,8 @@ class PeriodicScan:
             frame = np.linalg.inv(ideal) @ waves  # from frames to constants, turned
             metric = np.linalg.cholesky(frame.T @ frame).T
             across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
-            readings.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
+            bent = abs(np.log(along / across / self.frame_share)) + abs(shear / across)
+            readings.append((bent, across, along, shear))
         return np.array(min(readings))
 
 
@@ -139,7 +144,8 @@ def periodic_scan(
     Parameters
     ----------
     trace, retrace
-        Heights in any unit, shape (rows, columns), rows in the order of time.
+        Heights in any unit, shape (rows, columns), rows in the order of time; NaN where a pixel is missing. The result
+        is of the rows from the first with data to the last one.
     turn
         Share of the period in which the line rises.
     window
@@ -157,9 +163,12 @@ def periodic_scan(
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
+    complete = completed([image for image in (trace, retrace) if image is not None])
     cell, several = cell_of(trace, retrace, expected_area)
     scaled, stepped = list[Floats](), False
     if cell is None:
+        level = [np.asarray(geometry.levelled(one), dtype=np.float64) for one in complete.heights]
+        scaled = _unit(complete.heights, [geometry.weighted(one) for one in level])
         try:
             spot, bends = begin(geometry, heights, retrace_mirrored)
             model, state, free = fit_spots(geometry, heights, spot, bends)
@@ -170,11 +179,11 @@ def periodic_scan(
             raise
     else:
         waves = CellWaves.of(cell)
-        recorded = [image for image in (trace, retrace) if image is not None]
-        level = [without_terraces(image) for image in recorded]
-        has_terraces = any(image is not None for image in level)
-        levelled = [image if one is None else one for one, image in zip(level, recorded, strict=True)]
-        heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in levelled]
+        recorded = complete.heights
+        flat = [without_terraces(image) for image in recorded]
+        has_terraces = any(image is not None for image in flat)
+        levelled = [image if one is None else one for one, image in zip(flat, recorded, strict=True)]
+        heights = [geometry.weighted(np.asarray(geometry.levelled(image), dtype=np.float64)) for image in levelled]
         heights, scaled = _unit(heights, heights), _unit(recorded, heights)
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
         # Without terraces, what a first fit leaves is its own error, and would pass for steps.
@@ -182,10 +191,12 @@ def periodic_scan(
             without, stepped = _stepless(model, state, scaled)
             if not stepped:
                 break
-            heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in without]
+            heights = [geometry.weighted(np.asarray(geometry.levelled(image), dtype=np.float64)) for image in without]
             model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
+    if complete.has_gaps:
+        scaled = replace(complete, heights=scaled).with_model(model.periodic_parts(state))
     scan = _scan(model, state)
     distortion, straight = supported(scan.distortion, model, state, scan.tells_y)
     return replace(
@@ -196,6 +207,7 @@ def periodic_scan(
         several_cells="" if several is None else str(several),
         strong_index=strong_index(model, state),
         stepless=_stepless(model, state, scaled)[0][0] if stepped else None,
+        without_gaps=tuple(scaled) if complete.has_gaps else None,
     )
 
 

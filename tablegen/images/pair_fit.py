@@ -149,7 +149,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
     return ImageFit(
         turn=Estimate(geometry.turn),
         v_scan=v_scan,
-        samples=2 * geometry.rows * geometry.columns,
+        samples=2 * geometry.lines * geometry.columns,
         forward=forward,
         backward=backward,
         noise_percent=100.0 * noise / float(np.ptp(modelled)),
@@ -163,7 +163,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
         explained=1.0 - 2.0 * state.cost / sum(float(np.vdot(image, image)) for _, image in model.images),
         registration_percent=100.0 * float(distance[np.argmax(np.abs(distance))]),
         widened=sqrt(widened),
-        strays=loud_rows(state),
+        strays=loud_rows(model.geometry, state),
     )
 
 

@@ -303,7 +303,7 @@ def test_a_count_that_the_window_leaves_open_is_refused() -> None:
     [
         ({"retrace": np.zeros((256, 128))}, "trace and retrace have 256 x 256 and 256 x 128 pixels"),
         ({"trace": np.zeros((256, 20)), "retrace": np.zeros((256, 20))}, "256 x 20 pixels are too few"),
-        ({"trace": np.full((256, 256), np.nan)}, "the trace has 65536 pixels that are not numbers"),
+        ({"trace": np.full((256, 256), np.nan)}, "the trace has no pixel with a height"),
         ({"v_scan": 120.0}, "a scan of 120 V is outside the driver's 0..100 V"),
     ],
 )
