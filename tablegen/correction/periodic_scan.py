@@ -21,7 +21,7 @@ from tablegen.images.missing import completed
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
 from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
-from tablegen.images.terraces import without_steps, without_terraces
+from tablegen.images.stepless_fit import fit_without_steps, in_unit, stepless_images
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
@@ -33,7 +33,6 @@ _AVERAGED = 0.45  # of a period against another wave: the standard deviation of 
 _ROW_BENDS = 20  # terms for the residual of the phase polynomial in the rows
 _FOLLOWING = 0.5  # share of the change of a phase step that the next guess follows
 _ROUNDS = 40
-_STEP_ROUNDS = 2  # fits to images without the steps that the fit before left
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
@@ -168,7 +167,7 @@ def periodic_scan(
     scaled, stepped = list[Floats](), False
     if cell is None:
         level = [np.asarray(geometry.levelled(one), dtype=np.float64) for one in complete.heights]
-        scaled = _unit(complete.heights, [geometry.weighted(one) for one in level])
+        scaled = in_unit(complete.heights, [geometry.weighted(one) for one in level])
         try:
             spot, bends = begin(geometry, heights, retrace_mirrored)
             model, state, free = fit_spots(geometry, heights, spot, bends)
@@ -179,20 +178,10 @@ def periodic_scan(
             raise
     else:
         waves = CellWaves.of(cell)
-        recorded = complete.heights
-        flat = [without_terraces(image) for image in recorded]
-        has_terraces = any(image is not None for image in flat)
-        levelled = [image if one is None else one for one, image in zip(flat, recorded, strict=True)]
-        heights = [geometry.weighted(np.asarray(geometry.levelled(image), dtype=np.float64)) for image in levelled]
-        heights, scaled = _unit(heights, heights), _unit(recorded, heights)
-        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
-        # Without terraces, what a first fit leaves is its own error, and would pass for steps.
-        for _ in range(_STEP_ROUNDS if has_terraces else 0):
-            without, stepped = _stepless(model, state, scaled)
-            if not stepped:
-                break
-            heights = [geometry.weighted(np.asarray(geometry.levelled(image), dtype=np.float64)) for image in without]
-            model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
+        fit = fit_without_steps(
+            geometry, complete.heights, lambda level: fit_cell_spots(geometry, level, retrace_mirrored, waves)
+        )
+        model, state, free, scaled, stepped = fit.model, fit.state, fit.free, fit.scaled, fit.stepped
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
     if complete.has_gaps:
@@ -206,22 +195,9 @@ def periodic_scan(
         indexed=cell is not None,
         several_cells="" if several is None else str(several),
         strong_index=strong_index(model, state),
-        stepless=_stepless(model, state, scaled)[0][0] if stepped else None,
+        stepless=stepless_images(model, state, scaled)[0][0] if stepped else None,
         without_gaps=tuple(scaled) if complete.has_gaps else None,
     )
-
-
-def _unit(images: list[Floats], level: list[Floats]) -> list[Floats]:
-    """Divide images by the rms of levelled ones."""
-    spread = float(np.sqrt(np.mean([np.var(image) for image in level])))
-    return [image / spread for image in images]
-
-
-def _stepless(model: PeriodicModel, state: FitState, recorded: list[Floats]) -> tuple[list[Floats], bool]:
-    """Return the recorded images without the steps that a fit leaves, and True if one has steps."""
-    pairs = zip(recorded, model.periodic_parts(state), strict=True)
-    images, stepped = zip(*(without_steps(image, part) for image, part in pairs), strict=True)
-    return list(images), any(stepped)
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:
