@@ -20,6 +20,7 @@ from tablegen.images.frame_registration import registered
 from tablegen.images.image_grating import find_grating
 from tablegen.images.indexer import ImageCell, find_cell, same_lattice
 from tablegen.images.measured_cell import MeasuredCell, measured_cell, stretches
+from tablegen.images.missing import count_missing
 from tablegen.numerics.arrays import Floats
 
 Kind = Literal["hexagonal", "square", "oblique", "grating"]
@@ -233,6 +234,7 @@ class ImageLattice(Result):
             "rows_columns": [rows, columns],
             "width_nm": self.scan.width_nm,
             "height_nm": self.scan.height_nm,
+            "missing": count_missing(self.scan.heights).record,
             "kind": self.kind,
             "unit": self.unit,
             "cell": None if self.image_cell is None else _cell_record(self.cell),
@@ -254,13 +256,17 @@ class ImageLattice(Result):
 
     def summary(self) -> str:
         """Return the text that ``tablegen lattice`` prints."""
-        return "\n".join([self._title(), *self._cell_lines(), *self._drift_lines()])
+        return "\n".join([self._title(), *self._missing_lines(), *self._cell_lines(), *self._drift_lines()])
 
     def _title(self) -> str:
         rows, columns = self.scan.heights.shape
         size = f", {self.scan.width_nm:.6g} x {self.scan.height_nm:.6g} nm" if self.unit == "nm" else ", size unknown"
         frames = "" if self.frames is None else ", mean of frames {}:{}".format(*self.frames)
         return f"{self.scan.file}: {self.scan.channel or 'image'}{frames}, {columns} x {rows} pixels{size}"
+
+    def _missing_lines(self) -> list[str]:
+        count = count_missing(self.scan.heights)
+        return [f"missing: {count}, without weight"] if count else []
 
     def _cell_lines(self) -> list[str]:
         if self.image_cell is None:

@@ -13,6 +13,7 @@ from tablegen.charts.picture_file import PlottedCharts
 from tablegen.images.files import ScanImage, channels_of, read_pair
 from tablegen.images.files import read_image as read_one
 from tablegen.images.formats.channel import Channel, choose, partner
+from tablegen.images.missing import count_missing
 from tablegen.numerics.arrays import Floats
 
 _ANGLE, _TURN, _WINDOW = "angle [deg]", "turn", "window"
@@ -107,7 +108,7 @@ def _has_both(path: Path, channel: str | None) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Image(Result):
-    """An image of heights as its file has it, and its ``retrace``, which is None where there is none.
+    """An image of heights as its file has it, NaN where a pixel is missing, and its ``retrace``, or None.
 
     Row 0 is the first in time as far as the file states it, and the left end of the line is at the left.
     """
@@ -169,6 +170,7 @@ class Image(Result):
             "turn": one.turn,
             "window": None if one.window is None else list(one.window),
             "frame": one.frame,
+            "missing": count_missing(one.heights).record,
             "retrace": None if self.retrace is None else self.retrace.record,
         }
 
@@ -185,8 +187,10 @@ class Image(Result):
         return f"{name or 'image'}, {columns} x {rows} pixels{size}"
 
     def _range(self) -> str:
-        low, high = float(np.min(self.heights)), float(np.max(self.heights))
-        return f"heights {low:.4g} to {high:.4g} {self.unit or 'in units of the file'}"
+        low, high = float(np.nanmin(self.heights)), float(np.nanmax(self.heights))
+        count = count_missing(self.heights)
+        missing = f"; {count} missing" if count else ""
+        return f"heights {low:.4g} to {high:.4g} {self.unit or 'in units of the file'}{missing}"
 
     def _lines(self) -> Sequence[str]:
         back = "without a retrace" if self.retrace is None else f"retrace of {self.retrace.scan.file}"

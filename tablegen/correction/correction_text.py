@@ -3,6 +3,7 @@
 from tablegen.base.warnings import Finding, worst_first
 from tablegen.correction.job import Images
 from tablegen.correction.straight import StraightScan
+from tablegen.images.missing import missing_text
 from tablegen.images.scan_angle import angle_text
 
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
@@ -95,6 +96,13 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
         text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
         notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
     notes += _by_file(scan)
+    if scan.record.get("missing"):
+        text = missing_text([images.channels[i].heights for i in images.reference])
+        text += ", and no corrected pixel" if scan.record["by"].startswith("fit") else "; a missing pixel stays missing"
+        notes.append(Finding("note", 0.0, text))
+    if imaged := scan.record.get("imaged_rows"):
+        text = f"rows {imaged[0] + 1} to {imaged[1]} have data; the picture is of these"
+        notes.append(Finding("note", 0.0, text))
     if straight := scan.record.get("not_displaced"):
         text = f"the displacement along {' and '.join(straight)} is within its errors; it was not applied"
         notes.append(Finding("note", 0.0, text))

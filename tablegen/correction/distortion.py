@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.images.missing import without_holes
 from tablegen.numerics.arrays import Bools, Floats
 
 _ORDER = 3  # of the splines
@@ -20,6 +21,7 @@ _MARGIN = 12  # pixels beyond which values do not matter to a spline
 _HALF = 0.5  # of a pixel: from its middle to its edge
 _ROUNDING = 1e-6  # of a pixel
 _OUTER = 0.25  # of a sweep at either end, where an axis may still go back
+_MISSING_SHARE = 0.1  # of missing pixels among those from which a pixel is interpolated
 _FINEST = 0.02  # of the mean step: closer pixels are at one position
 
 
@@ -195,20 +197,27 @@ class Resampler:
         """Resample an image by cubic splines.
 
         Beyond its edges an image is continued point-symmetrically about its outer pixels, so that a slope is no edge.
+        What comes from a missing pixel, or from between it and others, is missing.
 
         Parameters
         ----------
         image
-            Heights, shape (rows, columns).
+            Heights, shape (rows, columns); NaN where a pixel is missing.
 
         Returns
         -------
         Heights of the same shape and unit; NaN where nothing was imaged.
         """
+        missing = ~np.isfinite(image)
+        inside = self.inside
+        if missing.any():
+            share = map_coordinates(missing.astype(np.float64), [self.row, self.column], order=1, mode="nearest")
+            inside = inside & (share <= _MISSING_SHARE)
+            image = np.nan_to_num(without_holes(image), nan=float(np.nanmean(image)))
         wide = np.pad(image, _MARGIN, mode="reflect", reflect_type="odd")
         at = np.stack([self.row, self.column]) + _MARGIN
         heights: Floats = map_coordinates(wide, at, order=_ORDER, mode="mirror")
-        return np.where(self.inside, heights, np.nan)
+        return np.where(inside, heights, np.nan)
 
 
 def _edges(x: Floats) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from tablegen.images.files import ScanImage, channels_of, read_channels, read_im
 from tablegen.images.formats.channel import Channel, Direction, channel_list, choose, partner, quote
 from tablegen.images.frame_registration import registered
 from tablegen.images.measured_cell import IDEAL_ANGLES
+from tablegen.images.missing import count_missing, imaged_rows, valid_pixels
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.images.scan_angle import is_turned
 from tablegen.numerics.arrays import Floats
@@ -91,7 +92,8 @@ class Images:
 
     ``reference`` are the numbers of the channels that are fitted and compared, trace first; ``left_out`` are channels
     that cannot be read, with the reason. ``frames`` are the first one of a movie and the one after the last, of which
-    the channels are the means.
+    the channels are the means; ``imaged_rows`` the first row with data and the one after the last, where others are
+    left out, and ``frame_share`` the part of the frame that they are.
     """
 
     channels: tuple[ScanImage, ...]
@@ -100,6 +102,8 @@ class Images:
     left_out: tuple[str, ...]
     mirrored: bool
     frames: tuple[int, int] | None = None
+    imaged_rows: tuple[int, int] | None = None
+    frame_share: float = 1.0
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -122,6 +126,44 @@ class Images:
         recorded = self.channels[number].heights
         mirrored = self.mirrored and not self.forward[number]
         return np.ascontiguousarray(recorded[:, ::-1]) if mirrored else recorded
+
+    def of_imaged_rows(self) -> "Images":
+        """Return the rows from the first with data in the reference to the last one, and their part of the height.
+
+        Rows of the reference without data between them become NaN.
+
+        Raises
+        ------
+        Unphysical
+            If the reference has too little data.
+        """
+        rows, count = imaged_rows([self.channels[i].heights for i in self.reference]), self.shape[0]
+        if rows == slice(0, count) and not self.missing:
+            return self
+        share = (rows.stop - rows.start) / count
+        channels = []
+        for i, one in enumerate(self.channels):
+            heights = one.heights
+            if i in self.reference:
+                heights = np.where(valid_pixels(heights), heights, np.nan)
+            height_nm = None if one.height_nm is None else share * one.height_nm
+            channels.append(replace(one, heights=heights[rows], height_nm=height_nm))
+        imaged = None if share == 1.0 else (rows.start, rows.stop)
+        return replace(self, channels=tuple(channels), imaged_rows=imaged, frame_share=share)
+
+    @property
+    def missing(self) -> dict[str, Any]:
+        """Missing rows and pixels of the reference, and the rows of the frame, for the record; empty if none is."""
+        counts = [count_missing(self.channels[i].heights) for i in self.reference]
+        record: dict[str, Any] = {}
+        if any(counts):
+            record["missing"] = {
+                self.channels[i].channel or side: count.record
+                for i, side, count in zip(self.reference, ("trace", "retrace"), counts, strict=False)
+            }
+        if self.imaged_rows is not None:
+            record["imaged_rows"] = list(self.imaged_rows)
+        return record
 
     @property
     def pictures(self) -> list[ScanPicture]:
@@ -412,6 +454,7 @@ def _scanned(
         "sources": images.sources,
         **images.angle,
         **images.timing,
+        **images.missing,
         "scanner": {"file": path.name, "sha256": file_sha256(path, CONFIGURATION)},
         **how,
     }
@@ -453,6 +496,7 @@ def by_fit(
         If there is no fit, or the image does not support the correction: the cell is ambiguous, the displacement is too
         large, or trace and retrace do not agree better.
     """
+    images = images.of_imaged_rows()
     conditions = _timed(images, conditions)
     trace, retrace = (*(images.channels[i].heights for i in images.reference), None)[:2]
     retrace_alone = not any(images.forward)
@@ -470,10 +514,11 @@ def by_fit(
         fit = periodic_scan(trace, None, 1.0 - turn, (1.0 - high, 1.0 - low), False, delay_pixels, expected)
     else:
         fit = periodic_scan(trace, retrace, turn, (low, high), mirrored, delay_pixels, expected)
+    fit = replace(fit, frame_share=images.frame_share)
     size: tuple[float, float] | None = None
     distortion: Distortion = fit.distortion
     record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources}
-    record |= {**images.angle, **images.timing}
+    record |= {**images.angle, **images.timing, **images.missing}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
             check_constant(fit, lattice_nm, expected is not None)
@@ -507,12 +552,21 @@ def by_fit(
         record["retrace_alone"] = True
     scan = _corrected(images, distortion, size, record)
     check_moves(distortion)
-    heights = trace if retrace_alone else images.heights(images.reference[0])
-    check_cell(fit, heights if fit.stepless is None else fit.stepless, True)
+    recorded, pictures = _checked_pictures(fit, scan, trace)
+    check_cell(fit, recorded, True)
     check_agreement(scan.agreement)
-    pictures = [scan.pictures[i].heights for i in images.reference]
     check_straight_cell(fit, pictures, size, lattice_nm, kind or "hexagonal", expected is not None)
     return scan, fit
+
+
+def _checked_pictures(fit: PeriodicScan, scan: StraightScan, trace: Floats) -> tuple[Floats, list[Floats]]:
+    """Return the first image as it was fitted, without steps and gaps, and the straight pictures without gaps."""
+    recorded, pictures = trace, [scan.pictures[i].heights for i in scan.reference]
+    if fit.without_gaps is not None:
+        recorded = fit.without_gaps[0]
+        both = zip((True, False), fit.without_gaps, strict=False)
+        pictures = [Resampler.of(fit.distortion, way)(one) for way, one in both]
+    return recorded if fit.stepless is None else fit.stepless, pictures
 
 
 def check_order(images: Images, distortion: Distortion) -> None:

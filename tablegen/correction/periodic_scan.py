@@ -17,10 +17,11 @@ from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.correction.support import supported
 from tablegen.images.cell_start import CellWaves, cell_of, fit_cell_spots, strong_index
 from tablegen.images.cell_vectors import reduced
+from tablegen.images.missing import completed
 from tablegen.images.model_start import begin, fit_spots, prepare_heights
 from tablegen.images.pair_fit import check_fit
 from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
-from tablegen.images.terraces import without_steps, without_terraces
+from tablegen.images.stepless_fit import fit_without_steps, in_unit, stepless_images
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
@@ -32,7 +33,6 @@ _AVERAGED = 0.45  # of a period against another wave: the standard deviation of 
 _ROW_BENDS = 20  # terms for the residual of the phase polynomial in the rows
 _FOLLOWING = 0.5  # share of the change of a phase step that the next guess follows
 _ROUNDS = 40
-_STEP_ROUNDS = 2  # fits to images without the steps that the fit before left
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
@@ -48,9 +48,10 @@ class PeriodicScan:
     per line and per frame, shape (bases, 2). ``explained`` is the share of the contrast that is periodic, ``tells_y``
     true if y is that of the sample and not of the rows. ``indexed`` is true if the cell is that of the indexer, and not
     of the strongest spots. The strong spots alone are those of a cell with the area divided by ``strong_index``.
-    ``stepless`` is the first image without the steps of terraces, None where it has none. ``several_cells`` is the
-    indexer's reason where several cells explain the image. Displacements along ``straight_axes`` are within their
-    errors, and left out.
+    ``stepless`` is the first image without the steps of terraces, None where it has none. ``without_gaps``
+    are the images with the fitted values in place of missing pixels, None where none is missing. ``several_cells`` is
+    the indexer's reason where several cells explain the image. Displacements along ``straight_axes`` are within their
+    errors, and left out. ``frame_share`` is the part of the frame that the rows are.
     """
 
     distortion: Distortion
@@ -60,8 +61,10 @@ class PeriodicScan:
     indexed: bool = False
     strong_index: int = 1
     stepless: Floats | None = None
+    without_gaps: tuple[Floats, ...] | None = None
     several_cells: str = ""
     straight_axes: str = ""
+    frame_share: float = 1.0
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
         """Return the distortion in nm for a grating, or densest rows of a lattice, with this pitch.
@@ -110,7 +113,8 @@ class PeriodicScan:
             frame = np.linalg.inv(ideal) @ waves  # from frames to constants, turned
             metric = np.linalg.cholesky(frame.T @ frame).T
             across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
-            readings.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
+            bent = abs(np.log(along / across / self.frame_share)) + abs(shear / across)
+            readings.append((bent, across, along, shear))
         return np.array(min(readings))
 
 
@@ -139,7 +143,8 @@ def periodic_scan(
     Parameters
     ----------
     trace, retrace
-        Heights in any unit, shape (rows, columns), rows in the order of time.
+        Heights in any unit, shape (rows, columns), rows in the order of time; NaN where a pixel is missing. The result
+        is of the rows from the first with data to the last one.
     turn
         Share of the period in which the line rises.
     window
@@ -157,9 +162,12 @@ def periodic_scan(
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
+    complete = completed([image for image in (trace, retrace) if image is not None])
     cell, several = cell_of(trace, retrace, expected_area)
     scaled, stepped = list[Floats](), False
     if cell is None:
+        level = [np.asarray(geometry.levelled(one), dtype=np.float64) for one in complete.heights]
+        scaled = in_unit(complete.heights, [geometry.weighted(one) for one in level])
         try:
             spot, bends = begin(geometry, heights, retrace_mirrored)
             model, state, free = fit_spots(geometry, heights, spot, bends)
@@ -170,22 +178,14 @@ def periodic_scan(
             raise
     else:
         waves = CellWaves.of(cell)
-        recorded = [image for image in (trace, retrace) if image is not None]
-        level = [without_terraces(image) for image in recorded]
-        has_terraces = any(image is not None for image in level)
-        levelled = [image if one is None else one for one, image in zip(level, recorded, strict=True)]
-        heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in levelled]
-        heights, scaled = _unit(heights, heights), _unit(recorded, heights)
-        model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
-        # Without terraces, what a first fit leaves is its own error, and would pass for steps.
-        for _ in range(_STEP_ROUNDS if has_terraces else 0):
-            without, stepped = _stepless(model, state, scaled)
-            if not stepped:
-                break
-            heights = [np.asarray(geometry.levelled(image), dtype=np.float64) for image in without]
-            model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
+        fit = fit_without_steps(
+            geometry, complete.heights, lambda level: fit_cell_spots(geometry, level, retrace_mirrored, waves)
+        )
+        model, state, free, scaled, stepped = fit.model, fit.state, fit.free, fit.scaled, fit.stepped
     check_fit(model, state, free)
     model, state = _bent(model, state, free)
+    if complete.has_gaps:
+        scaled = replace(complete, heights=scaled).with_model(model.periodic_parts(state))
     scan = _scan(model, state)
     distortion, straight = supported(scan.distortion, model, state, scan.tells_y)
     return replace(
@@ -195,21 +195,9 @@ def periodic_scan(
         indexed=cell is not None,
         several_cells="" if several is None else str(several),
         strong_index=strong_index(model, state),
-        stepless=_stepless(model, state, scaled)[0][0] if stepped else None,
+        stepless=stepless_images(model, state, scaled)[0][0] if stepped else None,
+        without_gaps=tuple(scaled) if complete.has_gaps else None,
     )
-
-
-def _unit(images: list[Floats], level: list[Floats]) -> list[Floats]:
-    """Divide images by the rms of levelled ones."""
-    spread = float(np.sqrt(np.mean([np.var(image) for image in level])))
-    return [image / spread for image in images]
-
-
-def _stepless(model: PeriodicModel, state: FitState, recorded: list[Floats]) -> tuple[list[Floats], bool]:
-    """Return the recorded images without the steps that a fit leaves, and True if one has steps."""
-    pairs = zip(recorded, model.periodic_parts(state), strict=True)
-    images, stepped = zip(*(without_steps(image, part) for image, part in pairs), strict=True)
-    return list(images), any(stepped)
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:

@@ -66,8 +66,9 @@ def _row_ratios(distortion: Distortion, model: PeriodicModel, state: FitState) -
             BinnedResidual.of(turned, residual.T, slope.T).error
             for residual, slope in zip(state.residuals, slopes, strict=True)
         ]
-        error = np.sum(np.array(errors) ** -2.0, axis=0) ** -0.5
-        ratios.append(_binned(0.5 * (displacement[1:] + displacement[:-1])) / error)
+        weight = np.sum(np.array(errors) ** -2.0, axis=0)
+        there = weight > 0.0  # others have no row with data
+        ratios.append(_binned(0.5 * (displacement[1:] + displacement[:-1]))[there] / weight[there] ** -0.5)
     return np.concatenate(ratios)
 
 

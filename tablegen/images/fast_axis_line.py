@@ -261,7 +261,7 @@ def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree
         np.linalg.lstsq(ripple.T, off, rcond=None)[0]
         for ripple, off in zip(_ripples(geometry, most), model.off, strict=True)
     ]
-    pixels = geometry.rows * geometry.columns * len(model.images)
+    pixels = geometry.lines * geometry.columns * len(model.images)
     spots = list(map(tuple, model.spots.tolist()))
     fits: list[_Degree] = []
     for count in range(most, 0, -1):
@@ -388,7 +388,7 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
         explained=1.0 - 2.0 * state.cost / power,
         noise_percent=100.0 * pixel_noise(state) / float(np.ptp(modelled)),
         widened=sqrt(widened),
-        strays=loud_rows(state),
+        strays=loud_rows(model.geometry, state),
     )
 
 

@@ -56,6 +56,7 @@ class ScanImage:
     """Heights, rows x columns, with the data of their file; ``file`` is its name in messages.
 
     Row 0 is the first in time as far as the file states it; the left end of the line is at the left in both directions.
+    NaN is a missing pixel.
     A value that the file does not have is None, or empty.
     """
 
@@ -225,20 +226,22 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         raise ValueError(f"{what}has no frame {frame_number}; the last one is {channel.frames - 1}")
     if channel.frames > 1:
         what += f"frame {frame_number}: "
-    with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
+    with np.errstate(all="ignore"):  # of factors in a damaged file; what is infinite is counted below
         matrix = channel.load(frame_number)
         if matrix.dtype.kind not in "iufb":
             raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
         if matrix.shape != channel.shape:
             raise ValueError(f"{what}has {matrix.size} pixels, not {size}; copy it again")
         heights = matrix.astype(np.float64)
-    bad = int(np.sum(~np.isfinite(heights)))
-    if bad:
-        raise ValueError(f"{what}{bad} pixels are not finite; crop or interpolate them")
-    if np.max(np.abs(heights)) > _MAX_HEIGHT:
+    if infinite := int(np.sum(np.isinf(heights))):
+        raise ValueError(f"{what}{infinite} pixels are infinite; if they are missing, save them as NaN")
+    there = heights[np.isfinite(heights)]  # NaN marks a missing pixel
+    if not len(there):
+        raise ValueError(f"{what}all pixels are NaN; was a different channel saved?")
+    if np.max(np.abs(there)) > _MAX_HEIGHT:
         raise ValueError(f"{what}has heights beyond {_MAX_HEIGHT:g}; is it damaged?")
-    if not np.ptp(heights) > 1.0 / _MAX_HEIGHT:
-        raise ValueError(f"{what}all pixels are {heights.flat[0]:g}; was a different channel saved?")
+    if not np.ptp(there) > 1.0 / _MAX_HEIGHT:
+        raise ValueError(f"{what}all pixels are {there[0]:g}; was a different channel saved?")
     return ScanImage(
         file=file.name,
         source=file.source,

@@ -6,7 +6,9 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.images.autocorrelation import autocorrelation, significant_spots
-from tablegen.images.lattice_filters import FilteredImage, filtered_images
+from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images
+from tablegen.images.missing import without_holes
+from tablegen.images.pair_checks import MIN_PIXELS
 from tablegen.numerics.arrays import Floats
 
 _CERTAINTY = 5.0  # exponent of e
@@ -39,6 +41,10 @@ def find_grating(heights: Floats) -> ImageGrating:
     Unphysical
         If no wave stands out, others are no harmonics, or there are fewer than three periods.
     """
+    heights = without_holes(heights[complete_region(heights)])
+    if min(heights.shape) < MIN_PIXELS:
+        size = " x ".join(map(str, heights.shape))
+        raise Unphysical(f"without missing rows the image has {size} pixels; crop it to a region without missing rows")
     image = filtered_images(heights)[0]
     least = float(np.log(heights.size) + _CERTAINTY)
     spots = significant_spots(image, least)

@@ -22,7 +22,8 @@ from tablegen.images.cell_errors import fit_cell
 from tablegen.images.cell_vectors import area, lattices_of_index, reduced, sides_and_angle, sublattice_index
 from tablegen.images.hum import hum_waves, of_hum
 from tablegen.images.lattice_candidates import Candidate, candidates, distinct
-from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images, without_holes
+from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images
+from tablegen.images.missing import rows_with_data, valid_pixels, without_holes
 from tablegen.images.pair_checks import MIN_PIXELS
 from tablegen.numerics.arrays import Bools, Floats
 
@@ -59,6 +60,7 @@ _LEAST_CELLS = 4.0  # in the image
 _LEAST_PERIODS = 2.2  # of each side's rows in the image
 _MOST_ERROR = 0.05  # of a side
 _LEAST_VALID = 0.25  # share of the pixels
+_LEAST_COMPARED = 0.5  # share of the rows that the other direction has
 _SAME_CELL = 0.12  # share
 _LEAST_LEVEL = 0.04  # of the variance, at the lattice points
 
@@ -146,7 +148,7 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
         raise Unphysical(f"without missing rows the image has {size} pixels; crop it to a region without missing rows")
     views = [_view(image) for image in filtered_images(heights)]
     hum = np.zeros((0, 2))
-    if other is not None:
+    if other is not None and float(np.mean(rows_with_data(other[region]))) > _LEAST_COMPARED:
         beside = np.concatenate(
             [
                 significant_spots(image, _FAINT * _least(image), _FAINTEST * WEAKEST).waves
@@ -231,9 +233,7 @@ def _check(heights: Floats) -> None:
     if heights.ndim != 2 or min(heights.shape) < MIN_PIXELS:
         size = " x ".join(map(str, heights.shape))
         raise Unphysical(f"{size} pixels are too few for a lattice; {MIN_PIXELS} rows and columns do")
-    valid = np.isfinite(heights)
-    valid &= (np.ptp(np.where(valid, heights, np.nanmin(heights) if valid.any() else 0.0), axis=1) > 0.0)[:, None]
-    share = float(np.mean(valid))
+    share = float(np.mean(valid_pixels(heights)))
     if share < _LEAST_VALID:
         raise Unphysical(f"{100.0 * share:.2g} % of the pixels have heights; crop the image to what was scanned")
 

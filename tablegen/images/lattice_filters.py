@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from tablegen.images.missing import COMPLETE, longest_run, valid_pixels
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _CLIPPED = 1.0  # percent of the heights at either end
@@ -18,7 +19,7 @@ _EDGE = 2.0  # times the limit: a slope that is the edge of a terrace or a speck
 _BESIDE = 10  # pixels on either side of an edge, whose medians tell a terrace from a speck
 _STEP_SHARE = 0.5  # of the slope at an edge that remains as a step between these medians
 _LEAST_TERRACE = 6  # pixels of a row: a shorter part is not levelled by itself
-_COMPLETE = 0.8  # share of valid pixels: a row or column with fewer is missing
+_FILLED_GAP = 0.02  # of the rows: a longer gap would make spots of its own if it were interpolated
 _BOW_DEGREE = 2
 _WIDTH = 1.0  # pixels: standard deviation of the Gaussian that smooths slopes
 
@@ -45,7 +46,7 @@ def filtered_images(heights: Floats) -> list[FilteredImage]:
     list
         The levelled heights, then their slopes along the rows.
     """
-    valid = _valid(heights)
+    valid = valid_pixels(heights)
     rows = np.where(valid, heights, 0.0)
     level = _terraces_levelled(_rows_levelled(rows, valid), valid)
     images = [_windowed("heights", _clipped(level, valid), valid)]
@@ -55,7 +56,7 @@ def filtered_images(heights: Floats) -> list[FilteredImage]:
 
 
 def complete_region(heights: Floats) -> tuple[slice, slice]:
-    """Return the rows and columns of the largest part of an image without missing rows.
+    """Return the rows and columns of the largest part of an image without gaps of more than a few rows.
 
     The edges of missing rows would make spots beside those of the lattice.
 
@@ -64,35 +65,13 @@ def complete_region(heights: Floats) -> tuple[slice, slice]:
     heights
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
-    valid = _valid(heights)
+    valid = valid_pixels(heights)
     there = valid[:, valid.any(axis=0)]
-    rows = _longest(np.mean(there, axis=1) >= _COMPLETE) if there.size else slice(0, 0)
-    columns = _longest(np.mean(valid[rows], axis=0) >= _COMPLETE) if valid[rows].size else slice(0, 0)
+    complete = np.mean(there, axis=1) >= COMPLETE if there.size else np.zeros(len(valid), dtype=np.bool_)
+    rows = longest_run(complete, int(_FILLED_GAP * len(valid)))
+    part = valid[rows][complete[rows]]
+    columns = longest_run(np.mean(part, axis=0) >= COMPLETE) if part.size else slice(0, 0)
     return rows, columns
-
-
-def _longest(there: Bools) -> slice:
-    """Return the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
-    if not len(edges):
-        return slice(0, 0)
-    best = int(np.argmax(edges[1::2] - edges[::2]))
-    return slice(int(edges[2 * best]), int(edges[2 * best + 1]))
-
-
-def without_holes(heights: Floats) -> Floats:
-    """Interpolate missing pixels along the rows.
-
-    Parameters
-    ----------
-    heights
-        Heights in any unit, shape (rows, columns), a few of them NaN.
-    """
-    whole = heights.copy()
-    for row in np.flatnonzero(~np.isfinite(heights).all(axis=1)):
-        there = np.isfinite(heights[row])
-        whole[row, ~there] = np.interp(np.flatnonzero(~there), np.flatnonzero(there), heights[row, there])
-    return whole
 
 
 def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
@@ -109,20 +88,11 @@ def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
         Levelled heights, shape (rows, columns); then of each edge its row, the first column after it, and the step
         there, shape (edges,) each.
     """
-    valid = _valid(heights)
+    valid = valid_pixels(heights)
     level = _rows_levelled(np.where(valid, heights, 0.0), valid)
     edges = [(row, end, step) for row, ends in _parts(level, valid) for end, step in ends]
     rows, columns, steps = zip(*edges, strict=True) if edges else ((), (), ())
     return level, np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), np.array(steps, dtype=np.float64)
-
-
-def _valid(heights: Floats) -> Bools:
-    """Return True for finite pixels of rows with contrast: a scan that was stopped leaves flat rows."""
-    valid = np.isfinite(heights)
-    low = np.min(np.where(valid, heights, np.inf), axis=1)
-    high = np.max(np.where(valid, heights, -np.inf), axis=1)
-    valid &= (high > low)[:, None]
-    return np.asarray(valid, dtype=np.bool_)
 
 
 def _rows_levelled(heights: Floats, valid: Bools) -> Floats:

@@ -145,13 +145,13 @@ def size_of_line(
         If no reading fits, or several do that differ without ``aspect``.
     """
     if aspect is not None:
-        return _size(line, cell, grating, aspect)
+        return _size(line, cell, grating, aspect / line.geometry.part.times)
     span = line.geometry.window[1] - line.geometry.window[0]
     size = _size(line, cell, grating, line.geometry.rows * span / line.geometry.columns)
-    if line.geometry.rows == line.geometry.columns:
+    if round(line.geometry.rows * line.geometry.part.times) == line.geometry.columns:
         return size
     try:
-        other = _size(line, cell, grating, span)
+        other = _size(line, cell, grating, span / line.geometry.part.times)
     except Unphysical:
         return size
     differs = abs(other.nm.value / size.nm.value - 1.0)
@@ -318,7 +318,7 @@ def _strongest_part(line: ImagedWaves, part: int, share: float = _MIN_PART) -> t
     finer, at = model.divided(state, part)
     strength = finer.strengths(at, np.array(spots))
     best = int(np.argmax(strength))
-    pixels = line.geometry.rows * line.geometry.columns * len(model.images)
+    pixels = line.geometry.lines * line.geometry.columns * len(model.images)
     noise = sqrt(2.0 * state.cost / pixels) * sqrt(2.0 * len(model.images) / pixels)
     least = max(share * float(np.max(line.amplitudes)), _MIN_PART_ERRORS * noise)
     return tuple(spots[best]) if strength[best] > least else None

@@ -7,8 +7,9 @@ from scipy.optimize import least_squares
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.images.missing import completed
 from tablegen.images.pair_checks import ALIASING_HINT, check_heights, check_lines, check_pair
-from tablegen.images.periodic_model import BASES, LAG, Columns, FitState, Geometry, PeriodicModel, settle
+from tablegen.images.periodic_model import BASES, LAG, Columns, FitState, FramePart, Geometry, PeriodicModel, settle
 from tablegen.images.spots import Bend, Spot, bend_of, column_phase, row_polynomial, second_base, strongest
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
@@ -32,7 +33,7 @@ def prepare_heights(
     Parameters
     ----------
     trace, retrace
-        Heights in any unit, shape (rows, columns) each; no retrace is None.
+        Heights in any unit, shape (rows, columns) each, NaN where a pixel is missing; no retrace is None.
     turn
         Share of the period in which the drive rises.
     window
@@ -44,12 +45,13 @@ def prepare_heights(
     -------
     tuple
         The geometry, and the heights of the trace and of the retrace if there is one, dimensionless, each of shape
-        (rows, columns).
+        (rows, columns). Missing rows at either end are left out; others have the weight 0, and heights of 0.
 
     Raises
     ------
     Unphysical
-        If an image has too few pixels or no contrast, or the turn, the window or the delay is out of range.
+        If an image has too few pixels, too few with data, or no contrast, or the turn, the window or the delay is out
+        of range.
     """
     if retrace is None:
         check_heights("trace", trace)
@@ -61,16 +63,19 @@ def prepare_heights(
         raise Unphysical(f"a window of {window[0]:g}..{window[1]:g} is not a large part of the sweep, 0..1")
     if not abs(delay) <= _MAX_DELAY * trace.shape[1]:
         raise Unphysical(f"a delay of {delay:g} pixels is too large for a line of {trace.shape[1]}")
-    geometry = Geometry(trace.shape[0], trace.shape[1], turn, window, delay)
+    whole = completed([trace] if retrace is None else [trace, retrace])
+    count, first = whole.heights[0].shape[0], whole.rows.start
+    geometry = Geometry(
+        count, trace.shape[1], turn, window, delay, whole.weight, FramePart(first, trace.shape[0] / count)
+    )
+    there = np.arange(count) if whole.weight is None else np.flatnonzero(whole.weight)
     images = []
-    for name, image in (("trace", trace), ("retrace", retrace)):
-        if image is None:
-            continue
+    for name, image in zip(("trace", "retrace"), whole.heights, strict=False):
         image = image - np.mean(image)
         largest = float(np.max(np.abs(image)))
         level = np.asarray(geometry.levelled(image), dtype=np.float64)
-        check_lines(name, level, largest)
-        images.append(level)
+        check_lines(name, level[there], largest, there + first)
+        images.append(geometry.weighted(level))
     spread = sqrt(sum(float(np.var(image)) for image in images) / len(images))
     return geometry, [image / spread for image in images]
 
@@ -346,9 +351,9 @@ def with_spots(model: PeriodicModel, state: FitState, highest: int | None = None
     if not len(spots) or room < 1:
         return model
     strength = model.strengths(state, spots)
-    noise = sqrt(2.0 * state.cost / (geometry.rows * geometry.columns * len(model.images)))
+    noise = sqrt(2.0 * state.cost / (geometry.lines * geometry.columns * len(model.images)))
     least = max(
-        _MIN_SPOT_ERRORS * noise / sqrt(geometry.rows * geometry.columns),
+        _MIN_SPOT_ERRORS * noise / sqrt(geometry.lines * geometry.columns),
         _MIN_SPOT_AMPLITUDE * float(np.max(np.abs(state.amplitudes))),
     )
     best = [i for i in np.argsort(-strength)[:room] if strength[i] > least]

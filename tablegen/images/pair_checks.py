@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.numerics.arrays import Floats
+from tablegen.images.missing import valid_pixels
+from tablegen.numerics.arrays import Floats, Ints
 
 MIN_PIXELS = 32  # rows and columns
 MIN_PERIODS = 3.0  # in the line
@@ -49,7 +50,7 @@ def check_pair(trace: Floats, retrace: Floats) -> None:
         raise Unphysical(f"trace and retrace have {sizes} pixels; both must be from one scan")
     for name, image in (("trace", trace), ("retrace", retrace)):
         check_heights(name, image)
-    if np.array_equal(trace, retrace) or np.array_equal(trace, retrace[:, ::-1]):
+    if any(np.array_equal(trace, one, equal_nan=True) for one in (retrace, retrace[:, ::-1])):
         raise Unphysical(
             "trace and retrace are the same image; both directions are needed, since the scanner file has a branch for "
             "each"
@@ -57,14 +58,14 @@ def check_pair(trace: Floats, retrace: Floats) -> None:
 
 
 def check_heights(name: str, image: Floats) -> None:
-    """Check an image: enough rows and columns, finite heights, contrast, no saturation at the end of a range.
+    """Check an image: enough rows and columns, contrast, no saturation at the end of a range.
 
     Parameters
     ----------
     name
         Name of the image in a message.
     image
-        Heights in any unit, shape (rows, columns).
+        Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
 
     Raises
     ------
@@ -73,12 +74,16 @@ def check_heights(name: str, image: Floats) -> None:
     """
     if image.ndim != 2 or min(image.shape) < MIN_PIXELS:
         raise Unphysical(f"{' x '.join(map(str, image.shape))} pixels are too few; {MIN_PIXELS} rows and columns do")
-    if not np.all(np.isfinite(image)):
-        raise Unphysical(f"the {name} has {int(np.sum(~np.isfinite(image)))} pixels that are not numbers; crop it")
-    low, high = float(np.min(image)), float(np.max(image))
+    there = image[np.isfinite(image)]
+    if not len(there):
+        raise Unphysical(f"the {name} has no pixel with a height; was a different channel saved?")
+    low, high = float(np.min(there)), float(np.max(there))
     if not high > low:
         raise Unphysical(f"the {name} has no contrast: all its pixels are {low:g}; was a different channel saved?")
-    moving = image[np.ptp(image, axis=1) > 0.0]  # lines of a scan that was stopped are another matter
+    moving = image[valid_pixels(image)]  # lines of a scan that was stopped are another matter
+    if not len(moving):
+        raise Unphysical(f"the {name} has no contrast along its lines")
+    low, high = float(np.min(moving)), float(np.max(moving))
     step = _CLIPPED_STEP * (high - low)
     for limit, inward in ((low, 1.0), (high, -1.0)):
         at = int(np.sum(moving == limit))
@@ -91,7 +96,7 @@ def check_heights(name: str, image: Floats) -> None:
             )
 
 
-def check_lines(name: str, level: Floats, largest: float) -> None:
+def check_lines(name: str, level: Floats, largest: float, rows: Ints | None = None) -> None:
     """Check that levelled lines have contrast, and all about as much.
 
     Parameters
@@ -102,6 +107,8 @@ def check_lines(name: str, level: Floats, largest: float) -> None:
         Levelled heights, shape (rows, columns).
     largest
         Largest height before levelling, in the unit of ``level``.
+    rows
+        Numbers of the rows in the image, counted from 0; all of them by default.
 
     Raises
     ------
@@ -110,16 +117,19 @@ def check_lines(name: str, level: Floats, largest: float) -> None:
     """
     if not np.max(np.abs(level)) > 1e-12 * largest:
         raise Unphysical(f"the {name} has no contrast along its lines")
+    numbers = np.arange(len(level)) + 1 if rows is None else rows + 1
     power = np.sum(level**2, axis=1)
     flat = np.flatnonzero(power <= _FLAT * np.max(power))
     if len(flat) > _MANY_FLAT * len(power):
         raise Unphysical(
-            f"{len(flat)} rows of the {name}, from {flat[0] + 1} to {flat[-1] + 1}, have no contrast, as of a scan "
-            f"that was stopped; crop both images"
+            f"{len(flat)} rows of the {name}, from {numbers[flat[0]]} to {numbers[flat[-1]]}, have no contrast, as of "
+            f"a scan that was stopped; crop both images"
         )
     loud = np.flatnonzero(power > _MAX_LINE_POWER * np.median(power))
     if np.sum(power[loud]) > 0.5 * np.sum(power):
-        raise Unphysical(f"rows {loud[0] + 1} to {loud[-1] + 1} have most of the {name}'s contrast; crop them")
+        raise Unphysical(
+            f"rows {numbers[loud[0]]} to {numbers[loud[-1]]} have most of the {name}'s contrast; crop them"
+        )
 
 
 def check_periods(periods: float, span: float, columns: int) -> None:

@@ -1,5 +1,6 @@
 """Fit both branches of the model to one trace and one retrace image of a periodic sample."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
 
@@ -11,10 +12,12 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Curve, Estimate
 from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measured_branch
 from tablegen.images.cell_start import fit_sample_spots
+from tablegen.images.missing import completed
 from tablegen.images.model_start import check_signs, prepare_heights
 from tablegen.images.pair_checks import MIN_PERIODS
-from tablegen.images.periodic_model import FitState, PeriodicModel
+from tablegen.images.periodic_model import FitState, Geometry, PeriodicModel
 from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
+from tablegen.images.stepless_fit import Fit, fit_without_steps, have_terraces
 from tablegen.numerics.arrays import Bools, Floats
 
 _MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
@@ -78,9 +81,35 @@ def fit_pair(
     if retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepare_heights(trace, retrace, turn, window, delay_pixels)
-    model, state, free, _ = fit_sample_spots(geometry, heights, retrace_mirrored, trace, retrace, sizes=False)
-    check_fit(model, state, free)
+
+    def fit(level: list[Floats]) -> Fit:
+        return fit_sample_spots(geometry, level, retrace_mirrored, trace, retrace, sizes=False)[:3]
+
+    reason: Unphysical | None = None
+    try:
+        model, state, free = fit(heights)
+        check_fit(model, state, free)
+    except Unphysical as refused:
+        reason = refused
+    stepless = None if reason is None and model.bases < 2 else _stepless(geometry, trace, retrace, fit)
+    if stepless is not None:
+        model, state, free = stepless
+    elif reason is not None:
+        raise reason
     return _result(model, state, free, v_scan)
+
+
+def _stepless(geometry: Geometry, trace: Floats, retrace: Floats, fit: Callable[[list[Floats]], Fit]) -> Fit | None:
+    """Fit a lattice beside the steps of terraces; None if there are none, or no such fit. Bars would pass for steps."""
+    recorded = completed([trace, retrace]).heights
+    if not have_terraces(recorded):
+        return None
+    try:
+        best = fit_without_steps(geometry, recorded, fit)
+        check_fit(best.model, best.state, best.free)
+    except Unphysical:
+        return None
+    return (best.model, best.state, best.free) if best.stepped and best.model.bases == 2 else None
 
 
 def _carrying(model: PeriodicModel, state: FitState) -> float:
@@ -149,7 +178,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
     return ImageFit(
         turn=Estimate(geometry.turn),
         v_scan=v_scan,
-        samples=2 * geometry.rows * geometry.columns,
+        samples=2 * geometry.lines * geometry.columns,
         forward=forward,
         backward=backward,
         noise_percent=100.0 * noise / float(np.ptp(modelled)),
@@ -163,7 +192,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
         explained=1.0 - 2.0 * state.cost / sum(float(np.vdot(image, image)) for _, image in model.images),
         registration_percent=100.0 * float(distance[np.argmax(np.abs(distance))]),
         widened=sqrt(widened),
-        strays=loud_rows(state),
+        strays=loud_rows(model.geometry, state),
     )
 
 

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.images.missing import Number, interpolated_rows
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 Complexes = npt.NDArray[np.complex128]
@@ -29,11 +30,20 @@ _ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
 _MAX_STEPS = 100
 
 
+@dataclass(frozen=True)
+class FramePart:
+    """The part of a frame whose other rows are missing: its first row, and all rows of the frame over its own."""
+
+    first_row: int = 0
+    times: float = 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Geometry:
     """Layout of the images: rows and columns, the turn, the window of each sweep that the columns span.
 
-    Columns show the sample ``delay`` columns late.
+    Columns show the sample ``delay`` columns late. ``row_weight`` is 0 for a missing row and 1 for others, shape
+    (rows,); None if none is missing. ``part`` says which rows of the frame these are.
     """
 
     rows: int
@@ -41,6 +51,21 @@ class Geometry:
     turn: float = 0.5
     window: tuple[float, float] = (0.0, 1.0)
     delay: float = 0.0
+    row_weight: Floats | None = None
+    part: FramePart = FramePart()
+
+    @property
+    def lines(self) -> int:
+        """The number of rows with data."""
+        return self.rows if self.row_weight is None else int(np.sum(self.row_weight))
+
+    def weighted(self, heights: Floats) -> Floats:
+        """Return heights, shape (rows, columns), with 0 in missing rows."""
+        return heights if self.row_weight is None else heights * self.row_weight[:, None]
+
+    def bridged(self, values: npt.NDArray[Number]) -> npt.NDArray[Number]:
+        """Interpolate values of the rows, shape (rows, n), over missing rows."""
+        return values if self.row_weight is None else interpolated_rows(values, self.row_weight > 0.0)
 
     @cached_property
     def place(self) -> Floats:
@@ -297,14 +322,14 @@ class PeriodicModel:
         return PeriodicModel(self.geometry, images, spots, self.order, self.off, self.ripples, self.row_off)
 
     def periodic_parts(self, state: FitState) -> list[Floats]:
-        """Return the periodic part of each image without levelling.
+        """Return the periodic part of each image without levelling, in missing rows too.
 
         Returns
         -------
         list of Floats
             In heights, shape (rows, columns) each.
         """
-        rows = self._rows(state.parameters)[0]
+        rows = self._every_row(state.parameters)[0]
         return [
             np.real((rows.T * state.amplitudes) @ self._waves(state.parameters, forward)) for forward, _ in self.images
         ]
@@ -327,7 +352,7 @@ class PeriodicModel:
         waves = np.zeros((len(spots), self.geometry.rows), dtype=np.complex128)
         for forward, heights in self.images:
             waves += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
-        return waves
+        return self.geometry.bridged(waves.T).T
 
     def phase_slopes(self, state: FitState) -> list[Floats]:
         """Return the derivative of each image by the phase of each base vector.
@@ -375,6 +400,11 @@ class PeriodicModel:
         return scores
 
     def _rows(self, parameters: Floats) -> Complexes:
+        """Return each spot's row part, times the powers of y, 0 in missing rows: (order + 1, spots, rows)."""
+        rows = self._every_row(parameters)
+        return rows if self.geometry.row_weight is None else rows * self.geometry.row_weight
+
+    def _every_row(self, parameters: Floats) -> Complexes:
         """Return each spot's row part, times the powers of y: (order + 1, spots, rows)."""
         phase = self.spots @ (self.s(parameters) @ self.y_powers[1:] + self.row_off)
         rows: Complexes = self.y_powers[:, None, :] * np.exp(2j * pi * phase)
@@ -458,8 +488,8 @@ class PeriodicModel:
         for (forward, _), residual in zip(self.images, state.residuals, strict=True):
             column = other._columns(state.parameters, forward)[0]
             total += np.sum(np.conj(row) * (np.conj(column) @ residual.T), axis=1)
-            power += np.sum(np.abs(column) ** 2, axis=1) * self.geometry.rows
-        pixels = self.geometry.rows * self.geometry.columns * len(self.images)
+            power += np.sum(np.abs(column) ** 2, axis=1) * self.geometry.lines
+        pixels = self.geometry.lines * self.geometry.columns * len(self.images)
         amplitudes: Floats = 2.0 * np.abs(total) / np.sqrt(np.maximum(power, 1e-6 * pixels) * pixels)
         return amplitudes
 

@@ -9,6 +9,7 @@ from tablegen.fitting.measured_branch import BINS
 from tablegen.images.periodic_model import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
+_NO_WEIGHT = 1e-150
 _ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
 
 
@@ -16,6 +17,7 @@ _ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
 class BinnedResidual:
     """Position error of the model in each twentieth of the columns, as a share of the line, and its standard error.
 
+    The error is infinite where no row has data.
     ``place`` is the bin of each column; ``clean`` the residual of the image without that error.
     """
 
@@ -41,7 +43,8 @@ class BinnedResidual:
         weight = np.maximum(np.sum(weights, axis=1), 1e-300)
         off = np.sum(products, axis=1) / weight
         spread = np.sum((products - off[:, None] * weights) ** 2, axis=1)
-        error = np.sqrt(spread / weight**2 + _ARITHMETIC_ERROR**2)
+        empty = weight <= _NO_WEIGHT  # of missing rows
+        error = np.where(empty, np.inf, np.sqrt(spread / np.where(empty, 1.0, weight) ** 2 + _ARITHMETIC_ERROR**2))
         return cls(place, off, error, residual - steep * off[place])
 
 
@@ -71,7 +74,7 @@ def covariance(
     inverse = np.linalg.pinv(state.hessian[np.ix_(joint, joint)], rcond=1e-13, hermitian=True)
     count = int(np.sum(free))
     influence = (model.scores_of(state, clean)[:, joint] @ inverse)[:, :count]
-    lines = len(influence)
+    lines = model.geometry.lines
     watched_influence = influence[:, watched[free]]
     widened = max(
         correlation_length(watched_influence / np.maximum(np.sqrt(np.mean(watched_influence**2, axis=0)), 1e-300)),
@@ -83,12 +86,14 @@ def covariance(
     return whole, widened
 
 
-def loud_rows(state: FitState) -> tuple[int, ...]:
-    """Return the rows, counted from 0, whose residuals are far larger than those of the others."""
+def loud_rows(geometry: Geometry, state: FitState) -> tuple[int, ...]:
+    """Return the rows of the frame, counted from 0, whose residuals are far larger than those of the others."""
     power = np.sqrt(np.mean(np.stack(state.residuals) ** 2, axis=(0, 2)))
-    middle = float(np.median(power))
-    spread = 1.4826 * float(np.median(np.abs(power - middle)))
-    return tuple(np.flatnonzero(power > middle + max(8.0 * spread, 0.5 * middle)).tolist())
+    there = power[power > 0.0]  # missing rows have no residual
+    middle = float(np.median(there))
+    spread = 1.4826 * float(np.median(np.abs(there - middle)))
+    loud = np.flatnonzero(power > middle + max(8.0 * spread, 0.5 * middle))
+    return tuple((loud + geometry.part.first_row).tolist())
 
 
 def pixel_noise(state: FitState) -> float:

@@ -156,6 +156,7 @@ def row_polynomial(
     """
     tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(True)))
     wave = (heights @ np.exp(-2j * np.pi * bend.q * tau)) * np.exp(-2j * np.pi * spot.s * geometry.y)
+    wave = geometry.bridged(wave[:, None])[:, 0]
     box = np.ones(max(round(smoothed * geometry.rows), 1) | 1)
     smooth = np.convolve(np.convolve(wave, box, "same"), box, "same")
     phase = np.unwrap(np.angle(smooth)) / (2.0 * np.pi)

@@ -27,6 +27,7 @@ _PACE_ORDER = 5  # order of the polynomial in the rows from which the growth of 
 _CHUNK_VALUES = 1 << 22  # values of the derivatives that are evaluated at a time
 _LOUD_ROWS = 3.0  # times the median rms residual of a row; rows above it weigh less
 _RCOND = 1e-11
+_MISSING_WEIGHT = 1e-6  # of a missing row's phase, where others have 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ class FreeRows:
             If the fit does not converge.
         """
         state = start
-        weights = np.ones(self.geometry.rows)
+        weights = self._row_weight()
         cost = self._cost(state, weights)
         for step in range(_MAX_STEPS):
             solved, moves = self._solved(state, weights)
@@ -136,6 +137,14 @@ class FreeRows:
         else:
             raise Unphysical("the fit does not converge; is the sample periodic, and are the images from one scan?")
         return self._result(state, weights)
+
+    def _row_weight(self) -> Floats:
+        weight = self.geometry.row_weight
+        return np.ones(self.geometry.rows) if weight is None else weight.copy()
+
+    def _certainty(self) -> Floats:
+        """Return 1, and next to nothing for a missing row, whose phase is that of its neighbours."""
+        return np.maximum(self._row_weight(), _MISSING_WEIGHT)
 
     def positions(self, state: FreeRowsState) -> Floats:
         """Return the position of all columns, trace then retrace.
@@ -244,12 +253,12 @@ class FreeRows:
             modes=state.modes + applied[:modes],
             q=state.q + applied[modes : modes + waves],
             amplitudes=state.amplitudes + a[:spots] + 1j * a[spots:],
-            rows=state.rows + size * rows(step),
+            rows=self.geometry.bridged(state.rows + size * rows(step)),
         )
 
     def _left(self, state: FreeRowsState) -> Floats:
         pace = self._pace(state.rows)
-        return self.heights - self._drawn(state, slice(None), pace)
+        return self.geometry.weighted(self.heights - self._drawn(state, slice(None), pace))
 
     def _cost(self, state: FreeRowsState, weights: Floats) -> float:
         return float(weights @ np.sum(self._left(state) ** 2, axis=1))
@@ -257,11 +266,12 @@ class FreeRows:
     def _weights(self, state: FreeRowsState) -> Floats:
         """Return 1, and less where a row has a far larger residual than the others."""
         power = np.sqrt(np.mean(self._left(state) ** 2, axis=1))
-        usual = _LOUD_ROWS * float(np.median(power))
+        there = self._row_weight()
+        usual = _LOUD_ROWS * float(np.median(power[there > 0.0]))
         weights: Floats = (
             np.minimum(1.0, (usual / np.maximum(power, 1e-300)) ** 2) if usual > 0.0 else np.ones(len(power))
         )
-        return weights
+        return weights * there
 
     def _result(self, state: FreeRowsState, weights: Floats) -> FreeRowsFit:
         count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 2,) * 2)
@@ -291,11 +301,11 @@ class FreeRows:
         return FreeRowsFit(
             state=state,
             covariance=covariance,
-            phases=RowPhases(state.rows, noise * np.concatenate(inverses)),
+            phases=RowPhases(state.rows, noise * np.concatenate(inverses) / self._certainty()[:, None, None]),
             lags=(first, second),
             residuals=(both[0], both[1]),
             explained=(explained[0], explained[1]),
-            loud=tuple(np.flatnonzero(weights < 1.0).tolist()),
+            loud=tuple((np.flatnonzero((weights < 1.0) & (weights > 0.0)) + self.geometry.part.first_row).tolist()),
         )
 
 

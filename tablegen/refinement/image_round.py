@@ -16,6 +16,7 @@ from tablegen.images.line_length import Cell, size_of_line
 from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.refinement.free_rows import FreeRowsFit
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.lattice_start import SampleCell
 from tablegen.refinement.learning import LayerUpdate, learn
@@ -34,6 +35,7 @@ from tablegen.refinement.window_line import WindowLine, averaged
 
 _MIN_EXPLAINED = 0.03  # share of the variance of an image
 _LITTLE_EXPLAINED = 0.5
+_MOST_UNEXPLAINED = 0.12  # share of the variance of an image, with the periods of the sample
 _SURE_LAG = 0.2  # standard error below which the order of time is determined
 _FAR_APART = 0.35  # periods
 _SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: a larger size error gets a remark
@@ -158,8 +160,20 @@ def _check(frame: LatticeLine) -> None:
             f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
             f"else, or trace and retrace are not of one scan"
         )
-    if len(fit.state.q) < 2 or not frame.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
+    if len(fit.state.q) < 2:
         return
+    if frame.rows_model.moves and max(error for _, error in fit.lags) <= _SURE_LAG:
+        _check_order(fit)
+    if (rest := max(frame.unexplained)) > _MOST_UNEXPLAINED:
+        raise Unphysical(
+            f"trace and retrace show the waves of the lattice at different places: {100.0 * rest:.0f} % of the "
+            f"contrast has their periods and is not explained, as where both are a period of the sample apart; if one "
+            f"was cropped, do not; else calibrate first, or take a sample of a longer period"
+        )
+
+
+def _check_order(fit: FreeRowsFit) -> None:
+    """Check that rows and columns are in the order of time, by the phases of two waves."""
     between, along = (lag < 0.0 for lag, _ in fit.lags)
     if between or along:
         what = {

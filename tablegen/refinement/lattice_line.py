@@ -21,6 +21,7 @@ _MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
 _LEAST_DEGREES = 4
 _FAR_APART = 0.5  # periods
 _STRONG = 0.5  # of the largest amplitude
+_LEAST_SIZE = 1e-3  # of the largest singular value: waves that others contain
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,21 @@ class LatticeLine:
         Magnitudes, for heights of unit variance, shape (spots,).
         """
         return np.abs(self.fit.state.amplitudes)
+
+    @property
+    def unexplained(self) -> tuple[float, float]:
+        """Share of each image's variance that has the periods of the spots along the line, and is not explained."""
+        geometry = self.geometry
+        phase = 2.0 * np.pi * (self.start.spots @ self.fit.state.q)[:, None] * geometry.place
+        waves = np.asarray(geometry.levelled(np.concatenate([np.cos(phase), np.sin(phase)])), dtype=np.float64)
+        left, sizes, _ = np.linalg.svd(waves.T, full_matrices=False)
+        basis = left[:, sizes > _LEAST_SIZE * sizes[0]]
+        by_noise = basis.shape[1] / geometry.columns
+        shares = []
+        for image, residual in zip(np.split(self.rows_model.heights, 2, axis=1), self.fit.residuals, strict=True):
+            noise = float(np.sum((residual - (residual @ basis) @ basis.T) ** 2)) / (1.0 - by_noise)
+            shares.append((float(np.sum((residual @ basis) ** 2)) - by_noise * noise) / float(np.sum(image**2)))
+        return shares[0], shares[1]
 
     @property
     def waves(self) -> Floats:

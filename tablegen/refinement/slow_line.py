@@ -33,6 +33,12 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
     """
     line, schedule = plan.y, plan.schedule
     rows, q = frames[0].geometry.rows, frames[0].fit.state.q
+    part = frames[0].geometry.part
+    if part.times > 1.0:
+        raise Unphysical(
+            f"rows {part.first_row + 1} to {part.first_row + rows} have data, of {round(rows * part.times)} in the "
+            f"image; y is learnt from the whole frame: scan it to its end"
+        )
     if rows != schedule.up.count:
         raise Unphysical(
             f"the images have {rows} rows, and this scan images {schedule.up.count} lines of a frame; y is learnt from "

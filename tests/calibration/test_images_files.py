@@ -133,7 +133,12 @@ def test_channels_by_title_and_by_number(tmp_path: Path) -> None:
         ("a.npy", b"\x93NUMPY\x01\x00\xff\xff" + b"{" * 100, "is not a complete .npy file of numbers"),
         ("a.npy", npy(HEIGHTS.reshape(-1)), "has the shape 1920; rows x columns are needed"),
         ("a.npy", npy(HEIGHTS[:20]), "has 20 x 48 pixels; at least 32 x 32"),
-        ("a.npy", npy(np.where(HEIGHTS > 4.9, np.nan, HEIGHTS)), "pixels are not finite; crop or interpolate them"),
+        (
+            "a.npy",
+            npy(np.where(HEIGHTS > 4.9, np.inf, HEIGHTS)),
+            "pixels are infinite; if they are missing, save them as NaN",
+        ),
+        ("a.npy", npy(np.full((40, 48), np.nan)), "all pixels are NaN; was a different channel saved?"),
         ("a.npy", npy(np.full((40, 48), 7.0)), "all pixels are 7; was a different channel saved?"),
         ("a.png", png(STEPS)[:-30], "is not a complete PNG file"),
         ("a.png", b"GIF89a" + bytes(100), "is not a complete PNG file"),

@@ -5,7 +5,7 @@ import pytest
 from calibrating import AMPLITUDES, V_MAX, Sample, Scanner, grating, grown, lattice
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lattice_images import SitesOnTerrace
+from lattice_images import OnTerraces, SitesOnTerrace
 from replacing import replace
 
 from tablegen.base.input_errors import Unphysical
@@ -303,7 +303,7 @@ def test_a_count_that_the_window_leaves_open_is_refused() -> None:
     [
         ({"retrace": np.zeros((256, 128))}, "trace and retrace have 256 x 256 and 256 x 128 pixels"),
         ({"trace": np.zeros((256, 20)), "retrace": np.zeros((256, 20))}, "256 x 20 pixels are too few"),
-        ({"trace": np.full((256, 256), np.nan)}, "the trace has 65536 pixels that are not numbers"),
+        ({"trace": np.full((256, 256), np.nan)}, "the trace has no pixel with a height"),
         ({"v_scan": 120.0}, "a scan of 120 V is outside the driver's 0..100 V"),
     ],
 )
@@ -347,3 +347,20 @@ def test_loud_lines_are_named() -> None:
     assert any("3 lines differ from the others (row 101, 102, 103); they were used" in text for text in fit.remarks)
     loud[100:103] *= 30.0
     assert "rows 101 to 103 have most of the trace's contrast; crop them" in refused(loud, images.retrace)
+
+
+@pytest.mark.parametrize("angle", [-8.0, 5.0, 14.0])
+def test_steps_of_terraces_are_removed(angle: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three steps of six times the amplitude of the strongest wave."""
+    images = pair(OnTerraces(lattice(9.3, 11.0), 6.0, angle), 0.02, seed=3)
+    fit = fitted(images)
+    assert fit.explained > 0.8
+    assert max(map(abs, distances(fit))) < 4.0
+    assert max(abs(one - truth) for one, truth in zip(shapes(fit), FULL, strict=True)) < 0.005
+    monkeypatch.setattr("tablegen.images.pair_fit.have_terraces", lambda _: False)
+    try:
+        before = fitted(images)
+    except Unphysical:
+        return
+    assert before.explained < 0.5
+    assert before.forward.beta.standard_error > 3.0 * fit.forward.beta.standard_error

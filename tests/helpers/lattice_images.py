@@ -1,6 +1,7 @@
 """Images with and without a lattice, from physics: three sites a cell, terraces, rows that jump, drift, noise."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -70,6 +71,32 @@ class SitesOnTerrace:
             away = at - site
             heights += np.exp(-np.sum(((away - np.round(away)) @ cell) ** 2, axis=-1) / (2.0 * (0.09 * side) ** 2))
         return heights
+
+
+@dataclass(frozen=True, eq=False)
+class OnTerraces:
+    """A sample for ``calibrating.Scanner``, in lines of 100 V, on four terraces with steps of this height."""
+
+    sample: "Heights"
+    step: float
+    angle: float
+    pixels: int = 128
+    lines: int = 96
+    window: tuple[float, float] = (0.0, 1.0)
+    lag: float = 1.0
+    drift: float = 0.0
+
+    def height(self, x: Floats, y: Floats) -> Floats:
+        """At x and y in lines."""
+        along = x + np.tan(np.radians(self.angle)) * y
+        return self.sample.height(x, y) + self.step * np.sum([along > at for at in (0.2, 0.45, 0.75)], axis=0)
+
+
+class Heights(Protocol):
+    """A surface."""
+
+    def height(self, x: Floats, y: Floats) -> Floats:
+        """At x and y in lines."""
 
 
 def weak_lowest(pitch: float, times: float, turned: float, share: float) -> Surface:

@@ -268,6 +268,13 @@ def test_half_a_period_between_the_images_is_refused(setup: Setup, bars: Pair) -
         refine_images(setup, "x", [(bars[0], np.roll(bars[1], 6, axis=1))], Options())
 
 
+@pytest.mark.parametrize("columns", [5, 15])
+def test_a_lattice_folded_onto_the_next_period_is_refused(setup: Setup, lattice: Pair, columns: int) -> None:
+    """One wave folds onto the next period; the other one does not. The layer was wrong, with status 0."""
+    with pytest.raises(Unphysical, match=r"at different places: \d\d % of the contrast has their periods"):
+        refine_images(setup, "x", [(lattice[0], np.roll(lattice[1], columns, axis=1))], Options())
+
+
 @pytest.mark.parametrize(
     ("periods", "message"),
     [

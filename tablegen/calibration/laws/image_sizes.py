@@ -14,6 +14,7 @@ from tablegen.fitting.estimate import ImageSize, LineSize
 from tablegen.images.cell_start import strong_index
 from tablegen.images.fast_axis_line import ImageLine, fit_line, shows_turns
 from tablegen.images.line_length import ASPECT_ERROR, DRIFT_ERROR, Cell, Grating, size_of_line
+from tablegen.images.missing import missing_text
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 
@@ -105,6 +106,8 @@ def sizes_of(
                 100.0 * gap,
             )
         )
+        if lacking := missing_text([one for one in (image.trace, image.retrace) if one is not None]):
+            remarks.append(Remark(lacking).under(image.name))
         remarks += [text.under(image.name) for text in _remarks(line, size)]
     for one, other in combinations(images, 2):
         if one.trace.shape == other.trace.shape and np.array_equal(one.trace, other.trace):

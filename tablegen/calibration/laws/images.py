@@ -12,6 +12,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.base.warnings import Remark, spoils
 from tablegen.calibration.laws.hysteresis import TYPICAL_RHO, HysteresisFit, combined
+from tablegen.images.missing import missing_text
 from tablegen.images.pair_fit import ImageFit, fit_pair
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
@@ -62,6 +63,8 @@ def fit_images(
         except Unphysical as reason:
             raise Unphysical(f"{pair.name}: {reason}" if pair.name else str(reason)) from None
         fits.append(fit)
+        if lacking := missing_text([pair.trace, pair.retrace]):
+            remarks.append(Remark(lacking).under(pair.name))
         remarks += [text.under(pair.name) for text in _remarks(fit)]
     for one, other in combinations(pairs, 2):
         if np.array_equal(one.trace, other.trace) or np.array_equal(one.retrace, other.retrace):
