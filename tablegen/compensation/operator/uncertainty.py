@@ -53,7 +53,7 @@ _SIZE_UNIT = 10.0  # percent, of which the share of a size is; sizes do not foll
 _POWERS = tuple(0.5 * k for k in range(-10, 11))  # logarithms of the variance over that of the median share
 _POWER_SPREAD = 2.0  # their standard deviation before traces at other offsets were left out
 
-_NOISE_LEVEL = (1.0, 0.8, 1.1, 1.0)  # of what remains in the fit: a field takes out a part of a trace's noise
+_NOISE_LEVEL = (1.0, 1.0, 1.1, 1.0)  # of what remains in the fit: a field takes out a part of a trace's noise
 _DEPARTURE_LEVEL = (1.1, 0.7, 1.0, 0.55)
 _LEAST = (0.0, 0.0, 0.0, 0.13)  # percent: sizes are those of laws that were fitted to noisy sizes
 
