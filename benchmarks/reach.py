@@ -124,7 +124,7 @@ def calibrated(plant: ForeignPlant, folder: Path, protocol: Sequence[tuple[float
     calibrate("size", "drive_v,actual_nm", (strokes * V_MAX, sizes), "--write")
     centres = np.linspace(0.1, 0.9, 9)
     lattice = np.array([20.0 / extent(plant, centre, SMALL) for centre in centres]) * noisy(random, len(centres))
-    small = ("--size-v", f"{SMALL * V_MAX:g}", "--write")
+    small = ("--size-v", f"{SMALL * V_MAX:g}", "--write", "--force")
     calibrate("offset", "offset_v,apparent_nm", (centres * V_MAX, lattice * extent(plant, 0.5, SMALL)), *small)
     f = np.geomspace(10.0, 2000.0, 15)
     calibrate("frequency", "frequency_hz,gain", (f, np.abs(plant.crept(f)) * noisy(random, len(f))), "--write")

@@ -61,8 +61,8 @@ def calibrate_operator(
     ----------
     traces : path, mapping of arrays, or a sequence of them
         Settled periods as ``time_s`` in s, ``drive_v`` in V at the piezo, ``displacement_nm`` in nm, (n,) each; six
-        sizes or more at one offset. Where one is no settled period, or there are fewer than three, all are fitted in
-        time: records of any drive.
+        sizes or more at one offset, and two at one on either side. Where one is no settled period, or there are fewer
+        than three, all are fitted in time: records of any drive.
     axis : {"x", "y"}
         Axis that was measured.
     images : sequence of (volts, offset_v, rate_hz, trace) or (volts, offset_v, rate_hz, trace, retrace)

@@ -22,7 +22,7 @@ from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.in_time import OperatorInTime, Start
 from tablegen.compensation.operator.operator import STROKE_REACH, Operator
-from tablegen.compensation.operator.uncertainty import departures
+from tablegen.compensation.operator.uncertainty import possible_errors
 from tablegen.config.load import load_scanner
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
@@ -129,7 +129,7 @@ def predict(
         position = in_time.position(time_s, u, state)
     except Unphysical as reason:
         raise Rejected([Problem(str(scanner), 0, f"{axis}.hysteresis.file", str(reason))]) from None
-    rms, _, _, size = departures(known.operator.lines, stroke, centre)
+    rms, _, _, size = possible_errors(known.operator, stroke, centre)
     extent = float(np.max(position) - np.min(position))
     measured = None
     if against is not None:

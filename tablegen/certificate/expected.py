@@ -6,6 +6,8 @@ earlier: at a stroke of V_scan (w_max - w_min). The piezo's loop is that of this
 the branches that were applied.
 """
 
+from math import hypot
+
 import numpy as np
 from msgspec.structs import replace
 
@@ -38,7 +40,7 @@ def expected_of(line: LinePlan) -> Expectation | None:
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
     """Compute the expectation of the emitted integers: what the converter's steps leave is uncertain too.
 
-    It is added to the uncertainties: nobody knows how steps and departures of the piezo fall together.
+    Steps and departures of the piezo are independent: the squares of their errors add up.
     """
     expected = expected_of(line)
     if expected is None or expected.basis != "traces":
@@ -53,7 +55,10 @@ def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation 
 
 
 def _less_certain(figure: Figure, by: float) -> Figure:
-    return figure if figure.uncertainty is None else replace(figure, uncertainty=figure.uncertainty + by)
+    if figure.uncertainty is None:
+        return figure
+    together = abs(figure.value) + figure.uncertainty
+    return replace(figure, uncertainty=figure.uncertainty + hypot(together, by) - together)
 
 
 def rounding_mismatch(line: LinePlan) -> float | None:

@@ -12,7 +12,7 @@ from tablegen.comparison.quantity import ComparedQuantity, keys_of
 from tablegen.compensation.operator.file import OperatorFile, read_operator
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.uncertainty import departures
+from tablegen.compensation.operator.uncertainty import possible_errors
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 
@@ -86,7 +86,7 @@ def _line(one: ComparedOperator, place: Place, section: str) -> Iterator[Compare
     if loop is None:
         return
     stroke, centre = one.shares(place)
-    rms, _, mismatch, size = (by / _DEVIATIONS for by in departures(one.operator.lines, stroke, centre))
+    rms, _, mismatch, size = (by / _DEVIATIONS for by in possible_errors(one.operator, stroke, centre))
     name = f"{section}line of {place[0]:g} V at {place[1]:g} V"
     yield ComparedQuantity(name, "size", loop.extent_nm, "nm", 0.01 * size * loop.extent_nm)
     both = residuals(loop)

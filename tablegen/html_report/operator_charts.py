@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tablegen.calibration.operator.advice import NextTrace, beyond_reach, expected_rms
+from tablegen.calibration.operator.advice import NextTrace, beyond_reach, possible_rms
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.loop_errors import WINDOW
 from tablegen.calibration.operator.periodic_line import PeriodicLine
@@ -50,17 +50,16 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) ->
 
 
 def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver) -> Chart:
-    """Draw the expected rms residual, where the driver reaches and scans are not refused."""
+    """Draw the rms residual that nine of ten scans stay below, where the driver reaches and scans are not refused."""
     span, ends = driver.span, (driver.v_min, driver.v_max)
     strokes, centres = np.linspace(1.0, 0.02, _GRID), np.linspace(0.0, 1.0, _GRID)
-    points = np.array([(stroke, centre) for stroke in strokes for centre in centres])
-    rms = expected_rms(fit, points).reshape(_GRID, _GRID)
+    rms = possible_rms(fit.operator, strokes[::-1], centres)[::-1]
     trace_centres = np.array([line.centre for line in lines])
     refused = beyond_reach(lines, strokes, centres)
     beyond = 0.5 * strokes[:, None] > np.minimum(centres, 1.0 - centres)
     visible = np.where(refused | beyond, np.nan, rms)
     high = float(np.nanmax(visible)) if np.isfinite(visible).any() else 1.0
-    raster = Raster(visible, ends, (0.02 * span, span), 0.0, high, "heat", "expected rms [% of the line]")
+    raster = Raster(visible, ends, (0.02 * span, span), 0.0, high, "heat", "rms that 90 % stay below [% of the line]")
     curves = (
         DrawnCurve(
             "largest size of the driver",
@@ -85,7 +84,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
     )
     return Chart(
         "expected",
-        "Expected error of other scans; blank: refused",
+        "Possible error of other scans; blank: refused",
         "offset [V]",
         "size [V]",
         curves,

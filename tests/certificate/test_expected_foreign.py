@@ -1,11 +1,12 @@
 """What the certificate expects, and how sure it is, against piezos that the project does not contain: kept aside."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from editing import SCAN, SCANNER, edited, write_pair
-from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record, triangle
+from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, ManyPlays, record, triangle
 
 from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.file_of_fit import operator_file
@@ -43,12 +44,13 @@ def small(plant: ForeignPlant, centre: float) -> float:
     return float(np.ptp(plant.settled(triangle(400, centre, 0.1), 100.0)))
 
 
-def judged(plant: ForeignPlant, folder: Path) -> tuple[Floats, Floats, Floats]:
+def judged(plant: ForeignPlant, protocol: Sequence[tuple[float, float]], folder: Path) -> tuple[Floats, Floats, Floats]:
     """What each scan leaves, the most that its certificate expects, and what traces are missed by; percent."""
+    folder.mkdir()
     centres = np.linspace(0.1, 0.9, 9)
     bent = np.polyfit(2.0 * centres - 1.0, [small(plant, 0.5) / small(plant, centre) for centre in centres], 2)
     low, middle, high = (float(np.polyval(bent, p)) for p in (-1.0, 0.0, 1.0))
-    traces = [Trace(f"{s:g}", *record(plant, c, s, seed=seed)) for seed, (c, s) in enumerate(SIX)]
+    traces = [Trace(f"{s:g}", *record(plant, c, s, seed=seed)) for seed, (c, s) in enumerate(protocol)]
     lines = [periodic_line(trace, 100.0) for trace in traces]
     fit = fit_operator(lines, None, lambda centre: float(np.polyval(bent, 2.0 * centre - 1.0)) / middle)
     (folder / "operator.toml").write_bytes(operator_file(fit, "x", 100.0))
@@ -77,14 +79,20 @@ def judged(plant: ForeignPlant, folder: Path) -> tuple[Floats, Floats, Floats]:
 
 @pytest.mark.rest
 def test_nine_of_ten_scans_leave_less_than_what_is_expected_and_its_uncertainty(tmp_path: Path) -> None:
-    parts = []
-    for kind, plant in PLANTS.items():
-        (tmp_path / kind).mkdir()
-        parts.append(judged(plant, tmp_path / kind))
-    left, most, plain = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    """From traces of the default procedure, at three offsets."""
+    parts = [judged(plant, TEN, tmp_path / kind) for kind, plant in PLANTS.items()]
+    left, most, _ = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     within = np.mean(left <= most, axis=0)
     assert np.all(within >= 0.9), within
-    # It says something: of most scans less than five times as much as is left; sizes may be right by chance.
-    assert np.all(np.median(most[:, :3] / left[:, :3], axis=0) < 5.0)
+    # It says something: of most scans less than three times as much as is left; sizes may be right by chance.
+    assert np.all(np.median(most[:, :3] / left[:, :3], axis=0) < 3.0)
+
+
+@pytest.mark.rest
+def test_it_holds_at_offsets_that_no_trace_showed(tmp_path: Path) -> None:
+    """It cannot be as tight there: that the loop of plays does not change with the offset is not seen at one offset."""
+    left, most, plain = judged(PLANTS["plays"], SIX, tmp_path / "plays")
+    within = np.mean(left <= most, axis=0)
+    assert np.all(within >= 0.9), within
     # What the traces are missed by, wherever the scan is, does not hold that often.
     assert np.min(np.mean(left <= plain, axis=0)) < 0.7

@@ -1,5 +1,8 @@
 """How far an operator may be off: against piezos that depart by a known process, and the laws that it has to obey."""
 
+from itertools import pairwise
+from math import hypot
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,12 +11,23 @@ from replacing import replace
 
 from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.compensation.identification import MeasuredLine
-from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
+from tablegen.compensation.operator.loop import POINTS, Loop
+from tablegen.compensation.operator.uncertainty import (
+    ErrorParts,
+    Figures,
+    LoopShape,
+    PossibleErrors,
+    beside,
+    shape_of,
+    size_uncertainty,
+)
 from tablegen.numerics.arrays import Floats
 
 SIX = tuple((stroke, 0.5) for stroke in (0.1, 0.25, 0.45, 0.65, 0.82, 0.97))
 TEN = (*SIX, (0.25, 0.7), (0.58, 0.7), (0.12, 0.85), (0.28, 0.85))
 NOTHING = (0.0, 0.0, 0.0, 0.0)
+STRAIGHT = LoopShape(0.0, 0.0, 0.0)  # without hysteresis, which does not change with the offset
+BENT = LoopShape(3.0, 30.0, 8.0)
 errors = st.tuples(*(st.floats(0.01, 5.0) for _ in range(4)))
 
 
@@ -26,6 +40,18 @@ def lines(
         )
         for (stroke, centre), one in zip(places, missed, strict=True)
     ]
+
+
+def parts(measured: list[MeasuredLine], stroke: float, centre: float, shape: LoopShape = STRAIGHT) -> ErrorParts:
+    """Of a line, where all loops have one shape."""
+    return PossibleErrors(tuple(measured), (shape,) * len(measured), 0.5).at(stroke, centre, shape)
+
+
+def departures(measured: list[MeasuredLine], stroke: float, centre: float) -> Figures:
+    """Of piezos whose loops do not change with the offset, noise included."""
+    found = parts(measured, stroke, centre)
+    rms, scaling, mismatch, size = (hypot(a, b) for a, b in zip(found.noise, found.departure, strict=True))
+    return rms, scaling, mismatch, size
 
 
 def alike(points: Floats, others: Floats) -> Floats:
@@ -120,17 +146,50 @@ def test_formulas_may_be_wrong_by_a_share_of_what_they_say() -> None:
     assert size_uncertainty(()) == 0.0
 
 
-def test_a_shape_that_no_trace_showed_at_this_offset_may_be_another_one() -> None:
-    """Half a percent of it for each percent of v_max: of a loop of which both branches are bent."""
-    one = [0.0, 0.0, 0.02, *[0.0] * 18]  # 2 % of T_2 up, as much the other way down
-    row = np.array([*one, *(-value for value in one)])
-    x = 0.8 * np.linspace(-1.0, 1.0, 161)
-    bent = 0.02 * (2.0 * x * x - 1.0)
-    rms, scaling, mismatch = shape_uncertainty(row, 0.2)
-    assert rms == pytest.approx(0.1 * 100.0 * float(np.sqrt(np.mean(bent**2))), rel=1e-9)
-    assert mismatch == pytest.approx(0.1 * 100.0 * 2.0 * float(np.max(np.abs(bent))), rel=1e-9)
-    assert scaling == pytest.approx(0.1 * 100.0 * float(np.ptp(np.gradient(bent, x / 2.0))), rel=0.1)
-    assert shape_uncertainty(row, 0.0) == (0.0, 0.0, 0.0)
-    assert shape_uncertainty(np.array([*one, *one]) * 0.0, 0.3) == (0.0, 0.0, 0.0)
-    straight = np.array([0.1, 0.2, *[0.0] * 19] * 2)  # no shape at all: a line
-    assert shape_uncertainty(straight, 0.3) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+def test_a_loop_that_no_trace_showed_at_this_offset_may_be_another_one() -> None:
+    """However well traces at one offset predict each other: the error grows with the loop, and with the way there."""
+    measured = lines(SIX, [(0.01, 0.3, 0.02, 0.05)] * 6)
+    at = [parts(measured, 0.3, centre, BENT).change for centre in (0.5, 0.55, 0.7, 0.85)]
+    assert at[0] == NOTHING
+    assert all(np.all(np.array(far) > np.array(near)) for near, far in pairwise(at))
+    assert at[2][0] > 0.05 * BENT.rms
+    twice = LoopShape(*(2.0 * value for value in BENT))
+    found = parts(measured, 0.3, 0.7, twice).change
+    assert found[:3] == pytest.approx(2.0 * np.array(at[2][:3]), rel=1e-12)
+    assert parts(measured, 0.3, 0.7, STRAIGHT).change[:3] == NOTHING[:3]
+
+
+def test_traces_at_other_offsets_decide_how_much_a_loop_changes() -> None:
+    """They are predicted well, or badly, without themselves; the lines between them follow."""
+    small, large = (0.01, 0.3, 0.02, 0.05), (0.5, 8.0, 1.5, 2.0)
+    one_offset = parts(lines(SIX, [small] * 6), 0.3, 0.78, BENT).together
+    alike_there = parts(lines(TEN, [small] * 10), 0.3, 0.78, BENT).together
+    unlike_there = parts(lines(TEN, [small] * 6 + [large] * 4), 0.3, 0.78, BENT).together
+    assert np.all(3.0 * np.array(alike_there)[:3] < np.array(one_offset)[:3])
+    assert np.all(np.array(unlike_there) > 3.0 * np.array(alike_there))
+
+
+def test_errors_of_other_offsets_do_not_count_where_most_traces_are() -> None:
+    """A trace that is the only one of its kind is predicted badly; that says little of scans at the main offset."""
+    small, large = (0.01, 0.3, 0.02, 0.05), (0.3, 5.0, 1.0, 1.0)
+    ten = parts(lines(TEN, [small] * 6 + [large] * 4), 0.55, 0.5, BENT).together
+    assert np.all(np.array(ten) < 0.3 * np.array(large))
+
+
+def test_the_shape_of_a_loop_is_that_about_its_line() -> None:
+    """Of a loop of which both branches are bent by 2 % of T_2, one up and one down, over 0.1..0.9 of the stroke."""
+    u = np.linspace(0.0, 1.0, POINTS)
+    bend = 0.02 * (2.0 * (2.0 * u - 1.0) ** 2 - 1.0)
+    shape = shape_of(Loop(0.2, 0.6, u + bend, u - bend, 100.0))
+    x = np.linspace(0.1, 0.9, 801)
+    bent = 0.02 * (2.0 * (2.0 * x - 1.0) ** 2 - 1.0)
+    assert shape.rms == pytest.approx(100.0 * float(np.sqrt(np.mean(bent**2))), rel=1e-2)
+    assert shape.mismatch == pytest.approx(200.0 * float(np.max(np.abs(bent))), rel=1e-2)
+    assert shape.scaling == pytest.approx(100.0 * float(np.ptp(np.gradient(bent, x))), rel=0.1)
+    assert shape_of(Loop(0.2, 0.6, u, u, 100.0)) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+@given(st.floats(-5.0, 5.0), st.floats(0.0, 5.0))
+def test_independent_errors_add_by_their_squares(value: float, error: float) -> None:
+    assert abs(value) + beside(value, error) == pytest.approx(hypot(value, error), rel=1e-12, abs=1e-12)
+    assert beside(value, 0.0) == 0.0

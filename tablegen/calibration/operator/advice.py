@@ -12,7 +12,8 @@ from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.field import covariance
-from tablegen.compensation.operator.operator import STROKE_REACH
+from tablegen.compensation.operator.operator import STROKE_REACH, Operator
+from tablegen.compensation.operator.uncertainty import possible_errors
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.numerics.driver import Driver
 
@@ -20,7 +21,7 @@ _STROKES = np.arange(0.1, 1.0, 0.05)
 _CENTRES = np.arange(0.1, 0.91, 0.05)
 _JITTER = 1e-5  # relative variance that every trace leaves
 _NOISE = 1e-4  # relative variance that the next trace leaves: a slope from two near points is not worth much
-_LEAST_RMS = 1e-4  # percent
+_COARSE = 31  # points of a map each way, between which the error is interpolated
 _DECADE = 8.0  # ratio of rates that separates creep from hysteresis
 
 _Line = PeriodicLine | MeasuredLine
@@ -123,27 +124,30 @@ def beyond_reach(lines: Sequence[_Line], strokes: Floats, centres: Floats) -> Bo
     return out
 
 
-def expected_rms(fit: OperatorFit, points: Floats) -> Floats:
-    """Return the expected rms residual of lines.
+def possible_rms(operator: Operator, strokes: Floats, centres: Floats) -> Floats:
+    """Return the rms residual that nine of ten lines stay below: that of a build, without the converter's part.
 
-    Without uncertainty it is the residual of the fit; it grows with the uncertainty of the fields there, as much
-    as it does for the lines that were left out.
+    It grows with the distance from the traces, and with that from their offsets.
 
     Parameters
     ----------
-    points
-        Points (stroke, centre), shares of v_max, shape (n, 2).
+    strokes, centres
+        Shares of v_max, ascending, shapes (n,) and (m,).
 
     Returns
     -------
     Floats
-        Residuals in percent of the line, shape (n,).
+        Residuals in percent of the line, shape (n, m).
     """
-    inverse = _inverse(fit)
-    without = np.sqrt(1.0 / np.diag(inverse))  # of each line, by all others
-    scale = np.exp(np.mean([np.log(max(out.rms, _LEAST_RMS)) for out in fit.left_out] - np.log(without)))
-    least = float(np.median([errors.rms for errors in fit.in_fit]))
-    return np.asarray(np.sqrt(least**2 + scale**2 * np.maximum(_unknown(fit, points), 0.0)), dtype=np.float64)
+    coarse = [np.linspace(float(np.min(axis)), float(np.max(axis)), _COARSE) for axis in (strokes, centres)]
+
+    def at(stroke: float, centre: float) -> float:  # beyond the driver's range, that of its edge
+        within = min(max(centre, 0.5 * stroke), 1.0 - 0.5 * stroke)
+        return possible_errors(operator, stroke, within)[0]
+
+    rms = np.array([[at(stroke, centre) for centre in coarse[1].tolist()] for stroke in coarse[0].tolist()])
+    rows = np.stack([np.interp(centres, coarse[1], row) for row in rms])
+    return np.stack([np.interp(strokes, coarse[0], column) for column in rows.T], axis=1)
 
 
 def _inverse(fit: OperatorFit) -> Floats:

@@ -72,9 +72,10 @@ def operator(
     Builds then invert this operator, and `show` prints the errors to expect on the scanner. The laws (1) to (23) stay
     in the scanner file: m of (1) gives the size at offsets without a trace.
 
-    Record three settled periods or more at six sizes, from 10 % of v_max to its full range, all at the offset that you
-    use most. Two sizes at each further offset make scans there as accurate. Each period must have one rise and one
-    fall; shape, rate and turn are free.
+    Record three settled periods or more of ten lines at three offsets: six sizes, from 10 % of v_max to its full range,
+    at the offset that you use most, and two at an offset on either side, a small one and the largest that fits there.
+    Traces at one offset do not show how the piezo's loop changes with it. Each period must have one rise and one fall;
+    shape, rate and turn are free.
 
     \b
     Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
@@ -91,7 +92,7 @@ def operator(
 
     \b
     Examples:
-      tablegen calibrate operator --axis x 10v.csv 25v.csv 50v.csv 75v.csv 97v.csv --scanner scanner.toml --write
+      tablegen calibrate operator --axis x *v_at_*v.csv --scanner scanner.toml --write
     """
     from tablegen.api.calibrate_operator import calibrate_operator
 

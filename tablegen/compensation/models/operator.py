@@ -26,7 +26,7 @@ from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, 
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
-from tablegen.compensation.operator.uncertainty import departures, shape_uncertainty, size_uncertainty
+from tablegen.compensation.operator.uncertainty import beside, possible_errors, size_uncertainty
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
@@ -234,12 +234,20 @@ def _expectation(operator: Operator, solution: LearntWaveform, by: ExpectedError
     errors, beyond = solution.expected, solution.unmeasured
     return Expectation(
         "traces",
-        {side: Figure(errors.rms[i], by.rms[i] + beyond.rms[i]) for i, side in enumerate(SIDES)},
-        {side: Figure(errors.scaling[i], by.scaling[i] + beyond.scaling[i]) for i, side in enumerate(SIDES)},
-        Figure(errors.mismatch, by.mismatch + beyond.mismatch),
-        Figure(errors.size, by.size + beyond.size),
+        {side: _independent(errors.rms[i], by.rms[i], beyond.rms[i]) for i, side in enumerate(SIDES)},
+        {side: _independent(errors.scaling[i], by.scaling[i], beyond.scaling[i]) for i, side in enumerate(SIDES)},
+        _independent(errors.mismatch, by.mismatch, beyond.mismatch),
+        _independent(errors.size, by.size, beyond.size),
         100.0 * operator.distance(solution.stroke, solution.centre),
     )
+
+
+def _independent(value: float, error: float, beyond: float) -> Figure:
+    """Return a figure of a line whose own error and the piezo's departure are two curves that know nothing of another.
+
+    Their squares add up, so that value and uncertainty together are the root of the sum; ``beyond`` is added to it.
+    """
+    return Figure(value, beside(value, error) + beyond)
 
 
 def _check_sense(operator: Operator, request: LineRequest) -> None:
@@ -275,19 +283,12 @@ def _check_reach(operator: Operator, stroke: float, centre: float, driver: Drive
 def _uncertainty(operator: Operator, request: LineRequest, solution: LearntWaveform) -> ExpectedErrors:
     """Return the possible errors besides the waveform's: departures of the piezo from the operator, more for the size.
 
-    The shape of a stroke is that at other offsets, but for the family's part. The size depends on (1) from the nearest
-    offset that was measured, on (23) or creep from the nearest rate, and on the bend of the loop: from a triangle's
-    trace only the bend tells what depends on the mean of the drive, and what on the middle between the turns.
+    The size depends on (23) or creep from the nearest rate too, and on the bend of the loop: from a triangle's trace
+    only the bend tells what depends on the mean of the drive, and what on the middle between the turns.
     """
-    lines = operator.lines
-    rms, scaling, mismatch, size = departures(lines, solution.stroke, solution.centre)
-    away = min(abs(line.centre - solution.centre) for line in lines)
-    others = shape_uncertainty(operator.residual.at(solution.stroke, solution.centre), away)
-    rms, scaling, mismatch = (sqrt(a * a + b * b) for a, b in zip((rms, scaling, mismatch), others, strict=True))
-    here = request.factor_at(solution.mean)
-    offset = min(abs(here / request.factor_at(line.centre) - 1.0) for line in lines)
-    rate = min(abs(_rate_change(operator, request, line.rate_hz)) for line in lines)
-    by = size_uncertainty((offset, rate))
+    rms, scaling, mismatch, size = possible_errors(operator, solution.stroke, solution.centre)
+    rate = min(abs(_rate_change(operator, request, line.rate_hz)) for line in operator.lines)
+    by = size_uncertainty((rate,))
     size = sqrt(size * size + by * by + (100.0 * _BEND_UNKNOWN * solution.grown) ** 2)
     return ExpectedErrors((rms, rms), (scaling, scaling), mismatch, size)
 
