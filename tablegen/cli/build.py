@@ -1,5 +1,6 @@
 """``tablegen build``: write the files of a scan."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,7 +95,7 @@ def build(
     """
     _check_usage(only_check, depfile, depfile_target, plot)
     check_plot(plot)
-    if not only_check and not output.exists():
+    if not only_check and not os.path.exists(output):
         check_place(output)
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     try:

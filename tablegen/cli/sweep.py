@@ -1,6 +1,7 @@
 """``tablegen sweep``: build many scans as a library of programs."""
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,7 +86,7 @@ def sweep(
     from tablegen.cli.shared.progress_bar import Bar
 
     quiet_blas()
-    if not (only_check or only_list or output.exists()):
+    if not (only_check or only_list or os.path.exists(output)):
         check_place(output)
     from tablegen.emit.write import CannotWrite, NoPlace
     from tablegen.sweeping.sweep import build_library

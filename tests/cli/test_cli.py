@@ -467,7 +467,7 @@ def test_an_output_below_a_file_cannot_be_written(scan: Path, command: str) -> N
     out = scan / "out"
     outcome = run("build", scan, "-o", out) if command == "build" else run("init", out)
     assert (outcome.status, outcome.out) == (4, "")
-    assert outcome.messages == [f"{out}: Not a directory"]
+    assert outcome.messages == [f"{out}: {scan} is no directory"]
     assert scan.read_text(encoding="utf-8") == SCAN
 
 

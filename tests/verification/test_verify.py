@@ -481,8 +481,8 @@ def test_junit_that_cannot_be_written_is_status_4(short: Build, tmp_path: Path) 
     (tmp_path / "file").write_text("")
     outcome = verify(short.folder, "--junit", tmp_path / "file" / "x.xml")
     assert outcome.status == 4
-    assert "verified" in outcome.out
-    assert outcome.messages == [f"{tmp_path}/file/x.xml: File exists"]
+    assert outcome.out == ""  # it is known before the work
+    assert outcome.messages == [f"{tmp_path}/file/x.xml: {tmp_path}/file is no directory"]
 
 
 @pytest.mark.common

@@ -69,7 +69,7 @@ class OutputFolder(click.Path):
         path = Path(os.fsdecode(super().convert(value, parameter, context)))
         if (other := other_than_file(path)) not in (None, "a directory"):
             self.fail(f"'{path}' is {other}, where a directory has to go.", parameter, context)
-        if self._always and not path.exists():
+        if self._always and not os.path.exists(path):
             check_place(path)
         return path
 
