@@ -4,7 +4,7 @@ Candidates come from the autocorrelation, whose maxima do not depend on which sp
 between them. What remains ambiguous is refused.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,8 +22,16 @@ from tablegen.images.cell_errors import fit_cell
 from tablegen.images.cell_vectors import area, lattices_of_index, reduced, sides_and_angle, sublattice_index
 from tablegen.images.hum import hum_waves, of_hum
 from tablegen.images.lattice_candidates import Candidate, candidates, distinct
-from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images, without_holes
+from tablegen.images.lattice_filters import FilteredImage, filtered_images, valid_pixels
 from tablegen.images.pair_checks import MIN_PIXELS
+from tablegen.images.searched_part import (
+    SearchedPart,
+    aliased,
+    blocks_of_whole,
+    central_part,
+    complete_part,
+    largest_block,
+)
 from tablegen.numerics.arrays import Bools, Floats
 
 _CERTAINTY = 5.0  # exponent of e
@@ -57,18 +65,40 @@ _NO_LATTICE = (
 _SUPERCELLS = (2, 3, 4, 5, 6, 7)
 _LEAST_CELLS = 4.0  # in the image
 _LEAST_PERIODS = 2.2  # of each side's rows in the image
+_LEAST_PERIODS_OF_CENTRE = 8.0  # in the centre of an image, which is searched alone because of its fine waves
+_TOO_LARGE = "crop the image to a quarter, or save it with fewer pixels"
 _MOST_ERROR = 0.05  # of a side
 _LEAST_VALID = 0.25  # share of the pixels
 _SAME_CELL = 0.12  # share
 _LEAST_LEVEL = 0.04  # of the variance, at the lattice points
+_LEAST_BLOCKS = 12.0  # to a side: the maxima of shorter ones lie on too few blocks for the errors of a large image
 
 
 class AmbiguousCell(Unphysical):
-    """Several cells explain an image; ``cells`` in pixels, shape (2, 2) each, of the significant ``spots``."""
+    """Several cells explain an image.
+
+    Parameters
+    ----------
+    cells
+        Cells in pixels, shape (2, 2) each.
+    spots
+        The significant spots, by which the cells have their likelihoods.
+    extent
+        Columns and rows of the image.
+    reason
+        Why they are possible.
+    """
 
     def __init__(self, cells: list[Floats], spots: Spots, extent: Floats, reason: str) -> None:
-        super().__init__(ambiguous(cells, spots, extent, reason))
-        self.cells, self.spots = cells, spots
+        """Name the cells, each with its likelihood."""
+        super().__init__(ambiguous(cells, likelihoods(cells, spots, extent), reason))
+        self.cells, self.spots, self._shown = cells, spots, (extent, reason)
+
+    def in_pixels(self, block: int) -> "AmbiguousCell":
+        """Return the same reason in pixels, where cells and spots are in blocks."""
+        extent, reason = self._shown
+        spots = Spots(self.spots.waves / block, self.spots.contrast, self.spots.power)
+        return AmbiguousCell([block * cell for cell in self.cells], spots, block * extent, reason)
 
     def common_cell(self) -> Floats | None:
         """Return the cell that has the waves of all the others; None if there is none."""
@@ -85,7 +115,8 @@ class ImageCell:
     """The cell of an image in pixels.
 
     ``vectors`` are its reduced sides, shape (2, 2), x and y; ``covariance`` that of a_x, a_y, b_x, b_y; ``spots`` the
-    significant ones of the spectrum, ``explained`` those that the cell explains; ``filter_name`` how it was found.
+    significant ones of the spectrum, ``explained`` those that the cell explains; ``filter_name`` how it was found,
+    ``part`` where.
     """
 
     vectors: Floats
@@ -93,13 +124,13 @@ class ImageCell:
     spots: Spots
     explained: Bools
     level: float
-    shape: tuple[int, int]
+    part: SearchedPart
     filter_name: str
 
     @property
     def cells(self) -> float:
-        """Cells in the image."""
-        return self.shape[0] * self.shape[1] / area(self.vectors)
+        """Cells in the part of the image that was searched."""
+        return self.part.pixels / area(self.vectors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +143,9 @@ class _View:
     faint: Spots  # of less contrast and power: they confirm those of another view
     least: float  # contrast of a significant spot
     cells: list[Candidate]  # of its autocorrelation
+
+
+_ViewCell = tuple[Floats, Floats, Spots, Bools, float, str]  # vectors to level of a cell, and the name of the filter
 
 
 def find_cell(heights: Floats, other: Floats | None = None, expected_area: float | None = None) -> ImageCell:
@@ -130,7 +164,7 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
     Returns
     -------
     ImageCell
-        The reduced cell with its errors.
+        The reduced cell with its errors. More than 2^20 pixels are searched in blocks, or in their centre.
 
     Raises
     ------
@@ -139,25 +173,98 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
         several cells that explain them as well.
     """
     _check(heights)
-    region = complete_region(heights)
-    heights = without_holes(heights[region])
-    if min(heights.shape) < MIN_PIXELS:
-        size = " x ".join(map(str, heights.shape))
-        raise Unphysical(f"without missing rows the image has {size} pixels; crop it to a region without missing rows")
-    views = [_view(image) for image in filtered_images(heights)]
+    part = complete_part(heights)
+    if part.large:
+        return _cell_of_many_pixels(heights, part, other, expected_area)
+    return _cell_of_part(heights, part, _views(part.of(heights)), other, expected_area)
+
+
+def _cell_of_many_pixels(
+    heights: Floats, part: SearchedPart, other: Floats | None, expected_area: float | None
+) -> ImageCell:
+    """Return the cell in blocks that show all waves and are small against the cell, if need be of the centre alone."""
+    block, before = largest_block(heights, part), None
+    while True:
+        searched = central_part(part, block)
+        views = _views(searched.of(heights))
+        if np.any(aliased(heights, searched, [view.spots.waves for view in views])):
+            block = 1
+            continue
+        cell = _cell_of_part(heights, searched, views, other, expected_area)
+        if before is not None and not same_lattice(cell.vectors, before.vectors):
+            cells, extent = [before.vectors, cell.vectors], np.array(part.size[::-1], dtype=np.float64)
+            raise AmbiguousCell(cells, before.spots, extent, "the image shows one and its centre the other")
+        side = float(np.min(np.hypot(*cell.vectors.T)))
+        if block == 1 or side >= _LEAST_BLOCKS * block:
+            if before is None and searched.cropped:
+                _check_slow_waves(heights, part, cell.vectors)
+            return cell
+        block, before = max(1, int(side / _LEAST_BLOCKS)), cell
+
+
+def _check_slow_waves(heights: Floats, part: SearchedPart, vectors: Floats) -> None:
+    """Check that the cell of the centre explains the slow waves of the whole image, of which the centre has few."""
+    blocks = blocks_of_whole(part)
+    views = [_view(image, with_cells=False) for image in filtered_images(blocks.of(heights))]
+    slow = ~aliased(heights, blocks, [view.spots.waves for view in views])
+    ends = np.cumsum([len(view.spots.waves) for view in views])[:-1]
+    every = _together(
+        [
+            replace(view, spots=Spots(view.spots.waves[use], view.spots.contrast[use], view.spots.power[use]))
+            for view, use in zip(views, np.split(slow, ends), strict=True)
+        ],
+        1.0,
+    )
+    explained, informative = explained_spots(vectors / blocks.block, every)
+    waves = every.waves[informative & ~explained]
+    waves = waves[~of_an_edge(waves, every.waves[explained], _extent(views[0]))]
+    if len(waves) > 1 and not one_direction(waves):
+        raise Unphysical(
+            f"the image has slow waves of a large cell beside fine ones, too many pixels for both: {_TOO_LARGE}"
+        )
+
+
+def _views(heights: Floats) -> list[_View]:
+    return [_view(image) for image in filtered_images(heights)]
+
+
+def _cell_of_part(
+    heights: Floats, part: SearchedPart, views: list[_View], other: Floats | None, expected_area: float | None
+) -> ImageCell:
+    """Return the cell of the views of a part, in pixels of the image."""
+    block = part.block
+    expected = None if expected_area is None else expected_area / block**2
+    try:
+        cell = _cell_of_views(views, None if other is None else part.of(other), expected)
+        if part.cropped:
+            _check_periods(cell[0], _extent(views[0]), _LEAST_PERIODS_OF_CENTRE, _TOO_LARGE)
+    except AmbiguousCell as reason:
+        raise reason.in_pixels(block) from None
+    except Unphysical as reason:
+        if not part.cropped:
+            raise
+        raise Unphysical(f"{reason}; so large an image is searched in its centre, {part}") from None
+    vectors, covariance, spots, explained, level, name = cell
+    spots = Spots(spots.waves / block, spots.contrast, spots.power)
+    return ImageCell(block * vectors, block**2 * covariance, spots, explained, level, part, name)
+
+
+def _cell_of_views(views: list[_View], other: Floats | None, expected_area: float | None) -> _ViewCell:
+    """Return the cell of the views of an image. Raise ``Unphysical`` if there is none, or more than one."""
+    shape = views[0].image.values.shape
     hum = np.zeros((0, 2))
     if other is not None:
         beside = np.concatenate(
             [
                 significant_spots(image, _FAINT * _least(image), _FAINTEST * WEAKEST).waves
-                for image in filtered_images(without_holes(other[region]))
+                for image in filtered_images(other)
             ]
         )
-        hum = hum_waves(_together(views, 1.0).waves, beside, (heights.shape[0], heights.shape[1]))
+        hum = hum_waves(_together(views, 1.0).waves, beside, (shape[0], shape[1]))
     if not any(len(view.spots.contrast) and view.spots.contrast[0] >= _CLEAR * view.least for view in views):
         raise Unphysical(_NO_LATTICE)
     vectors = _chosen(views, hum, expected_area)
-    _check_periods(vectors, np.array([heights.shape[1], heights.shape[0]]))
+    _check_periods(vectors, np.array([shape[1], shape[0]]), _LEAST_PERIODS, "scan more of them")
     reasons: list[Unphysical] = []
     # A view whose own maxima gave the cell comes first.
     for view in sorted(views, key=lambda view: not any(same_lattice(cell.vectors, vectors) for cell in view.cells)):
@@ -168,21 +275,18 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
     raise reasons[-1]
 
 
-def ambiguous(cells: list[Floats], spots: Spots, extent: Floats, reason: str = "they explain the image") -> str:
+def ambiguous(cells: list[Floats], shares: Floats, reason: str) -> str:
     """Return the text that refuses several cells.
 
     Parameters
     ----------
     cells
         Cells in pixels, shape (2, 2) each.
-    spots
-        The significant spots, by which the cells have their likelihoods.
-    extent
-        Columns and rows of the image.
+    shares
+        The likelihood of each.
     reason
         Why they are possible.
     """
-    shares = likelihoods(cells, spots, extent)
     order = np.argsort(-shares, kind="stable")
     names = []
     for number in order.tolist():
@@ -227,23 +331,25 @@ def likelihoods(cells: list[Floats], spots: Spots, extent: Floats) -> Floats:
     return np.asarray(shares / np.sum(shares))
 
 
+def _size(shape: tuple[int, ...]) -> str:
+    return " x ".join(map(str, shape))
+
+
 def _check(heights: Floats) -> None:
     if heights.ndim != 2 or min(heights.shape) < MIN_PIXELS:
-        size = " x ".join(map(str, heights.shape))
+        size = _size(heights.shape)
         raise Unphysical(f"{size} pixels are too few for a lattice; {MIN_PIXELS} rows and columns do")
-    valid = np.isfinite(heights)
-    valid &= (np.ptp(np.where(valid, heights, np.nanmin(heights) if valid.any() else 0.0), axis=1) > 0.0)[:, None]
-    share = float(np.mean(valid))
+    share = float(np.mean(valid_pixels(heights)))
     if share < _LEAST_VALID:
         raise Unphysical(f"{100.0 * share:.2g} % of the pixels have heights; crop the image to what was scanned")
 
 
-def _view(image: FilteredImage) -> _View:
+def _view(image: FilteredImage, with_cells: bool = True) -> _View:
     correlation = autocorrelation(image)
     least, weakest = _least(image), _FAINTEST * WEAKEST
     peaks = spectrum_peaks(image, weakest)
     spots, faint = own_spots(peaks, image, least), own_spots(peaks, image, _FAINT * least, weakest)
-    return _View(image, correlation, spots, faint, least, candidates(correlation))
+    return _View(image, correlation, spots, faint, least, candidates(correlation) if with_cells else [])
 
 
 def _least(image: FilteredImage) -> float:
@@ -251,9 +357,9 @@ def _least(image: FilteredImage) -> float:
     return float(np.log(image.values.size) + _CERTAINTY)
 
 
-def _fitted(view: _View, vectors: Floats) -> ImageCell:
+def _fitted(view: _View, vectors: Floats) -> _ViewCell:
     """Fit a cell to the maxima of a view's autocorrelation. Raise ``Unphysical`` if it is none of them."""
-    spots, shape = view.spots, view.image.values.shape
+    spots = view.spots
     fit = fit_cell(view.image, vectors)
     if fit is None or fit.level < _LEAST_LEVEL or not same_lattice(fit.vectors, vectors):
         raise Unphysical(
@@ -268,7 +374,7 @@ def _fitted(view: _View, vectors: Floats) -> ImageCell:
             f"lattice? Crop to a region with one, or scan with less drift"
         )
     explained = explained_spots(fit.vectors, spots)[0]
-    return ImageCell(fit.vectors, fit.covariance, spots, explained, fit.level, (shape[0], shape[1]), view.image.name)
+    return fit.vectors, fit.covariance, spots, explained, fit.level, view.image.name
 
 
 def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Floats:
@@ -531,14 +637,14 @@ def _unexplained(count: int, total: int) -> str:
     )
 
 
-def _check_periods(vectors: Floats, extent: Floats) -> None:
+def _check_periods(vectors: Floats, extent: Floats, least: float, advice: str) -> None:
     cells = float(np.prod(extent)) / area(vectors)
     waves = np.linalg.inv(vectors).T * extent  # periods of each base wave along x and y, summed over the image
     periods = float(np.min(np.hypot(*waves.T)))
-    if cells < _LEAST_CELLS or periods < _LEAST_PERIODS:
+    if cells < _LEAST_CELLS or periods < least:
         raise Unphysical(
-            f"the image has {periods:.2g} periods of its lattice; at least {_LEAST_PERIODS:g} in each direction are "
-            f"needed: scan more of them"
+            f"the image has {periods:.2g} periods of its lattice; at least {least:g} in each direction are needed: "
+            f"{advice}"
         )
 
 

@@ -45,7 +45,7 @@ def filtered_images(heights: Floats) -> list[FilteredImage]:
     list
         The levelled heights, then their slopes along the rows.
     """
-    valid = _valid(heights)
+    valid = valid_pixels(heights)
     rows = np.where(valid, heights, 0.0)
     level = _terraces_levelled(_rows_levelled(rows, valid), valid)
     images = [_windowed("heights", _clipped(level, valid), valid)]
@@ -64,7 +64,7 @@ def complete_region(heights: Floats) -> tuple[slice, slice]:
     heights
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
-    valid = _valid(heights)
+    valid = valid_pixels(heights)
     there = valid[:, valid.any(axis=0)]
     rows = _longest(np.mean(there, axis=1) >= _COMPLETE) if there.size else slice(0, 0)
     columns = _longest(np.mean(valid[rows], axis=0) >= _COMPLETE) if valid[rows].size else slice(0, 0)
@@ -109,18 +109,18 @@ def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
         Levelled heights, shape (rows, columns); then of each edge its row, the first column after it, and the step
         there, shape (edges,) each.
     """
-    valid = _valid(heights)
+    valid = valid_pixels(heights)
     level = _rows_levelled(np.where(valid, heights, 0.0), valid)
     edges = [(row, end, step) for row, ends in _parts(level, valid) for end, step in ends]
     rows, columns, steps = zip(*edges, strict=True) if edges else ((), (), ())
     return level, np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), np.array(steps, dtype=np.float64)
 
 
-def _valid(heights: Floats) -> Bools:
+def valid_pixels(heights: Floats) -> Bools:
     """Return True for finite pixels of rows with contrast: a scan that was stopped leaves flat rows."""
     valid = np.isfinite(heights)
-    low = np.min(np.where(valid, heights, np.inf), axis=1)
-    high = np.max(np.where(valid, heights, -np.inf), axis=1)
+    low = np.min(heights, axis=1, where=valid, initial=np.inf)
+    high = np.max(heights, axis=1, where=valid, initial=-np.inf)
     valid &= (high > low)[:, None]
     return np.asarray(valid, dtype=np.bool_)
 
