@@ -10,19 +10,29 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.images.autocorrelation import (
+    FINEST,
     WEAKEST,
-    Autocorrelation,
     Spots,
-    autocorrelation,
-    own_spots,
     significant_spots,
-    spectrum_peaks,
 )
 from tablegen.images.cell_errors import fit_cell
 from tablegen.images.cell_vectors import area, lattices_of_index, reduced, sides_and_angle, sublattice_index
+from tablegen.images.fine_waves import whole_spots
 from tablegen.images.hum import hum_waves, of_hum
-from tablegen.images.lattice_candidates import Candidate, candidates, distinct
-from tablegen.images.lattice_filters import FilteredImage, filtered_images, valid_pixels
+from tablegen.images.image_views import (
+    FAINT,
+    FAINTEST,
+    NEAR_SPOT,
+    STRAIN,
+    View,
+    confirmed,
+    image_views,
+    least_contrast,
+    together,
+    view_spots,
+)
+from tablegen.images.lattice_candidates import Candidate, distinct
+from tablegen.images.lattice_filters import filtered_images, valid_pixels
 from tablegen.images.pair_checks import MIN_PIXELS
 from tablegen.images.searched_part import (
     SearchedPart,
@@ -32,13 +42,11 @@ from tablegen.images.searched_part import (
     complete_part,
     largest_block,
 )
-from tablegen.numerics.arrays import Bools, Floats
+from tablegen.numerics.arrays import Bools, Floats, Ints
 
-_CERTAINTY = 5.0  # exponent of e
 _STRONG = 1.25  # times the contrast of a significant spot
 _CLEAR = 1.3  # times that of a significant spot: the strongest one has to have it
 _OFF = 0.12  # of an index: largest distance of a spot from a whole number
-_STRAIN = 0.02  # share: what distortion may move a spot
 _INFORMATIVE = 0.25  # of an index: a spot with more uncertainty is not compared
 _ORDERS = (2, 4, 6, 10)  # indices up to which a cell is fitted to spots, one after the other
 _FRACTIONS = (2, 3, 4)  # of the waves of a cell, where a superstructure has its own
@@ -49,11 +57,8 @@ _MOST_AREA_RATIO = 1.75  # of the measured cell and that of the sample by the si
 _PARALLEL = 0.1  # radians
 _CORRECTED = 0.05  # share: what spots may change of the sides that the maxima have
 _OWN_SHARE = 0.6  # of the spots that are near enough to 0
-_FAINT, _FAINTEST = 0.5, 0.3  # of the contrast of a significant spot, and of its least power
-_NEAR_SPOT = 1.2  # periods in the image: spots of two views this near are one
 _ALONG = 0.5  # of a wave along the rows: slopes show it about as well as heights
 _SLOW, _SLOW_SHARE = 4.0, 0.5  # periods in the image, and of the slowest wave of the cell: a terrace has waves below
-_STEEP = 0.12  # of a wave along the rows
 _SPOT_WIDTH, _STRAY = 0.4, 0.02  # periods in the image; chance that a spot belongs to no lattice
 _PRIMES = (2, 3, 5, 7)
 _CLEARLY_LESS = 0.5  # of the autocorrelation at the cell's sides
@@ -133,18 +138,6 @@ class ImageCell:
         return self.part.pixels / area(self.vectors)
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """A filtered image with its autocorrelation and spots."""
-
-    image: FilteredImage
-    correlation: Autocorrelation
-    spots: Spots
-    faint: Spots  # of less contrast and power: they confirm those of another view
-    least: float  # contrast of a significant spot
-    cells: list[Candidate]  # of its autocorrelation
-
-
 _ViewCell = tuple[Floats, Floats, Spots, Bools, float, str]  # vectors to level of a cell, and the name of the filter
 
 
@@ -176,7 +169,7 @@ def find_cell(heights: Floats, other: Floats | None = None, expected_area: float
     part = complete_part(heights)
     if part.large:
         return _cell_of_many_pixels(heights, part, other, expected_area)
-    return _cell_of_part(heights, part, _views(part.of(heights)), other, expected_area)
+    return _cell_of_part(heights, part, image_views(part.of(heights)), other, expected_area)
 
 
 def _cell_of_many_pixels(
@@ -186,7 +179,7 @@ def _cell_of_many_pixels(
     block, before = largest_block(heights, part), None
     while True:
         searched = central_part(part, block)
-        views = _views(searched.of(heights))
+        views = image_views(searched.of(heights))
         if np.any(aliased(heights, searched, [view.spots.waves for view in views])):
             block = 1
             continue
@@ -196,8 +189,11 @@ def _cell_of_many_pixels(
             raise AmbiguousCell(cells, before.spots, extent, "the image shows one and its centre the other")
         side = float(np.min(np.hypot(*cell.vectors.T)))
         if block == 1 or side >= _LEAST_BLOCKS * block:
-            if before is None and searched.cropped:
+            seen = searched if before is None else before.part
+            if seen.cropped:
                 _check_slow_waves(heights, part, cell.vectors)
+                seen = blocks_of_whole(part)
+            _check_fine_waves(heights, part, cell.vectors, FINEST / seen.block)
             return cell
         block, before = max(1, int(side / _LEAST_BLOCKS)), cell
 
@@ -205,10 +201,10 @@ def _cell_of_many_pixels(
 def _check_slow_waves(heights: Floats, part: SearchedPart, vectors: Floats) -> None:
     """Check that the cell of the centre explains the slow waves of the whole image, of which the centre has few."""
     blocks = blocks_of_whole(part)
-    views = [_view(image, with_cells=False) for image in filtered_images(blocks.of(heights))]
+    views = [view_spots(image) for image in filtered_images(blocks.of(heights))]
     slow = ~aliased(heights, blocks, [view.spots.waves for view in views])
     ends = np.cumsum([len(view.spots.waves) for view in views])[:-1]
-    every = _together(
+    every = together(
         [
             replace(view, spots=Spots(view.spots.waves[use], view.spots.contrast[use], view.spots.power[use]))
             for view, use in zip(views, np.split(slow, ends), strict=True)
@@ -217,19 +213,43 @@ def _check_slow_waves(heights: Floats, part: SearchedPart, vectors: Floats) -> N
     )
     explained, informative = explained_spots(vectors / blocks.block, every)
     waves = every.waves[informative & ~explained]
-    waves = waves[~of_an_edge(waves, every.waves[explained], _extent(views[0]))]
+    waves = waves[~of_an_edge(waves, every.waves[explained], views[0].extent)]
     if len(waves) > 1 and not one_direction(waves):
         raise Unphysical(
             f"the image has slow waves of a large cell beside fine ones, too many pixels for both: {_TOO_LARGE}"
         )
 
 
-def _views(heights: Floats) -> list[_View]:
-    return [_view(image) for image in filtered_images(heights)]
+def _check_fine_waves(heights: Floats, part: SearchedPart, vectors: Floats, finest: float) -> None:
+    """Check that the cell explains the waves of all pixels that are faster than ``finest`` periods per pixel."""
+    highest = (_INFORMATIVE - _OFF) / STRAIN * np.array([[1.0, 1.0], [1.0, -1.0]])
+    if np.max(np.abs(highest @ np.linalg.inv(vectors).T)) <= finest:
+        return
+    views = whole_spots(heights, part)
+    every, extent = together(views, 1.0), views[0].extent
+    fine = np.max(np.abs(every.waves), axis=1, initial=0.0) > finest
+    every = Spots(every.waves[fine], every.contrast[fine], every.power[fine])
+    explained, informative = explained_spots(vectors, every)
+    waves = every.waves[informative & ~explained]
+    waves = waves[_beside(waves) < _STREAK]
+    fractional = waves[_fractional(waves @ vectors.T)]
+    if len(fractional):
+        larger = _supercell(vectors, fractional)
+        cells = [vectors] if larger is None else [vectors, larger]
+        raise AmbiguousCell(cells, every, extent, "a fine spot is at a fraction of the smaller cell's waves")
+    if len(waves) > 2 + len(explained) // 20:
+        raise Unphysical(_unexplained(len(waves), len(explained)))
+
+
+def _beside(waves: Floats) -> Ints:
+    """Return how many waves have the direction of each, with itself."""
+    direction = np.arctan2(waves[:, 1], waves[:, 0])
+    beside = np.abs((direction[:, None] - direction[None] + np.pi / 2) % np.pi - np.pi / 2) < _PARALLEL
+    return np.asarray(np.sum(beside, axis=1), dtype=np.int64)
 
 
 def _cell_of_part(
-    heights: Floats, part: SearchedPart, views: list[_View], other: Floats | None, expected_area: float | None
+    heights: Floats, part: SearchedPart, views: list[View], other: Floats | None, expected_area: float | None
 ) -> ImageCell:
     """Return the cell of the views of a part, in pixels of the image."""
     block = part.block
@@ -237,7 +257,7 @@ def _cell_of_part(
     try:
         cell = _cell_of_views(views, None if other is None else part.of(other), expected)
         if part.cropped:
-            _check_periods(cell[0], _extent(views[0]), _LEAST_PERIODS_OF_CENTRE, _TOO_LARGE)
+            _check_periods(cell[0], views[0].extent, _LEAST_PERIODS_OF_CENTRE, _TOO_LARGE)
     except AmbiguousCell as reason:
         raise reason.in_pixels(block) from None
     except Unphysical as reason:
@@ -249,18 +269,18 @@ def _cell_of_part(
     return ImageCell(block * vectors, block**2 * covariance, spots, explained, level, part, name)
 
 
-def _cell_of_views(views: list[_View], other: Floats | None, expected_area: float | None) -> _ViewCell:
+def _cell_of_views(views: list[View], other: Floats | None, expected_area: float | None) -> _ViewCell:
     """Return the cell of the views of an image. Raise ``Unphysical`` if there is none, or more than one."""
     shape = views[0].image.values.shape
     hum = np.zeros((0, 2))
     if other is not None:
         beside = np.concatenate(
             [
-                significant_spots(image, _FAINT * _least(image), _FAINTEST * WEAKEST).waves
+                significant_spots(image, FAINT * least_contrast(float(image.values.size)), FAINTEST * WEAKEST).waves
                 for image in filtered_images(other)
             ]
         )
-        hum = hum_waves(_together(views, 1.0).waves, beside, (shape[0], shape[1]))
+        hum = hum_waves(together(views, 1.0).waves, beside, (shape[0], shape[1]))
     if not any(len(view.spots.contrast) and view.spots.contrast[0] >= _CLEAR * view.least for view in views):
         raise Unphysical(_NO_LATTICE)
     vectors = _chosen(views, hum, expected_area)
@@ -324,7 +344,7 @@ def likelihoods(cells: list[Floats], spots: Spots, extent: Floats) -> Floats:
     for cell in cells:
         index = spots.waves @ cell.T
         distance = np.hypot(*(((index - np.round(index)) @ np.linalg.inv(cell).T) * extent).T)
-        width = _SPOT_WIDTH + 0.5 * _STRAIN * np.hypot(*(spots.waves * extent).T)
+        width = _SPOT_WIDTH + 0.5 * STRAIN * np.hypot(*(spots.waves * extent).T)
         near = np.exp(-0.5 * (distance / width) ** 2) / (2.0 * np.pi * width**2) / max(area(cell), 1.0)
         logarithms.append(0.5 * float(np.sum(np.log((1.0 - _STRAY) * near + _STRAY / pixels))))
     shares = np.exp(np.array(logarithms) - max(logarithms))
@@ -344,20 +364,7 @@ def _check(heights: Floats) -> None:
         raise Unphysical(f"{100.0 * share:.2g} % of the pixels have heights; crop the image to what was scanned")
 
 
-def _view(image: FilteredImage, with_cells: bool = True) -> _View:
-    correlation = autocorrelation(image)
-    least, weakest = _least(image), _FAINTEST * WEAKEST
-    peaks = spectrum_peaks(image, weakest)
-    spots, faint = own_spots(peaks, image, least), own_spots(peaks, image, _FAINT * least, weakest)
-    return _View(image, correlation, spots, faint, least, candidates(correlation) if with_cells else [])
-
-
-def _least(image: FilteredImage) -> float:
-    """Return the contrast of a significant spot."""
-    return float(np.log(image.values.size) + _CERTAINTY)
-
-
-def _fitted(view: _View, vectors: Floats) -> _ViewCell:
+def _fitted(view: View, vectors: Floats) -> _ViewCell:
     """Fit a cell to the maxima of a view's autocorrelation. Raise ``Unphysical`` if it is none of them."""
     spots = view.spots
     fit = fit_cell(view.image, vectors)
@@ -377,10 +384,10 @@ def _fitted(view: _View, vectors: Floats) -> _ViewCell:
     return fit.vectors, fit.covariance, spots, explained, fit.level, view.image.name
 
 
-def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Floats:
+def _chosen(views: list[View], hum: Floats, expected_area: float | None) -> Floats:
     """Return the smallest cell that explains all spots. Raise ``Unphysical`` if there is none, or more than one."""
-    extent = _extent(views[0])
-    strong, every = _together(views, _STRONG), _together(views, 1.0)
+    extent = views[0].extent
+    strong, every = together(views, _STRONG), together(views, 1.0)
     if len(strong.waves) < 2 or one_direction(strong.waves):
         raise Unphysical(_why_none([], strong))
     cells = distinct([cell for view in views for cell in view.cells])
@@ -412,7 +419,7 @@ def _chosen(views: list[_View], hum: Floats, expected_area: float | None) -> Flo
     return sure
 
 
-def _check_deciding(vectors: Floats, spots: Spots, views: list[_View]) -> None:
+def _check_deciding(vectors: Floats, spots: Spots, views: list[View]) -> None:
     """Check that a smaller cell leaves two spots or more, or is none of the autocorrelation: one may be an artefact."""
     explained, informative = explained_spots(vectors, spots)
     index = np.round(spots.waves[explained & informative] @ vectors.T).astype(np.int64)
@@ -430,28 +437,25 @@ def _check_deciding(vectors: Floats, spots: Spots, views: list[_View]) -> None:
                 other = vectors[1] if u else vectors[0]
                 smaller = np.array([np.array([u, v]) @ vectors / part, other])
                 reason = "one spot alone tells them apart"
-                raise AmbiguousCell([vectors, smaller], spots, _extent(views[0]), reason)
+                raise AmbiguousCell([vectors, smaller], spots, views[0].extent, reason)
 
 
-def _check_fractions(vectors: Floats, spots: Spots, views: list[_View], hum: Floats) -> None:
+def _check_fractions(vectors: Floats, spots: Spots, views: list[View], hum: Floats) -> None:
     """Check that no spot of one view, which the other one does not show, is that of a larger cell."""
     explained, informative = explained_spots(vectors, spots)
     waves = spots.waves[informative & ~explained]
     waves = waves[~of_hum(waves, hum, vectors)]
     waves = waves[_fractional(waves @ vectors.T)]
-    waves = waves[~of_an_edge(waves, spots.waves[explained], _extent(views[0]))]
+    waves = waves[~of_an_edge(waves, spots.waves[explained], views[0].extent)]
     for other in views:
-        if other.image.name == "slopes":  # where a wave along the rows shows, unless it is the edge of a terrace
+        if other.name == "slopes":  # where a wave along the rows shows, unless it is the edge of a terrace
             steep = np.abs(waves[:, 0]) < _ALONG * np.hypot(*waves.T)
-            waves = waves[steep | _confirmed(waves, other)]
-    if len(waves):
-        direction = np.arctan2(waves[:, 1], waves[:, 0])
-        beside = np.abs((direction[:, None] - direction[None] + np.pi / 2) % np.pi - np.pi / 2) < _PARALLEL
-        if np.any(np.sum(beside, axis=1) < _STREAK):
-            larger = _supercell(vectors, waves)
-            cells = [vectors] if larger is None else [vectors, larger]
-            reason = "a weak spot is at a fraction of the smaller cell's waves"
-            raise AmbiguousCell(cells, spots, _extent(views[0]), reason)
+            waves = waves[steep | confirmed(waves, other)]
+    if np.any(_beside(waves) < _STREAK):
+        larger = _supercell(vectors, waves)
+        cells = [vectors] if larger is None else [vectors, larger]
+        reason = "a weak spot is at a fraction of the smaller cell's waves"
+        raise AmbiguousCell(cells, spots, views[0].extent, reason)
 
 
 def _supercell(vectors: Floats, waves: Floats) -> Floats | None:
@@ -464,35 +468,6 @@ def _supercell(vectors: Floats, waves: Floats) -> Floats | None:
     return None
 
 
-def _together(views: list[_View], contrast: float) -> Spots:
-    """Return the spots of all views with this share of the contrast of significant ones.
-
-    A spot has to be in every view, or along the columns, to which slopes along the rows are blind: the edge of a
-    terrace makes spots in the heights alone.
-    """
-    parts = []
-    for view in views:
-        use = view.spots.contrast >= contrast * view.least
-        for other in views:
-            if other is not view:
-                use &= _confirmed(view.spots.waves, other)
-        parts.append(Spots(view.spots.waves[use], view.spots.contrast[use], view.spots.power[use]))
-    return Spots(
-        np.concatenate([part.waves for part in parts]),
-        np.concatenate([part.contrast for part in parts]),
-        np.concatenate([part.power for part in parts]),
-    )
-
-
-def _confirmed(waves: Floats, other: _View) -> Bools:
-    extent = np.array(other.image.values.shape[::-1])
-    steep = np.abs(waves[:, 0]) < _STEEP * np.hypot(*waves.T)
-    if not len(other.faint.waves):
-        return np.asarray(steep)
-    distance = np.hypot(*np.moveaxis((waves[:, None] - other.faint.waves[None]) * extent, -1, 0))
-    return np.asarray(steep | (np.min(distance, axis=1) <= _NEAR_SPOT + _STRAIN * np.hypot(*(waves * extent).T)))
-
-
 def explained_spots(vectors: Floats, spots: Spots) -> tuple[Bools, Bools]:
     """Return which spots are at whole numbers of a cell's reciprocal, and which are near enough to 0 to tell.
 
@@ -503,7 +478,7 @@ def explained_spots(vectors: Floats, spots: Spots) -> tuple[Bools, Bools]:
     """
     index = spots.waves @ vectors.T
     off = np.max(np.abs(index - np.round(index)), axis=1)
-    tolerance = _OFF + _STRAIN * np.max(np.abs(index), axis=1)
+    tolerance = _OFF + STRAIN * np.max(np.abs(index), axis=1)
     return np.asarray(off <= tolerance), np.asarray(tolerance <= _INFORMATIVE)
 
 
@@ -590,11 +565,7 @@ def of_an_edge(waves: Floats, own: Floats, extent: Floats) -> Bools:
         return slow
     unit = np.linalg.svd(periods[slow], full_matrices=False)[2][0]
     across = np.abs(periods @ np.array([-unit[1], unit[0]]))
-    return np.asarray(slow & np.all(across[slow] <= _NEAR_SPOT))
-
-
-def _extent(view: _View) -> Floats:
-    return np.array(view.image.values.shape[::-1], dtype=np.float64)
+    return np.asarray(slow & np.all(across[slow] <= NEAR_SPOT))
 
 
 def _fractional(index: Floats) -> Bools:

@@ -9,15 +9,14 @@ from math import isqrt
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.images.autocorrelation import significant_spots
+from tablegen.images.image_views import together, view_spots
 from tablegen.images.lattice_filters import complete_region, filtered_images, without_holes
 from tablegen.images.pair_checks import MIN_PIXELS
 from tablegen.numerics.arrays import Bools, Complexes, Floats
 
 _MOST_PIXELS = 1 << 20  # that are searched
-_FINEST = 0.25  # periods per block: blocks show faster waves as slower ones, or on too few blocks
+_FINEST = 0.33  # periods per block: with the slowest wave this fast, a side has the least length of a candidate, 3
 _ALIAS = 0.25  # periods over blocks: an alias is off by a whole number
-_CERTAINTY = 5.0  # exponent of e
 
 
 @dataclass(frozen=True)
@@ -141,9 +140,8 @@ def largest_block(heights: Floats, part: SearchedPart) -> int:
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
     centre = central_part(part, 1).of(heights)
-    least = float(np.log(centre.size) + _CERTAINTY)
-    spots = [significant_spots(image, least).waves for image in filtered_images(centre)]
-    finest = float(np.max(np.hypot(*np.concatenate(spots).T), initial=0.0))
+    views = [view_spots(image) for image in filtered_images(centre)]
+    finest = float(np.max(np.hypot(*together(views, 1.0).waves.T), initial=0.0))
     return max(1, min(_most_block(part), int(_FINEST / max(finest, 1e-9))))
 
 
@@ -181,12 +179,15 @@ def aliased(heights: Floats, part: SearchedPart, waves: list[Floats]) -> Bools:
 def _coefficients(heights: Floats, waves: list[Floats]) -> Complexes:
     """Return the Fourier coefficients of the views of an image at their waves."""
     rows, columns = (np.arange(count) for count in heights.shape)
-    coefficients = [
-        complex(np.exp(-2j * np.pi * v * rows) @ (image.values * image.weight) @ np.exp(-2j * np.pi * u * columns))
-        for image, spots in zip(filtered_images(heights), waves, strict=True)
-        for u, v in spots.tolist()
-    ]
-    return np.array(coefficients, dtype=np.complex128)
+    parts = []
+    for image, spots in zip(filtered_images(heights), waves, strict=True):
+        across, along = (
+            np.exp(-2j * np.pi * spots[:, axis, None] * place) for axis, place in ((1, rows), (0, columns))
+        )
+        values = image.values * image.weight
+        lines = across.real @ values + 1j * (across.imag @ values)  # complex factors would make the image complex
+        parts.append(np.sum(lines * along, axis=1))
+    return np.concatenate(parts)
 
 
 def _block_means(heights: Floats, block: int) -> Floats:

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from lattice_images import three_sites
+from real_files import real_folder
 from test_image_lattice import plain_lattice
 
 import tablegen
@@ -14,10 +16,11 @@ from tablegen.cli import cli
 from tablegen.images import image_grating, indexer, searched_part
 from tablegen.images.direction_shift import direction_shift
 from tablegen.images.image_grating import find_grating
-from tablegen.images.indexer import find_cell, same_lattice
+from tablegen.images.indexer import AmbiguousCell, find_cell, same_lattice
 from tablegen.images.searched_part import aliased, central_part, complete_part
 
 SIZE = 384
+REAL = real_folder()
 
 
 @pytest.fixture
@@ -40,6 +43,90 @@ def test_the_cell_is_that_of_the_full_search(side: float, block: int, monkeypatc
     change = np.round(full.vectors @ np.linalg.inv(cell.vectors)) @ cell.vectors - full.vectors
     assert np.all(np.abs(change.ravel()) < 4.0 * errors)
     assert np.all(np.abs(cell.spots.waves[cell.explained] @ cell.vectors.T % 1.0 - 0.5) > 0.35)
+
+
+def agrees(seed: int, size: int, scale: float, most: int, monkeypatch: pytest.MonkeyPatch) -> bool:
+    """True if the cell of at most ``most`` pixels is that of all pixels, and the true one, within its errors.
+
+    False if it is refused. Images have weak lowest orders, drift, and some of them a terrace or rows that jump.
+    """
+    heights, truth = three_sites(seed, size, scale)
+    monkeypatch.setattr(searched_part, "_MOST_PIXELS", most)
+    try:
+        cell = find_cell(heights)
+    except Unphysical:
+        return False
+    assert not cell.part.whole
+    assert same_lattice(cell.vectors, truth)
+    within(cell.vectors, truth, cell.covariance)
+    monkeypatch.setattr(searched_part, "_MOST_PIXELS", size**2)
+    try:
+        full = find_cell(heights)
+    except Unphysical:  # of a large image the search of all pixels sees weaker spots
+        return True
+    within(cell.vectors, full.vectors, cell.covariance + full.covariance)
+    return True
+
+
+def within(vectors: np.ndarray, other: np.ndarray, covariance: np.ndarray) -> None:
+    """The cell is the other one within four standard errors and 0.1 % of a side, which drift may bend it."""
+    change = np.round(other @ np.linalg.inv(vectors)) @ vectors - other
+    error = 4.0 * np.sqrt(np.diag(covariance)) + 1e-3 * np.min(np.hypot(*vectors.T))
+    assert np.all(np.abs(change.ravel()) < error)
+
+
+@pytest.mark.parametrize(("seed", "scale"), [(1, 1.0), (2, 3.0), (0, 2.0)])
+def test_a_quarter_of_the_pixels_shows_the_same_cell(seed: int, scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert agrees(seed, 512, scale, 512**2 // 4, monkeypatch)
+
+
+@pytest.mark.common
+def test_a_sixteenth_of_the_pixels_shows_the_same_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert agrees(1, 1024, 5.0, 1024**2 // 16, monkeypatch)
+
+
+@pytest.mark.long
+def test_large_generated_images_have_the_cell_of_all_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit is lowered for 512 and 1024 pixels, and as it is for 2048."""
+    accepted = [
+        agrees(seed, size, scale, most, monkeypatch)
+        for size, most, scales, seeds in (
+            (512, 512**2 // 4, (1.0, 1.5, 2.0, 3.0), range(10)),
+            (1024, 1024**2 // 16, (1.0, 3.0, 5.0), range(4)),
+            (2048, 1 << 20, (1.5, 4.0), range(2)),
+        )
+        for scale in scales
+        for seed in seeds
+    ]
+    assert np.mean(accepted) > 0.75
+
+
+@pytest.mark.parametrize(("share", "noise", "width"), [(0.09, 1.0, SIZE), (0.065, 1.0, SIZE), (0.2, 0.7, SIZE // 3)])
+def test_a_weak_fine_wave_of_a_larger_cell_is_seen_in_all_pixels(
+    share: float, noise: float, width: int, few_pixels: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Blocks average it away, and the centre has too few pixels for it, or none of those that have it."""
+    heights, truth = plain_lattice(40.0, -np.pi / 6.0, SIZE)
+    y, x = np.mgrid[:SIZE, :SIZE].astype(np.float64)
+    u, v = np.linalg.inv(truth) @ np.array([5.5, 6.0])
+    heights += share * np.cos(2.0 * np.pi * (u * x + v * y)) * (x < width)
+    heights += noise * np.random.default_rng(5).normal(size=heights.shape)
+    with pytest.raises(AmbiguousCell, match="a fine spot is at a fraction") as reason:
+        find_cell(heights)
+    assert same_lattice(reason.value.cells[0], truth)
+    monkeypatch.setattr(indexer, "_check_fine_waves", lambda *_: None)
+    assert find_cell(heights).part.block == 3  # the negative control: the smaller cell
+
+
+def test_many_fine_waves_of_another_lattice_are_refused(few_pixels: None) -> None:
+    """They have no cell, and the blocks and the centre show none of them."""
+    heights, _ = plain_lattice(40.0, size=SIZE)
+    y, x = np.mgrid[:SIZE, :SIZE].astype(np.float64)
+    for turn in (0.1, 0.45, 0.8, 1.35):
+        away = np.cos(2.0 * np.pi * 0.18 * (x * np.cos(turn) + y * np.sin(turn)))
+        heights += 0.5 * away * (y < 120)
+    with pytest.raises(Unphysical):
+        find_cell(heights)
 
 
 def test_without_the_checks_blocks_show_another_cell(few_pixels: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,3 +229,16 @@ def test_half_an_image_is_said() -> None:
     assert "searched" not in tablegen.lattice(heights).summary()
     heights[:, :60] = np.nan
     assert "searched: rows 1 to 128, columns 61 to 128" in tablegen.lattice(heights).summary()
+
+
+if REAL is not None:  # else the run says so at its end
+
+    @pytest.mark.common
+    def test_a_quarter_of_the_pixels_of_silicon_shows_the_same_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+        heights = tablegen.lattice(REAL / "si7x7_50nm.sxm", channel="Z forward", lattice_nm=2.688).scan.heights
+        full = find_cell(heights)
+        monkeypatch.setattr(searched_part, "_MOST_PIXELS", heights.size // 4)
+        cell = find_cell(heights)
+        assert not cell.part.whole
+        assert same_lattice(cell.vectors, full.vectors)
+        within(cell.vectors, full.vectors, cell.covariance + full.covariance)
