@@ -14,11 +14,13 @@ from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.charts.chart import Arrows, Chart
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.fitting.estimate import Estimate
+from tablegen.images.cell_spots import same_lattice
 from tablegen.images.direction_shift import DirectionShift, direction_shift
 from tablegen.images.files import ScanImage, read_image
 from tablegen.images.frame_registration import registered
+from tablegen.images.image_cell import ImageCell
 from tablegen.images.image_grating import find_grating
-from tablegen.images.indexer import ImageCell, find_cell, same_lattice
+from tablegen.images.indexer import find_cell
 from tablegen.images.measured_cell import MeasuredCell, measured_cell, stretches
 from tablegen.images.searched_part import SearchedPart
 from tablegen.numerics.arrays import Floats

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.images.cell_errors import block_sums, parabola_maxima
-from tablegen.images.indexer import ImageCell
+from tablegen.images.image_cell import ImageCell
 from tablegen.images.lattice_filters import filtered_images
 from tablegen.numerics.arrays import Floats
 

@@ -13,10 +13,12 @@ from test_image_lattice import plain_lattice
 import tablegen
 from tablegen.base.input_errors import Unphysical
 from tablegen.cli import cli
-from tablegen.images import image_grating, indexer, searched_part
+from tablegen.images import image_grating, large_image_cell, searched_part
+from tablegen.images.ambiguous_cell import AmbiguousCell
+from tablegen.images.cell_spots import same_lattice
 from tablegen.images.direction_shift import direction_shift
 from tablegen.images.image_grating import find_grating
-from tablegen.images.indexer import AmbiguousCell, find_cell, same_lattice
+from tablegen.images.indexer import find_cell
 from tablegen.images.searched_part import aliased, central_part, complete_part
 
 SIZE = 384
@@ -114,7 +116,7 @@ def test_a_weak_fine_wave_of_a_larger_cell_is_seen_in_all_pixels(
     with pytest.raises(AmbiguousCell, match="a fine spot is at a fraction") as reason:
         find_cell(heights)
     assert same_lattice(reason.value.cells[0], truth)
-    monkeypatch.setattr(indexer, "_check_fine_waves", lambda *_: None)
+    monkeypatch.setattr(large_image_cell, "_check_fine_waves", lambda *_: None)
     assert find_cell(heights).part.block == 3  # the negative control: the smaller cell
 
 
@@ -132,9 +134,9 @@ def test_many_fine_waves_of_another_lattice_are_refused(few_pixels: None) -> Non
 def test_without_the_checks_blocks_show_another_cell(few_pixels: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Negative control: a period of 4.4 pixels looks like a longer one in blocks of 3."""
     heights, truth = plain_lattice(5.1, size=SIZE)
-    monkeypatch.setattr(indexer, "largest_block", lambda heights, part: 3)
+    monkeypatch.setattr(large_image_cell, "largest_block", lambda heights, part: 3)
     assert same_lattice(find_cell(heights).vectors, truth)
-    monkeypatch.setattr(indexer, "aliased", lambda heights, part, waves: np.zeros(1, dtype=bool))
+    monkeypatch.setattr(large_image_cell, "aliased", lambda heights, part, waves: np.zeros(1, dtype=bool))
     try:
         wrong = find_cell(heights).vectors
     except Unphysical:
