@@ -14,13 +14,16 @@ from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.charts.chart import Arrows, Chart
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.fitting.estimate import Estimate
+from tablegen.images.cell_spots import same_lattice
 from tablegen.images.direction_shift import DirectionShift, direction_shift
 from tablegen.images.files import ScanImage, read_image
 from tablegen.images.frame_registration import registered
+from tablegen.images.image_cell import ImageCell
 from tablegen.images.image_grating import find_grating
-from tablegen.images.indexer import ImageCell, find_cell, same_lattice
+from tablegen.images.indexer import find_cell
 from tablegen.images.measured_cell import MeasuredCell, measured_cell, stretches
 from tablegen.images.missing import count_missing
+from tablegen.images.searched_part import SearchedPart
 from tablegen.numerics.arrays import Floats
 
 Kind = Literal["hexagonal", "square", "oblique", "grating"]
@@ -94,8 +97,8 @@ def lattice(
                 "trace and retrace show different cells; are both of one scan? Choose another --channel, or give the "
                 "sample's --lattice-nm"
             )
-        shift = direction_shift(scan.heights, other, cell.vectors)
-    result = ImageLattice(scan, kind, lattice_nm, cell, second, shift, frames, shifts)
+        shift = direction_shift(scan.heights, other, cell)
+    result = ImageLattice(scan, kind, lattice_nm, cell.part, cell, second, shift, frames, shifts)
     if kind in ("hexagonal", "square"):
         long, short = stretches(result.cell.vectors, kind)
         if long > _MOST_STRETCHED * short:
@@ -148,7 +151,9 @@ def _grating(
     frames: tuple[int, int] | None,
 ) -> "ImageLattice":
     one = find_grating(scan.heights)
-    result = ImageLattice(scan, "grating", pitch_nm, None, None, None, frames, shifts, one.wave, one.covariance)
+    result = ImageLattice(
+        scan, "grating", pitch_nm, one.part, None, None, None, frames, shifts, one.wave, one.covariance
+    )
     if pitch_nm and pixel and not 1.0 / _MOST_PITCH_RATIO < result.pitch.value / pitch_nm < _MOST_PITCH_RATIO:
         raise Unphysical(
             f"the pitch is {result.pitch.value:.4g} nm by the size in the file, and {pitch_nm:.4g} nm is given; is "
@@ -163,12 +168,13 @@ class ImageLattice(Result):
 
     ``cell`` and ``retrace_cell`` have sides in ``unit`` and the angle, with standard errors; ``pitch`` is that of a
     grating. ``shift`` is that of the retrace against the trace, and ``frame_shifts`` those of frames against the first,
-    in pixels.
+    in pixels. ``part`` is what of the image was searched: all of it, in blocks, or a region.
     """
 
     scan: ScanImage
     kind: Kind | None
     lattice_nm: float | None
+    part: SearchedPart
     image_cell: ImageCell | None
     retrace_image_cell: ImageCell | None
     shift: DirectionShift | None
@@ -232,6 +238,11 @@ class ImageLattice(Result):
             "sha256": self.scan.source.sha256,
             "channel": self.scan.channel,
             "rows_columns": [rows, columns],
+            "searched": {
+                "rows": list(self.part.rows),
+                "columns": list(self.part.columns),
+                "block_pixels": self.part.block,
+            },
             "width_nm": self.scan.width_nm,
             "height_nm": self.scan.height_nm,
             "missing": count_missing(self.scan.heights).record,
@@ -256,7 +267,8 @@ class ImageLattice(Result):
 
     def summary(self) -> str:
         """Return the text that ``tablegen lattice`` prints."""
-        return "\n".join([self._title(), *self._missing_lines(), *self._cell_lines(), *self._drift_lines()])
+        part = [] if self.part.whole else [f"searched: {self.part}"]
+        return "\n".join([self._title(), *part, *self._missing_lines(), *self._cell_lines(), *self._drift_lines()])
 
     def _title(self) -> str:
         rows, columns = self.scan.heights.shape
@@ -314,7 +326,7 @@ class ImageLattice(Result):
         bottom = scan.first_row == "bottom"
         title = f"{scan.channel or 'image'}, levelled line by line, with the cell"
         heights = height_chart("lattice", ScanPicture(scan.channel, True, scan.heights, scan.unit, bottom), size, title)
-        view = filtered_images(scan.heights)[0 if one is None or one.filter_name == "heights" else 1]
+        view = filtered_images(self.part.of(scan.heights))[0 if one is None or one.filter_name == "heights" else 1]
         if one is None:
             assert self.wave is not None
             waves, explained, base = self.wave[None], np.array([True]), self.wave[None]
@@ -324,13 +336,17 @@ class ImageLattice(Result):
                 one.explained,
                 np.linalg.inv(self.cell.vectors / np.array(self.pixel)).T,
             )
-        spectrum = spectrum_chart(view, waves, explained, base, self.pixel, self.unit, bottom)
+        block = self.part.block
+        pixel = block * self.pixel[0], block * self.pixel[1]
+        spectrum = spectrum_chart(view, block * waves, explained, block * base, pixel, self.unit, bottom)
         values = autocorrelation(view).values
         picture = ScanPicture("", True, values, "", bottom)
-        reach = (values.shape[1] * self.pixel[0], values.shape[0] * self.pixel[1]) if size else None
-        around = height_chart("autocorrelation", picture, reach, "autocorrelation, with the cell")
+        reach = (values.shape[1] * pixel[0], values.shape[0] * pixel[1])
+        title = "autocorrelation, with the cell"
+        around = height_chart("autocorrelation", picture, reach if size else None, title)
+        label = "correlation, levelled by lines [1]"
         if around.raster is not None:
-            around = replace(around, raster=replace(around.raster, label="correlation, levelled by lines [1]"))
+            around = replace(around, raster=replace(around.raster, x=(0.0, reach[0]), y=(0.0, reach[1]), label=label))
         charts = self._with_cell(heights, bottom), spectrum, self._with_cell(around, bottom)
         return PlottedCharts(self._title(), charts, 3, charts[:2])
 

@@ -14,8 +14,9 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.correction.agreement import Agreement, levelled
 from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan
+from tablegen.images.cell_spots import same_lattice
 from tablegen.images.cell_vectors import area, reduced, sides_and_angle
-from tablegen.images.indexer import find_cell, same_lattice
+from tablegen.images.indexer import find_cell
 from tablegen.images.measured_cell import IDEAL_ANGLES, measured_cell
 from tablegen.numerics.arrays import Bools, Floats, Ints
 

@@ -20,7 +20,7 @@ _FLOOR = 1e-5  # of the largest power: what leaks from the strongest spot
 _BACKGROUND = 6, 2  # cells of the spectrum: reach of the neighbourhood of a spot, and of the spot itself
 _STREAK = 1.5  # periods along the rows: rows that jump have their power below
 _SLOWEST = 1.2  # periods in the image
-_FINEST = 0.45  # of the sampling rate
+FINEST = 0.45  # of the sampling rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ def significant_spots(image: FilteredImage, least: float, weakest: float = WEAKE
     weakest
         Least power over that of the strongest spot.
     """
-    return own_spots(spectrum_peaks(image, weakest), image, least, weakest)
+    return own_spots(spectrum_peaks(image, weakest), np.array(image.values.shape[::-1]), least, weakest)
 
 
 def spectrum_peaks(image: FilteredImage, weakest: float) -> Spots:
@@ -162,7 +162,7 @@ def spectrum_peaks(image: FilteredImage, weakest: float) -> Spots:
     """
     rows, columns = image.values.shape
     power, u, v = power_spectrum(image)
-    searched = (u[None, :] * columns >= _STREAK) & (u[None, :] <= _FINEST) & (np.abs(v[:, None]) <= _FINEST)
+    searched = (u[None, :] * columns >= _STREAK) & (u[None, :] <= FINEST) & (np.abs(v[:, None]) <= FINEST)
     searched = searched & (np.hypot(u[None, :] * columns, v[:, None] * rows) >= _SLOWEST)
     row, column = np.nonzero(_peaks(power) & searched)
     height = power[row, column]
@@ -171,13 +171,15 @@ def spectrum_peaks(image: FilteredImage, weakest: float) -> Spots:
     return Spots(np.stack([u[column], v[row]], axis=1), height / _background(power, row, column), height)
 
 
-def own_spots(peaks: Spots, image: FilteredImage, least: float, weakest: float = WEAKEST) -> Spots:
+def own_spots(peaks: Spots, extent: Floats | Ints, least: float, weakest: float = WEAKEST) -> Spots:
     """Return the peaks that stand out of their neighbourhood and are no wings of stronger ones.
 
     Parameters
     ----------
     peaks
-        Peaks of the spectrum of ``image``.
+        Peaks of the spectrum of an image.
+    extent
+        Columns and rows of the image.
     least
         Least power of a spot over its background.
     weakest
@@ -185,7 +187,7 @@ def own_spots(peaks: Spots, image: FilteredImage, least: float, weakest: float =
     """
     use = (peaks.contrast >= least) & (peaks.power >= weakest * np.max(peaks.power, initial=0.0))
     waves, contrast, power = peaks.waves[use], peaks.contrast[use], peaks.power[use]
-    own = _without_wings(waves * np.array(image.values.shape[::-1]), power)
+    own = _without_wings(waves * extent, power)
     order = np.flatnonzero(own)[np.argsort(-contrast[own], kind="stable")]
     return Spots(waves[order], contrast[order], power[order])
 

@@ -6,7 +6,10 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
-from tablegen.images.indexer import AmbiguousCell, ImageCell, explained_spots, find_cell
+from tablegen.images.ambiguous_cell import AmbiguousCell
+from tablegen.images.cell_spots import explained_spots
+from tablegen.images.image_cell import ImageCell
+from tablegen.images.indexer import find_cell
 from tablegen.images.model_start import begin, first_wave, fit_spots, row_order, with_spots
 from tablegen.images.pair_checks import MAX_PERIODS_PER_COLUMN, MIN_PERIODS, FinePeriods
 from tablegen.images.periodic_model import BASES, LAG, FitState, Geometry, PeriodicModel, settle

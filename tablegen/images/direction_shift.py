@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.images.cell_errors import block_sums, parabola_maxima
+from tablegen.images.image_cell import ImageCell
 from tablegen.images.lattice_filters import filtered_images
 from tablegen.numerics.arrays import Floats
 
@@ -21,17 +22,20 @@ class DirectionShift:
     correlation: float
 
 
-def direction_shift(trace: Floats, retrace: Floats, vectors: Floats) -> DirectionShift:
+def direction_shift(trace: Floats, retrace: Floats, cell: ImageCell) -> DirectionShift:
     """Return the mean shift between both directions: the nearest maximum of their correlation.
+
+    The part of the image is that in which the cell was found.
 
     Parameters
     ----------
     trace, retrace
         Heights, shape (rows, columns) each.
-    vectors
-        The cell in pixels, shape (2, 2): a shift of more than half a side cannot be told from a smaller one.
+    cell
+        The cell of the trace: a shift of more than half a side cannot be told from a smaller one.
     """
-    one, other = filtered_images(trace)[0], filtered_images(retrace)[0]
+    block, vectors = cell.part.block, cell.vectors / cell.part.block
+    one, other = (filtered_images(cell.part.of(heights))[0] for heights in (trace, retrace))
     spectra = [np.fft.rfft2(image.values * image.weight) for image in (one, other)]
     rows, columns = one.values.shape
     match = np.fft.irfft2(np.conj(spectra[0]) * spectra[1], (rows, columns))
@@ -51,5 +55,7 @@ def direction_shift(trace: Floats, retrace: Floats, vectors: Floats) -> Directio
     places, _ = parabola_maxima((product / np.maximum(window, 1e-300))[:, None], middle, step)
     power = [float(np.sum(image.values**2 * image.weight**2)) for image in (one, other)]
     return DirectionShift(
-        places[0, 0], np.std(places[1:, 0], axis=0), float(np.max(match[~far]) / np.sqrt(np.prod(power)))
+        block * places[0, 0],
+        block * np.std(places[1:, 0], axis=0),
+        float(np.max(match[~far]) / np.sqrt(np.prod(power))),
     )

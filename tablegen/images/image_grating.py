@@ -6,9 +6,14 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.images.autocorrelation import autocorrelation, significant_spots
-from tablegen.images.lattice_filters import FilteredImage, complete_region, filtered_images
-from tablegen.images.missing import without_holes
-from tablegen.images.pair_checks import MIN_PIXELS
+from tablegen.images.lattice_filters import FilteredImage, filtered_images
+from tablegen.images.searched_part import (
+    SearchedPart,
+    aliased,
+    central_part,
+    complete_part,
+    largest_block,
+)
 from tablegen.numerics.arrays import Floats
 
 _CERTAINTY = 5.0  # exponent of e
@@ -21,11 +26,15 @@ _BLOCKS = 4  # to a side
 
 @dataclass(frozen=True, eq=False)
 class ImageGrating:
-    """The wave of a grating in periods per pixel along x and y, its covariance, and the correlation after a period."""
+    """The wave of a grating in periods per pixel along x and y, its covariance, and the correlation after a period.
+
+    ``part`` is what of the image was searched.
+    """
 
     wave: Floats
     covariance: Floats
     level: float
+    part: SearchedPart
 
 
 def find_grating(heights: Floats) -> ImageGrating:
@@ -41,12 +50,23 @@ def find_grating(heights: Floats) -> ImageGrating:
     Unphysical
         If no wave stands out, others are no harmonics, or there are fewer than three periods.
     """
-    heights = without_holes(heights[complete_region(heights)])
-    if min(heights.shape) < MIN_PIXELS:
-        size = " x ".join(map(str, heights.shape))
-        raise Unphysical(f"without missing rows the image has {size} pixels; crop it to a region without missing rows")
+    part = complete_part(heights)
+    if part.large:
+        centre = central_part(part, largest_block(heights, part))
+        waves = [significant_spots(image, _least(image)).waves for image in filtered_images(centre.of(heights))]
+        part = central_part(part, 1) if np.any(aliased(heights, centre, waves)) else centre
+    wave, covariance, level = _grating_of(part.of(heights))
+    return ImageGrating(wave / part.block, covariance / part.block**2, level, part)
+
+
+def _least(image: FilteredImage) -> float:
+    return float(np.log(image.values.size) + _CERTAINTY)
+
+
+def _grating_of(heights: Floats) -> tuple[Floats, Floats, float]:
+    """Return wave, covariance and correlation of a part of an image. Raise ``Unphysical`` if it is no grating."""
     image = filtered_images(heights)[0]
-    least = float(np.log(heights.size) + _CERTAINTY)
+    least = _least(image)
     spots = significant_spots(image, least)
     if not len(spots.waves) or spots.contrast[0] < _CLEAR * least:
         raise Unphysical(
@@ -70,7 +90,7 @@ def find_grating(heights: Floats) -> ImageGrating:
     if not level[0] > _LEAST_CORRELATION or level[1] < _LEAST_CORRELATION:
         raise Unphysical("the image does not repeat after a period of its strongest wave; is the sample a grating?")
     refined, covariance = _refined(image, wave)
-    return ImageGrating(refined, covariance, float(level[0]))
+    return refined, covariance, float(level[0])
 
 
 def _refined(image: FilteredImage, wave: Floats) -> tuple[Floats, Floats]:

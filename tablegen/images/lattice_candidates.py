@@ -7,6 +7,7 @@ import numpy as np
 
 from tablegen.images.autocorrelation import Autocorrelation, maxima
 from tablegen.images.cell_vectors import area, lattice_points, reduced, sides_and_angle
+from tablegen.images.nearby_maxima import NearbyMaxima
 from tablegen.numerics.arrays import Floats
 
 _LEAST_SIDE = 3.0  # pixels
@@ -41,7 +42,7 @@ def candidates(correlation: Autocorrelation) -> list[Candidate]:
     high = heights >= max(_LEAST_HEIGHT * heights[0], _LEAST_CORRELATION)
     near = np.argsort(np.hypot(*lags[high].T), kind="stable")[:_NEAREST]
     chosen = np.union1d(near, np.arange(min(int(high.sum()), _HIGHEST)))
-    both, levels = np.concatenate([lags, -lags]), np.concatenate([heights, heights])
+    both = NearbyMaxima(np.concatenate([lags, -lags]), np.concatenate([heights, heights]))
     cells: list[Candidate] = []
     for i, j in combinations(chosen.tolist(), 2):
         pair = lags[[i, j]]
@@ -50,9 +51,9 @@ def candidates(correlation: Autocorrelation) -> list[Candidate]:
         vectors = reduced(pair)
         if np.hypot(*vectors[0]) < _LEAST_SIDE or _known(vectors, cells):
             continue
-        level = _sums(vectors, correlation, both, levels)
+        level = _sums(vectors, correlation, both)
         if level >= _LEAST_HEIGHT * min(heights[i], heights[j]):
-            cells.append(_refined(Candidate(vectors, level, np.inf), both, levels))
+            cells.append(_refined(Candidate(vectors, level, np.inf), both))
     return distinct(cells)
 
 
@@ -73,7 +74,7 @@ def _known(vectors: Floats, cells: list[Candidate]) -> bool:
     return bool(np.min(np.max(off, axis=(1, 2))) < _SAME * side)
 
 
-def _sums(vectors: Floats, correlation: Autocorrelation, lags: Floats, heights: Floats) -> float:
+def _sums(vectors: Floats, correlation: Autocorrelation, peaks: NearbyMaxima) -> float:
     """Return the least of the maxima at the sides of a cell, their difference, and their sum if the lags reach it."""
     side = float(np.hypot(*vectors[0]))
     a, b = vectors
@@ -83,30 +84,23 @@ def _sums(vectors: Floats, correlation: Autocorrelation, lags: Floats, heights: 
             if point is a or point is b:
                 return 0.0
             continue
-        near = np.hypot(*(lags - point).T) <= max(_NEAR * side, 1.5)
-        level = min(level, float(np.max(heights[near], initial=0.0)))
+        level = min(level, peaks.highest(point, max(_NEAR * side, 1.5)))
     return level
 
 
-def _refined(cell: Candidate, lags: Floats, heights: Floats) -> Candidate:
+def _refined(cell: Candidate, peaks: NearbyMaxima) -> Candidate:
     """Fit a cell to the maxima at its lattice points, from the near ones to the far ones."""
     vectors, scatter = cell.vectors, np.inf
     for reach in range(1, _REACH + 1):
         points = lattice_points(reach)
         near = max(_NEAR * float(np.hypot(*vectors[0])), 1.5)
-        close = np.max(np.abs(lags), axis=1) <= near + np.max(np.abs(points @ vectors))
-        places, levels = lags[close], heights[close]
-        expected = points @ vectors
-        x, y = (places[None, :, axis] - expected[:, None, axis] for axis in (0, 1))
-        distance = np.sqrt(x * x + y * y)
-        nearest = np.argmin(distance, axis=1)
-        matched = distance[np.arange(len(points)), nearest] <= near
-        matched &= levels[nearest] > 0.0
+        nearest, matched = peaks.nearest(points @ vectors, near)
+        matched &= peaks.heights[nearest] > 0.0
         if np.linalg.matrix_rank(points[matched]) < 2:
             break
-        weight, places = levels[nearest[matched]], places[nearest[matched]]
+        weight, places = peaks.heights[nearest[matched]], peaks.lags[nearest[matched]]
         fit = np.linalg.lstsq(points[matched] * weight[:, None], places * weight[:, None], rcond=None)[0]
-        vectors = fit
+        vectors = np.asarray(fit, dtype=np.float64)
         scatter = float(np.sqrt(np.mean(np.sum((points[matched] @ fit - places) ** 2, axis=1))))
     a, _, _ = sides_and_angle(vectors)
     return Candidate(reduced(vectors) if a > 0.0 else cell.vectors, cell.level, scatter)

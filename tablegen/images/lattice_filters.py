@@ -122,7 +122,7 @@ def _terraces_levelled(level: Floats, valid: Bools) -> Floats:
 def _parts(level: Floats, valid: Bools) -> Iterator[tuple[int, list[tuple[int, float]]]]:
     """Yield each row with edges of terraces: the first pixel after each edge, and the step there."""
     steps, inside = _steps(level, valid)
-    edges = inside & (np.abs(steps) > _EDGE * _slope_limit(steps, inside))
+    edges = inside & (np.abs(steps) > _EDGE * slope_limit(steps, inside))
     for row in np.flatnonzero(edges.any(axis=1)).tolist():
         ends: list[tuple[int, float]] = []
         for end in (np.flatnonzero(edges[row]) + 1).tolist():
@@ -143,7 +143,16 @@ def _steps(level: Floats, valid: Bools) -> tuple[Floats, Bools]:
     return steps, inside
 
 
-def _slope_limit(steps: Floats, inside: Bools) -> float:
+def slope_limit(steps: Floats, inside: Bools) -> float:
+    """Return the largest slope of a lattice: the edge of a terrace has more.
+
+    Parameters
+    ----------
+    steps
+        Differences to the next pixel of each row, shape (rows, columns).
+    inside
+        True where both pixels are valid, of the same shape.
+    """
     usual = 1.4826 * float(np.median(np.abs(steps[inside])))
     return _SLOPE_LIMIT * (usual or float(np.std(steps[inside])))
 
@@ -156,7 +165,7 @@ def _clipped(values: Floats, valid: Bools) -> Floats:
 def _slopes(level: Floats, valid: Bools) -> tuple[Floats, Bools]:
     """Return clipped slopes along the rows, smoothed by a Gaussian, and where all pixels that they need are valid."""
     steps, inside = _steps(level, valid)
-    limit = _slope_limit(steps, inside)
+    limit = slope_limit(steps, inside)
     use = inside & (np.abs(steps) <= _EDGE * limit)
     steps = np.where(use, np.clip(steps, -limit, limit), 0.0)
     return np.where(inside, _smoothed(steps, _WIDTH), 0.0), inside

@@ -13,9 +13,11 @@ from real_files import real_folder
 import tablegen
 from tablegen.base.input_errors import Unphysical
 from tablegen.cli import cli
+from tablegen.images.ambiguous_cell import likelihoods
 from tablegen.images.autocorrelation import Spots
+from tablegen.images.cell_spots import same_lattice
 from tablegen.images.cell_vectors import reduced, sides_and_angle
-from tablegen.images.indexer import find_cell, likelihoods, same_lattice
+from tablegen.images.indexer import find_cell
 from tablegen.images.measured_cell import measured_cell
 
 REAL = real_folder()

@@ -11,22 +11,23 @@ from tablegen.virtual.imaging import Surface
 _SITES = np.array([[0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0], [2.0 / 3.0, 2.0 / 3.0]])
 
 
-def three_sites(seed: int, size: int = 128) -> tuple[Floats, Floats]:
-    """Return an image of a lattice whose lowest orders are weak, and its cell in pixels, shape (2, 2).
+def three_sites(seed: int, size: int = 128, scale: float = 1.0) -> tuple[Floats, Floats]:
+    """Return an image of a lattice whose lowest orders are weak, and its mean cell in pixels, shape (2, 2).
 
     Three equal sites at thirds of the diagonal would have a cell of a third of the area. They are off by some 5 %, so
     that the lowest orders have some 10 % of the strongest amplitude. Half of the images have a terrace, half have rows
-    that jump.
+    that jump. All drift. ``scale`` is that of the sites and of the sides, which are 13 to 24 pixels.
     """
     rng = np.random.default_rng(seed)
-    side = rng.uniform(13.0, 19.0)
+    side = scale * rng.uniform(13.0, 19.0)
     angle = np.radians(rng.choice([60.0, 90.0, rng.uniform(65.0, 88.0)]))
     other = side * (1.0 if angle in (np.radians(60.0), np.radians(90.0)) else rng.uniform(1.0, 1.25))
     turn = rng.uniform(0.0, np.pi)
     cell = np.array([[side, 0.0], [other * np.cos(angle), other * np.sin(angle)]])
     cell = cell @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     y, x = np.mgrid[:size, :size].astype(np.float64)
-    bent = x + rng.uniform(-1.0, 1.0) * (y / size) ** 2
+    drift = rng.uniform(-1.0, 1.0)
+    bent = x + drift * (y / size) ** 2
     at = np.stack([bent, y], axis=-1) @ np.linalg.inv(cell)
     offsets = 0.05 * np.array([[np.cos(t), np.sin(t)] for t in rng.uniform(0.0, 0.5) + np.array([0.0, 2.1, 4.2])])
     heights = np.zeros((size, size))
@@ -39,7 +40,8 @@ def three_sites(seed: int, size: int = 128) -> tuple[Floats, Floats]:
         heights += rng.uniform(1.0, 4.0) * ((x - size / 2) * normal[0] + (y - size / 2) * normal[1] > 0.0)
     if rng.random() < 0.5:
         heights += rng.uniform(0.2, 1.0) * rng.normal(size=(size, 1))
-    return heights + noise * rng.normal(size=heights.shape) + 0.01 * x - 0.01 * y, cell
+    image = heights + noise * rng.normal(size=heights.shape) + 0.01 * x - 0.01 * y
+    return image, cell - np.outer(cell[:, 1], [drift / size, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
