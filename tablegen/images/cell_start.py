@@ -58,6 +58,10 @@ def cell_of(
         return None, None
 
 
+class SeveralCells(Unphysical):
+    """Several cells without common waves explain the image."""
+
+
 def fit_sample_spots(
     geometry: Geometry,
     heights: list[Floats],
@@ -207,7 +211,7 @@ def _common(several: AmbiguousCell, sizes: bool) -> CellWaves:
     vectors = several.common_cell()
     if vectors is None or sizes:
         size = ", and the size of the line would be another with each" if sizes else ""
-        raise Unphysical(
+        raise SeveralCells(
             f"{str(several).partition('; ')[0]}{size}; image more periods with less noise, or choose another --channel"
         ) from None
     explained = explained_spots(vectors, several.spots)[0]

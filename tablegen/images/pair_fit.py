@@ -11,7 +11,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.estimate import Curve, Estimate
 from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measured_branch
-from tablegen.images.cell_start import fit_sample_spots
+from tablegen.images.cell_start import SeveralCells, fit_sample_spots
 from tablegen.images.missing import completed
 from tablegen.images.model_start import check_signs, prepare_heights
 from tablegen.images.pair_checks import MIN_PERIODS
@@ -89,6 +89,8 @@ def fit_pair(
     try:
         model, state, free = fit(heights)
         check_fit(model, state, free)
+    except SeveralCells:
+        raise
     except Unphysical as refused:
         reason = refused
     stepless = None if reason is None and model.bases < 2 else _stepless(geometry, trace, retrace, fit)
