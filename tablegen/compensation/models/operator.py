@@ -26,7 +26,7 @@ from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, 
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
-from tablegen.compensation.operator.uncertainty import beside, possible_errors, size_uncertainty
+from tablegen.compensation.operator.uncertainty import possible_errors, size_uncertainty
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
@@ -242,20 +242,12 @@ def _expectation(operator: Operator, solution: LearntWaveform, by: ExpectedError
     errors = solution.expected
     return Expectation(
         "traces",
-        {side: _independent(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
-        {side: _independent(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
-        _independent(errors.mismatch, by.mismatch),
-        _independent(errors.size, by.size),
+        {side: Figure(errors.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
+        {side: Figure(errors.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
+        Figure(errors.mismatch, by.mismatch),
+        Figure(errors.size, by.size),
         100.0 * operator.distance(solution.stroke, solution.centre),
     )
-
-
-def _independent(value: float, error: float) -> Figure:
-    """Return a figure of a line whose own error and the piezo's departure are two curves that know nothing of another.
-
-    Their squares add up, so that value and uncertainty together are the root of the sum.
-    """
-    return Figure(value, beside(value, error))
 
 
 def _check_sense(operator: Operator, request: LineRequest) -> None:
