@@ -103,7 +103,7 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
         assert expected.scaling[side].value == pytest.approx(scaling[side], rel=0.1, abs=0.3)
         assert expected.rms[side].uncertainty == pytest.approx(np.hypot(LEFT_OUT[0], steps.rms[side]), rel=1e-3)
         # The middle between the turns is not quite that of the traces.
-        assert expected.scaling[side].uncertainty == pytest.approx(together, rel=1e-3)
+        assert expected.scaling[side].uncertainty == pytest.approx(np.hypot(LEFT_OUT[1], steps.scaling[side]), rel=1e-3)
     assert expected.mismatch is not None
     apart = float(np.max(np.abs(sides["forward"] - sides["backward"])))
     assert expected.mismatch.value == pytest.approx(apart, rel=0.1, abs=0.02)
