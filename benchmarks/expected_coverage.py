@@ -3,7 +3,7 @@
 ``python benchmarks/expected_coverage.py`` prints a row for each piezo and protocol: the share of scans that leave less
 than value and uncertainty together, which should be 90 %, and the median of what is left over that sum. Scans are at
 random sizes, offsets between those of the traces, and rates. The levels of the uncertainty were chosen on ``FITTED``;
-no scan on ``ASIDE`` had a say, and Bouc and Wen's and Duhem's equations are not among the families that did. A
+those of ``ASIDE`` are of other numbers or families; docs/operator.md says what was seen of them meanwhile. A
 simulation.
 """
 

@@ -57,8 +57,7 @@ def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation 
 def _less_certain(figure: Figure, by: float) -> Figure:
     if figure.uncertainty is None:
         return figure
-    together = abs(figure.value) + figure.uncertainty
-    return replace(figure, uncertainty=figure.uncertainty + hypot(together, by) - together)
+    return replace(figure, uncertainty=hypot(figure.uncertainty, by))
 
 
 def rounding_mismatch(line: LinePlan) -> float | None:

@@ -102,17 +102,18 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
     for side in sides:
         assert expected.rms[side].value == pytest.approx(rms[side], rel=0.05, abs=0.005)
         assert expected.scaling[side].value == pytest.approx(scaling[side], rel=0.1, abs=0.3)
-        assert expected.rms[side].uncertainty == LEFT_OUT[0] + steps.rms[side]
-        assert expected.scaling[side].uncertainty == LEFT_OUT[1] + steps.scaling[side]
+        assert expected.rms[side].uncertainty == pytest.approx(np.hypot(LEFT_OUT[0], steps.rms[side]), rel=1e-3)
+        # The middle between the turns is not quite that of the traces.
+        assert expected.scaling[side].uncertainty == pytest.approx(np.hypot(LEFT_OUT[1], steps.scaling[side]), rel=1e-3)
     assert expected.mismatch is not None
     apart = float(np.max(np.abs(sides["forward"] - sides["backward"])))
     assert expected.mismatch.value == pytest.approx(apart, rel=0.1, abs=0.02)
     assert expected.size is not None
     assert expected.size.value == pytest.approx(100.0 * (slope / line.drive.size_nm - 1.0), abs=0.03)
-    assert expected.mismatch.uncertainty == 0.2 + steps.mismatch
+    assert expected.mismatch.uncertainty == pytest.approx(np.hypot(0.2, steps.mismatch), rel=1e-3)
     known = line.drive.shape.identification
     assert isinstance(known, OperatorIdentification)
-    assert expected.size.uncertainty == pytest.approx(np.hypot(0.1, 100.0 * known.between), rel=1e-12)
+    assert expected.size.uncertainty == pytest.approx(np.hypot(np.hypot(0.1, 0.13), 100.0 * known.between), rel=1e-3)
     assert abs(known.between) < 5e-4
     assert (max(scaling.values()) > 10.0) == (harmonics == 6)  # it is the waveform that makes the difference
 
@@ -130,7 +131,7 @@ def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read
     text = run("show", path, "--no-plot", "--all").out
     assert re.search(r"on the scanner +rms forward [\d.e-]+ \+- 0\.05 %, rms backward ", text)
     assert re.search(r"\n +scaling forward [\d.e-]+ \+- 1\.5 %, scaling backward ", text)
-    assert re.search(r"\n +mismatch [\d.e-]+ \+- 0\.2 %, size [+-][\d.e-]+ \+- 0\.1 %", text)
+    assert re.search(r"\n +mismatch [\d.e-]+ \+- 0\.2 %, size [+-][\d.e-]+ \+- 0\.16 %", text)
     assert re.search(r"\n +nearest measured line [\d.]+ % of v_max away", text)
     manifest = json.loads((out / "manifest.json").read_bytes())
     (name,) = manifest["axes"]["x"]["drive"]["model_files"]
@@ -147,7 +148,7 @@ def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read
         "distance_percent",
     ]
     steps = converter_errors(plan.x, EmittedPeriod(plan.x)).scaling["backward"]
-    assert expected["scaling_percent"]["backward"]["uncertainty"] == float(f"{1.5 + steps:.6g}")
+    assert expected["scaling_percent"]["backward"]["uncertainty"] == pytest.approx(np.hypot(1.5, steps), rel=1e-3)
     assert steps < 0.01
     assert "expected" not in manifest["axes"]["y"]["certificate"]  # forward only, and no operator
     before = read_build(out)

@@ -21,7 +21,7 @@ from tablegen.virtual.simulation import run_line
 
 SAMPLES = 2000  # of a period, on which the piezos are integrated
 SCANS = tuple((offset, share) for offset in (0.5, 0.6, 0.7, 0.85) for share in (0.2, 0.5, 0.85))
-PLANTS = {  # with numbers on which nothing was tuned
+PLANTS = {  # not of benchmarks/expected_coverage.py; one level was raised after scaling errors of these missed
     "plays": ForeignPlant(ManyPlays(seed=11), creep=0.024),
     "Bouc-Wen": ForeignPlant(BoucWen(a=0.3, beta=5.0, gamma=-1.5, n=1.2, depth=0.5, asymmetry=0.2, bend=0.2), 0.022),
 }

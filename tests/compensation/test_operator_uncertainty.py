@@ -17,7 +17,6 @@ from tablegen.compensation.operator.uncertainty import (
     Figures,
     LoopShape,
     PossibleErrors,
-    beside,
     shape_of,
     size_uncertainty,
 )
@@ -187,9 +186,3 @@ def test_the_shape_of_a_loop_is_that_about_its_line() -> None:
     assert shape.mismatch == pytest.approx(200.0 * float(np.max(np.abs(bent))), rel=1e-2)
     assert shape.scaling == pytest.approx(100.0 * float(np.ptp(np.gradient(bent, x))), rel=0.1)
     assert shape_of(Loop(0.2, 0.6, u, u, 100.0)) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
-
-
-@given(st.floats(-5.0, 5.0), st.floats(0.0, 5.0))
-def test_independent_errors_add_by_their_squares(value: float, error: float) -> None:
-    assert abs(value) + beside(value, error) == pytest.approx(hypot(value, error), rel=1e-12, abs=1e-12)
-    assert beside(value, 0.0) == 0.0

@@ -26,7 +26,7 @@ from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, 
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
-from tablegen.compensation.operator.uncertainty import beside, possible_errors, size_uncertainty
+from tablegen.compensation.operator.uncertainty import possible_errors, size_uncertainty
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
@@ -234,20 +234,12 @@ def _expectation(operator: Operator, solution: LearntWaveform, by: ExpectedError
     errors, beyond = solution.expected, solution.unmeasured
     return Expectation(
         "traces",
-        {side: _independent(errors.rms[i], by.rms[i], beyond.rms[i]) for i, side in enumerate(SIDES)},
-        {side: _independent(errors.scaling[i], by.scaling[i], beyond.scaling[i]) for i, side in enumerate(SIDES)},
-        _independent(errors.mismatch, by.mismatch, beyond.mismatch),
-        _independent(errors.size, by.size, beyond.size),
+        {side: Figure(errors.rms[i], by.rms[i] + beyond.rms[i]) for i, side in enumerate(SIDES)},
+        {side: Figure(errors.scaling[i], by.scaling[i] + beyond.scaling[i]) for i, side in enumerate(SIDES)},
+        Figure(errors.mismatch, by.mismatch + beyond.mismatch),
+        Figure(errors.size, by.size + beyond.size),
         100.0 * operator.distance(solution.stroke, solution.centre),
     )
-
-
-def _independent(value: float, error: float, beyond: float) -> Figure:
-    """Return a figure of a line whose own error and the piezo's departure are two curves that know nothing of another.
-
-    Their squares add up, so that value and uncertainty together are the root of the sum; ``beyond`` is added to it.
-    """
-    return Figure(value, beside(value, error) + beyond)
 
 
 def _check_sense(operator: Operator, request: LineRequest) -> None:

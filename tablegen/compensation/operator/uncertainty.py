@@ -14,7 +14,7 @@ equation; ``benchmarks/expected_coverage.py`` checks them on others.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import hypot, log, sqrt
+from math import log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +53,7 @@ _SIZE_UNIT = 10.0  # percent, of which the share of a size is; sizes do not foll
 _POWERS = tuple(0.5 * k for k in range(-10, 11))  # logarithms of the variance over that of the median share
 _POWER_SPREAD = 2.0  # their standard deviation before traces at other offsets were left out
 
-_NOISE_LEVEL = (1.0, 1.0, 1.1, 1.0)  # of what remains in the fit: a field takes out a part of a trace's noise
+_NOISE_LEVEL = (1.0, 1.0, 1.0, 1.0)  # of what remains in the fit: a field takes out a part of a trace's noise
 _DEPARTURE_LEVEL = (1.1, 0.7, 1.0, 0.55)
 _LEAST = (0.0, 0.0, 0.0, 0.13)  # percent: sizes are those of laws that were fitted to noisy sizes
 
@@ -265,11 +265,6 @@ def shape_of(loop: Loop) -> LoopShape:
 def size_uncertainty(steps: Sequence[float]) -> float:
     """Return by how much the size may be off, in percent, for the shares by which formulas change it."""
     return 100.0 * _FORMULAS * sqrt(sum(step * step for step in steps))
-
-
-def beside(value: float, error: float) -> float:
-    """Return the uncertainty of a value that an independent error, at the level of 90 %, adds to: never less than 0."""
-    return hypot(value, error) - abs(value)
 
 
 def _without_each(factor: Cholesky, count: int) -> list[float]:
