@@ -33,6 +33,7 @@ _ROW_BENDS = 20  # terms for the residual of the phase polynomial in the rows
 _FOLLOWING = 0.5  # share of the change of a phase step that the next guess follows
 _ROUNDS = 40
 _STEP_ROUNDS = 2  # fits to images without the steps that the fit before left
+_ODD = 4.0  # times the median rms that a fit leaves in a row
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of the effect of a term
 _MOST_BENT_LATTICE = 0.5  # sum of log aspect and shear that a frame may have
@@ -178,7 +179,7 @@ def periodic_scan(
         heights, scaled = _unit(heights, heights), _unit(recorded, heights)
         model, state, free = fit_cell_spots(geometry, heights, retrace_mirrored, waves)
         # Without terraces, what a first fit leaves is its own error, and would pass for steps.
-        for _ in range(_STEP_ROUNDS if has_terraces else 0):
+        for _ in range(_STEP_ROUNDS if has_terraces or _has_odd_rows(state) else 0):
             without, stepped = _stepless(model, state, scaled)
             if not stepped:
                 break
@@ -210,6 +211,12 @@ def _stepless(model: PeriodicModel, state: FitState, recorded: list[Floats]) -> 
     pairs = zip(recorded, model.periodic_parts(state), strict=True)
     images, stepped = zip(*(without_steps(image, part) for image, part in pairs), strict=True)
     return list(images), any(stepped)
+
+
+def _has_odd_rows(state: FitState) -> bool:
+    """Return True if a fit leaves far more in some rows than in the others: the edge of a terrace along the rows."""
+    spread = np.sqrt(np.mean([np.mean(residual**2, axis=1) for residual in state.residuals], axis=0))
+    return bool(np.max(spread) > _ODD * np.median(spread))
 
 
 def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicModel, FitState]:
