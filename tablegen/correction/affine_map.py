@@ -13,6 +13,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
+from tablegen.correction.levelled_cell import levelled_cell
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.direction_shift import DirectionShift, direction_shift
 from tablegen.images.indexer import find_cell, same_lattice
@@ -29,6 +30,10 @@ _BASES = [
     for one in product((-1, 0, 1), repeat=4)
     if abs(one[0] * one[3] - one[1] * one[2]) == 1
 ]
+
+
+class ImplausibleMap(Unphysical):
+    """The cell is that of another kind of lattice, or of another constant."""
 
 
 @dataclass(frozen=True)
@@ -175,8 +180,9 @@ def affine_map(
 def _mean_cell(images: Sequence[Floats], expected: float | None) -> tuple[Floats, Floats]:
     """Return the cell in pixels with its covariance: the mean of both directions, whose hysteresis is opposite."""
     cell = find_cell(images[0], images[1] if len(images) == 2 else None, expected)
+    vectors, covariance = levelled_cell(images[0], cell)
     if len(images) == 1:
-        return cell.vectors, cell.covariance
+        return vectors, covariance
     other = find_cell(images[1], images[0], expected)
     if not same_lattice(cell.vectors, other.vectors):
         raise Unphysical(
@@ -184,9 +190,9 @@ def _mean_cell(images: Sequence[Floats], expected: float | None) -> tuple[Floats
             "sample's --lattice-nm"
         )
     change = np.kron(np.round(cell.vectors @ np.linalg.inv(other.vectors)), np.eye(2))
-    vectors = (change @ other.vectors.ravel()).reshape(2, 2)
-    covariance = change @ other.covariance @ change.T
-    return 0.5 * (cell.vectors + vectors), 0.25 * (cell.covariance + covariance)
+    second, spread = levelled_cell(images[1], other)
+    second = (change @ second.ravel()).reshape(2, 2)
+    return 0.5 * (vectors + second), 0.25 * (covariance + change @ spread @ change.T)
 
 
 def _map(vectors: Floats, basis: Floats, kind: str) -> Floats:
@@ -211,7 +217,7 @@ def _constant(vectors: Floats, reading: _Reading, size_nm: tuple[float, float]) 
 
 
 def _reading(vectors: Floats, size_nm: tuple[float, float], constant_nm: float | None, kind: str) -> _Reading:
-    """Return the one plausible map. Raise ``Unphysical`` if there is none, or more than one."""
+    """Return the one plausible map. Raise an error if there is none, or more than one."""
     readings: dict[tuple[float, ...], _Reading] = {}
     for basis in _BASES:
         one = _Reading(kind, basis, 1.0, 1.0, 0.0)
@@ -221,7 +227,7 @@ def _reading(vectors: Floats, size_nm: tuple[float, float], constant_nm: float |
     ranked = sorted(readings.values(), key=lambda one: one.strain)
     plausible = [one for one in ranked if one.plausible(constant_nm is not None)]
     if not plausible:
-        raise Unphysical(
+        raise ImplausibleMap(
             f"as a {kind} lattice the frame would be {_size(ranked[0], size_nm)}; a factor of {_MOST_SCALED[0]:g} of "
             f"the width, one of {_MOST_SCALED[1]:g} of the height and a shear of {100.0 * _MOST_SHEARED:.0f} % are "
             f"plausible; is the sample such a lattice (--lattice), and this its constant?"

@@ -11,7 +11,7 @@ from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.reading import CONFIGURATION, file_sha256
 from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
-from tablegen.correction.affine_map import affine_map
+from tablegen.correction.affine_map import ImplausibleMap, affine_map
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.fit_checks import (
@@ -443,8 +443,10 @@ def _affine_advice(images: Images, lattice_nm: float | None, kind: str | None) -
     for name in IDEAL_ANGLES if kind is None else (kind,):
         try:
             by_affine_map(images, lattice_nm, name)
-        except Unphysical:
+        except ImplausibleMap:
             continue
+        except Unphysical:
+            return ""
         condition = "" if kind is not None else f"if the lattice is {name}, "
         return f"{condition}--affine --lattice {name} corrects width, height and shear alone"
     return ""

@@ -95,6 +95,13 @@ def test_shape_alone_where_the_constant_is_unknown() -> None:
     assert scan.record["affine"]["shear_nm"]["value"] == pytest.approx(10.0, abs=1.0)
 
 
+def test_levelled_rows_do_not_shift_the_cell() -> None:
+    """A wave of 1.4 periods along the rows loses power when they are levelled: the shear was off by 2 %."""
+    frame = picture(0.95 * 43.0, 1.0355 * 43.0, -0.1276 * 0.95 * 43.0, noise=0.1)
+    affine = by_affine_map(file_of(frame, size_nm=(43.0, 43.0)), SIDE_NM, "hexagonal").record["affine"]
+    assert affine["shear_nm"]["value"] == pytest.approx(-0.1276 * 0.95 * 43.0, abs=0.006 * 43.0)
+
+
 def test_some_three_periods_in_both_directions() -> None:
     """Trace and retrace are 5 pixels apart: each is moved by half of it."""
     frame = {"width_nm": 28.0, "height_nm": 30.0, "shear_nm": 2.2, "noise": 0.3}
@@ -217,9 +224,9 @@ if REAL is not None:  # else the run says so at its end
         """Both directions have the same map by themselves."""
         images = read_scan(REAL / "moire_10nm.sxm", None, Choice())
         scan = by_affine_map(images, None, "hexagonal")
-        assert scan.record["affine"]["shear_nm"]["value"] == pytest.approx(0.89, abs=0.1)
+        assert scan.record["affine"]["shear_nm"]["value"] == pytest.approx(0.68, abs=0.1)
         assert scan.agreement is not None
-        assert scan.agreement.worst == pytest.approx((5.74, 0.44), abs=0.05)
+        assert scan.agreement.worst == pytest.approx((5.77, 0.47), abs=0.05)
 
     @pytest.mark.common
     def test_frames_of_a_movie_have_one_map() -> None:
