@@ -11,7 +11,17 @@ from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.correction.correction_text import correct_text
-from tablegen.correction.job import Choice, Images, OldAxis, OldScan, by_fit, by_scan_file, by_scanner, read_scan
+from tablegen.correction.job import (
+    Choice,
+    Images,
+    OldAxis,
+    OldScan,
+    by_affine_map,
+    by_fit,
+    by_scan_file,
+    by_scanner,
+    read_scan,
+)
 from tablegen.correction.output_files import files_of
 from tablegen.correction.straight import StraightScan
 from tablegen.emit.write import write_files
@@ -34,6 +44,7 @@ def correct(
     lattice: Literal["hexagonal", "square"] | None = None,
     pitch_nm: float | None = None,
     fit: bool = False,
+    affine: bool = False,
     **how: Any,
 ) -> "Corrected":
     """Correct an image: by a scanner file, by the scan file that it was taken with, or by a fit to a lattice.
@@ -49,6 +60,8 @@ def correct(
         Constant in nm of a periodic sample, which is fitted; ``fit=True`` where it is unknown.
     lattice : {"hexagonal", "square"}, optional
         Kind of the lattice of ``lattice_nm``; hexagonal by default, unless the frame is straight as a square one.
+    affine : bool
+        Correct height and shear alone, and with ``lattice_nm`` the width, by the cell of a lattice of kind ``lattice``.
     **how : optional
         ``size_v`` in V peak to peak at the piezo or ``size_nm``, ``offset_v``, ``turn``, ``window`` of the fast axis,
         the same with ``slow_`` of the slow one; ``rate_hz``, ``lines``, ``slow_back``, ``delay_pixels``; of files
@@ -75,7 +88,9 @@ def correct(
     True
     """
     check_names(how, _NAMES)
-    fitted = fit or lattice_nm is not None or pitch_nm is not None
+    fitted = fit or affine or lattice_nm is not None or pitch_nm is not None
+    if affine and (pitch_nm is not None or lattice is None):
+        raise TypeError("affine needs lattice, the kind of the lattice; lattice_nm for the size too; and no pitch_nm")
     if fitted == (scanner is not None or scan is not None):
         raise TypeError("give scanner, the scanner file, or scan, or fit=True for a periodic sample; one of the ways")
     if isinstance(trace, str | Path):
@@ -89,6 +104,8 @@ def correct(
         mirrored = bool(how.get("retrace_mirrored", False))
         images = Images(tuple(both), (True, False)[: len(both)], tuple(range(len(both))), (), mirrored)
     files = [None if path is None else Path(path) for path in (scanner, scan)]
+    if affine and lattice is not None:
+        return Corrected(by_affine_map(images, lattice_nm, lattice), images)
     return Corrected(straight(images, files[0], files[1], old_scan_of(how), pitch_nm, lattice_nm, lattice), images)
 
 

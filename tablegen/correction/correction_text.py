@@ -1,5 +1,7 @@
 """The terminal output of `tablegen correct`."""
 
+from typing import Any
+
 from tablegen.base.warnings import Finding, worst_first
 from tablegen.correction.job import Images
 from tablegen.correction.straight import StraightScan
@@ -9,6 +11,7 @@ from tablegen.images.scan_angle import angle_text
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
 _OTHER = 1.4  # times the size of the file: another size
 _FEW_PERIODS = 8.0  # in the line
+_NOT_MOVED = 1e-9  # pixels: rounding
 _FAR = 1.0  # pixels of mismatch of trace and retrace that need a finding
 
 
@@ -19,7 +22,9 @@ def correct_text(scan: StraightScan, images: Images) -> list[str]:
     files = ", ".join(dict.fromkeys(one.file for one in images.channels))
     count = len(images.channels)
     lines = [f"{files}: {columns} x {rows} pixels, {count} channel{'s' if count > 1 else ''}"]
-    if record["by"].startswith("fit"):
+    if "affine" in record:
+        lines += _affine_lines(record)
+    elif record["by"].startswith("fit"):
         periods = ", ".join(f"{value:.4g}" for value in record["periods_in_the_line"])
         lines.append(
             f"fit           {periods} periods in the line; {100.0 * record['explained']:.3g} % of the contrast"
@@ -34,7 +39,7 @@ def correct_text(scan: StraightScan, images: Images) -> list[str]:
                 f"{one['rate_hz']:.4g} Hz, turn {one['turn']:g}"
             )
     lines.append(f"size          {_size(scan.size_nm)}; the file has {_size(_of_file(images))}")
-    x, y = scan.moved_pixels
+    x, y = (value if value > _NOT_MOVED else 0.0 for value in scan.moved_pixels)
     lines.append(
         f"moved         up to {x:.3g} pixels ({100.0 * x / columns:.3g} %) along x, "
         f"{y:.3g} pixels ({100.0 * y / rows:.3g} %) along y"
@@ -45,6 +50,33 @@ def correct_text(scan: StraightScan, images: Images) -> list[str]:
         of_y = "" if scan.lattice.y is None else f", {along:.2g} % along y"
         lines.append(f"lattice       off a perfect one by up to {across:.2g} % along x{of_y}, after")
     return [*lines, *(finding.line for finding in _findings(scan, images))]
+
+
+def _affine_lines(record: dict[str, Any]) -> list[str]:
+    """Return the lines of an affine map: the cell of the recorded image, the map, and what it leaves."""
+    affine, cell = record["affine"], record["affine"]["cell_nm"]
+    sides = " x ".join(_shown(cell[side]) for side in ("a", "b"))
+    kind, constant = record["lattice"], record["lattice_nm"]
+    sample = f"{kind}, {constant:.6g} nm" if constant else f"{kind}, of unknown constant: the width is that of the file"
+    lines = [
+        f"cell          {sides} nm at {_shown(cell['angle_deg'])} degrees as recorded",
+        f"sample        {sample}",
+        f"affine map    width x {_shown(affine['width_factor'])}, height x {_shown(affine['height_factor'])}, last row "
+        f"{_shown(affine['shear_nm'])} nm to the right",
+    ]
+    if "retrace_shift_pixels" in affine:
+        x, y = affine["retrace_shift_pixels"]
+        moved = f"{x:.3g} pixels along x, {y:.3g} along y from the trace; each was moved by half of it"
+        lines.append(f"retrace       {moved}")
+    for direction, bows in affine["bows_percent"].items():
+        line, rows_x, rows_y = (f"{one['value']:.2g} +- {one['standard_error']:.2g} %" for one in bows.values())
+        lines.append(f"bow left      {direction}: lines {line}; rows {rows_x} along x, {rows_y} along y")
+    return lines
+
+
+def _shown(number: dict[str, float]) -> str:
+    value, error = number["value"], number["standard_error"]
+    return f"{value:.4g} +- {error:.2g}" if error else f"{value:.4g}"
 
 
 def _size(size: tuple[float, float] | None) -> str:
@@ -88,11 +120,23 @@ def _by_file(scan: StraightScan) -> list[Finding]:
     return notes
 
 
+def _by_affine_map(scan: StraightScan) -> list[Finding]:
+    """Return what an affine map leaves."""
+    if "affine" not in scan.record:
+        return []
+    text = "the affine map leaves the displacement within lines and between rows, as of hysteresis, as it was"
+    notes = [Finding("spoils", 0.0, text)]
+    if not scan.record["affine"]["sheared"]:
+        notes.append(Finding("note", 0.0, "shear and aspect are within their errors; they were not applied"))
+    return notes
+
+
 def _findings(scan: StraightScan, images: Images) -> list[Finding]:
     """Return the findings, the worst first; percentages are of the picture."""
     notes = [Finding("note", 0.0, f"left out: {text}") for text in images.left_out]
+    affine = scan.record.get("affine")
     angle = scan.record.get("scan_angle_deg")
-    if angle is not None and not scan.record["by"].startswith("fit"):
+    if angle is not None and affine is None and not scan.record["by"].startswith("fit"):
         text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
         notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
     notes += _by_file(scan)
@@ -103,6 +147,7 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
     if imaged := scan.record.get("imaged_rows"):
         text = f"rows {imaged[0] + 1} to {imaged[1]} have data; the picture is of these"
         notes.append(Finding("note", 0.0, text))
+    notes += _by_affine_map(scan)
     if straight := scan.record.get("not_displaced"):
         text = f"the displacement along {' and '.join(straight)} is within its errors; it was not applied"
         notes.append(Finding("note", 0.0, text))
@@ -133,5 +178,6 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
             notes.append(Finding("limit", offset_percent, text))
         elif worst is not None and worst[1] > _FAR:
             text = "trace and retrace are still apart; are drive, offset, rate, turn and window those of the image?"
+            text = "trace and retrace are still apart: the lines are bent" if affine is not None else text
             notes.append(Finding("spoils", offset_percent, text))
     return worst_first(notes)

@@ -14,10 +14,13 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.correction.agreement import Agreement, levelled
 from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan
+from tablegen.images.cell_errors import CellFit, fit_cell
 from tablegen.images.cell_spots import same_lattice
 from tablegen.images.cell_vectors import area, reduced, sides_and_angle
+from tablegen.images.image_cell import ImageCell
 from tablegen.images.indexer import find_cell
-from tablegen.images.measured_cell import IDEAL_ANGLES, measured_cell
+from tablegen.images.lattice_filters import filtered_images
+from tablegen.images.measured_cell import IDEAL_ANGLES, MeasuredCell, measured_cell
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _MOST_MOVED = 0.05  # of the picture, without the bow of hysteresis
@@ -31,6 +34,7 @@ _CLOSE = 0.5  # pixels: trace and retrace within this distance agree
 _SIDE_OFF = 0.01  # share of a side of the straight cell
 _ANGLE_OFF = 1.0  # degrees
 _ERRORS = 3.0  # standard errors
+_LEAST_LEVEL = 0.04  # of the variance, of the autocorrelation at the points of a lattice
 
 _CLIPPED = 1.0  # percent of the heights at either end: debris has power at all frequencies
 _LEAST_PERIODS = 2.5  # along the line; levelling the rows removes slower waves
@@ -262,33 +266,88 @@ def check_straight_cell(
             f"{fit.several_cells.partition('; ')[0]}; image more periods with less noise, give --lattice-nm with a "
             f"file that has its size, or correct with --scanner"
         )
+    if size_nm is not None and constant_nm is not None:
+        check_sample_cell(pictures, size_nm, constant_nm, kind, by_size)
+        return
     rows, columns = pictures[0].shape
-    imaged = _imaged_rectangle(np.isfinite(np.sum(pictures, axis=0)))
-    picture = np.mean(pictures, axis=0)[imaged]
     (low_x, high_x), (low_y, high_y) = fit.distortion.x_range, fit.distortion.y_range
     own = np.linalg.inv(fit.waves).T / np.array([(high_x - low_x) / columns, (high_y - low_y) / rows])
-    pixel = (1.0, 1.0) if size_nm is None or constant_nm is None else (size_nm[0] / columns, size_nm[1] / rows)
-    expected = area(own)
-    if constant_nm is not None:
-        expected = constant_nm**2 * float(np.sin(np.radians(IDEAL_ANGLES[kind]))) / (pixel[0] * pixel[1])
+    image_cell = _cell_of_mean(pictures, area(own) if by_size else None)
+    if same_lattice(image_cell.vectors, own):
+        return
+    sides = "{:.4g} x {:.4g} pixels at {:.3g} degrees".format(*sides_and_angle(reduced(own)))
+    raise _other_cell(measured_cell(image_cell.vectors, image_cell.covariance, (1.0, 1.0)), sides)
+
+
+def check_sample_cell(
+    pictures: Sequence[Floats],
+    size_nm: tuple[float, float],
+    constant_nm: float,
+    kind: str,
+    by_size: bool,
+    start: Floats | None = None,
+) -> None:
+    """Check that the mean of straight pictures is a lattice of this constant and kind.
+
+    A side may be off by 1 %, the angle by 1 degree, and each by three standard errors. The cell is that of the indexer;
+    where ``start`` has fewer than 4.4 periods in the picture, it is that of the autocorrelation's maxima beside it.
+
+    Parameters
+    ----------
+    pictures
+        Straight trace, and retrace if there is one, shape (rows, columns) each; NaN where nothing was imaged.
+    size_nm, constant_nm, kind
+        Width and height of the pictures, and constant and kind of the lattice.
+    by_size
+        True if the size in the file decides between cells of several sizes.
+    start
+        The cell that the pictures should have, in their pixels, shape (2, 2).
+
+    Raises
+    ------
+    Unphysical
+        If it has another cell, or none.
+    """
+    rows, columns = pictures[0].shape
+    pixel = size_nm[0] / columns, size_nm[1] / rows
+    expected = constant_nm**2 * float(np.sin(np.radians(IDEAL_ANGLES[kind]))) / (pixel[0] * pixel[1])
+    image_cell: ImageCell | CellFit
+    if start is not None and _slowest(np.asarray(np.linalg.inv(start).T * [columns, rows], dtype=np.float64)) < _FEWEST:
+        image_cell = _cell_beside(np.mean(pictures, axis=0), start)
+    else:
+        image_cell = _cell_of_mean(pictures, expected if by_size else None)
+    cell = measured_cell(image_cell.vectors, image_cell.covariance, pixel)
+    angle_off = abs(cell.angle_deg.value - IDEAL_ANGLES[kind])
+    right = angle_off <= _ANGLE_OFF + _ERRORS * cell.angle_deg.standard_error
+    for side in (cell.a, cell.b):
+        right &= abs(side.value - constant_nm) <= _SIDE_OFF * constant_nm + _ERRORS * side.standard_error
+    if not right:
+        raise _other_cell(cell, f"{constant_nm:.4g} nm at {IDEAL_ANGLES[kind]:g} degrees")
+
+
+def _cell_of_mean(pictures: Sequence[Floats], expected_area: float | None) -> ImageCell:
+    """Return the cell of the mean of straight pictures. Raise ``Unphysical`` if there is none."""
+    imaged = _imaged_rectangle(np.isfinite(np.sum(pictures, axis=0)))
     try:
-        image_cell = find_cell(picture, None, expected if by_size else None)
+        return find_cell(np.mean(pictures, axis=0)[imaged], None, expected_area)
     except Unphysical as reason:
         raise Unphysical(f"the corrected image does not show the sample's cell: {reason}") from None
-    cell = measured_cell(image_cell.vectors, image_cell.covariance, pixel)
-    if constant_nm is None:
-        if same_lattice(image_cell.vectors, own):
-            return
-        sides = "{:.4g} x {:.4g} pixels at {:.3g} degrees".format(*sides_and_angle(reduced(own)))
-    else:
-        angle_off = abs(cell.angle_deg.value - IDEAL_ANGLES[kind])
-        right = angle_off <= _ANGLE_OFF + _ERRORS * cell.angle_deg.standard_error
-        for side in (cell.a, cell.b):
-            right &= abs(side.value - constant_nm) <= _SIDE_OFF * constant_nm + _ERRORS * side.standard_error
-        if right:
-            return
-        sides = f"{constant_nm:.4g} nm at {IDEAL_ANGLES[kind]:g} degrees"
-    raise Unphysical(
+
+
+def _cell_beside(picture: Floats, start: Floats) -> CellFit:
+    """Return the cell of the autocorrelation's maxima beside ``start``, shape (2, 2) in pixels."""
+    cell = fit_cell(filtered_images(picture)[0], start)
+    if cell is None or cell.level < _LEAST_LEVEL or not same_lattice(cell.vectors, start):
+        raise Unphysical(
+            "the corrected image does not show the sample's cell: its autocorrelation has no maxima there; image more "
+            "periods with less noise, or correct with --scanner"
+        )
+    return cell
+
+
+def _other_cell(cell: MeasuredCell, sides: str) -> Unphysical:
+    """Return the error of a straight image whose cell does not have these sides."""
+    return Unphysical(
         f"the corrected image does not show the sample's cell: its sides are {cell.a.value:.4g} x {cell.b.value:.4g} "
         f"at {cell.angle_deg.value:.3g} degrees, and not {sides}; give --lattice-nm and --lattice, image more periods "
         f"with less noise, or correct with --scanner"

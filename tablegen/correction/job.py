@@ -11,9 +11,18 @@ from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.reading import CONFIGURATION, file_sha256
 from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
+from tablegen.correction.affine_map import ImplausibleMap, affine_map
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
-from tablegen.correction.fit_checks import check_agreement, check_cell, check_constant, check_moves, check_straight_cell
+from tablegen.correction.fit_checks import (
+    check_agreement,
+    check_cell,
+    check_constant,
+    check_moves,
+    check_sample_cell,
+    check_straight_cell,
+)
+from tablegen.correction.lattice_bow import check_bows
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, corrected_scan
@@ -497,6 +506,32 @@ def by_fit(
         large, or trace and retrace do not agree better.
     """
     images = images.of_imaged_rows()
+    try:
+        return _by_fit(images, conditions, pitch_nm, lattice_nm, kind)
+    except Unphysical as reason:
+        advice = "" if pitch_nm is not None else _affine_advice(images, lattice_nm, kind)
+        if not advice:
+            raise
+        raise Unphysical(f"{reason}; {advice}") from None
+
+
+def _affine_advice(images: Images, lattice_nm: float | None, kind: str | None) -> str:
+    """Return a sentence for the text of a refused fit, where an affine map is possible; else nothing."""
+    for name in IDEAL_ANGLES if kind is None else (kind,):
+        try:
+            by_affine_map(images, lattice_nm, name)
+        except ImplausibleMap:
+            continue
+        except Unphysical:
+            return ""
+        condition = "" if kind is not None else f"if the lattice is {name}, "
+        return f"{condition}--affine --lattice {name} corrects width, height and shear alone"
+    return ""
+
+
+def _by_fit(
+    images: Images, conditions: OldScan, pitch_nm: float | None, lattice_nm: float | None, kind: str | None
+) -> tuple[StraightScan, PeriodicScan]:
     conditions = _timed(images, conditions)
     trace, retrace = (*(images.channels[i].heights for i in images.reference), None)[:2]
     retrace_alone = not any(images.forward)
@@ -505,8 +540,7 @@ def by_fit(
     if lattice_nm is not None and first.width_nm is not None and first.height_nm is not None:
         angle = np.radians(IDEAL_ANGLES[kind or "hexagonal"])
         expected = lattice_nm**2 * float(np.sin(angle)) * rows * columns / (first.width_nm * first.height_nm)
-    if retrace is None and not all(images.forward) and not retrace_alone:
-        raise Unphysical("has channels of the retrace, but none of the fitted signal; give --retrace-channel")
+    _check_reference(images)
     assert trace is not None
     (turn, (low, high)), delay_pixels, mirrored = conditions.x.timing, conditions.delay_pixels, images.mirrored
     if retrace_alone:  # a way back is a way forward over the mirror image of the sample
@@ -567,6 +601,54 @@ def _checked_pictures(fit: PeriodicScan, scan: StraightScan, trace: Floats) -> t
         both = zip((True, False), fit.without_gaps, strict=False)
         pictures = [Resampler.of(fit.distortion, way)(one) for way, one in both]
     return recorded if fit.stepless is None else fit.stepless, pictures
+
+
+def _check_reference(images: Images) -> None:
+    """Check that each direction that the file has is among the channels that are fitted."""
+    if len(images.reference) == 1 and not all(images.forward) and any(images.forward):
+        raise Unphysical("has channels of the retrace, but none of the fitted signal; give --retrace-channel")
+
+
+def by_affine_map(images: Images, lattice_nm: float | None, kind: str) -> StraightScan:
+    """Correct width, height and shear of images of a lattice by its cell; lines and rows stay straight.
+
+    Parameters
+    ----------
+    images
+        Images of a file that has its size.
+    lattice_nm
+        Constant of the lattice in nm; None where it is unknown: then the width of the file stands.
+    kind
+        "hexagonal" or "square".
+
+    Raises
+    ------
+    Unphysical
+        If the cell does not determine the map, the map is implausible, or the image does not support it.
+    """
+    _check_reference(images)
+    images = images.of_imaged_rows()
+    first = images.first
+    if first.width_nm is None or first.height_nm is None:
+        raise Unphysical("--affine needs a file that has its size, which decides between cells of several sizes")
+    heights = [images.heights(i) for i in images.reference]
+    ways = [images.forward[i] for i in images.reference]
+    affine = affine_map(heights, ways, (first.width_nm, first.height_nm), lattice_nm, kind)
+    distortion = affine.distortion
+    size = distortion.x_range[1] - distortion.x_range[0], distortion.y_range[1] - distortion.y_range[0]
+    record: dict[str, Any] = {"by": "affine map of a lattice", "sources": images.sources, **images.angle}
+    record |= {"lattice_nm": lattice_nm, "lattice": affine.kind, "affine": affine.record}
+    record["not_corrected"] = "displacement within lines and between rows"
+    scan = _corrected(images, distortion, size, record)
+    check_agreement(scan.agreement)
+    pictures = [scan.pictures[i].heights for i in images.reference]
+    rows, columns = images.shape
+    start = affine.sides_nm(first.height_nm) * [columns / size[0], rows / size[1]]
+    bows = check_bows(pictures, start, scan.agreement)
+    check_sample_cell(pictures, size, affine.constant_nm, affine.kind, lattice_nm is not None, start)
+    names = ["trace" if way else "retrace" for way in ways]
+    scan.record["affine"]["bows_percent"] = {name: one.record for name, one in zip(names, bows, strict=True)}
+    return scan
 
 
 def check_order(images: Images, distortion: Distortion) -> None:

@@ -10,6 +10,7 @@ from tablegen.images.terraces import without_steps, without_terraces
 from tablegen.numerics.arrays import Bools, Floats
 
 Fit = tuple[PeriodicModel, FitState, Bools]
+_ODD = 4.0  # times the median rms that a fit leaves in a row
 _STEP_ROUNDS = 2  # fits to images without the steps that the fit before left
 
 
@@ -63,12 +64,18 @@ def fit_without_steps(geometry: Geometry, recorded: list[Floats], fit: Callable[
     model, state, free = fit(heights)
     stepped = False
     # Without terraces, what a first fit leaves is its own error, and would pass for steps.
-    for _ in range(_STEP_ROUNDS if has_terraces else 0):
+    for _ in range(_STEP_ROUNDS if has_terraces or _has_odd_rows(state) else 0):
         without, stepped = stepless_images(model, state, scaled)
         if not stepped:
             break
         model, state, free = fit([_level(geometry, image) for image in without])
     return SteplessFit(model, state, free, scaled, has_terraces, stepped)
+
+
+def _has_odd_rows(state: FitState) -> bool:
+    """Return True if a fit leaves far more in some rows than in the others: the edge of a terrace along the rows."""
+    spread = np.sqrt(np.mean([np.mean(residual**2, axis=1) for residual in state.residuals], axis=0))
+    return bool(np.max(spread) > _ODD * np.median(spread))
 
 
 def _level(geometry: Geometry, image: Floats) -> Floats:

@@ -34,6 +34,14 @@ def test_a_distorted_lattice_is_corrected(seed: int) -> None:
 
 
 @pytest.mark.common
+def test_an_edge_along_the_rows_does_not_move_them() -> None:
+    """The edge of a terrace crosses 9 rows, fewer than those of other terraces: they were off by 1.3 pixels."""
+    lattice = distorted_lattice(752)
+    error = deviation(corrected(lattice, "size and constant"), lattice, "size and constant")
+    assert error.outermost < 0.3
+
+
+@pytest.mark.common
 def test_a_dozen_distorted_lattices() -> None:
     assert accepted_and_wrong([0, 1, 3, 4, 5, 7, 9, 10, 19, 24, 53, 98], "size and constant") == (12, [])
 
@@ -87,8 +95,8 @@ def test_a_lattice_without_terraces_is_left_as_it_is() -> None:
 
 @pytest.mark.long
 def test_the_numbers_of_the_page_of_correct() -> None:
-    """Of 380 images 95 % are accepted and none wrong; of 200 without a lattice none is accepted."""
-    accepted, wrong = accepted_and_wrong(range(380), "size and constant")
+    """Of 1,000 images 95 % are accepted and none wrong; of 200 without a lattice none is accepted."""
+    accepted, wrong = accepted_and_wrong(range(1000), "size and constant")
     assert wrong == []
-    assert accepted >= 361
+    assert accepted >= 950
     assert not any(accepted_without_period(seed) for seed in range(200))

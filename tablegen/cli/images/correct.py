@@ -36,6 +36,7 @@ Examples:
   tablegen correct old.gwy --scanner scanner.toml --size-v 90 --offset-v 50 --rate-hz 2
   tablegen correct trace.npy retrace.npy --scanner scanner.toml --size-v 90 --rate-hz 2 -o straight.gwy
   tablegen correct old.ibw --fit --lattice-nm 18.5 -o straight.tif --plot straight.png
+  tablegen correct atoms.sxm --fit --affine --lattice-nm 0.246 --lattice hexagonal -o straight.gwy
   tablegen correct *.ibw --each --scanner scanner.toml --size-v 90 --rate-hz 2 -o straight
 
 \b
@@ -64,6 +65,12 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     "--lattice",
     type=click.Choice(["hexagonal", "square"]),
     help="Kind of the lattice of --lattice-nm.  [default: hexagonal, or square if this makes the frame straight]",
+)
+@click.option(
+    "--affine",
+    is_flag=True,
+    help="With --fit and --lattice: correct height and shear alone, and with --lattice-nm the width, by the cell of "
+    "the lattice. For images of few periods, or with too much beside the lattice for a displacement.",
 )
 @_number("--size-v", "V", "Scan voltage of the fast axis at the piezo, peak to peak.")
 @_number("--size-nm", "NM", "Instead of --size-v: scan size by the size calibration of the scanner file.")
@@ -157,6 +164,7 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
     By a scanner file:  give the drive of the image: --size-v, --offset-v, --rate-hz; or --scan.
     By a fit (--fit):   trace and retrace of a grating or a lattice, three periods or more in the
                         line, better ten. A lattice gives both axes, a grating the fast one.
+                        With --affine height and shear alone, and with --lattice-nm the width.
 
     A file may have trace and retrace as channels; otherwise give both files. The command prints their difference before
     and after, which shows whether the correction is right.
@@ -241,12 +249,15 @@ def _wrong_way(options: dict[str, Any]) -> str | None:
     if not options["fit"]:
         if not files:
             return "give --scanner FILE, or --scan SCAN.TOML, or --fit for a periodic sample"
-        if options["pitch_nm"] or options["lattice_nm"] or options["lattice"]:
-            return "--pitch-nm, --lattice-nm and --lattice are for --fit"
+        if options["pitch_nm"] or options["lattice_nm"] or options["lattice"] or options["affine"]:
+            return "--pitch-nm, --lattice-nm, --lattice and --affine are for --fit"
     elif files:
         return "--fit needs no scanner file; keep one of the two"
+    elif options["affine"]:
+        if options["pitch_nm"] or not options["lattice"]:
+            return "--affine needs --lattice, the kind of the lattice; --lattice-nm for the size too; and no --pitch-nm"
     elif options["lattice"] and not options["lattice_nm"]:
-        return "--lattice is the kind of the lattice of --lattice-nm"
+        return "--lattice is the kind of the lattice of --lattice-nm; without it, --affine corrects the shape alone"
     elif options["pitch_nm"] and options["lattice_nm"]:
         return "--pitch-nm and --lattice-nm: keep one of the two"
     return None
