@@ -35,7 +35,7 @@ def shaped_travel(axis: str, shaped: Changes, rounded: Changes) -> list[Finding]
     text = (
         f"shaped codes of {axis} go to and fro, {100.0 * extra:.3g} % further in all than without shaping: a piezo "
         "whose hysteresis follows every step then leaves its model, which no error of the position here contains. "
-        "`dac.shaping` of a lower order, a lower update_rate_hz or a filter before the piezo make it less"
+        "`dac.shaping` of a lower order or a lower update_rate_hz make it less"
     )
     return [Finding("expect", 0.0, text, code="shaped-travel", axis=axis_name(axis))]
 
