@@ -35,6 +35,7 @@ FindingCode = Literal[
     "inverted-sensor",
     "mains-hum",
     "mismatch-only",
+    "missing-pixels",
     "mixed-offsets",
     "model-mismatch",
     "noise-limit",

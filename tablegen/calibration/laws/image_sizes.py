@@ -107,7 +107,7 @@ def sizes_of(
             )
         )
         if lacking := missing_text([one for one in (image.trace, image.retrace) if one is not None]):
-            remarks.append(Remark(lacking).under(image.name))
+            remarks.append(Remark(lacking, code="missing-pixels").under(image.name))
         remarks += [text.under(image.name) for text in _remarks(line, size)]
     for one, other in combinations(images, 2):
         if one.trace.shape == other.trace.shape and np.array_equal(one.trace, other.trace):

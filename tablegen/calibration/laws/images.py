@@ -64,7 +64,7 @@ def fit_images(
             raise Unphysical(f"{pair.name}: {reason}" if pair.name else str(reason)) from None
         fits.append(fit)
         if lacking := missing_text([pair.trace, pair.retrace]):
-            remarks.append(Remark(lacking).under(pair.name))
+            remarks.append(Remark(lacking, code="missing-pixels").under(pair.name))
         remarks += [text.under(pair.name) for text in _remarks(fit)]
     for one, other in combinations(pairs, 2):
         if np.array_equal(one.trace, other.trace) or np.array_equal(one.retrace, other.retrace):
