@@ -145,8 +145,8 @@ def verify(
       tablegen verify build --sim verilator --junit verify.xml
 
     \b
-    Exit status: 0 verified, 2 DIR contains neither a build nor a library, 4 cannot write, 5 a check failed,
-    6 a simulator, compiler or library is missing.
+    Exit status: 0 verified, 2 DIR contains neither a build nor a library, 4 cannot write,
+    5 a check failed, 6 a simulator, compiler or library is missing.
     """
     for option, value in (("--sim", simulator), ("--axis", axis)):
         if target_name not in (None, "verilog") and value is not None:

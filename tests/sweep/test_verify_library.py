@@ -41,12 +41,12 @@ def test_every_program_and_the_index_are_verified(stored: Path) -> None:
     assert (status, err) == (0, "")
     lines = out.splitlines()
     for name in NAMES:
-        assert sum(line.startswith(f"{name}: ") and line.endswith("  ok") for line in lines) == 11
+        assert sum(line.startswith(f"{name}: ") and line.endswith("  ok") for line in lines) == 12
     assert [line.split()[:2] for line in lines if line.startswith("library ")] == [
         ["library", "records"],
         ["library", "index"],
     ]
-    assert lines[-1] == f"{stored}: verified, 35 checks"
+    assert lines[-1] == f"{stored}: verified, 38 checks"
 
 
 def edit_json(path: Path, change: Callable[[dict], object]) -> None:
