@@ -120,12 +120,17 @@ SCANS: dict[str, Variant] = {
 def operator() -> str:
     """Plays, a residual over them that differs from trace to trace, and creep."""
     file = operator_file(creep=0.027)
+
+    def closed(values: list[float]) -> list[float]:
+        """Coefficients of Chebyshev's polynomials that are 0 at both ends, as a loop that closes has them."""
+        return [high - low for high, low in zip([0.0, 0.0, *values], [*values, 0.0, 0.0], strict=True)]
+
     lines = [
         msgspec.structs.replace(
             line,
             size=0.001 * (i - 1.3),
-            rising=[0.002 / (k + 1 + i) for k in range(12)],
-            falling=[-0.003 / (k + 2 + i) for k in range(12)],
+            rising=closed([0.002 / (k + 1 + i) for k in range(10)]),
+            falling=closed([-0.003 / (k + 2 + i) for k in range(10)]),
         )
         for i, line in enumerate(file.lines)
     ]
