@@ -27,9 +27,9 @@ from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
 from tablegen.calibration.tables.recorder import Columns, Recorder
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.calibration.tables.traces import split_traces, trace_name
-from tablegen.compensation.models.operator import SLOWEST_HZ
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.transient import SLOWEST_HZ
 from tablegen.fitting.estimate import Estimate
 from tablegen.images.files import ScanImage
 from tablegen.numerics.driver import Driver

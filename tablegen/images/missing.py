@@ -20,7 +20,7 @@ Number = TypeVar("Number", bound=np.inexact)  # real or complex
 COMPLETE = 0.8  # share of valid pixels: a row or column with fewer is missing
 _LEAST_ROWS = 32
 _LEAST_SHARE = 0.7  # of the rows from the first with data to the last: gaps beyond that make spots of their own
-_MOST_CLIPPED = 0.5  # share of the rows: where more are clipped, the image is saturated, or has a few levels
+_MOST_CLIPPED = 0.3  # share of the rows: where more are clipped, the image is saturated, or has a few levels
 _PADDED = 3  # pixels with the value of the rows that were never scanned: a row with as many ends there
 
 

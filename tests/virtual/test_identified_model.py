@@ -40,9 +40,7 @@ class Linear:
 class LinearPiezo(Identification, frozen=True, kw_only=True, eq=False):
     nm_per_v: float
 
-    def piezo(
-        self, driver: Driver, response: Response | None, harmonics: int, seed: tuple[int, ...] | None = None
-    ) -> Linear:
+    def piezo(self, driver: Driver, response: Response | None, seed: tuple[int, ...] | None = None) -> Linear:
         share = 0.0 if seed is None else 0.01 * float(np.random.default_rng(seed).standard_normal())
         return Linear(self.nm_per_v * (1.0 + share))
 

@@ -25,7 +25,7 @@ from tablegen.compensation.operator.minimum_acceleration_line import minimum_acc
 from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, Operator
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
-from tablegen.compensation.operator.transient import after_offset, after_size
+from tablegen.compensation.operator.transient import SLOWEST_HZ, after_offset, after_size
 from tablegen.compensation.operator.uncertainty import possible_errors, size_uncertainty
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.driver import Driver
@@ -35,7 +35,6 @@ from tablegen.waveform.window_fit import fit_window
 # An operator serves centres this far from any that was measured, of v_max.
 CENTRE_REACH = 0.4
 _BEND_UNKNOWN = 0.7  # of what a loop grows by its bend; on simulated piezos of four kinds it was wrong by less
-SLOWEST_HZ = 0.01  # of frames over which drift is followed
 SIDES = ("forward", "backward")
 
 

@@ -20,6 +20,7 @@ from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, CreepTer
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.elementary import exp
 
+SLOWEST_HZ = 0.01  # of frames over which drift is followed
 _POINTS = 65  # of the first sweep
 _MANY_PERIODS = 1e3  # periods; of a longer time constant only the mean of a line counts
 
