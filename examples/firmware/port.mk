@@ -14,7 +14,7 @@ TABLEGEN ?= tablegen
 include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install piezo-tablegen, or give TABLEGEN=PATH))
 $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
-SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))
+SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_% %_program.h,$($(BUILD)/scan_HEADERS))))
 SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
 
 vpath memory.c ..

@@ -296,10 +296,10 @@ SEQUENCER: tuple[Edit, ...] = (
         "(write && !(writable && exists)) || unrendered",
     ),
     Edit(
-        "pages of 8 registers alias",
+        "registers of y are those of x too",
         "dac_sequencer",
         "write_region == PROGRAM && write_address[15:4] == X_PAGE",
-        "write_region == PROGRAM && write_address[7:4] == X_PAGE[3:0]",
+        "write_region == PROGRAM && (write_address[15:4] == X_PAGE || write_address[15:4] == Y_PAGE)",
     ),
     Edit(
         "clearing waits for no tick",
@@ -399,7 +399,7 @@ SEQUENCER: tuple[Edit, ...] = (
         "write region",
         "dac_sequencer",
         "assign y_table_write = host_write && region == Y_TABLE;",
-        "assign y_table_write = host_write && region != X_TABLE && region != PROGRAM;",
+        "assign y_table_write = host_write && region == X_TABLE;",
     ),
 )
 

@@ -312,14 +312,14 @@ class PositionErrors:
         Parameters
         ----------
         k
-            Ticks of the period, any shape.
+            Ticks, any shape; periods repeat, since a damaged manifest may have windows beyond the first one.
 
         Returns
         -------
         Floats
             LSB of the converter, shape of ``k``.
         """
-        return self._errors[k]
+        return self._errors[k % len(self._errors)]
 
 
 def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None:
