@@ -236,17 +236,12 @@ def test_half_an_image_is_said() -> None:
 if REAL is not None:  # else the run says so at its end
 
     @pytest.mark.common
-    def test_half_of_the_pixels_of_silicon_show_the_same_cell_or_say_that_it_may_be(
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
+    def test_half_of_the_pixels_of_silicon_say_which_cells_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
+        """The weak spots of one cell are lost in the noise of half of the pixels: it is refused, and among those named."""
         heights = tablegen.lattice(REAL / "si7x7_50nm.sxm", channel="Z forward", lattice_nm=2.688).scan.heights
         expected = 2.688**2 * np.sin(np.pi / 3.0) * heights.size / 50.0**2  # by the constant: alone it is ambiguous
         full = find_cell(heights, expected_area=expected)
         monkeypatch.setattr(searched_part, "_MOST_PIXELS", heights.size // 2)
-        try:
-            cell = find_cell(heights, expected_area=expected)
-        except AmbiguousCell as reason:
-            assert any(same_lattice(one, full.vectors) for one in reason.cells)
-        else:
-            assert not cell.part.whole
-            within(cell.vectors, full.vectors, cell.covariance + full.covariance)
+        with pytest.raises(AmbiguousCell) as reason:
+            find_cell(heights, expected_area=expected)
+        assert any(same_lattice(one, full.vectors) for one in reason.value.cells)
