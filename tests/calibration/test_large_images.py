@@ -237,7 +237,7 @@ if REAL is not None:  # else the run says so at its end
 
     @pytest.mark.common
     def test_half_of_the_pixels_of_silicon_say_which_cells_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-        """The weak spots of one cell are lost in the noise of half of the pixels: it is refused, and among those named."""
+        """The weak spots of one cell are lost in the noise: both cells are named."""
         heights = tablegen.lattice(REAL / "si7x7_50nm.sxm", channel="Z forward", lattice_nm=2.688).scan.heights
         expected = 2.688**2 * np.sin(np.pi / 3.0) * heights.size / 50.0**2  # by the constant: alone it is ambiguous
         full = find_cell(heights, expected_area=expected)
