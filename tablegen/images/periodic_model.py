@@ -316,11 +316,6 @@ class PeriodicModel:
         spots = [tuple(spot) for spot in self.spots.tolist()]
         return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
 
-    def with_images(self, images: Sequence[tuple[bool, Floats]]) -> "PeriodicModel":
-        """Return the same model of other images, of the same directions and shape."""
-        spots = [tuple(spot) for spot in self.spots.tolist()]
-        return PeriodicModel(self.geometry, images, spots, self.order, self.off, self.ripples, self.row_off)
-
     def periodic_parts(self, state: FitState) -> list[Floats]:
         """Return the periodic part of each image without levelling, in missing rows too.
 

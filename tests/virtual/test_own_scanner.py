@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from editing import edited
 from operator_files import REVERSIBLE, STROKES, THRESHOLDS, WEIGHTS, operator_file, write_operator_scan
 from replacing import replace
 
@@ -75,13 +76,20 @@ def plants(line: LinePlan, operator: Operator) -> list[OperatorPiezo]:
     return [replace(piezo(line), operator=departing(operator, (0, k))) for k in range(4)]
 
 
-def test_without_a_departure_it_does_what_the_build_expects(line: LinePlan) -> None:
+@pytest.mark.parametrize("damped", [True, False])
+def test_without_a_departure_it_does_what_the_build_expects(line: LinePlan, tmp_path: Path, damped: bool) -> None:
+    """The steps of the converter and the harmonics of the loop reach a resonance of quality 20; damped, they do not."""
+    if damped:
+        scan = write_operator_scan(tmp_path, operator_file(creep=0.02))
+        scanner = tmp_path / "scanner.toml"
+        scanner.write_text(edited(scanner.read_text("utf-8"), "x.resonance.quality = 2.0"), "utf-8")
+        line = make_plan(load(scan)).x
     rms, scaling, mismatch, size = image_errors(run_line(line, piezo(line)))
-    # The steps of the converter reach the resonance, as the harmonics of the loop do.
     steps, expected = converter_errors(line, EmittedPeriod(line)), expected_of(line)
     assert expected is not None
     assert rms < 0.02
     assert scaling < max(one.value for one in expected.scaling.values()) + max(steps.scaling.values())
+    assert scaling < 0.8 or not damped
     assert mismatch < 0.05
     assert abs(size) < 0.02
 
