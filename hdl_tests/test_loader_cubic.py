@@ -105,7 +105,7 @@ def loader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     x, y = request.param
     boot = random_dual(np.random.default_rng(x + y), SequencerShape(16, x, 4, 17, y, 3, 12), kind="smooth")
     wide = (0, 65535, 65535)
-    return Loader(tmp_path_factory.mktemp("loader"), boot, (wide, wide), 6, 0)
+    return Loader(tmp_path_factory.mktemp("loader"), boot, (wide, wide), 6, 1_000_000)
 
 
 @pytest.mark.rest
