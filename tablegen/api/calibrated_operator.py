@@ -134,7 +134,7 @@ class CalibratedOperator(Result):
             f"family   {self.family}  (mean rms of a trace left out: {scores})",
             f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
             *_sweep_text(self.fit.operator.sweep),
-            *_delay_text(self.delay),
+            *delay_text(self.delay),
             *_bias_text(self.bias_memory),
             "",
             f"{'':41}  {'in the fit':<23}   left out",
@@ -264,8 +264,11 @@ def _sweep_text(sweep: SweepLoss | None) -> list[str]:
     return [f"response without {creep}a lag of {360.0 * sweep.loss_turns:.2g} degrees, which the operator has itself"]
 
 
-def _delay_text(delay: Estimate) -> list[str]:
+def delay_text(delay: Estimate) -> list[str]:
     """Return a line on the delay; none for a delay of 0."""
+    long = abs(delay.value) >= 1e-3
+    per_s, unit = (1e3, "ms") if long else (1e6, "us")
     if isfinite(delay.standard_error):
-        return [f"delay    {1e6 * delay.value:.3g} us of the sensor, fitted, +- {1e6 * delay.standard_error:.2g} us"]
-    return [f"delay    {1e6 * delay.value:.3g} us of the sensor, as given"] if delay.value else []
+        error = f"{per_s * delay.standard_error:.2g}"
+        return [f"delay    {per_s * delay.value:.3g} {unit} of the sensor, fitted, +- {error} {unit}"]
+    return [f"delay    {per_s * delay.value:.3g} {unit} of the sensor, as given"] if delay.value else []
