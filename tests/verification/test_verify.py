@@ -68,11 +68,7 @@ ON_BLOCKS = ("left_aligned", "narrow_table_wide_dac")
 PLACED = [
     *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "direct_steps")]),
     *(pytest.param((name, "blocks"), marks=pytest.mark.common) for name in ON_BLOCKS),
-    *(
-        pytest.param((name, "pipelined"), marks=pytest.mark.rest)
-        for name in MODES
-        if name not in ("example", "direct_steps")
-    ),
+    pytest.param(("bits_24", "pipelined"), marks=pytest.mark.rest),
 ]
 
 # One edit for two tests, which share its play; what is in the comment ends a text of XML.
@@ -118,6 +114,17 @@ def test_a_build_verifies(placed: tuple[str, str], tmp_path: Path) -> None:
     assert len(verdicts(outcome)) == checks
     assert outcome.out.splitlines()[-1] == f"{built.folder}: verified, {checks} checks"
     assert not list(built.folder.glob("*.vvp")), "nothing is written into the build"
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", [name for name in MODES if name not in ("example", "direct_steps")])
+def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
+    """The same of the others, without requests, which are the same for all."""
+    built = build(tmp_path, VARIANTS[name])
+    outcome = verify_alone(built.folder, "--axis", "pipelined")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert set(verdicts(outcome).values()) <= {"ok", "not exercised"}
+    assert {verdicts(outcome)[axis, "integer model"] for axis in "xy"} == {"ok"}
 
 
 @pytest.mark.common
@@ -581,7 +588,7 @@ def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str]
 
     # What a device renders comes from the Fourier words, what it plays otherwise from the table.
     flip(built.folder / f"{NAME}_x_fourier.mem", 1, 27)
-    outcome = verify(built.folder, *arguments)
+    outcome = verify(built.folder, *arguments, requests="--fourier" in arguments)
     assert outcome.status == 5
     assert (("markers", "integer model") in failed(outcome) or ("x", "integer model") in failed(outcome)) == (
         "--fourier" in arguments
