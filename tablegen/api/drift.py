@@ -197,7 +197,7 @@ class ImageDrift(Result):
             charts.append(
                 Chart(
                     f"drift_{name}", f"drift along {name}", "time [s]", f"drift [{self.unit}]",
-                    (bars, DrawnCurve("each interval", "forward", middle, rate, "points"),
+                    (bars, DrawnCurve("each interval", "other", middle, rate, "points"),
                      DrawnCurve("mean", "before", np.array([0.0, ends[-1]]), np.full(2, mean))),
                 )
             )  # fmt: skip
