@@ -12,6 +12,7 @@ from tablegen.images.image_shift import ImagePair, ImageShift, image_shift
 from tablegen.numerics.arrays import Floats
 
 _LEAST_CORRELATION = 0.4  # images of other places have less, or several shifts that are as likely
+_LEAST_SIGNIFICANCE = 4.0  # images with few features agree somewhere by chance
 _SAME_ANGLE_DEG = 0.05
 _SAME_SIZE = 1e-3  # of width and height
 _MOST_SHOWN = 6  # shifts in a message
@@ -126,3 +127,9 @@ def _check_shift(shift: ImageShift, one: ScanImage, other: ScanImage, within_nm:
             "bound the shift with --within, below half a cell; images closer in time allow a smaller bound"
         )
         raise Rejected([Problem(name, 0, "", why, "ambiguous-shift")])
+    if within_nm is None and shift.significance < _LEAST_SIGNIFICANCE:
+        why = (
+            f"have too few features: images of other places would correlate by {1.0 / shift.significance:.2g} of this; "
+            "take a larger image, or bound the shift with --within if they show the same place"
+        )
+        raise Rejected([Problem(name, 0, "", why, "weak-registration")])

@@ -38,14 +38,16 @@ class ImagePair(NamedTuple):
 class ImageShift:
     """Shift x, y of the second image against the first, in pixels.
 
-    ``errors`` are standard errors, ``correlation`` is that at the shift, from 0 to 1. ``directions`` has the shift of
-    each direction alone, shape (directions, 2), and ``rivals`` the other shifts that are as likely, shape (rivals, 2),
-    the nearest first. ``open_ended`` is true if the correlation does not fall off in every direction.
+    ``errors`` are standard errors, ``correlation`` is that at the shift, from 0 to 1, and ``significance`` its ratio to
+    the standard deviation that images of other places with the same features would have. ``directions`` has the shift
+    of each direction alone, shape (directions, 2), and ``rivals`` the other shifts that are as likely, shape
+    (rivals, 2), the nearest first. ``open_ended`` is true if the correlation does not fall off in every direction.
     """
 
     pixels: Floats
     errors: Floats
     correlation: float
+    significance: float
     directions: Floats
     rivals: Floats
     open_ended: bool
@@ -74,7 +76,10 @@ def image_shift(pairs: Sequence[ImagePair], reach: Floats | None = None) -> Imag
     alone = [pixels] if len(pairs) == 1 else [_least_squares([one], pixels, width)[0] for one in smooth[width]]
     rivals = search.places[1:]
     near = np.argsort(np.hypot(*rivals.T), kind="stable")
-    return ImageShift(pixels, errors, search.correlation, np.array(alone), rivals[near], search.open_ended)
+    significance = search.correlation / min(_chance_correlation(one) for one in levelled)
+    return ImageShift(
+        pixels, errors, search.correlation, significance, np.array(alone), rivals[near], search.open_ended
+    )
 
 
 class _Filtered(NamedTuple):
@@ -183,6 +188,16 @@ def _correlation(first: _Filtered, second: _Filtered) -> Floats:
     size = float(np.sum(first.values**2) * np.sum(second.values**2))
     enough = (count >= _LEAST_OVERLAP * rows * columns) & (power > 1e-6 * size)
     return np.where(enough, product(0, 0) / np.sqrt(np.where(enough, power, 1.0)), np.nan)
+
+
+def _chance_correlation(pair: _Prepared) -> float:
+    """Return the standard deviation of the correlation of two images with nothing in common, by Bartlett's formula."""
+    rows, columns = pair.first.values.shape
+    shape = (2 * rows, 2 * columns)
+    powers = [np.abs(np.fft.rfft2(image.values, shape)) ** 2 for image in pair]
+    both = [np.fft.irfft2(power, shape) for power in powers]
+    product = float(np.sum(both[0] * both[1]) / max(both[0][0, 0] * both[1][0, 0], 1e-300))
+    return float(np.sqrt(max(product, 1.0) / (rows * columns)))
 
 
 def _local_maxima(values: Floats) -> Bools:

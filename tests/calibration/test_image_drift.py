@@ -86,6 +86,32 @@ def test_another_place_is_refused() -> None:
     assert refused(first, second)[0] in ("weak-registration", "ambiguous-shift")
 
 
+def test_a_place_with_few_features_is_refused() -> None:
+    """Two places whose few islands agree somewhere, and nowhere else: no other check sees it."""
+    first, second = (images(sample(seed, 12.0), [(0.0, 0.0)], at)[0] for seed, at in ((11, 11), (5011, 12)))
+    code, why = refused(first, second)
+    assert (code, why[:21]) == ("weak-registration", "have too few features")
+    shift = image_shift([ImagePair(first, second)])
+    assert shift.correlation > 0.4
+    assert not len(shift.rivals)
+    assert not shift.open_ended
+
+
+@pytest.mark.common
+def test_both_directions_count() -> None:
+    """Trace and retrace have one shift, and noise of their own: on average the error falls; each alone is stored."""
+    variances = []
+    for seed in range(4, 9):
+        ways = [ImagePair(*images(sample(seed), [(0.0, 0.0), (3.0, -2.0)], way, noise=1.0)) for way in (0, 1)]
+        one, both = image_shift(ways[:1]), image_shift(ways)
+        assert np.all(np.abs(both.pixels - [3.0, -2.0]) < 3.0 * both.errors)
+        assert np.allclose(both.directions[0], one.pixels, atol=0.2)
+        assert both.directions.shape == (2, 2)
+        variances.append((np.sum(one.errors**2), np.sum(both.errors**2)))
+    alone, together = np.mean(variances, axis=0)
+    assert together < 0.8 * alone
+
+
 def test_other_pixels_are_refused() -> None:
     first, second = images(sample(1), [(0.0, 0.0), (1.0, 0.0)])
     assert refused(first, second[:, :-4])[0] == "unlike-images"
