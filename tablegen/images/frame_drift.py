@@ -116,6 +116,13 @@ def _check_shift(shift: ImageShift, one: ScanImage, other: ScanImage, within_nm:
             f"{_LEAST_CORRELATION:g} are needed; take them closer together, or choose another --channel"
         )
         raise Rejected([Problem(name, 0, "", why, "weak-registration")])
+    if within_nm is not None:
+        far, error = (
+            float(np.hypot(*(shift_or_error * _nm_per_pixel(one)))) for shift_or_error in (shift.pixels, shift.errors)
+        )
+        if far > within_nm + 3.0 * error:
+            why = f"are {far:.4g} nm apart, further than --within {within_nm:.4g}"
+            raise Rejected([Problem(name, 0, "", why, "weak-registration")])
     if shift.open_ended or len(shift.rivals):
         likely = sorted([shift.pixels, *shift.rivals], key=lambda place: float(np.hypot(*place)))[:_MOST_SHOWN]
         size = pixel_size(one)

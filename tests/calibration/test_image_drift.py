@@ -139,6 +139,11 @@ def test_files_with_a_size_have_a_bound_and_the_time_of_the_row() -> None:
     pair = scans(*images(lattice, [(0.0, 0.0), (1.0, 2.0)]), line_rate_hz=10.0)
     (interval,) = drift_intervals(pair, 8.0, 8.0)
     assert abs(interval.seconds - 8.2) < 0.02
+    with pytest.raises(Rejected, match="do not show the same place within 2 nm"):
+        drift_intervals(pair, 8.0, 2.0)
+    beside = scans(*images(lattice, [(0.0, 0.0), (1.0, 0.0)]))
+    with pytest.raises(Rejected, match="nm apart, further than --within 1"):
+        drift_intervals(beside, 8.0, 1.0)
 
 
 def test_scans_that_are_not_alike_are_refused() -> None:
