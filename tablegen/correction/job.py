@@ -32,6 +32,7 @@ from tablegen.images.frame_registration import registered
 from tablegen.images.measured_cell import IDEAL_ANGLES
 from tablegen.images.missing import count_missing, imaged_rows, valid_pixels
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
+from tablegen.images.periodicity import NOTHING_PERIODIC, shows_nothing_periodic
 from tablegen.images.scan_angle import is_turned
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import size_law_of
@@ -509,6 +510,8 @@ def by_fit(
     try:
         return _by_fit(images, conditions, pitch_nm, lattice_nm, kind)
     except Unphysical as reason:
+        if shows_nothing_periodic(images.heights(images.reference[0])):
+            raise Unphysical(NOTHING_PERIODIC) from None
         advice = "" if pitch_nm is not None else _affine_advice(images, lattice_nm, kind)
         if not advice:
             raise
