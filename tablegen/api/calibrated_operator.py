@@ -158,7 +158,8 @@ class CalibratedOperator(Result):
         ]
         sweep = self.fit.operator.sweep
         if further.rate_hz is not None and not (sweep and sweep.creep):
-            text.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would separate creep from hysteresis")
+            rate = f"{further.rate_hz:.3g}" if further.rate_hz < 999.5 else f"{further.rate_hz:.0f}"
+            text.append(f"next rate: a trace at {rate} Hz would separate creep from hysteresis")
         return text
 
     def _lines(self) -> Sequence[str]:
