@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from building import BENCHES, NAME, REPOSITORY, VARIANTS, Build, build, run_clean
 from limits import PATIENCE_S
-from sets import common
+from sets import LONG_TEST, common
 from short_scans import CUBIC, DIRECT, model_ticks, short
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
@@ -96,7 +96,12 @@ def elaborated(built: Build, text: str, top: str, *sources: Path, **parameters: 
     return program, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("name", common(("interpolated", "direct x", "shaped", "18 bits"), PLAYED))
+QUICKER = ("interpolated", "direct x", "shaped", "18 bits")
+SLOWEST = "128 harmonics"
+SCANS = [*common(QUICKER, [name for name in PLAYED if name != SLOWEST]), pytest.param(SLOWEST, marks=LONG_TEST)]
+
+
+@pytest.mark.parametrize("name", SCANS)
 def test_every_scan_is_played(name: str, tmp_path: Path) -> None:
     built, capture = short(tmp_path, PLAYED[name]), tmp_path / "capture.hex"
     ticks, converter = 60, Converter(built.plan.program.x.output.word_bits, cpol=0, cpha=0)

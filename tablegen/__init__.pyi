@@ -22,6 +22,7 @@ from tablegen.api.read_image import (
     read_image as read_image,
 )
 from tablegen.api.lattice import lattice as lattice
+from tablegen.api.drift import drift as drift
 from tablegen.api.refine import refine as refine
 from tablegen.api.correct import correct as correct
 from tablegen.api.simulate import simulate as simulate
@@ -51,6 +52,7 @@ from tablegen.api.read_image import (
     Channels as Channels,
 )
 from tablegen.api.lattice import ImageLattice as ImageLattice
+from tablegen.api.drift import ImageDrift as ImageDrift
 from tablegen.api.refine import RefinedScan as RefinedScan
 from tablegen.api.correct import Corrected as Corrected
 from tablegen.api.simulate import SimulatedScan as SimulatedScan

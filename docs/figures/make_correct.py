@@ -19,8 +19,11 @@ sys.path.insert(0, str(FOLDER.parents[1] / "tests" / "helpers"))
 
 from correcting import OFFSET_V, RATE_HZ, V, off, old_frame, save_pair, scanner_file  # noqa: E402
 
+from tablegen.correction.by_fit import by_fit  # noqa: E402
+from tablegen.correction.by_scanner import by_scanner  # noqa: E402
 from tablegen.correction.distortion import Distortion, Sweep1D  # noqa: E402
-from tablegen.correction.job import Choice, OldAxis, OldScan, by_fit, by_scanner, read_scan  # noqa: E402
+from tablegen.correction.old_scan import OldAxis, OldScan  # noqa: E402
+from tablegen.correction.scan_images import Choice, read_scan  # noqa: E402
 from tablegen.correction.straight import StraightScan  # noqa: E402
 from tablegen.virtual.imaging import FrameImages  # noqa: E402
 

@@ -134,7 +134,7 @@ class CalibratedOperator(Result):
             f"family   {self.family}  (mean rms of a trace left out: {scores})",
             f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
             *_sweep_text(self.fit.operator.sweep),
-            *_delay_text(self.delay),
+            *delay_text(self.delay),
             *_bias_text(self.bias_memory),
             "",
             f"{'':41}  {'in the fit':<23}   left out",
@@ -158,7 +158,8 @@ class CalibratedOperator(Result):
         ]
         sweep = self.fit.operator.sweep
         if further.rate_hz is not None and not (sweep and sweep.creep):
-            text.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would separate creep from hysteresis")
+            rate = f"{further.rate_hz:.3g}" if further.rate_hz < 999.5 else f"{further.rate_hz:.0f}"
+            text.append(f"next rate: a trace at {rate} Hz would separate creep from hysteresis")
         return text
 
     def _lines(self) -> Sequence[str]:
@@ -264,8 +265,11 @@ def _sweep_text(sweep: SweepLoss | None) -> list[str]:
     return [f"response without {creep}a lag of {360.0 * sweep.loss_turns:.2g} degrees, which the operator has itself"]
 
 
-def _delay_text(delay: Estimate) -> list[str]:
+def delay_text(delay: Estimate) -> list[str]:
     """Return a line on the delay; none for a delay of 0."""
+    long = abs(delay.value) >= 1e-3
+    per_s, unit = (1e3, "ms") if long else (1e6, "us")
     if isfinite(delay.standard_error):
-        return [f"delay    {1e6 * delay.value:.3g} us of the sensor, fitted, +- {1e6 * delay.standard_error:.2g} us"]
-    return [f"delay    {1e6 * delay.value:.3g} us of the sensor, as given"] if delay.value else []
+        error = f"{per_s * delay.standard_error:.2g}"
+        return [f"delay    {per_s * delay.value:.3g} {unit} of the sensor, fitted, +- {error} {unit}"]
+    return [f"delay    {per_s * delay.value:.3g} {unit} of the sensor, as given"] if delay.value else []

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.api.calibrated_operator import CalibratedOperator
+from tablegen.api.calibrated_operator import CalibratedOperator, delay_text
 from tablegen.api.known_scanner import KnownScanner
 from tablegen.base.input_errors import Unphysical
 from tablegen.base.warnings import Remark, spoils
@@ -155,7 +155,7 @@ class CalibratedRecords(CalibratedOperator):
             f"model    {self.family}, {fit.weights} weights for {fit.samples} samples"
             f"  (rms of the last parts, predicted: {scores})",
             f"creep    {100.0 * fit.operator.creep.loss_per_decade:.2g} % a decade",
-            *self._delay_text(),
+            *delay_text(self.delay),
             "",
             f"{'':43}in the fit      last part predicted",
             "size [V]  offset [V]  rate [Hz]  begins         rms  worst     from [s]    rms  worst  record",
@@ -183,12 +183,6 @@ class CalibratedRecords(CalibratedOperator):
         if models < len(COMPLEXITIES):
             return f"a simpler model than usual: {self.in_time.samples} samples carry no more weights"
         return "a simpler model than usual: more weights do not predict the last parts better"
-
-    def _delay_text(self) -> list[str]:
-        error = self.delay.standard_error
-        if isfinite(error):
-            return [f"delay    {1e6 * self.delay.value:.3g} us of the sensor, fitted"]
-        return [f"delay    {1e6 * self.delay.value:.3g} us of the sensor, as given"] if self.delay.value else []
 
     def _lines(self) -> Sequence[str]:
         worst = max(one.predicted_rms for one in self.in_time.errors)

@@ -10,19 +10,13 @@ from tablegen.api.result import Result
 from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.charts.picture_file import PlottedCharts
+from tablegen.correction.by_affine_map import by_affine_map
+from tablegen.correction.by_fit import by_fit
+from tablegen.correction.by_scanner import by_scan_file, by_scanner
 from tablegen.correction.correction_text import correct_text
-from tablegen.correction.job import (
-    Choice,
-    Images,
-    OldAxis,
-    OldScan,
-    by_affine_map,
-    by_fit,
-    by_scan_file,
-    by_scanner,
-    read_scan,
-)
+from tablegen.correction.old_scan import OldAxis, OldScan
 from tablegen.correction.output_files import files_of
+from tablegen.correction.scan_images import Choice, Images, read_scan
 from tablegen.correction.straight import StraightScan
 from tablegen.emit.write import write_files
 from tablegen.numerics.arrays import Floats

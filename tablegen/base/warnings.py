@@ -12,6 +12,7 @@ from msgspec import Struct
 Weight = Literal["limit", "spoils", "expect", "note"]
 FindingCode = Literal[
     "",
+    "ambiguous-shift",
     "aperiodic-contrast",
     "assumed-unit",
     "assumed-value",
@@ -59,9 +60,11 @@ FindingCode = Literal[
     "uncompensated-hysteresis",
     "undetermined-parameter",
     "uneven-drift",
+    "unlike-images",
     "unmeasured-response",
     "unverified-build",
     "way-up-only",
+    "weak-registration",
     "widened-errors",
     "wrong-length-unit",
 ]

@@ -75,7 +75,7 @@ class ErrorAnswer(Struct, frozen=True):
 
 def short(value: float) -> str:
     """Format an error with two digits, and without an exponent where it is not tiny."""
-    return f"{value:.2g}" if abs(value) < 100.0 else f"{value:.0f}"
+    return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
 
 
 def error_answers(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[ErrorAnswer]:

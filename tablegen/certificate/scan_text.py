@@ -11,9 +11,10 @@ def scan_text(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
     """List the lines of ``tablegen show`` below the errors; ``summary`` has factors, words and equations as well."""
     schedule = plan.schedule
     directions = "trace and retrace" if schedule.backward.count else "trace alone"
-    per_pixel = 1e6 * float(schedule.pixel_ticks) / float(schedule.update_rate_hz)
+    pixel_us = 1e6 * float(schedule.pixel_ticks) / float(schedule.update_rate_hz)
+    a_pixel = f"{pixel_us:.3g} us" if pixel_us < 999.5 else f"{1e-3 * pixel_us:.3g} ms"
     lines = [
-        f"{float(schedule.line_rate):.4g} lines a second, {directions}; {per_pixel:.3g} us a pixel; "
+        f"{float(schedule.line_rate):.4g} lines a second, {directions}; {a_pixel} a pixel; "
         f"{schedule.lines} line periods a frame with its turnarounds",
     ]
     for line in plan.lines:

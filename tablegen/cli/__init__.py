@@ -33,6 +33,7 @@ _COMMANDS = {
     "calibrate": ("calibrate.group", "calibrate"),
     "channels": ("images.channels", "channels"),
     "lattice": ("images.lattice", "lattice"),
+    "drift": ("images.drift", "drift"),
     "simulate": ("simulate", "simulate"),
     "predict": ("predict", "predict"),
     "refine": ("images.refine", "refine"),

@@ -50,7 +50,14 @@ def _quantity(
 
 @click.command(short_help="Write a scan file and scanner file to start from.")
 @click.argument("folder", type=OutputFolder(), default=Path("."), metavar="[DIR]")
-@click.option("--image-nm", type=float, callback=finite, metavar="NM", help="Size of the image in nm.  [default: 200]")
+@click.option(
+    "--image-nm",
+    type=float,
+    callback=finite,
+    metavar="NM",
+    help="Size of the image in nm.  [default: 200; with --nm-per-v, if 200 nm are below 2 or above 50 % of the range,"
+    " up to a quarter of it]",
+)
 @click.option("--image-um", type=float, callback=finite, metavar="UM", help="Size of the image in micrometres.")
 @click.option("--pixels", type=int, metavar="N", help="Pixels per line and direction.  [default: 200]")
 @click.option("--lines", type=int, metavar="N", help="Lines of the image.  [default: as many as pixels]")
@@ -119,18 +126,18 @@ def init(
         raise click.UsageError("give --line-rate or --frame-rate, not both")
     if clock is not None and tick is not None:
         raise click.UsageError("give --clock or --tick, not both")
-    from tablegen.cli.init_files import Wishes, files
+    from tablegen.cli.init_files import Wishes, files, usual_image_nm
 
-    size = image_nm if image_nm is not None else 200.0 if image_um is None else float(f"{1e3 * image_um:.12g}")
+    size = image_nm if image_um is None else float(f"{1e3 * image_um:.12g}")
     rates = {"line_rate_hz": line_rate, "frame_rate_hz": frame_rate}
     rate = next(((key, value) for key, value in rates.items() if value is not None), None)
-    if not size > 0.0 or (pixels is not None and pixels < 1):
+    if not (size is None or size > 0.0) or (pixels is not None and pixels < 1):
         raise click.UsageError("an image has a size above 0, and one pixel at least")
     pixels = 200 if pixels is None else pixels
     wishes = Wishes(
         bits=bits,
         update_rate_hz=clock or (500e3 if tick is None else float(f"{1.0 / tick:.12g}")),
-        image_nm=size,
+        image_nm=200.0 if size is None else size,
         pixels=pixels,
         image_lines=pixels if lines is None else lines,
         frame=frame,
@@ -146,6 +153,8 @@ def init(
         raise click.UsageError(f"the driver goes from {low:g} to {high:g} V: give a --v-max above --v-min")
     if nm_per_v is not None and not nm_per_v > 0.0:
         raise click.UsageError(f"--nm-per-v {nm_per_v:g} is not above 0")
+    if size is None:
+        wishes = replace(wishes, image_nm=usual_image_nm(wishes.driver, nm_per_v))
     texts = files(wishes)
     there = [folder / name for name in texts if os.path.lexists(folder / name)]
     if there and not force:

@@ -1,7 +1,7 @@
 """Texts of the two files that ``tablegen init`` writes."""
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, floor, log10
 
 from tablegen.compensation.size import SizeLaw
 
@@ -13,6 +13,9 @@ _SHARE = 0.8  # of the line of x that is imaged
 _FASTEST_HZ = 500.0
 TABLE_LENGTHS = (2048, 4096, 8192, 16384, 32768, 65536)
 _FEW_BITS = 16  # below, the scan has to use most of the converter
+_USUAL_NM = 200.0  # of an image
+_FITTING = (0.02, 0.5)  # shares of the scanner's range that an image may span: less is quantised, more does not fit
+_NEW_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,33 @@ class Wishes:
         ticks = max(2, ceil(0.5 * _SHARE * self.update_rate_hz / (self.pixels * _FASTEST_HZ)))
         rate = 0.5 * _SHARE * self.update_rate_hz / (self.pixels * ticks)
         return "line_rate_hz", rate, f"a pixel is {ticks} ticks; "
+
+
+def usual_image_nm(driver: tuple[float, float], nm_per_v: float | None) -> float:
+    """Return the size of an image, in nm, that a scanner can make.
+
+    Parameters
+    ----------
+    driver : tuple[float, float]
+        The range of the piezo driver in V.
+    nm_per_v : float or None
+        The sensitivity of the scanner; None for the example's scanner, whose range fits the image.
+
+    Returns
+    -------
+    float
+        200 nm if that is from 2 to 50 % of the scanner's range; otherwise the largest of 1, 2 and 5 times a power of
+        ten up to a quarter of the range.
+    """
+    if nm_per_v is None:
+        return _USUAL_NM
+    whole = (driver[1] - driver[0]) * nm_per_v
+    if _FITTING[0] <= _USUAL_NM / whole <= _FITTING[1]:
+        return _USUAL_NM
+    most = _NEW_SHARE * whole
+    power = floor(log10(most))
+    steps = [step * 10.0**place for place in (power - 1, power) for step in (1, 2, 5)]
+    return float(f"{max(step for step in steps if step <= most):.1g}")
 
 
 def files(wishes: Wishes) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from tablegen.base.warnings import Finding, worst_first
-from tablegen.correction.job import Images
+from tablegen.correction.scan_images import Images
 from tablegen.correction.straight import StraightScan
 from tablegen.images.missing import missing_text
 from tablegen.images.scan_angle import angle_text

@@ -24,6 +24,12 @@ _LEAST_CORRELATION = 0.15  # at one and at two periods
 _BLOCKS = 4  # to a side
 
 
+NO_GRATING = (
+    "no grating stands out of the noise; its bars have to cross the rows. Choose another --channel, or image more "
+    "periods"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class ImageGrating:
     """The wave of a grating in periods per pixel along x and y, its covariance, and the correlation after a period.
@@ -69,10 +75,7 @@ def _grating_of(heights: Floats) -> tuple[Floats, Floats, float]:
     least = _least(image)
     spots = significant_spots(image, least)
     if not len(spots.waves) or spots.contrast[0] < _CLEAR * least:
-        raise Unphysical(
-            "no grating stands out of the noise; its bars have to cross the rows. Choose another --channel, or image "
-            "more periods"
-        )
+        raise Unphysical(NO_GRATING)
     strong = spots.waves[spots.power >= 0.02 * np.max(spots.power)]
     wave = strong[np.argmin(np.hypot(*strong.T))]
     index = strong @ wave / float(wave @ wave)

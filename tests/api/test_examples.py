@@ -20,7 +20,7 @@ SLOW = ("calibrate_operator", "predict")
 
 @pytest.fixture(scope="module")
 def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A scan, its scanner, and two images of a lattice."""
+    """A scan, its scanner, two images of a lattice, and two of a rough sample that drifts."""
     folder = tmp_path_factory.mktemp("samples")
     shutil.copy(EXAMPLE, folder / "scan.toml")
     shutil.copy(EXAMPLE.parent / "scanner.toml", folder)
@@ -28,6 +28,9 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     image = laboratory.image(laboratory.lattice(17.7), size_v=20.0, offset_v=50.0, rate_hz=2.0, pixels=96)
     np.save(folder / "trace.npy", image.trace.heights)
     np.save(folder / "retrace.npy", image.retrace.heights)
+    rough = np.cumsum(np.random.default_rng(15).standard_normal((40, 64)), axis=1)
+    np.save(folder / "first.npy", rough[:, :60])
+    np.save(folder / "second.npy", rough[:, 3:63])
     return folder
 
 

@@ -37,7 +37,7 @@ from scipy.io import netcdf_file
 import tablegen
 from tablegen.api.image_input import sample_image
 from tablegen.base.input_errors import Rejected
-from tablegen.correction.job import Choice, read_scan
+from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
 from tablegen.images.formats.channel import Channel, rotation_deg, split_direction

@@ -13,7 +13,8 @@ import tablegen
 from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage, sizes_of
 from tablegen.calibration.laws.images import Pair, fit_images
-from tablegen.correction.job import OldScan, by_fit
+from tablegen.correction.by_fit import by_fit
+from tablegen.correction.old_scan import OldScan
 from tablegen.images.files import read_image
 from tablegen.images.indexer import find_cell
 from tablegen.images.line_length import Cell

@@ -11,6 +11,8 @@ from igor2 import binarywave
 from nanonispy2.read import Scan
 from real_files import real_folder
 
+import tablegen
+from tablegen.base.input_errors import Unphysical
 from tablegen.images.files import channels_of, read_image
 
 FOLDER = real_folder()  # conftest.py leaves this module out where there is none
@@ -147,3 +149,19 @@ def test_every_other_image_of_the_folder_is_read() -> None:
             for one in channels_of(FOLDER / name):
                 image = read_image(FOLDER / name, str(one.number), frame=0 if one.frames > 1 else None)
                 assert image.heights.shape == one.shape, name
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [
+        pair
+        for pair in (("with_thumbnail.jpk", "height"), ("stopped_scan.ibw", "HeightRetrace"))
+        if FOLDER and (FOLDER / pair[0]).is_file()
+    ],
+)
+def test_a_real_image_without_a_period_is_refused_for_that(name: str, channel: str) -> None:
+    """It was refused as one of two periods, and for a fit that does not converge."""
+    assert FOLDER is not None
+    with pytest.raises(Unphysical, match="no period stands out of the image"):
+        tablegen.correct(FOLDER / name, channel=channel, fit=True)

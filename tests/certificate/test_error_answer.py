@@ -6,16 +6,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from building import EXAMPLE
+from building import EXAMPLE, Variant, build
 from editing import run
 from msgspec.structs import replace
 
 import tablegen
+from tablegen.certificate.certificate import certify
 from tablegen.certificate.error_answer import (
     converter_percent,
     error_answers,
+    short,
     time_text,
 )
+from tablegen.certificate.scan_text import scan_text
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.config.schema import Refinement
 from tablegen.html_report.planned_scan import planned_scan
@@ -164,3 +167,18 @@ def test_show_is_brief_and_all_has_the_rest(built: tablegen.Build) -> None:
     scaling = max(one.scaling_error_percent for one in built.certificates.values())
     assert f"it varies by {scaling:.3g} %" in brief
     assert run("show", EXAMPLE, "--json").out == run("show", EXAMPLE, "--json", "--all").out
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.01234, "0.012"), (4.56, "4.6"), (99.4, "99"), (99.6, "100"), (-99.6, "-100"), (1234.5, "1234")],
+)
+def test_errors_have_two_digits_and_no_exponent(value: float, text: str) -> None:
+    assert short(value) == text
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(("rate_hz", "text"), [(400.0, "; 5 us a pixel; "), (1.0, "; 2 ms a pixel; ")])
+def test_a_slow_pixel_is_told_in_milliseconds(rate_hz: float, text: str, tmp_path: Path) -> None:
+    plan = build(tmp_path, Variant({"timing.line_rate_hz": rate_hz, "timing.lines": 8})).plan
+    assert text in scan_text(plan, certify(plan))[0]

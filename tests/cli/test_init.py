@@ -5,8 +5,11 @@ from pathlib import Path
 
 import pytest
 from editing import run
+from hypothesis import given
+from hypothesis import strategies as st
 
 import tablegen
+from tablegen.cli.init_files import usual_image_nm
 
 
 def made(folder: Path, *options: str) -> Path:
@@ -30,6 +33,9 @@ OPTIONS: dict[tuple[str, ...], dict[str, object]] = {
     ("--clock", "1MHz", "--frame-rate", "0.5", "--image-nm", "50", "--name", "mine"): {
         "clock": 1e6, "frame_rate_hz": 0.5, "image_nm": 50.0, "name": "mine",
     },
+    ("--v-max", "3.6", "--nm-per-v", "12500"): {"image_nm": 10000.0, "name": "image_10000nm"},
+    ("--v-max", "10", "--nm-per-v", "5"): {"image_nm": 10.0},
+    ("--v-max", "100", "--nm-per-v", "10"): {"image_nm": 200.0},
     ("--bits", "14", "--clock", "100k", "--pixels", "128"): {"bits": 14, "clock": 100e3, "pixels": 128},
 }  # fmt: skip
 
@@ -51,6 +57,16 @@ def test_what_it_writes_says_what_was_asked_and_builds_without_a_warning(
     assert schedule.pixels == said["pixels"]
     assert schedule.pixel_ticks.denominator == 1 or "frame_rate_hz" in said
     assert path.stem == scan["name"]
+
+
+@given(v_max=st.floats(0.01, 2000.0), nm_per_v=st.floats(0.001, 1e5))
+def test_the_usual_image_fits_the_scanner(v_max: float, nm_per_v: float) -> None:
+    """200 nm where they fit; otherwise from a tenth to a quarter of the range."""
+    size, whole = usual_image_nm((0.0, v_max), nm_per_v), v_max * nm_per_v
+    if size == 200.0 and 0.02 <= 200.0 / whole <= 0.5:
+        return
+    assert 0.099 * whole <= size <= 0.2501 * whole
+    assert f"{size:e}"[:2] in ("1.", "2.", "5.")
 
 
 def test_nothing_is_said_twice(tmp_path: Path) -> None:

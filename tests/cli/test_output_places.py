@@ -28,6 +28,7 @@ WORDS = {
     "predict": f"no.toml no.csv --axis x -o {FILE}",
     "predict --plot": f"no.toml no.csv --axis x --plot {FILE}",
     "lattice": f"no.npy --plot {FILE}",
+    "drift": f"no.npy no.npy --plot {FILE}",
     "correct": f"no.npy --fit -o {FILE}.npy",
     "correct --each": f"no.npy --fit --each -o {FILE}",
     "correct --plot": f"no.npy --fit --plot {FILE}",

@@ -8,6 +8,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import Measured, Response, SecondOrder, capped_inverse
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
+from tablegen.compensation.operator import scan_line
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths
@@ -165,3 +166,43 @@ def test_a_factor_makes_the_drive_larger() -> None:
 def test_a_scan_beyond_the_driver_is_refused() -> None:
     with pytest.raises(Unphysical, match=r"take \d+ % of v_max by the operator; at this offset 100 % are left"):
         learn_waveform(operator(), wanted(5000.0), straight(0.5), same, None)
+
+
+# Of the size of those that were fitted to the records of a real stage, docs/evidence.md: few thresholds, heavy ones.
+FEW_THRESHOLDS = 0.495 * (np.arange(1, 13) / 12) ** 1.5
+HEAVY = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 2000.0, 0.0, 4000.0, 600.0, 5700.0, 0.0, 29000.0],
+        [4600.0, 2100.0, 1800.0, 0.0, 300.0, 2200.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [4800.0, 5700.0, 900.0, 1600.0, 900.0, 1000.0, 1600.0, 0.0, 1200.0, 300.0, 0.0, 2800.0],
+    ]
+)
+
+
+def heavy_operator() -> Operator:
+    family = Family(Plays(FEW_THRESHOLDS, HEAVY, np.array([11700.0, 6100.0, -2300.0])))
+    return Operator(family, _NOTHING, _NO_SIZES, LogarithmicCreep(0.1, 0.005, 120.0, 1.0), 0.5, ())
+
+
+SIZES = (700.0, 1200.0, 2000.0, 5000.0, 10e3, 20e3)
+
+
+def learn_all(turn: float) -> list[LearntWaveform]:
+    return [
+        learn_waveform(heavy_operator(), wanted(size_nm, turn, 1.0), straight(turn), same, None) for size_nm in SIZES
+    ]
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("turn", [0.5, 0.8])
+def test_a_line_settles_at_every_size(turn: float) -> None:
+    for size_nm, settled in zip(SIZES, learn_all(turn), strict=True):
+        assert max(settled.expected.rms) < 0.12, size_nm
+        assert abs(settled.expected.size) < 0.05
+
+
+@pytest.mark.common
+def test_whole_corrections_go_to_and_fro(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scan_line, "_WHOLE_ROUNDS", 1000)
+    with pytest.raises(Unphysical, match="did not settle"):
+        learn_all(0.5)

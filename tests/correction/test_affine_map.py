@@ -11,8 +11,11 @@ from instrument_files import sxm
 from real_files import real_folder
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.correction.job import Choice, Images, OldScan, by_affine_map, by_fit, read_scan
+from tablegen.correction.by_affine_map import by_affine_map
+from tablegen.correction.by_fit import by_fit
 from tablegen.correction.lattice_bow import lattice_bows
+from tablegen.correction.old_scan import OldScan
+from tablegen.correction.scan_images import Choice, Images, read_scan
 from tablegen.numerics.arrays import Floats
 
 REAL = real_folder()

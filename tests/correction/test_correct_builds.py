@@ -9,7 +9,9 @@ from editing import SCAN, edited, run
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import load
-from tablegen.correction.job import Choice, OldScan, by_scan_file, read_scan
+from tablegen.correction.by_scanner import by_scan_file
+from tablegen.correction.old_scan import OldScan
+from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.imaging import Conditions, FrameImages, running_frame
 

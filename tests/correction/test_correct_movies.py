@@ -8,7 +8,7 @@ import pytest
 from editing import run
 from instrument_files import asd
 
-from tablegen.correction.job import Choice, read_scan
+from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.images.frame_registration import registered
 from tablegen.numerics.arrays import Floats
 

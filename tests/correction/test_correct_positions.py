@@ -9,8 +9,11 @@ from replacing import replace
 from sets import common
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.correction.by_fit import by_fit
+from tablegen.correction.by_scanner import by_scanner
 from tablegen.correction.distortion import Resampler
-from tablegen.correction.job import Choice, Images, OldAxis, OldScan, by_fit, by_scanner, read_scan
+from tablegen.correction.old_scan import OldAxis, OldScan
+from tablegen.correction.scan_images import Choice, Images, read_scan
 from tablegen.correction.straight import StraightScan
 from tablegen.virtual.imaging import FrameImages, grating
 

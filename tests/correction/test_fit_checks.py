@@ -13,10 +13,12 @@ from instrument_files import sxm
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.agreement import Agreement
+from tablegen.correction.by_fit import by_fit
 from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves, check_straight_cell, strange_spot
-from tablegen.correction.job import Choice, OldScan, by_fit, read_scan
+from tablegen.correction.old_scan import OldScan
 from tablegen.correction.periodic_scan import PeriodicScan
+from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.imaging import Surface
 

@@ -7,8 +7,10 @@ import pytest
 from correcting import off, old_frame, save_pair
 from editing import run
 
-from tablegen.correction.job import Choice, OldScan, by_fit, read_scan
+from tablegen.correction.by_fit import by_fit
+from tablegen.correction.old_scan import OldScan
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
+from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.numerics.arrays import Floats
 
 

@@ -13,7 +13,10 @@ from correcting import off as off_the_truth
 from editing import run
 
 from tablegen.cli.images.correct import correct
-from tablegen.correction.job import Choice, OldAxis, OldScan, by_fit, by_scanner, read_scan
+from tablegen.correction.by_fit import by_fit
+from tablegen.correction.by_scanner import by_scanner
+from tablegen.correction.old_scan import OldAxis, OldScan
+from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.images.files import read_channels
 from tablegen.virtual.imaging import Conditions, FrameImages, hexagonal, triangle_frame
 

@@ -11,8 +11,10 @@ from scipy.ndimage import map_coordinates
 
 from tablegen.base.data_files import Source
 from tablegen.base.input_errors import Unphysical
+from tablegen.correction.by_fit import by_fit
 from tablegen.correction.distortion import Distortion
-from tablegen.correction.job import Images, OldScan, by_fit
+from tablegen.correction.old_scan import OldScan
+from tablegen.correction.scan_images import Images
 from tablegen.images.files import ScanImage
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.imaging import FrameImages, SweepImage

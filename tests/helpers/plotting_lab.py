@@ -29,6 +29,7 @@ PLOTTING: dict[str, tuple[str, ...]] = {
     "refine": ("refine", "scan.toml", "trace.csv", "--axis", "x"),
     "predict": ("predict", "own/scanner.toml", "o3.csv", "--axis", "x", "--against", "o3.csv"),
     "lattice": ("lattice", "trace.npy", "retrace.npy"),
+    "drift": ("drift", "rough0.npy", "rough1.npy", "--seconds-apart", "10"),
     "correct": ("correct", "trace.npy", "retrace.npy", "--fit", "--lattice-nm", "60"),
     "calibrate offset": ("calibrate", "offset", *_AXIS, "offset.csv"),
     "calibrate size": ("calibrate", "size", *_AXIS, "size.csv"),
@@ -75,6 +76,9 @@ def make_lab(folder: Path) -> None:
     pair = Scanner().images(100.0, grating(16.0, pixels=128, lines=96), 0.05, np.random.default_rng(8))
     np.save(folder / "t100.npy", pair.trace)
     np.save(folder / "r100.npy", pair.retrace)
+    rough = np.cumsum(np.random.default_rng(15).standard_normal((40, 64)), axis=1)
+    np.save(folder / "rough0.npy", rough[:, :60])
+    np.save(folder / "rough1.npy", rough[:, 3:63])
     for number, (centre, stroke) in enumerate(SIX[1::2]):
         time_s, drive_v, nm = record(ForeignPlant(ManyPlays()), centre, stroke, seed=number)
         write_csv(folder / f"o{2 * number + 1}.csv", time_s=time_s, drive_v=drive_v, displacement_nm=nm)

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
-from kept_plays import kept_plays
+from kept_plays import kept_plays, own_program_alone
 from sets import quick
 from verifying import (
     check_first_difference,
@@ -63,30 +63,33 @@ MODES = (
 
 
 # By `make test` some are verified; together they have both modes of tables, steps, and words of all widths.
-# Of some only on multiplier blocks; widths are what the look-up tables go by.
-ON_BLOCKS = ("turn_0.7", "left_aligned", "narrow_table_wide_dac")
+# Of two only on multiplier blocks; widths are what the look-up tables go by.
+ON_BLOCKS = ("left_aligned", "narrow_table_wide_dac")
 PLACED = [
-    *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "bits_24", "direct_steps")]),
+    *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "direct_steps")]),
     *(pytest.param((name, "blocks"), marks=pytest.mark.common) for name in ON_BLOCKS),
-    *(
-        pytest.param((name, "pipelined"), marks=pytest.mark.rest)
-        for name in MODES
-        if name not in ("example", "bits_24", "direct_steps")
-    ),
+    pytest.param(("bits_24", "pipelined"), marks=pytest.mark.rest),
 ]
 
 # One edit for two tests, which share its play; what is in the comment ends a text of XML.
 ROUNDED_DOWN = ("1'b1} + step", "1'b0} + step  /* <&]]> */")
 
 
-def verify(folder: Path, *arguments: str | Path | int, ticks: int = TICKS) -> Outcome:
+def verify(folder: Path, *arguments: str | Path | int, ticks: int = TICKS, requests: bool = True) -> Outcome:
     """Verify with multiplier blocks, which play twice as fast, unless the placement is given; a play is kept.
 
-    With ``--keep`` it is not, since the test is of what a play leaves.
+    With ``--keep`` it is not, since the test is of what a play leaves. Without ``requests`` the build's own program is
+    played alone.
     """
     placed = () if {"--axis", "--fourier", "--target"} & set(map(str, arguments)) else ("--axis", "blocks")
-    with nullcontext() if "--keep" in arguments else kept_plays():
+    kept = nullcontext() if "--keep" in arguments else kept_plays()
+    with kept, nullcontext() if requests else own_program_alone():
         return run("verify", folder, "--ticks", str(ticks), *placed, *map(str, arguments))
+
+
+def verify_alone(folder: Path, *arguments: str | Path | int) -> Outcome:
+    """Verify without requests: for damage that a play of the build's own program shows."""
+    return verify(folder, *arguments, requests=False)
 
 
 def flip(path: Path, line: int, bit: int) -> None:
@@ -113,23 +116,34 @@ def test_a_build_verifies(placed: tuple[str, str], tmp_path: Path) -> None:
     assert not list(built.folder.glob("*.vvp")), "nothing is written into the build"
 
 
+@pytest.mark.rest
+@pytest.mark.parametrize("name", [name for name in MODES if name not in ("example", "direct_steps")])
+def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
+    """The same of the others, without requests, which are the same for all."""
+    built = build(tmp_path, VARIANTS[name])
+    outcome = verify_alone(built.folder, "--axis", "pipelined")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert set(verdicts(outcome).values()) <= {"ok", "not exercised"}
+    assert {verdicts(outcome)[axis, "integer model"] for axis in "xy"} == {"ok"}
+
+
 @pytest.mark.common
-def test_a_whole_frame_verifies(short: Build) -> None:
+@pytest.mark.parametrize(
+    ("seed", "placed"), [pytest.param(1, "pipelined", marks=pytest.mark.rest), (2, "blocks")], ids=str
+)
+def test_a_whole_frame_verifies(short: Build, seed: int, placed: str) -> None:
     """Codes of all of a line and of a frame, frames that follow, a swap in mid-frame; by any seed."""
-    for seed, axis in ((1, "pipelined"), (2, "blocks")):
-        outcome = verify(short.folder, "--seed", seed, "--axis", axis, ticks=300000)
-        assert (outcome.status, outcome.err) == (0, "")
-        assert "note:" not in outcome.out
-        table = " ".join(outcome.out.split())
-        for axis, period in (("x", "line"), ("y", "frame")):
-            promised = short.manifest["axes"][axis]["certificate"]["max_error_lsb"]
-            found = re.search(
-                rf"{axis} float waveform \d+ codes, 100 % of the {period} ([\d.]+) LSB ([\d.]+) LSB", table
-            )
-            assert found
-            # The certificate is the worst of the period, and the whole period was played.
-            assert float(found[1]) == pytest.approx(promised, abs=0.001)
-            assert float(found[2]) == pytest.approx(promised, abs=0.001)
+    outcome = verify(short.folder, "--seed", seed, "--axis", placed, ticks=300000)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "note:" not in outcome.out
+    table = " ".join(outcome.out.split())
+    for axis, period in (("x", "line"), ("y", "frame")):
+        promised = short.manifest["axes"][axis]["certificate"]["max_error_lsb"]
+        found = re.search(rf"{axis} float waveform \d+ codes, 100 % of the {period} ([\d.]+) LSB ([\d.]+) LSB", table)
+        assert found
+        # The certificate is the worst of the period, and the whole period was played.
+        assert float(found[1]) == pytest.approx(promised, abs=0.001)
+        assert float(found[2]) == pytest.approx(promised, abs=0.001)
 
 
 @pytest.mark.rest
@@ -174,7 +188,7 @@ def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis:
     raw = int((folder / f"{NAME}_{axis}.mem").read_text("ascii").split()[word], 16)
     heard = first_heard(program, word, raw - (raw >> (program.bits - 1) << program.bits))
 
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     assert {*FILES, (axis, "integer model")} <= failed(outcome)
     assert ("x" if axis == "y" else "y", "integer model") not in failed(outcome)
@@ -194,7 +208,7 @@ def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis:
 )
 def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit: int, fails: tuple[str, str]) -> None:
     flip(folder / f"{NAME}_program.mem", register, bit)
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     assert {fails, *FILES} <= failed(outcome)
     assert f"files: {NAME}_program.mem: stale or edited" in outcome.err
@@ -218,7 +232,7 @@ def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, 
 def test_an_edited_constant_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f"{NAME.upper()}_PIXELS = 32'sd50;", f"{NAME.upper()}_PIXELS = 32'sd51;")
     edit(folder / f"{NAME}.vh", f'{NAME.upper()}_X_TABLE_FILE = "{NAME}_x.mem";', f'{NAME.upper()}_X_TABLE_FILE = "";')
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     by_simulator = ("verilog header", "manifest, by the simulator")
     assert failed(outcome) == {
@@ -235,7 +249,7 @@ def test_an_edited_constant_is_found(folder: Path) -> None:
 @pytest.mark.common
 def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f"localparam signed [31:0] {NAME.upper()}_SETTLE_LINES", "localparam OTHER")
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert f"{NAME}.vh: {NAME.upper()}_SETTLE_LINES is missing, it is 2 in the manifest" in outcome.err
     assert f"{NAME}.vh: OTHER is not in the manifest" in outcome.err
 
@@ -267,7 +281,7 @@ def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
 @pytest.mark.common
 def test_a_runtime_that_does_not_compile_is_told_by_its_log(folder: Path) -> None:
     edit(folder / "dac_slew.v", "endmodule", "endmodul")
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     assert ("simulation", "icarus") in failed(outcome)
     assert "dac_slew.v" in outcome.err
@@ -277,7 +291,7 @@ def test_a_runtime_that_does_not_compile_is_told_by_its_log(folder: Path) -> Non
 @pytest.mark.common
 def test_samples_that_never_come_are_found(folder: Path) -> None:
     edit(folder / "dac_verdict.v", "strobe <= tick;", "strobe <= 1'b0;")
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     models = {(subject, "integer model") for subject in ("x", "y", "markers")}
     assert {*models, ("timing", "constant delay")} <= failed(outcome)
@@ -289,7 +303,7 @@ def test_unknown_codes_are_found(folder: Path) -> None:
     """A register without a power-up value, in a simulator that knows what that means."""
     text = (folder / "dac_interpolator.v").read_text("ascii")
     (folder / "dac_interpolator.v").write_text(text.replace("1'b1} + step", "1'bx} + step"), "ascii")
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     assert "got       undefined" in outcome.err
 
@@ -330,7 +344,7 @@ def test_all_that_is_wrong_is_told_at_once(folder: Path) -> None:
     (folder / f"{NAME}.h").unlink()
     edit(folder / f"{NAME}.vh", f"{NAME.upper()}_PIXELS = 32'sd50;", f"{NAME.upper()}_PIXELS = 32'sd51;")
     flip(folder / f"{NAME}_x.mem", 70 * 2048 // 331, 7)
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     for text in (f"{NAME}.h: missing", f"{NAME}.vh: stale", f"{NAME}_x.mem: stale", "PIXELS is 51", "first difference"):
         assert text in outcome.err
     assert outcome.err.splitlines()[-1] == f"{folder}: {len(failed(outcome))} of {CHECKS} checks failed"
@@ -436,9 +450,10 @@ def test_the_option_hides_nothing_of_a_build_of_this_version(folder: Path) -> No
 @pytest.mark.common
 def test_a_build_of_another_version_is_played(folder: Path) -> None:
     edit_manifest(folder, "tablegen", value="0.0.7")
-    outcome = verify(folder, "--other-version")
+    outcome = verify_alone(folder, "--other-version")
     assert (outcome.status, outcome.err) == (0, "")
-    assert set(verdicts(outcome).values()) == {"ok"}
+    assert ("x", "integer model") in verdicts(outcome)
+    assert failed(outcome) == set()
 
 
 @pytest.mark.common
@@ -488,7 +503,7 @@ def test_junit_that_cannot_be_written_is_status_4(short: Build, tmp_path: Path) 
 
 @pytest.mark.common
 def test_what_is_simulated_is_kept_on_request(short: Build, tmp_path: Path) -> None:
-    assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
+    assert verify_alone(short.folder, "--keep", tmp_path / "kept").status == 0
     assert {"script.hex", "capture.hex", "rtl", "icarus"} <= {path.name for path in (tmp_path / "kept").iterdir()}
 
 
@@ -559,7 +574,7 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
         pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
         (["--axis", "blocks", "--fourier"], 24),
         pytest.param(["--axis", "serial", "--fourier"], 41, marks=pytest.mark.rest),
-        (["--fourier"], 36),
+        pytest.param(["--fourier"], 36, marks=pytest.mark.rest),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -573,7 +588,7 @@ def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str]
 
     # What a device renders comes from the Fourier words, what it plays otherwise from the table.
     flip(built.folder / f"{NAME}_x_fourier.mem", 1, 27)
-    outcome = verify(built.folder, *arguments)
+    outcome = verify(built.folder, *arguments, requests="--fourier" in arguments)
     assert outcome.status == 5
     assert (("markers", "integer model") in failed(outcome) or ("x", "integer model") in failed(outcome)) == (
         "--fourier" in arguments

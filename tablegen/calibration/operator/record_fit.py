@@ -265,6 +265,12 @@ class _Problem:
         free = np.linalg.lstsq(self.free[i][use], (measured - by_weights)[use], rcond=None)[0]
         return self.scale * measured, self.scale * (by_weights + self.free[i] @ free)
 
+    def at_the_sensor(self, i: int, solution: _Solution) -> Floats:
+        """Return the fitted displacement of a record in nm at its own times, with the delays of sensor and scanner."""
+        times = self.records[i].time_s
+        fitted: Floats = np.interp(times - solution.delay_s - self.lag_s, times, self.displacement(i, solution)[1])
+        return fitted
+
     def skip_lead_in(self, delay_s: float) -> None:
         """Leave out the beginning of a record where the piezo was in no state of the model, such as after a jump."""
         solution = self.solve(self.whole, _LOSS_STEP, delay_s)
@@ -397,7 +403,7 @@ def _assembled(
         predicted = problem.errors(i, part, problem.after(i))
         since = float(record.time_s[np.flatnonzero(problem.after(i))[0]])
         begin, skipped = problem.begins[i], float(record.time_s[problem.skipped[i]])
-        fitted, held_out = (problem.displacement(i, one)[1] for one in (whole, part))
+        fitted, held_out = (problem.at_the_sensor(i, one) for one in (whole, part))
         errors.append(RecordErrors(record, rms, worst, *predicted, since, begin, skipped, fitted, held_out))
     lines = _lines(problem, whole, part, errors)
     widest = max(lines, key=lambda line: line.stroke)

@@ -23,8 +23,11 @@ from tablegen.numerics.turns import sine_and_cosine
 from tablegen.waveform.series import FourierSeries
 
 CHORD = 0.05  # of the line, for scaling errors
-_ROUNDS = 60
+_ROUNDS = 120
+_WHOLE_ROUNDS = 20  # after as many, corrections are halved, again and again: on loops of few kinks they go to and fro
 _CONVERGED = 1e-5  # of the line: the largest change of the position inside the windows in a round
+_LATE_ROUNDS = 2 * _WHOLE_ROUNDS
+_LATE_CONVERGED = 2e-4  # of the line: the same after as many rounds, of a whole correction; and the error of the size
 _GRID_PER_HARMONIC = 16
 _MIN_GRID = 1024
 _SMOOTHNESS = 1e-8  # of the penalty on n^4, against the mean square of the error
@@ -123,7 +126,8 @@ def learn_waveform(
         played = learner.play(series, amplitude)
         line = learner.line_of(played.position)
         inside = played.position[learner.imaged] - line[1]
-        settled = before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * target.size_nm
+        share = 0.5 ** ((turn - 1) // _WHOLE_ROUNDS)
+        settled = before is not None and learner.converged(turn, share, line[0], inside - before)
         if settled and amplitude == due:  # a line that is held at the ends of the driver settles at another size
             at = 0.5 * (played.loop.low + played.loop.high)
             expected, unmeasured = learner.expected(played.position), learner.unmeasured(played)
@@ -141,12 +145,13 @@ def learn_waveform(
                 turn,
             )
         before = inside
-        amplitude *= target.size_nm / line[0]
+        grown = target.size_nm / line[0]
+        amplitude *= grown if share == 1.0 else 0.5 * (1.0 + grown)
         if learn:
-            series = series.plus(learner.correction(played, amplitude, line))
+            series = series.plus(learner.correction(played, amplitude, line, share))
     raise Unphysical(
         f"the waveform did not settle within {_ROUNDS} rounds on the operator; a smaller scan, a lower line rate or "
-        "fewer harmonics may"
+        "fewer harmonics may help"
     )
 
 
@@ -262,8 +267,21 @@ class _Learner:
         slope = float(tree_sum(weight * (x - mean_x) * y)) / float(tree_sum(weight * (x - mean_x) * x))
         return slope, mean_y - slope * mean_x
 
-    def correction(self, played: _Played, amplitude: float, line: tuple[float, float]) -> FourierSeries:
-        """Return the missing part of the waveform, projected on its harmonics."""
+    def converged(self, turn: int, share: float, size_nm: float, change_nm: Floats) -> bool:
+        """Return whether a round, with a share of its correction, has changed as good as nothing.
+
+        Parameters
+        ----------
+        change_nm
+            Changes of the position in nm at the imaged times of the grid, shape (imaged,).
+        """
+        most, target_nm = float(np.max(np.abs(change_nm))), self._target.size_nm
+        if turn <= _LATE_ROUNDS:
+            return most < _CONVERGED * target_nm
+        return most < share * _LATE_CONVERGED * target_nm and abs(size_nm - target_nm) < _LATE_CONVERGED * target_nm
+
+    def correction(self, played: _Played, amplitude: float, line: tuple[float, float], share: float) -> FourierSeries:
+        """Return a share of the missing part of the waveform, projected on its harmonics."""
         imaged, loop = self.imaged, played.loop
         missing = line[0] * (self._x[imaged] - 0.5) + line[1] - played.position[imaged]
         step = (loop.high - loop.low) / (POINTS - 1) * _SLOPE_STEPS
@@ -273,7 +291,7 @@ class _Learner:
         )
         slope = loop.extent_nm * (ahead - behind) / (2.0 * step) * amplitude  # nm for 1 of w
         right = tree_sum(self._basis * (missing / slope * self._weight))
-        c = self._factor.solve(right)
+        c = share * self._factor.solve(right)
         return FourierSeries(0.0, c[1 : self._harmonics + 1], c[self._harmonics + 1 :])
 
     def expected(self, position: Floats) -> ExpectedErrors:

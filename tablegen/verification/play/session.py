@@ -108,12 +108,13 @@ def make_session(
     seed: int,
     placement: Placement,
     requests: bool = True,
+    wired: bool = True,
 ) -> BuildSession:
     """Make requests, and then some ``most`` ticks at most of a program whose words come from ``memories``.
 
     Without memories the device has the program already, as the C of a build does, and a driver reports overruns.
     Without ``requests`` the own program alone is played. A swap in mid-frame comes at a random tick, ticks then come
-    every one to three clocks, and the end is played so slowly that a serial converter gets every sample.
+    every one to three clocks. If ``wired``, the end is played so slowly that a serial converter gets every sample.
     """
     pace, schedule = placement.tick_clocks, program.schedule
     codes = power_up_codes(variation(program, "free", 0) if requests else program)
@@ -148,10 +149,10 @@ def make_session(
     until = max(own.most, own.played + _PARK_TICKS)
     while not script.model.parked and own.played < until:
         script.wait_ticks(min(_CATCH_UP_STRIDE, until - own.played))
-    if requests:
+    if wired:
         _slowly(own)
     script.state("at the end")
-    return BuildSession(script, whole, in_frame, WIRED_TICKS if requests else 0)
+    return BuildSession(script, whole, in_frame, WIRED_TICKS if wired else 0)
 
 
 def _slowly(own: _Own) -> None:

@@ -131,7 +131,7 @@ class VerilogTarget:
         if separate_frame:
             (job.work / "frame").mkdir(exist_ok=True)
             blocks = Placement("blocks").playing(program)
-            session = make_session(program, memories, job.most_ticks, seed, blocks, requests=False)
+            session = make_session(program, memories, job.most_ticks, seed, blocks, requests=False, wired=False)
             runs.append(SimulatedRun(job.work / "frame", session, blocks, memories))
         return runs
 

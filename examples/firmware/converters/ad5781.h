@@ -1,0 +1,20 @@
+/* AD5781: 18 bits, one output; the code stands in the upper bits of a word of 20, else as ad5791.h.
+ *
+ *     [dac]
+ *     bits = 18
+ *     coding = "offset-binary"
+ *     word_bits = 20
+ *     align = "left"
+ */
+#ifndef AD5781_H
+#define AD5781_H
+
+#include "spi_words.h"
+
+static const dac_spi_converter ad5781 = {
+    24, 20, 0, 1, /* bits of a frame and of a word, lowest bit, SPI mode */
+    {UINT32_C(0x100000), UINT32_C(0x100000)},
+    1, {UINT32_C(0x200012), 0}
+};
+
+#endif
