@@ -39,7 +39,7 @@ from tablegen.manifest.read import read_build
 from tablegen.version import __version__
 
 TICKS = 2000
-CHECKS = 33
+CHECKS = 34
 INSTALLED = ("files", f"tablegen {__version__}")
 FILES = {("files", "SHA-256 in the manifest"), INSTALLED, ("verilog memories", "manifest")}
 MODES = (
