@@ -12,6 +12,8 @@ from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
 
+MAX_RENDERED_HARMONICS = 512  # the most that a sequencer in Verilog renders
+
 
 class AxisContent(Struct, frozen=True, eq=False):
     """One axis: its program, its Fourier words a0, a1..aH, b1..bH, and the volts of its codes.
@@ -54,6 +56,12 @@ class Content(Struct, frozen=True, eq=False):
     def schedule(self) -> Schedule:
         """Ticks, lines and windows of the scan."""
         return self.program.schedule
+
+    @property
+    def renders_tables(self) -> bool:
+        """True if ``NAME_top.v`` boots Fourier words and renders both tables from them."""
+        modes = {axis.program.mode for axis in self.axes}
+        return "direct" not in modes and max(axis.harmonics for axis in self.axes) <= MAX_RENDERED_HARMONICS
 
     @property
     def sine_index_bits(self) -> int:

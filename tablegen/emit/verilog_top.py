@@ -4,10 +4,9 @@ from typing import Any
 
 from tablegen.device.widths import least_widths
 from tablegen.emit.constants import DEGREES, memory_index_bits, shaping_constants
-from tablegen.emit.content import AxisContent, Content
+from tablegen.emit.content import MAX_RENDERED_HARMONICS, AxisContent, Content
 from tablegen.emit.templates import template
 
-_HARMONICS = 512  # the most that a sequencer renders
 _PORT = len("[4*COUNT_BITS-1:0]")  # characters of the widest range of a port
 
 
@@ -34,9 +33,9 @@ def _context(content: Content) -> dict[str, Any]:
         "widths": least_widths(content.schedule, content.y.program),
         "shaping": shaping_constants(content).get("SHAPING", 0),
         "cubic": "cubic" in modes,
-        "fourier": int("direct" not in modes and highest <= _HARMONICS),
+        "fourier": int(content.renders_tables),
         "least_harmonics": highest,
-        "harmonics": min((1 << highest.bit_length()) - 1, _HARMONICS),  # what fills the memories
+        "harmonics": min((1 << highest.bit_length()) - 1, MAX_RENDERED_HARMONICS),  # what fills the memories
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": sine_memory(content),
         "dac_bits": dac_bits,

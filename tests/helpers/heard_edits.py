@@ -96,7 +96,7 @@ class PreparedPlay:
         self.job = PlayJob(folder, work, stored, limits, 1000, 1, lambda _: None)
         (self.run,) = self.target._runs(self.job, memories)
         self.sources = sorted(folder.glob("dac_*.v"))
-        self.run.prepare("icarus", stored, [work / stored.manifest.name, *self.sources])
+        self.run.prepare("icarus", stored, [work / stored.manifest.name, *self.sources], folder)
         expected = self.run.session.script.expected
         (work / "expected.hex").write_text("".join(f"{word:016x}\n" for word in expected), "ascii")
         flags = [

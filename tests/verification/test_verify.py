@@ -39,7 +39,7 @@ from tablegen.manifest.read import read_build
 from tablegen.version import __version__
 
 TICKS = 2000
-CHECKS = 33
+CHECKS = 34
 INSTALLED = ("files", f"tablegen {__version__}")
 FILES = {("files", "SHA-256 in the manifest"), INSTALLED, ("verilog memories", "manifest")}
 MODES = (
@@ -217,11 +217,14 @@ def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit:
 
 @pytest.mark.common
 @pytest.mark.parametrize("suffix", ["sine.mem", "x_fourier.mem", "y_fourier.mem"])
-def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, suffix: str) -> None:
+def test_a_flipped_bit_of_what_the_session_does_not_play_is_found(folder: Path, suffix: str) -> None:
     flip(folder / f"{NAME}_{suffix}", 3, 0)
     outcome = verify(folder)
     assert outcome.status == 5
-    assert failed(outcome) == FILES
+    booted = (
+        {("top", "integer model")} if suffix != "sine.mem" else set()
+    )  # the top boots Fourier words, not their sine
+    assert failed(outcome) == FILES | booted
     assert re.search(
         rf"verilog memories: {NAME}_{suffix}: word 3 is [0-9a-f]{{8}}, it is [0-9a-f]{{8}} in the manifest", outcome.err
     )

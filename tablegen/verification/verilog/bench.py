@@ -23,6 +23,9 @@ SPACING_CLOCKS = 200  # a strobe so long after the one before it is sent on the 
 COUNT_BITS = 8  # of a fault counter: few enough that it ends at its largest number
 WIRE_WORDS = 2  # 64-bit words of a sample on the wires: its number, then both words
 
+_TOP_PLAYS = """\
+    top_play #(.UPLOAD(UPLOAD), .BOOTED(BOOTED), .PLAYED(PLAYED)) top (.finished(top_finished));"""
+_NO_TOP = "    assign top_finished = 1'b1;"
 _MODULE = """\
 // The bench of tablegen verify: what a build emitted sets up the sequencer and its outputs.
 `timescale 1ns / 1ps
@@ -30,7 +33,8 @@ _MODULE = """\
 
 module verify_bench #(
     parameter SCRIPT = "", parameter CAPTURE = "", parameter STATES = "", parameter WORDS = "", parameter WIRES = "",
-    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
+    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter UPLOAD = "", parameter BOOTED = "",
+    parameter PLAYED = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
     parameter BOOT_Y = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
     parameter LOW_AREA = 0, parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "",
     parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
@@ -49,10 +53,13 @@ module verify_bench #(
     ) bench ();
 
     // For the cocotb side of the bench.
-    wire finished = bench.finished;
+    wire top_finished;
+    wire finished = bench.finished && top_finished;
     wire [127:0] fault_counts = bench.fault_counts;
     wire [31:0] strobes = bench.strobes, ticks = bench.ticks, jitter = bench.jitter, latency = bench.latency;
     wire refused = bench.refused;
+
+{top}
 
     integer constants;
     initial begin
@@ -137,8 +144,11 @@ def expected_constants(content: Content) -> dict[str, str]:
     return {"HASH": content.hash, **numbers}
 
 
-def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
-    """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y."""
+def bench_text(content: Content, index_bits: tuple[int, int], top: bool = False) -> str:
+    """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y.
+
+    With ``top`` its ``NAME_top.v`` plays beside the session.
+    """
     name = content.name.upper()
     formats = {key: "%h" if key == "HASH" else "%0d" for key in expected_constants(content)}
     lines = [f'        $fwrite(constants, "{how}\\n", {name}_{key});' for key, how in formats.items()]
@@ -149,6 +159,7 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
         x_index_bits=index_bits[0],
         y_index_bits=index_bits[1],
         spacing=SPACING_CLOCKS,
+        top=_TOP_PLAYS if top else _NO_TOP,
         constants="\n".join(lines),
     )
 

@@ -54,6 +54,7 @@ from tablegen.verification.verilog.bench import (
 )
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
 from tablegen.verification.verilog.simulate import Design, compile_design, require
+from tablegen.verification.verilog.top_play import TopPlay
 
 _SESSION_TICKS = 30_000  # of the program of a build, in a session that has its frame apart
 _CAPTURED_TICK_BYTES = 17  # bytes of a captured tick
@@ -109,8 +110,10 @@ class VerilogTarget:
         assert memories is not None
         job.progress("playing the integer model")
         runs = self._runs(job, memories)
+        if (job.folder / f"{name}_top.v").is_file():
+            runs[0].top = TopPlay.of(stored_content(stored), job.most_ticks)
         for run in runs:
-            run.prepare(self.simulator, stored, sources[:-1])
+            run.prepare(self.simulator, stored, sources[:-1], job.folder)
         job.progress(lambda: ", ".join(run.progress(self.simulator) for run in runs))
         try:
             statuses = worker.run_all(__name__, [(run.folder, run.job) for run in runs])
@@ -166,6 +169,8 @@ class VerilogTarget:
             check_states(script.states, states, most_counted),
             check_timing(capture, status),
         ]
+        if run.top is not None:
+            checks.append(run.top.check(run.folder))
         if len(runs) > 1:
             checks.append(check_whole("frame", captures[1], ", multiplier blocks"))
         differences = [first_difference(one) for one in captures]
@@ -174,6 +179,8 @@ class VerilogTarget:
         unplayed = unplayed_verilog(
             (name for name in stored.manifest.files if name.endswith(".v")), [one.placement for one in runs], programs
         )
+        if run.top is not None:
+            unplayed = [name for name in unplayed if name != f"{stored.manifest.name}_top.v"]
         return Outcome(checks, run.session, next(filter(None, differences), None), whole, unplayed=unplayed)
 
 
@@ -185,28 +192,32 @@ class SimulatedRun:
     session: BuildSession
     placement: Placement
     memories: Memories
+    top: TopPlay | None = None  # plays beside the session
     job: dict[str, Any] = field(default_factory=dict)
 
-    def prepare(self, simulator: str, stored: StoredBuild, sources: list[Path]) -> None:
+    def prepare(self, simulator: str, stored: StoredBuild, sources: list[Path], build: Path) -> None:
         """Write the script and the bench, and say what is to be compiled."""
         script, folder = self.session.script, self.folder
         (folder / SCRIPT).write_text(script.text(), "ascii")
         shape = SequencerShape.of((stored.program.x, stored.program.y))
         bench = folder / f"{TOP}.v"
         write_boot_files(folder)
-        bench.write_text(bench_text(stored_content(stored), (shape.x_index_bits, shape.y_index_bits)), "ascii")
+        index_bits, top = (shape.x_index_bits, shape.y_index_bits), self.top
+        bench.write_text(bench_text(stored_content(stored), index_bits, top is not None), "ascii")
+        beside = [] if top is None else top.prepare(build, folder, folder / simulator)
         harmonics = max(self.memories.x_harmonics, self.memories.y_harmonics)
         self.job = {
             "simulator": simulator,
-            "sources": [str(path) for path in (*sources, STREAM_BENCH, OUTPUT_BENCH, bench)],
+            "sources": [str(path) for path in (*sources, STREAM_BENCH, OUTPUT_BENCH, *beside, bench)],
             "includes": [str(sources[0].parent)],
             "parameters": {
                 **bench_parameters(SCRIPT, CAPTURE, self.session.wired_ticks > 0),
                 "X_POWER_UP_CODE": script.power_up[0],
                 "Y_POWER_UP_CODE": script.power_up[1],
                 **self.placement.parameters(harmonics, f"../{_SINE}"),
+                **({} if top is None else top.parameters()),
             },
-            "clocks": script.clocks,
+            "clocks": script.clocks if top is None else max(script.clocks, top.clocks),
         }
 
     def progress(self, simulator: str) -> str:

@@ -1,0 +1,311 @@
+"""A play of ``NAME_top.v``: what it boots from the memory files, then codes, words and markers of its first lines.
+
+It is a second device in the bench of a session, on a clock of its own. To render the tables takes a simulator longer
+than a session: a top that boots Fourier words is told to withdraw them once all have been compared, and gets the
+tables instead. The other parameters serve both ways.
+"""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tablegen.device.registers import program_words
+from tablegen.device.sequencer import Sequencer
+from tablegen.emit.content import Content
+from tablegen.emit.memory import memories
+from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.play.capture import UNDEFINED
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.stream import (
+    PROGRAM,
+    X_FOURIER,
+    X_TABLE,
+    Y_FOURIER,
+    Y_TABLE,
+    Sample,
+    Words,
+    pack,
+    read_capture,
+)
+
+BENCH = "top_play"
+_UPLOAD, _BOOTED, _PLAYED = "top_upload.hex", "top_booted.hex", "top_played.hex"
+_CLOCKS = 6000  # that ticks take, unless a line takes more
+_MAX_TICKS = 20_000
+_OTHER_CLOCKS = 2000  # to boot, to withdraw and to drain, beside the words
+_WORD = (1 << 32) - 1
+
+_OTHER_SINE = 'device.sequencer.SINE_FILE != "{}_sine.mem"'  # which only a rendering would read
+
+_MODULE = """\
+// The bench of NAME_top.v: compares nothing, writes down what the top boots and plays.
+`timescale 1ns / 1ps
+`default_nettype none
+
+module top_play #(
+    parameter UPLOAD = "", parameter BOOTED = "", parameter PLAYED = ""
+) (
+    output reg finished
+);
+    reg clock = 0, write = 0, commit = 0, withdraw = 0, start = 0, tick = 0;
+    reg [63:0] word = 0;
+    wire writable, refused, committed, booting, missing, strobe;
+    wire line, frame, pixel, backward, valid, swapped, playing, parked;
+    wire [3:0] faults;
+    wire [{dac_bits}-1:0] x_code, y_code;
+    wire [{x_bits}-1:0] x_word;
+    wire [{y_bits}-1:0] y_word;
+    wire [23:0] x_wide = x_code, y_wide = y_code;
+    wire [31:0] x_sent = x_word, y_sent = y_word;
+    integer upload, booted, played, clocks = 0;
+
+    {name}_top #(.PLAIN_MULTIPLIER(1)) device (
+        .clock(clock), .reset(1'b0), .write(write), .write_region(word[50:48]), .write_address(word[47:32]),
+        .write_data(word[31:0]), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
+        .committed(committed), .booting(booting), .missing(missing), .arm(start), .arm_frames(16'd0),
+        .trigger(start), .park(1'b0), .clear_faults(1'b0), .armed(), .running(), .tick(tick), .underrun(1'b0),
+        .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code), .x_word(x_word), .y_word(y_word),
+        .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
+        .valid_marker(valid), .swapped_marker(swapped), .playing(playing), .parked(parked), .faults(faults),
+        .fault_counts()
+    );
+
+    task step;
+        begin
+            #5 clock = 1;
+            #5 clock = 0;
+            clocks = clocks + 1;
+            if (strobe)
+                $fwrite(played, "%016x\\n%016x\\n",
+                        {{4'd0, faults, parked, playing, swapped, valid, backward, pixel, frame, line, y_wide, x_wide}},
+                        {{y_sent, x_sent}});
+        end
+    endtask
+
+    initial begin
+        finished = 0;
+        upload = $fopen(UPLOAD, "r");
+        booted = $fopen(BOOTED, "w");
+        played = $fopen(PLAYED, "w");
+        #1;
+        while (booting !== 1'b0 && clocks < {boot_clocks}) begin
+            if (device.sequencer.write)
+                $fwrite(booted, "%016x\\n", {{13'd0, device.sequencer.write_region, device.sequencer.write_address,
+                                            device.sequencer.write_data}});
+            step;
+        end
+        $fwrite(booted, "%016x\\n", {{61'd0, {other_sine}, missing, refused}});
+        $fclose(booted);
+        if ({withdraws}) begin
+            withdraw = 1;
+            step;
+            withdraw = 0;
+            repeat (8) step;
+            while ($fscanf(upload, "%h", word) == 1) begin
+                write = 1;
+                step;
+            end
+            write = 0;
+            commit = 1;
+            step;
+            commit = 0;
+        end
+        repeat (16) step;
+        tick = 1;
+        step;
+        tick = 0;
+        repeat (100) step;
+        start = 1;
+        step;
+        start = 0;
+        repeat ({ticks}) begin
+            tick = 1;
+            step;
+            tick = 0;
+            repeat ({pause}) step;
+        end
+        repeat (100) step;
+        $fwrite(played, "%016x\\n%016x\\n", {{63'd0, refused}}, {{63'd0, missing}});
+        $fclose(played);
+        finished = 1;
+    end
+endmodule
+
+`default_nettype wire
+"""
+
+
+class _Write(NamedTuple):
+    """A write at the host port."""
+
+    region: int
+    address: int
+    data: int
+
+    def packed(self) -> int:
+        """Return it as the bench reads and writes it."""
+        return self.region << 48 | self.address << 32 | self.data & _WORD
+
+
+@dataclass(frozen=True)
+class TopPlay:
+    """A play of the top of a build, of ``ticks`` ticks that are ``pace`` clocks apart."""
+
+    content: Content
+    ticks: int
+    pace: int
+
+    @classmethod
+    def of(cls, content: Content, most_ticks: int) -> "TopPlay":
+        """Return a play of a line at least, within ``most_ticks``."""
+        pace = Placement("blocks").playing(content.program).tick_clocks
+        ticks = max(content.schedule.ticks, _CLOCKS // pace)
+        return cls(content, min(ticks, most_ticks, _MAX_TICKS), pace)
+
+    @property
+    def clocks(self) -> int:
+        """The clocks that the play takes at most."""
+        return self._boot_clocks + len(self._tables()) + self.ticks * self.pace + _OTHER_CLOCKS
+
+    @property
+    def _boot_clocks(self) -> int:
+        return len(self._boot()) + _OTHER_CLOCKS // 2
+
+    def prepare(self, build: Path, folder: Path, model: Path) -> list[Path]:
+        """Copy the top of a build into ``folder``, memory files to where the ``model`` runs; return top and bench."""
+        model.mkdir(exist_ok=True)
+        for memory in memories(self.content):
+            name = f"{self.content.name}_{memory.name}.mem"
+            if (build / name).is_file():
+                shutil.copyfile(build / name, model / name)
+        upload = self._tables() if self.content.renders_tables else []
+        (folder / _UPLOAD).write_text("".join(f"{one.packed():016x}\n" for one in upload), "ascii")
+        bench = folder / f"{BENCH}.v"
+        bench.write_text(self._bench_text(), "ascii")
+        top = folder / f"{self.content.name}_top.v"
+        shutil.copyfile(build / top.name, top)
+        return [top, bench]
+
+    def parameters(self) -> dict[str, str]:
+        """Return the files of the bench, relative to the folder in which the model runs."""
+        names = {"UPLOAD": _UPLOAD, "BOOTED": _BOOTED, "PLAYED": _PLAYED}
+        return {key: f"../{name}" for key, name in names.items()}
+
+    def check(self, folder: Path) -> Check:
+        """Compare what was booted and played in a folder with the manifest and the integer model."""
+        boot = np.array([*(one.packed() for one in self._boot()), 0], dtype=np.uint64)
+        model, booted, played = self._model(), read_capture(folder / _BOOTED), read_capture(folder / _PLAYED)
+        failure = _boot_failure(boot, booted) or _play_failure(model, played)
+        wrong = _different(boot, booted) + _different(model, played)
+        compared = f"{len(boot) - 1} words booted, {self.ticks} ticks"
+        name = f"{self.content.name}_top.v"
+        return Check("top", "integer model", compared, f"{wrong} differ", "0", failure and f"{name}: {failure}")
+
+    def _bench_text(self) -> str:
+        x, y = (axis.program.output for axis in self.content.axes)
+        return _MODULE.format(
+            name=self.content.name,
+            dac_bits=x.dac_bits,
+            x_bits=x.word_bits,
+            y_bits=y.word_bits,
+            boot_clocks=self._boot_clocks,
+            other_sine=_OTHER_SINE.format(self.content.name) if self.content.renders_tables else "1'b0",
+            withdraws=int(self.content.renders_tables),
+            ticks=self.ticks,
+            pause=self.pace - 1,
+        )
+
+    def _boot(self) -> list[_Write]:
+        """Return what the top writes at power-up."""
+        if not self.content.renders_tables:
+            return self._tables()
+        x, y = self.content.axes
+        words = [(X_FOURIER, x.fourier_words), (Y_FOURIER, y.fourier_words)]
+        return self._registers((x.harmonics, y.harmonics)) + _writes(words)
+
+    def _tables(self) -> list[_Write]:
+        x, y = self.content.axes
+        return self._registers((0, 0)) + _writes([(X_TABLE, x.program.words), (Y_TABLE, y.program.words)])
+
+    def _registers(self, harmonics: tuple[int, int]) -> list[_Write]:
+        x, y = (axis.program for axis in self.content.axes)
+        words = program_words(self.content.schedule, x, y, harmonics)
+        return [_Write(PROGRAM, address, word) for address, word in enumerate(words)]
+
+    def _model(self) -> Words:
+        """Return each tick and its converter words, the tick that takes the program first, and the flags at the end."""
+        x, y = (axis.program.output for axis in self.content.axes)
+        model = Sequencer(None)
+        model.commit(self.content.program)
+        ticks = [model.step()]
+        model.arm()
+        model.trigger()
+        ticks += [model.step() for _ in range(self.ticks)]
+        words = [word for tick in ticks for word in (pack(tick), y.word(tick.y) << 32 | x.word(tick.x))]
+        return np.array([*words, 0, 0], dtype=np.uint64)
+
+
+def _writes(regions: "list[tuple[int, np.ndarray]]") -> list[_Write]:
+    return [
+        _Write(region, address, int(word)) for region, words in regions for address, word in enumerate(words.tolist())
+    ]
+
+
+def _different(expected: Words, got: Words) -> int:
+    """Return the number of words that differ, or that only one of both has."""
+    length = min(len(expected), len(got))
+    return int(np.sum(expected[:length] != got[:length])) + abs(len(expected) - len(got))
+
+
+def _first(expected: Words, got: Words) -> int:
+    """Return the first place that differs; the shorter length where there is none."""
+    length = min(len(expected), len(got))
+    return next(iter(np.flatnonzero(expected[:length] != got[:length]).tolist()), length)
+
+
+def _boot_failure(expected: Words, got: Words) -> str | None:
+    at = _first(expected, got)
+    if at == len(expected) == len(got):
+        return None
+    ours, theirs = (_written(words, at) for words in (expected, got))
+    return f"write {at} of its boot is {theirs}, it is {ours} in the manifest"
+
+
+def _written(words: Words, at: int) -> str:
+    """Describe a write of a boot; behind the last one are its flags."""
+    if at >= len(words):
+        return "missing"
+    if words[at] == UNDEFINED:
+        return "undefined"
+    if at == len(words) - 1:
+        flags = zip(("refused", "missing", "another SINE_FILE"), range(3), strict=True)
+        return "the end with " + (", ".join(name for name, bit in flags if int(words[at]) >> bit & 1) or "no fault")
+    word = int(words[at])
+    return f"0x{word & _WORD:x} at address {word >> 32 & 0xFFFF} of region {word >> 48}"
+
+
+def _play_failure(expected: Words, got: Words) -> str | None:
+    at = _first(expected, got)
+    if at == len(expected) == len(got):
+        return None
+    ours, theirs = (_played(words, at // 2 * 2) for words in (expected, got))
+    return f"tick {at // 2} differs from the model:\n  expected  {ours}\n  got       {theirs}"
+
+
+def _played(words: Words, at: int) -> str:
+    """Describe a tick and its converter words; behind the last one are the flags."""
+    if at + 1 >= len(words):
+        return "nothing"
+    if words[at] == UNDEFINED or words[at + 1] == UNDEFINED:
+        return "undefined"
+    if at + 2 == len(words):
+        return f"the end, refused {int(words[at])}, missing {int(words[at + 1])}"
+    sample, sent = Sample.of(int(words[at])), int(words[at + 1])
+    markers = " ".join(sample.flags) or "none"
+    return (
+        f"x {sample.x}, y {sample.y}, markers {markers}, faults {sample.faults:04b}, "
+        f"words 0x{sent & _WORD:x} and 0x{sent >> 32:x}"
+    )
