@@ -5,13 +5,13 @@ than a session: a top that boots Fourier words is told to withdraw them once all
 tables instead. The other parameters serve both ways.
 """
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.device.registers import program_words
 from tablegen.device.sequencer import Sequencer
 from tablegen.emit.content import Content
@@ -180,13 +180,13 @@ class TopPlay:
         for memory in memories(self.content):
             name = f"{self.content.name}_{memory.name}.mem"
             if (build / name).is_file():
-                shutil.copyfile(build / name, model / name)
+                (model / name).write_bytes(read_bytes(build / name, BUILD_FILE))
         upload = self._tables() if self.content.renders_tables else []
         (folder / _UPLOAD).write_text("".join(f"{one.packed():016x}\n" for one in upload), "ascii")
         bench = folder / f"{BENCH}.v"
         bench.write_text(self._bench_text(), "ascii")
         top = folder / f"{self.content.name}_top.v"
-        shutil.copyfile(build / top.name, top)
+        top.write_bytes(read_bytes(build / top.name, BUILD_FILE))
         return [top, bench]
 
     def parameters(self) -> dict[str, str]:
