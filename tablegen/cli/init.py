@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _NUMBER = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-zA-Z\u00b5]*)")
 _HERTZ = {"": 1.0, "hz": 1.0, "k": 1e3, "khz": 1e3, "m": 1e6, "mhz": 1e6}
+_SHORTEST_NM, _LONGEST_NM = 1e-3, 1e9  # of the range of a scanner
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\u00b5s": 1e-6, "ns": 1e-9}
 
 
@@ -153,6 +154,9 @@ def init(
         raise click.UsageError(f"the driver goes from {low:g} to {high:g} V: give a --v-max above --v-min")
     if nm_per_v is not None and not nm_per_v > 0.0:
         raise click.UsageError(f"--nm-per-v {nm_per_v:g} is not above 0")
+    if nm_per_v is not None and not _SHORTEST_NM < (high - low) * nm_per_v < _LONGEST_NM:
+        reach = f"{high - low:g} V by --nm-per-v {nm_per_v:g} are {(high - low) * nm_per_v:g} nm"
+        raise click.UsageError(f"{reach}: no range of a scanner; --nm-per-v is in nm/V at the piezo")
     if size is None:
         wishes = replace(wishes, image_nm=usual_image_nm(wishes.driver, nm_per_v))
     texts = files(wishes)

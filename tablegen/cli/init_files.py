@@ -74,7 +74,8 @@ def usual_image_nm(driver: tuple[float, float], nm_per_v: float | None) -> float
     driver : tuple[float, float]
         The range of the piezo driver in V.
     nm_per_v : float or None
-        The sensitivity of the scanner; None for the example's scanner, whose range fits the image.
+        The sensitivity of the scanner, with a range above 0 and finite; None for the example's scanner, whose range
+        fits the image.
 
     Returns
     -------
@@ -85,7 +86,7 @@ def usual_image_nm(driver: tuple[float, float], nm_per_v: float | None) -> float
     if nm_per_v is None:
         return _USUAL_NM
     whole = (driver[1] - driver[0]) * nm_per_v
-    if _FITTING[0] <= _USUAL_NM / whole <= _FITTING[1]:
+    if _FITTING[0] * whole <= _USUAL_NM <= _FITTING[1] * whole:
         return _USUAL_NM
     most = _NEW_SHARE * whole
     power = floor(log10(most))

@@ -139,7 +139,13 @@ def test_an_own_scanner_has_no_hysteresis_of_the_example(options: tuple[str, ...
     assert run("build", path, "-o", tmp_path / "out").status == 0
 
 
-@pytest.mark.parametrize("options", [("--v-max", "-5"), ("--v-min", "10", "--v-max", "5"), ("--nm-per-v", "0")])
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--v-max", "-5"), ("--v-min", "10", "--v-max", "5"), ("--nm-per-v", "0"),
+        ("--v-max", "1e308", "--nm-per-v", "1e308"), ("--v-max", "1e-10", "--nm-per-v", "1e-320"),
+    ],
+)  # fmt: skip
 def test_an_own_scanner_that_cannot_be(options: tuple[str, ...], tmp_path: Path) -> None:
     outcome = run("init", tmp_path, *options)
     assert outcome.status == 2
