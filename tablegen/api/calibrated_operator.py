@@ -265,11 +265,10 @@ def _sweep_text(sweep: SweepLoss | None) -> list[str]:
     return [f"response without {creep}a lag of {360.0 * sweep.loss_turns:.2g} degrees, which the operator has itself"]
 
 
-def delay_text(delay: Estimate) -> list[str]:
-    """Return a line on the delay; none for a delay of 0."""
-    long = abs(delay.value) >= 1e-3
-    per_s, unit = (1e3, "ms") if long else (1e6, "us")
-    if isfinite(delay.standard_error):
-        error = f"{per_s * delay.standard_error:.2g}"
-        return [f"delay    {per_s * delay.value:.3g} {unit} of the sensor, fitted, +- {error} {unit}"]
-    return [f"delay    {per_s * delay.value:.3g} {unit} of the sensor, as given"] if delay.value else []
+def delay_text(delay: Estimate, *, with_error: bool = True) -> list[str]:
+    """Return a line on the delay in s, in us or from 1 ms on in ms; none for a delay of 0 that was given."""
+    per_s, unit = (1e3, "ms") if abs(delay.value) >= 1e-3 else (1e6, "us")
+    text = f"delay    {per_s * delay.value:.3g} {unit} of the sensor"
+    if not isfinite(delay.standard_error):
+        return [f"{text}, as given"] if delay.value else []
+    return [f"{text}, fitted" + (f", +- {per_s * delay.standard_error:.2g} {unit}" if with_error else "")]

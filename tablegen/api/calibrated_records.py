@@ -155,7 +155,7 @@ class CalibratedRecords(CalibratedOperator):
             f"model    {self.family}, {fit.weights} weights for {fit.samples} samples"
             f"  (rms of the last parts, predicted: {scores})",
             f"creep    {100.0 * fit.operator.creep.loss_per_decade:.2g} % a decade",
-            *delay_text(self.delay),
+            *delay_text(self.delay, with_error=False),  # its error is the last step of a search
             "",
             f"{'':43}in the fit      last part predicted",
             "size [V]  offset [V]  rate [Hz]  begins         rms  worst     from [s]    rms  worst  record",

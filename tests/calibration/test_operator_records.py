@@ -140,6 +140,12 @@ def test_a_late_sensor_is_found_and_named() -> None:
     late = np.interp(record.time_s - 4e-4, record.time_s, record.displacement_nm)
     found = fitted(Trace("late", record.time_s, record.drive_v, late), delay_s=None)
     assert found.delay.value == pytest.approx(4e-4, abs=5e-5)
+    (errors,) = found.errors
+    inside = slice(20, -20)  # beside the ends, where the delay reaches beyond the record
+    left = (late - errors.displacement_nm)[inside]
+    early = (late - np.interp(record.time_s + 4e-4, record.time_s, errors.displacement_nm))[inside]
+    assert np.std(left) < 1e-2 * (errors.rms + 0.02) * float(np.ptp(late))  # at the times of the record
+    assert np.std(early) > 3.0 * np.std(left)
     unaware = fitted(Trace("late", record.time_s, record.drive_v, late))
     assert unaware.delay.value == 0.0
     assert unaware.best_delay_s == pytest.approx(4e-4, abs=5e-5)

@@ -270,10 +270,11 @@ def test_a_wrong_frame_is_seen(name: str, old: str, new: str, tmp_path: Path) ->
     bits = int(str(table.get("word_bits", table["bits"])))
     words = [(3 << bits - 3, 5 << bits - 3)] * 2
     right = list(outputs(name, sent(tmp_path / "own", name, words)[1], 2))
+    frames = sent(tmp_path / "wrong", name, words, text.replace(old, new))[1]
     try:
-        wrong = list(outputs(name, sent(tmp_path / "wrong", name, words, text.replace(old, new))[1], 2))
+        wrong = list(outputs(name, frames, 2))
     except AssertionError:
-        return  # the converter takes no such frame
+        wrong = []  # the converter takes no such frame
     assert wrong != right
 
 
