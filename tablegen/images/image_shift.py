@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import label
 
 from tablegen.images.lattice_filters import filtered_images
 from tablegen.images.missing import valid_pixels
@@ -147,10 +148,11 @@ def _search(pairs: list[_Prepared], reach: Floats | None) -> _Maxima:
     level = np.isfinite(match) & (filled >= _RIVAL * best) & (best > 0.0)
     places: list[tuple[float, float]] = []
     open_ended = False
+    lobes, _ = label(level)
     remaining = np.where(peaks & level, filled, -np.inf)
     while len(places) <= _MOST_RIVALS and np.max(remaining) > -np.inf:
         at = np.unravel_index(int(np.argmax(remaining)), match.shape)
-        lobe = _lobe(level, int(at[0]), int(at[1]))
+        lobe = lobes == lobes[at]
         open_ended = open_ended or (reach is None and not places and _at_edge(lobe, np.isfinite(match)))
         if filled[at] >= np.max(filled[lobe]):  # one side of a lobe is no maximum of its own
             places.append((float(x[at[1]]), float(y[at[0]])))
@@ -207,20 +209,6 @@ def _local_maxima(values: Floats) -> Bools:
             if dy or dx:
                 peaks &= values >= np.roll(values, (dy, dx), axis=(0, 1))
     return peaks
-
-
-def _lobe(level: Bools, row: int, column: int) -> Bools:
-    """Return the connected part of a region that has this pixel."""
-    lobe = np.zeros(level.shape, dtype=np.bool_)
-    lobe[row, column] = True
-    pending = [(row, column)]
-    while pending:
-        y, x = pending.pop()
-        for i, j in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
-            if 0 <= i < level.shape[0] and 0 <= j < level.shape[1] and level[i, j] and not lobe[i, j]:
-                lobe[i, j] = True
-                pending.append((i, j))
-    return lobe
 
 
 def _at_edge(lobe: Bools, searched: Bools) -> bool:

@@ -8,7 +8,7 @@ import click
 from tablegen.cli.images.pairs import channel_option, frames_option, require_readers, retrace_channel_option
 from tablegen.cli.shared.common import fail, finite, quiet_blas
 from tablegen.cli.shared.exit_status import ExitStatus
-from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_plot
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, show_result
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
@@ -66,11 +66,7 @@ def drift(images: tuple[Path, ...], plot: Path | None, as_json: bool, **how: Any
     with Progress() as progress:
         progress.now(f"registering {images[0].name}")
         result = _result(images, how)
-    if as_json:
-        click.echo(result.to_json())
-    else:
-        click.echo(result.summary())
-    show_plot(plot, result.charts)
+    show_result(result, plot, as_json)
     return ExitStatus.OK
 
 

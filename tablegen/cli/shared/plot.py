@@ -12,6 +12,7 @@ from tablegen.cli.shared.common import OutputFile, require, written
 from tablegen.cli.shared.terminal import paint
 
 if TYPE_CHECKING:
+    from tablegen.api.result import Result
     from tablegen.charts.picture_file import PlottedCharts
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -62,6 +63,12 @@ def plot_option(what: str, by_default: bool = False) -> Callable[[F], F]:
         return option
     none = click.option("--no-plot", is_flag=True, help="Do not plot in the terminal.")
     return lambda command: option(none(command))
+
+
+def show_result(result: "Result", plot: Path | None, as_json: bool) -> None:
+    """Print a result, as JSON or in text, and draw its charts."""
+    click.echo(result.to_json() if as_json else result.summary())
+    show_plot(plot, result.charts)
 
 
 def check_plot(plot: Path | None, as_json: bool = False) -> None:
