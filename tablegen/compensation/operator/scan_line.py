@@ -3,8 +3,8 @@
 A round plays the waveform on the operator: the settled loop of its stroke, then creep and dynamics, which act on all
 harmonics of the position, since a loop has many more of them than its drive. The distance of the position from the
 target line inside the imaging windows, over the slope of the branch, is projected on the harmonics with a penalty on
-n^4, and added; the amplitude is scaled to the size. Turns are rounded, so that the stroke differs from the line; the
-loop is that of the stroke.
+n^4, and added; the amplitude is scaled to the size. Corrections that go to and fro are halved. Turns are rounded, so
+that the stroke differs from the line; the loop is that of the stroke.
 """
 
 from collections.abc import Callable
