@@ -97,6 +97,7 @@ def check_stream(played: Stream) -> tuple[int, int]:
     return len(sent), len(missed)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("word_bits", "pauses", "gaps"),
     [(16, 0.0, (0,)), (8, 0.3, (2, 3)), (20, 0.5, (0, 0, 1, 5, 20)), (24, 0.7, (0,))],

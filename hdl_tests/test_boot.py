@@ -254,6 +254,7 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     return play(tmp_path_factory.mktemp("boot") / "boot", {name: (name, None) for name in SETUPS})
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[str, list[str]], name: str) -> None:
     ended = check(name, captured[name])

@@ -201,7 +201,7 @@ def test_small_tables_equal_the_host_s(
     assert failures(tmp_path, parameters, mixed_jobs(parameters, seed=harmonics)) == 0
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     "parameters",
     [
@@ -327,7 +327,7 @@ MUTANTS = {
 }
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("multiplier", [0, 1])
 def test_what_comes_while_it_renders(tmp_path: Path, multiplier: int) -> None:
     """And all that the mutants below are asked."""

@@ -103,7 +103,7 @@ def seen(lines: list[str], stored: list[DualProgram]) -> Played:
     return Played(picks, codes, expected)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("fourier", "clocks"), [(False, 1), (True, 3)])
 def test_what_is_picked_plays_as_the_model_does(library: Path, tmp_path: Path, fourier: bool, clocks: int) -> None:
     played = play(library, tmp_path / "play", fourier=fourier, clocks=clocks)
@@ -113,7 +113,7 @@ def test_what_is_picked_plays_as_the_model_does(library: Path, tmp_path: Path, f
     assert sum(flags >> 4 for _, _, flags in played.codes) == len(ORDER), "every pick was taken"
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("fourier", [False, True])
 def test_a_program_that_the_sequencer_refuses_has_failed(library: Path, tmp_path: Path, fourier: bool) -> None:
     """A line of more ticks than the sequencer counts, with a CRC that is right; the program before plays on."""
@@ -265,7 +265,7 @@ def test_a_fault_in_the_answer_is_found(library: Path, tmp_path: Path, name: str
     assert found != [expected, [*expected, "d", "f"]]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_fault_in_the_module_is_found(library: Path, tmp_path: Path, name: str) -> None:
     right, wrong = MUTANTS[name]

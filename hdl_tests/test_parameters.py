@@ -231,7 +231,7 @@ def test_an_illegal_parameter_is_refused_by_icarus(top: str, values: Values, rea
     assert re.search(rf"error: Unknown module type: \w*{reason}", icarus(top, values, tmp_path))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("top", "values", "reason"), CASES, ids=NAMES)
 def test_an_illegal_parameter_is_refused_by_verilator(top: str, values: Values, reason: str) -> None:
     assert re.search(rf"%Error-MODMISSING: .*Cannot find file containing module: '\w*{reason}", lint(top, values))

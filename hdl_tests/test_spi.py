@@ -30,7 +30,7 @@ def all_played(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Played]:
     return play("icarus", tmp_path_factory.mktemp("spi"), SETUPS, 80, {})
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", SETUPS)
 def test_converters_receive_every_sample_that_is_not_missed(all_played: dict[str, Played], name: str) -> None:
     want = check(all_played[name])

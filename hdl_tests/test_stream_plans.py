@@ -76,7 +76,7 @@ def test_the_shipped_example(simulator: str, lines: int, tmp_path: Path) -> None
         markers_of_a_scan(played.capture, plan, 1)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_the_longest_table(tmp_path: Path) -> None:
     plan = planned(tmp_path, short(x__table__length=65536, timing={**TIMING, "ticks_per_line": 1249}))
     program = plan.program
@@ -137,7 +137,7 @@ class Chip:
 CHIPS = {"bits_16": Chip(16, 16, 0, False), "bits_20": Chip(20, 24, 0x100000, True)}
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", CHIPS)
 def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
     chip = CHIPS[name]

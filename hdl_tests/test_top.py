@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from building import BENCHES, NAME, Build, run_clean
-from sets import quick
+from sets import common, quick
 from short_scans import CUBIC, DIRECT, model_ticks, short
 from test_lint import lint
 
@@ -37,7 +37,7 @@ def runtime(built: Build) -> list[Path]:
     return [built.folder / f"{TOP}.v", *sorted(built.folder.glob("dac_*.v"))]
 
 
-@pytest.mark.parametrize("name", quick(("direct x",), SCANS))
+@pytest.mark.parametrize("name", common(("direct x", "cubic", "shaped"), SCANS))
 def test_it_plays_the_words_of_the_model(name: str, tmp_path: Path) -> None:
     built = short(tmp_path, SCANS[name])
     program, simulation = built.plan.program, tmp_path / "top.vvp"

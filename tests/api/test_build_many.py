@@ -83,7 +83,7 @@ def test_sources_are_taken_as_they_are_needed(tmp_path: Path, jobs: int) -> None
     assert taken <= 3 + 2 * jobs
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_memory_does_not_grow_with_their_number(tmp_path: Path) -> None:
     setup = tablegen.load(write_pair(tmp_path, BASE))
     sizes = []

@@ -6,7 +6,7 @@ import pytest
 import reach
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_plant_is_calibrated_on_what_init_writes_and_its_scan_is_judged(tmp_path: Path) -> None:
     plant = reach.PLANTS["Bouc-Wen"][0]
     judged = reach.judge(reach.calibrated(plant, tmp_path, reach.SIX), plant, 0.5, 0.6, 100.0)

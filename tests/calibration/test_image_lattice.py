@@ -104,7 +104,7 @@ def test_half_of_the_columns_may_be_missing() -> None:
     assert same_lattice(find_cell(heights).vectors, cell)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
     accepted, wrong = accepted_and_wrong(range(24))
     assert wrong == []
@@ -139,7 +139,7 @@ def accepted_without_lattice(seeds: range) -> list[int]:
     return accepted
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_images_without_a_lattice_are_refused() -> None:
     assert accepted_without_lattice(range(40)) == []
 

@@ -121,6 +121,7 @@ def test_a_cell_that_one_weak_spot_decides_is_refused(times: float, turned: floa
     assert "the size of the line would be another with each; image more periods with less noise" in text
 
 
+@pytest.mark.rest
 @STRONG_WAVES
 def test_a_faint_wave_that_may_be_of_a_larger_cell_is_refused(times: float, turned: float, index: int) -> None:
     """The indexer does not see it; a fit of all pixels does."""
@@ -130,6 +131,7 @@ def test_a_faint_wave_that_may_be_of_a_larger_cell_is_refused(times: float, turn
     assert size(weak_lowest(times, turned, 0.0), EIGHT_PERIODS).value == pytest.approx(times * FULL_NM, rel=1e-3)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("seed", [0, 14, 17])
 def test_an_image_with_three_sites_a_cell_terraces_and_rows_that_jump(seed: int) -> None:
     """The strong spots gave 134 and 117 pixels in place of 128, and a refusal."""
@@ -154,6 +156,7 @@ def test_the_angle_of_bars_is_taken_from_the_rows_or_given() -> None:
         size(image, KnownSample(None, Grating(pitch, Estimate(25.0, 0.5))))
 
 
+@pytest.mark.rest
 def test_errors_hold_with_noise() -> None:
     """Root mean square of the distance to the truth, in standard errors, of lattices and gratings that drift."""
     random = np.random.default_rng(4)
@@ -240,6 +243,7 @@ def test_another_sample_than_said_is_refused() -> None:
     assert "not those of a given lattice" in refused(net, KnownSample(Cell(40.0, 200.0, 90.0, "given")))
 
 
+@pytest.mark.rest
 def test_another_size_than_said_and_an_alias_are_named() -> None:
     """Of three images one has another voltage, another pitch, or periods finer than two pixels."""
     right = [replace(shown(grating(16.0, pixels=128, lines=64), v=v), name=f"{v:g} V") for v in (40.0, 70.0, 100.0)]

@@ -94,6 +94,7 @@ def on_terrace(seed: int, step: float) -> ImageFit:
     return fitted(pair(SitesOnTerrace(seed, step), 0.02, seed))
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("seed", [0, 3])
 def test_weak_lowest_orders_beside_a_terrace_give_the_branches(seed: int) -> None:
     """The terrace is the strongest spot: its two periods were refused, or the fit did not converge."""
@@ -147,6 +148,7 @@ def coloured(random: np.random.Generator, shape: tuple[int, int], kernel: Floats
     return np.stack([np.convolve(row, kernel, "valid") for row in white])
 
 
+@pytest.mark.rest
 def test_errors_hold_for_noise_of_any_colour_along_the_line() -> None:
     """Noise alike over nine pixels, as a feedback makes it, has more power where a coarse grating has its period."""
     white, white_error = scatter(np.array([0.1]))
@@ -245,6 +247,7 @@ def refused(trace: Floats, retrace: Floats, **options: object) -> str:
     return str(caught.value)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("angle", [0.0, 5.0])
 def test_images_that_are_turned_or_exchanged_are_told(angle: float) -> None:
     images = pair(grating(angle=angle), 0.05)
@@ -350,6 +353,7 @@ def test_loud_lines_are_named() -> None:
     assert "rows 101 to 103 have most of the trace's contrast; crop them" in refused(loud, images.retrace)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("angle", [-8.0, 5.0])
 def test_steps_of_terraces_are_removed(angle: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three steps of six times the amplitude of the strongest wave."""

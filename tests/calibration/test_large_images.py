@@ -77,12 +77,13 @@ def within(vectors: np.ndarray, other: np.ndarray, covariance: np.ndarray) -> No
     assert np.all(np.abs(change.ravel()) < error)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(("seed", "scale"), [(1, 1.0), (2, 3.0), (0, 2.0)])
 def test_a_quarter_of_the_pixels_shows_the_same_cell(seed: int, scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
     assert agrees(seed, 512, scale, 512**2 // 4, monkeypatch)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_sixteenth_of_the_pixels_shows_the_same_cell(monkeypatch: pytest.MonkeyPatch) -> None:
     assert agrees(1, 1024, 5.0, 1024**2 // 16, monkeypatch)
 

@@ -151,7 +151,7 @@ def distorted(gap: str) -> tuple[DistortedLattice, Floats, Floats]:
     )
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("gap", GAPS)
 def test_a_correction_is_as_good_with_gaps(gap: str) -> None:
     whole, trace, retrace = distorted(gap)

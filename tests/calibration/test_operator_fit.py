@@ -73,6 +73,7 @@ def test_weights_are_the_best_that_are_not_negative(problem_of: type[PlaysProble
         assert np.max(np.abs(slopes[best.weights > 0.0])) < 1e-10
 
 
+@pytest.mark.rest
 def test_the_family_and_the_creep_are_found() -> None:
     _, plays = identified(ManyPlays, SIX)
     assert plays.family == "plays"
@@ -212,6 +213,7 @@ def test_traces_of_every_kind_together() -> None:
         assert found.mismatch < 0.25
 
 
+@pytest.mark.rest
 def test_fitted_envelopes_are_those_of_the_plant() -> None:
     plant, fit = identified(ManyPlays, TEN)
     assert isinstance(plant.core, ManyPlays)
@@ -233,6 +235,7 @@ def test_the_next_trace_is_that_of_the_scans_and_says_what_it_brings() -> None:
         check_scans([(45.0, 50.0), (40.0, 85.0)], Driver(100.0))
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("kind", [ManyPlays, BoucWen])
 def test_the_only_trace_of_an_offset_may_be_left_out(kind: type) -> None:
     """Its gain goes with it, and the other offset's stays at its place."""

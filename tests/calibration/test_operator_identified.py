@@ -66,7 +66,7 @@ def test_noiseless_traces_of_an_operator_that_the_family_has_are_met() -> None:
         assert abs(errors.size) < 0.2
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @given(
     st.permutations(range(len(STROKES))),
     st.floats(0.2, 5.0),
@@ -104,7 +104,7 @@ def played(volts: Floats, rate_hz: float, seed: int) -> tuple[Floats, Floats, Fl
     return time, np.tile(volts, periods), np.tile(nm, periods) + noise
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_other_waveforms_turns_and_rates_tell_the_same_operator() -> None:
     phase = np.arange(SAMPLES) / SAMPLES
     sine = V_MAX * (0.5 - 0.125 * np.cos(2.0 * np.pi * phase))

@@ -24,7 +24,7 @@ from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.played import played
 from tablegen.virtual.scanner import VirtualScanner
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 V_MAX = 100.0
 WINDOW = (0.05, 0.95)

@@ -31,7 +31,7 @@ def calibrated(*arguments: str | Path) -> Outcome:
     return run("calibrate", "operator", "--axis", "x", "--v-max", "100", *arguments)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_fitted_delay_is_printed_and_written_and_the_picture_is_drawn(traces: list[Path], tmp_path: Path) -> None:
     scanner, picture = tmp_path / "s.toml", tmp_path / "fit.png"
     wanted = ("--for", "30", "60", "--for", "20", "85")

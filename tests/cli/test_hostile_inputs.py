@@ -21,7 +21,7 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from image_writers import npy
 from instrument_files import sxm
 from limits import PATIENCE_S, within
-from sets import quick
+from sets import common, quick
 
 CPU_S = 5
 MOST_MEMORY_BYTES = 500 << 20
@@ -80,7 +80,7 @@ READING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("what", quick(["check"], READING))
+@pytest.mark.parametrize("what", common(["check"], READING))
 def test_no_command_waits_at_a_pipe_or_reads_a_device(what: str, tmp_path: Path) -> None:
     write_pair(tmp_path)
     (tmp_path / "data.csv").write_text("offset_v,apparent_nm\n0,100\n50,120\n100,140\n")
@@ -115,7 +115,8 @@ WRITING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
 }
 
 
-@pytest.mark.parametrize("what", quick(["build"], WRITING))
+@pytest.mark.common
+@pytest.mark.parametrize("what", common(["build"], WRITING))
 def test_no_output_goes_into_a_pipe_or_over_a_device(what: str, build: Path) -> None:
     for other, path in other_files(build.parent).items():
         assert f"is {other}" in refused(*WRITING[what](path), folder=build.parent)
@@ -216,7 +217,7 @@ DAMAGED: dict[str, tuple[str, Callable[[], bytes], str]] = {
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("what", quick(["directory of itself", "deep header"], DAMAGED))
+@pytest.mark.parametrize("what", common(["directory of itself", "deep header"], DAMAGED))
 def test_a_damaged_image_is_told(what: str, tmp_path: Path) -> None:
     name, content, said = DAMAGED[what]
     (tmp_path / name).write_bytes(content())
@@ -266,7 +267,7 @@ def test_no_manifest_takes_more_than_a_message(content: str, build: Path) -> Non
     ],
     ids=["parts", "brackets", "unknown keys", "long value", "long key"],
 )
-@pytest.mark.common
+@pytest.mark.rest
 def test_no_scan_takes_more_than_some_lines(content: str, most: int, tmp_path: Path) -> None:
     scan = write_pair(tmp_path, content)
     said = refused("check", scan, folder=tmp_path).splitlines()
@@ -275,7 +276,7 @@ def test_no_scan_takes_more_than_some_lines(content: str, most: int, tmp_path: P
 
 
 @pytest.mark.parametrize("gain", ["1e-320", "-1e-320", "0", "1e999", "nan"])
-@pytest.mark.common
+@pytest.mark.rest
 def test_no_gain_is_nothing(gain: str, tmp_path: Path) -> None:
     """Of the amplifier, of a response, and of a measurement."""
     scan = write_pair(tmp_path, edited(SCAN, f"amplifier.gain = {gain}"))

@@ -34,7 +34,7 @@ def heading(text: str) -> str:
     return text.split("\n\n")[1].splitlines()[0]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_text_and_data_say_the_same(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     shown, plain = run("simulate", scan), run("simulate", scan, "--json")
@@ -74,7 +74,7 @@ def test_a_calibration_makes_the_scan_straighter(tmp_path: Path) -> None:
     assert abs(calibrated["size_error_percent"]) < 1.0 < abs(given["size_error_percent"])
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_noise_and_seed_are_those_of_the_calibration(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     first, again, other, loud = (

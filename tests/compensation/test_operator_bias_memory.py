@@ -28,6 +28,8 @@ from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.planning.settling import Settling, settling_text
 
+pytestmark = pytest.mark.rest
+
 LINE_S = 0.01
 LATE = LogarithmicCreep(0.03, 1e-4, 1e3, 100.0)
 REMEMBERING = replace(operator(LATE), bias_memory=BiasMemory(0.2, 20.0, 0.1, 12.0))

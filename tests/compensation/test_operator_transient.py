@@ -30,6 +30,8 @@ from tablegen.planning.settling import settling
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 
+pytestmark = pytest.mark.rest
+
 LATE = LogarithmicCreep(0.03, 1e-4, 1e3, 100.0)
 LINE_S = 0.01
 

@@ -86,7 +86,7 @@ def covered(places: tuple[tuple[float, float], ...], at: list[tuple[float, float
     return 100.0 * float(np.mean(within)), 100.0 * float(np.mean(old))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("places", [SIX, TEN])
 def test_piezos_that_depart_at_random_stay_within_it_as_often_as_it_says(
     places: tuple[tuple[float, float], ...],

@@ -159,6 +159,7 @@ def test_the_keys_that_are_varied_are_those_of_the_files() -> None:
     assert SCANNER_FLOATS["x.size.beta"] == (-0.5, 100.0)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("key", sorted({*SCAN_FLOATS, *SCANNER_FLOATS}))
 @settings(STEADY, max_examples=8)
 @given(data=st.data())
@@ -242,6 +243,7 @@ def statuses_of_setups(folder: Path, count: int) -> list[int]:
     return statuses
 
 
+@pytest.mark.rest
 def test_some_scans_that_a_person_might_write(folder: Path) -> None:
     """A quarter of them is built: the fuzz is worth nothing if all of it ends in the first refusal."""
     assert statuses_of_setups(folder, 40).count(0) >= 10
@@ -274,6 +276,7 @@ def _with(text: str, key: str, value: str) -> str:
     return edited(text, f"{key} = {value}")
 
 
+@pytest.mark.rest
 @settings(STEADY, max_examples=200)
 @given(
     seed=st.integers(0, 1 << 30),
@@ -317,6 +320,7 @@ def test_any_bytes_anywhere_are_refused_or_built(folder: Path, at: int, put: byt
     build(folder, *((SMALL_SCAN, spoilt) if scanner else (spoilt, SCANNER)))
 
 
+@pytest.mark.rest
 @settings(STEADY, max_examples=80)
 @given(st.lists(st.tuples(across(-1e5, 1e5), across(1e-6, 1e9)), min_size=3, max_size=5), st.floats(0.0, 100.0))
 def test_any_offset_points_are_refused_or_built(folder: Path, points: list[tuple[float, float]], last: float) -> None:
@@ -326,6 +330,7 @@ def test_any_offset_points_are_refused_or_built(folder: Path, points: list[tuple
         build(folder, SMALL_SCAN, edited(SCANNER, *edits))
 
 
+@pytest.mark.rest
 @settings(STEADY, max_examples=80)
 @given(
     model=st.sampled_from(("harmonic", "sinusoidal")),
@@ -344,6 +349,7 @@ def test_any_branches_are_refused_or_built(
     build(folder, edited(SMALL_SCAN, f"x.size_nm = {size!r}"), scanner)
 
 
+@pytest.mark.rest
 @settings(STEADY, max_examples=80)
 @given(
     rows=st.lists(

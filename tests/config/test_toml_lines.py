@@ -328,7 +328,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("toml")
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @STEADY
 @given(documents())
 def test_every_key_is_found_on_its_line_and_nothing_else(folder: Path, document: tuple[str, dict[str, int]]) -> None:
@@ -337,7 +337,7 @@ def test_every_key_is_found_on_its_line_and_nothing_else(folder: Path, document:
     assert located(folder, text) == lines
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @settings(STEADY, max_examples=100)
 @given(documents())
 def test_line_ends_of_windows_change_nothing(folder: Path, document: tuple[str, dict[str, int]]) -> None:
@@ -357,7 +357,7 @@ def test_a_syntax_error_is_reported_on_its_line(
     assert refused(folder, f"{text}\n{wrong}\nlast = 1\n").startswith(f"scan.toml:{line}: not TOML: ")
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @settings(STEADY, max_examples=100)
 @given(documents(), st.sampled_from((b"\xff", b"\xc3(", b"\xed\xa0\x80", b"\xf8\x88")))
 def test_a_byte_that_is_not_utf8_is_reported_on_its_line(

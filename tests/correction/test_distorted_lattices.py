@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from distorted_lattices import Knowledge, accepted_without_period, corrected, deviation, distorted_lattice
 from lattice_images import three_sites
+from sets import common
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.images.terraces import without_steps, without_terraces
@@ -41,12 +42,12 @@ def test_an_edge_along_the_rows_does_not_move_them() -> None:
     assert error.outermost < 0.3
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_dozen_distorted_lattices() -> None:
     assert accepted_and_wrong([0, 1, 3, 4, 5, 7, 9, 10, 19, 24, 53, 98], "size and constant") == (12, [])
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("known", ["size", "nothing"])
 def test_it_is_corrected_without_the_constant(known: Knowledge) -> None:
     assert accepted_and_wrong([8], known) == (1, [])
@@ -60,7 +61,7 @@ def test_without_a_size_another_cell_may_have_the_constant() -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", common(range(3), range(10)))
 def test_a_sample_without_a_lattice_is_refused(seed: int) -> None:
     assert not accepted_without_period(seed)
 

@@ -81,7 +81,7 @@ def old_frame() -> FrameImages:
     return triangle_frame(*axes("default"), hexagonal(60.0), sizes, offsets, 100.0, conditions, 256, 256)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every command, in order, on images made by the virtual scanner, whose truth is known."""
     monkeypatch.chdir(tmp_path)

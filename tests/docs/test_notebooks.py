@@ -113,7 +113,7 @@ def test_a_notebook_takes_the_public_interface_alone(name: str) -> None:
     assert used <= set(tablegen.__all__)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_stored_is_what_a_run_gives(name: str) -> None:
     """Words and numbers, and figures of the same look; without a warning."""

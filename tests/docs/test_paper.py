@@ -59,6 +59,7 @@ def row(rows: dict[str, list[Row]]) -> Callable[[str, str], Row]:
     return find
 
 
+@pytest.mark.rest
 def test_the_page_is_what_comes_out(written: Path) -> None:
     """Word for word, and number for number to one unit of the last digit, which may differ between machines."""
     shown, made = (path.read_text(encoding="utf-8") for path in (PAGE, written / "README.md"))

@@ -15,7 +15,7 @@ from browser import loaded, seen
 from building import REPOSITORY
 from limits import PATIENCE_S
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 
 def built(folder: Path, repository: Path = REPOSITORY) -> subprocess.CompletedProcess[str]:

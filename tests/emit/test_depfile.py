@@ -169,7 +169,7 @@ def test_the_target_is_what_is_asked_for(scan: Path) -> None:
     assert names(file)[0] == "stamp"
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
     """Held against the interpreter, which tells what it opens: of the user's folder, of the templates, and modules."""
     folder = measured.parent

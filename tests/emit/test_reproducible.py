@@ -212,6 +212,7 @@ TOGETHER: dict[str, tuple[str, ...]] = {
 }
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", TOGETHER)
 def test_bytes_do_not_depend_on_environments_together(reference: dict[str, bytes], tmp_path: Path, name: str) -> None:
     environment = {key: value for one in TOGETHER[name] for key, value in ENVIRONMENTS[one].items()}
@@ -226,6 +227,7 @@ def test_bytes_do_not_depend_on_the_environment(reference: dict[str, bytes], tmp
     assert differing_lines(reference, built_files(tmp_path)) == []
 
 
+@pytest.mark.rest
 def test_bytes_do_not_depend_on_vector_units(reference: dict[str, bytes], tmp_path: Path) -> None:
     """numpy without any kernel beyond its baseline, nor a C library or OpenBLAS with fused multiplication."""
     disabled = dispatched_features()
@@ -237,6 +239,7 @@ def test_bytes_do_not_depend_on_vector_units(reference: dict[str, bytes], tmp_pa
     assert differing_lines(reference, built_files(tmp_path)) == []
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("option", common(["-OO"], ["-O", "-OO", "-I"]))
 def test_bytes_do_not_depend_on_the_interpreter_s_options(
     reference: dict[str, bytes], tmp_path: Path, option: str
@@ -245,6 +248,7 @@ def test_bytes_do_not_depend_on_the_interpreter_s_options(
     assert differing_lines(reference, built_files(tmp_path)) == []
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("path", common(["relative"], ["absolute", "relative"]))
 def test_bytes_do_not_depend_on_the_directory(reference: dict[str, bytes], tmp_path: Path, path: str) -> None:
     folder = tmp_path / "a scan of Zürich – 試料 \u00b5m"

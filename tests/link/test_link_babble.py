@@ -116,7 +116,7 @@ def test_answers_are_found_among_noise() -> None:
 # Real sockets
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_babbling_socket_ends_the_command_line() -> None:
     """The other end sends as fast as it can, and reads nothing."""
     with BabblingServer() as server:

@@ -72,7 +72,7 @@ def test_a_line_as_fast_as_it_should_be_is_not_called_slow() -> None:
         )
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @settings(max_examples=25, deadline=None)
 @given(
     slower=st.integers(1, 12),

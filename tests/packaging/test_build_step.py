@@ -229,6 +229,7 @@ def test_a_number_of_the_scan_recompiles_what_has_it_and_links(project: Project)
     does(project.build(), 0, set())
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", ["scan", "scanner", "response"])
 def test_a_comment_runs_tablegen_and_compiles_nothing(project: Project, name: str) -> None:
     project.append(getattr(project, name), "# a comment\n")
@@ -272,6 +273,7 @@ def widths_of(project: Project) -> set[str]:
     return {name for name, path in objects.items() if b"DAC_TABLE_STORAGE_BITS 32" in path.read_bytes()}
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("guarded", [True, False])
 def test_the_snippet_of_the_page_compiles_all_objects_when_a_width_changes(tmp_path: Path, guarded: bool) -> None:
     """From 16 to 20 bits. Without its line on DIR_OPTIONS the runtime stays as it was, and does not link."""
@@ -307,12 +309,14 @@ def test_a_number_of_the_scanner_rebuilds(project: Project) -> None:
     does(project.build(), 0, set())
 
 
+@pytest.mark.rest
 def test_a_number_of_a_response_rebuilds(project: Project) -> None:
     project.edit(project.response, "40e3,1.2,-5", "40e3,1.3,-5")
     does(project.build(), 1, OF_THE_SCAN)
     does(project.build(), 0, set())
 
 
+@pytest.mark.rest
 def test_a_template_rebuilds_what_comes_of_it(project: Project) -> None:
     project.append(project.templates / "c" / "tables.c.j2", "/* the end */\n")
     does(project.build(), 1, {NAME})
@@ -322,6 +326,7 @@ def test_a_template_rebuilds_what_comes_of_it(project: Project) -> None:
     does(project.build(), 0, set())
 
 
+@pytest.mark.rest
 def test_a_file_of_the_runtime_rebuilds_itself(project: Project) -> None:
     project.append(project.templates / "c" / "dac_axis.c", "/* the end */\n")
     does(project.build(), 1, {"dac_axis"})
@@ -337,6 +342,7 @@ def test_a_module_of_tablegen_runs_it(project: Project) -> None:
     does(project.build(), 0, set())
 
 
+@pytest.mark.rest
 def test_another_version_of_tablegen_runs_it(project: Project) -> None:
     """Though all of its files may be older than the build, as package managers that keep times leave them."""
     (record,) = project.packages.glob("piezo_tablegen-*.dist-info")
@@ -362,6 +368,7 @@ def test_the_source_of_the_user_compiles_itself(project: Project) -> None:
     does(project.build(), 0, {"main"})
 
 
+@pytest.mark.rest
 def test_a_scan_that_becomes_header_only_loses_a_source(project: Project) -> None:
     """The sources are those of the scan as it is now; NAME.c of before is removed."""
     project.append(project.scan, "[emit]\nheader_only = true\n")
@@ -375,6 +382,7 @@ def test_a_scan_that_becomes_header_only_loses_a_source(project: Project) -> Non
     assert (made.status, made.runs, made.compiled >= {"main"}, made.linked) == (0, 1, True, True), made.shown
 
 
+@pytest.mark.rest
 def test_four_jobs_after_cleaning_run_tablegen_once(project: Project) -> None:
     cleaned = project.clean()
     assert (cleaned.status, cleaned.runs) == (0, 0), cleaned.shown
@@ -387,6 +395,7 @@ def test_four_jobs_after_cleaning_run_tablegen_once(project: Project) -> None:
 # Failures
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("name", "old", "new", "why"),
     [
@@ -423,6 +432,7 @@ def test_a_prerequisite_that_is_gone_and_no_longer_named_is_no_error(project: Pr
     does(project.build(), 0, set())
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(("name", "named_by"), [("response", "scanner"), ("scanner", "scan")])
 def test_a_prerequisite_that_is_gone_and_still_named_is_missed_by_name(
     project: Project, name: str, named_by: str
@@ -458,6 +468,7 @@ def test_a_tablegen_that_is_killed_leaves_nothing_that_looks_built(project: Proj
     does(project.build(), 1, OF_THE_SCAN)
 
 
+@pytest.mark.rest
 def test_files_that_were_written_without_an_end_are_not_taken_for_a_build(project: Project) -> None:
     """What a tablegen leaves that dies after its last file but before it has noted so: the next run completes it."""
     project.edit(project.scan, "line_rate_hz = 400.0", "line_rate_hz = 500.0")
@@ -467,6 +478,7 @@ def test_files_that_were_written_without_an_end_are_not_taken_for_a_build(projec
     does(project.build(), 1, OF_THE_SCAN)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("built", ["make", "Ninja"], indirect=True)
 @pytest.mark.parametrize("file", [f"{NAME}.c", f"{NAME}.h", "dac_axis.c", "manifest.json"])
 def test_a_file_of_the_build_that_somebody_removed_is_made_again(project: Project, file: str) -> None:
@@ -635,6 +647,7 @@ def test_without_tablegen_what_is_included_says_what_to_do(tmp_path: Path, insta
         assert re.search(remedy, " ".join(done.stderr.split())), done.stderr
 
 
+@pytest.mark.rest
 def test_the_program_may_be_named(tmp_path: Path, installed: Path) -> None:
     """In TABLEGEN; with arguments of its own too."""
     for tool in ("make", "Ninja"):
@@ -653,6 +666,7 @@ def test_the_program_may_be_named(tmp_path: Path, installed: Path) -> None:
 # CMake alone
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("call", "why"),
     [

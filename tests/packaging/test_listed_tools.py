@@ -52,7 +52,7 @@ def test_the_table_has_the_packages_of_the_lists() -> None:
     assert lists["CHECK_TOOLS"] < lists["COMMON_TOOLS"] < lists["TOOLS"]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", CALLERS)
 def test_a_listed_package_is_called_by_the_tests_of_its_set(name: str) -> None:
     rest = name not in ("CHECK_TOOLS", "COMMON_TOOLS")

@@ -95,6 +95,7 @@ def test_the_sdist_holds_the_repository_and_nothing_that_was_made(packed: tuple[
         assert known - held == set()
 
 
+@pytest.mark.rest
 def test_tests_of_the_sdist_are_collected(
     sdist: Path, installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,6 +118,7 @@ def collected(tree: Path, *names: str, path: Path) -> set[str]:
     return {line.partition("::")[0] for line in shown.splitlines() if "::" in line}
 
 
+@pytest.mark.rest
 def test_the_wheel_of_the_sdist_is_the_wheel_of_the_tree(sdist_wheel: Path, wheel: Path) -> None:
     inside = [zipfile.ZipFile(path) for path in (sdist_wheel, wheel)]
     texts = [{name: archive.read(name) for name in archive.namelist()} for archive in inside]
@@ -125,6 +127,7 @@ def test_the_wheel_of_the_sdist_is_the_wheel_of_the_tree(sdist_wheel: Path, whee
     assert texts[0] == texts[1]
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("kind", common(["wheel"], ["wheel", "sdist_wheel"]))
 def test_in_a_clean_environment_it_builds_verifies_and_imports(
     kind: str, packages: Path, tree: Path, tmp_path: Path, request: pytest.FixtureRequest

@@ -42,7 +42,7 @@ def left(response: SecondOrder, shaping: Shaping, rate_hz: float) -> float:
     return float(np.sqrt(np.mean(np.abs(noise / (1.0 - r * r + 1j * r / response.quality)) ** 2) / 12.0))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @settings(max_examples=15)
 @given(st.floats(300.0, 200e3), st.floats(2.0, 60.0))
 def test_nothing_that_could_be_chosen_leaves_less(hz: float, quality: float) -> None:

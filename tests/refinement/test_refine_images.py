@@ -134,6 +134,7 @@ def test_three_rounds_reach_what_is_to_be_reached(plant: str, axis: str, volts: 
         assert last.true.scaling_percent[side] < 1.5
 
 
+@pytest.mark.rest
 def test_a_second_frame_tells_drift_from_y() -> None:
     """Drift along y that becomes faster bends one frame as y does; two that follow each other show it."""
     setup = calibrated(imaged_scan("y", 60.0))

@@ -117,7 +117,7 @@ def test_the_error_that_a_round_leaves_is_the_bounds(line: LinePlan) -> None:
         assert found[1] / found[0] == pytest.approx(abs(1.0 - GAIN * gain), abs=0.02)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("turn", [0.5, 0.7, 0.95])
 @pytest.mark.parametrize("both", [True, False])
 def test_the_coupled_loop_is_no_worse_than_its_harmonics(tmp_path: Path, turn: float, both: bool) -> None:

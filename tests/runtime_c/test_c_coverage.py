@@ -18,7 +18,7 @@ from c_shaped_waves import WAVES, shaped_waves
 from tablegen.base.resources import c_runtime
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 AXIS = next(path for path in c_runtime() if path.name == "dac_axis.c")
 SHAPING = next(path for path in c_runtime() if path.name == "dac_shaping.c")

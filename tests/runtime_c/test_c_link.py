@@ -106,7 +106,7 @@ def test_a_random_dialogue_is_that_of_the_model(name: str, key: bytes) -> None:
         Dialogue(SHAPES[name], seed, key).play(STEPS)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_random_dialogue_of_a_device_that_shapes() -> None:
     for name, order in (("16 bits", 3), ("24 bits", 1), ("direct", 2), ("cubic", 2)):
         for seed in range(SEEDS):

@@ -98,6 +98,7 @@ def test_a_device_objects_to_what_its_specification_objects_to(name: str, state:
     assert compare(SHAPES[name], state, PROGRAMS, 1)[None] > PROGRAMS // 20
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("name", ORDERS)
 def test_a_device_that_shapes_objects_to_the_same(name: str, state: str) -> None:

@@ -14,7 +14,7 @@ from link_replay import compile_replay, random_replay, replay, replay_of
 
 from tablegen.base.resources import c_link
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 # A program that passes every check and is not loaded all the same; a source of random numbers, which no notes have.
 UNREACHABLE = ("DAC_LINK_REFUSED, (uint32_t)loaded", "c->random(some)")

@@ -27,7 +27,7 @@ def edges(highest: int) -> "st.SearchStrategy[int]":
     return st.one_of(st.integers(1, highest), st.integers(max(1, highest - 1000), highest), st.sampled_from(powers))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @given(period=edges(MOST_ADVANCES), index_bits=st.integers(*INDEX_BITS), data=st.data())
 @settings(max_examples=1500)
 @example(period=MOST_ADVANCES, index_bits=16, data=None)

@@ -42,7 +42,7 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape) -> None:
             benches.play(script, shape, compiler, fill)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", common(("bits_16", "bits_24"), LONG))
 def test_long_lines(name: str, benches: dict[int, Benches]) -> None:
     script = long_play(name, 30_000, 1, 3)
@@ -50,7 +50,7 @@ def test_long_lines(name: str, benches: dict[int, Benches]) -> None:
     assert any(axis.output.shaping.order == 3 for program in script.swapped_programs for axis in (program.x, program.y))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_runtime_of_a_lower_order(order: int, benches: dict[int, Benches]) -> None:
     everywhere(benches[order], long_play("bits_16", 20_000, order, order), LONG["bits_16"][0])
@@ -66,7 +66,7 @@ def test_short_lines_that_clamp_are_held_back_and_take_each_other_s_place(
     assert script.swaps > 10
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", WAVES)
 def test_slow_waves_of_other_converters(name: str, benches: dict[int, Benches]) -> None:
     everywhere(benches[3], shaped_waves(WAVES[name]), WAVES[name])

@@ -11,6 +11,7 @@ from link_device import HostDevice, device_library
 from link_images import random_image
 from link_talk import Talk
 from replacing import replace
+from sets import common
 
 from tablegen.link.messages import CUBIC, DeviceInfo, Reason
 from tablegen.verification.c.bench import CBench, defines
@@ -64,8 +65,8 @@ def test_without_splines_a_cubic_table_is_not_loaded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
-@pytest.mark.parametrize("name", ["cubic", "cubic_and_lines"])
-@pytest.mark.parametrize("long_multiply", [1, 0], ids=["long", "short"])
+@pytest.mark.parametrize("name", common(["cubic_and_lines"], ["cubic", "cubic_and_lines"]))
+@pytest.mark.parametrize("long_multiply", common([0], [1, 0]), ids=["long", "short"])
 def test_a_spline_is_shaped_as_lines_are(name: str, fill: int, long_multiply: int, tmp_path: Path) -> None:
     """Every order on splines, by runs where there are some and by steps."""
     shape, script = LONG[name][0], long_play(name, 60_000, order=3)

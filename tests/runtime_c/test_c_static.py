@@ -126,7 +126,7 @@ def declared(*headers: str, shaped: bool = True) -> set[str]:
     return set(re.findall(r"^(?!static|#)\w[\w ]*?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     "options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]], ["-O2", *CHOICES["shaped"]]], ids=" ".join
 )

@@ -84,7 +84,7 @@ def model_codes(order: list[DualProgram]) -> list[tuple[int, int]]:
     return codes
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_program_that_is_picked_plays_as_the_model_does(library: Path) -> None:
     """By number and by name, one after the other while the scan runs."""
     program = compiled(library, "gcc", "-std=c99", "-O1", "-fsanitize=undefined,address")

@@ -425,7 +425,7 @@ def test_more_processes_write_the_same(library: Path, tmp_path: Path) -> None:
     assert one == two
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_leaves_whole_programs_and_no_index(tmp_path: Path, jobs: str, number: signal.Signals) -> None:

@@ -136,7 +136,7 @@ def test_a_build_that_was_verified_takes_its_objects_from_there(short: Build, ca
     assert kept(cache) == names
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("content", [b"", b"\x7fELF", None])
 def test_damaged_objects_change_no_verdict(short: Build, cache: Path, content: bytes | None) -> None:
     """Nor do those of others, in their place: they are taken out, and made again."""
@@ -152,7 +152,7 @@ def test_damaged_objects_change_no_verdict(short: Build, cache: Path, content: b
     assert kept(cache) == names
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_runtime_that_was_changed_is_compiled(folder: Path, cache: Path) -> None:
     """A source, or a header that others include: the objects of the one that was right are not taken for it."""
     assert run("verify", folder, "--target", "c").status == 0
@@ -181,7 +181,7 @@ def test_the_runtime_finds_no_header_but_its_own(folder: Path) -> None:
     assert f"{NAME}.h: No such file" in outcome.err
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("cflags", ["", "-O1"])
 def test_without_a_cache_everything_is_compiled(
     short: Build, cache: Path, cflags: str, monkeypatch: pytest.MonkeyPatch

@@ -157,12 +157,12 @@ def test_the_c_plays_shaped_codes(played: Path) -> None:
     all_shaped(run("verify", played, "--target", "c"))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_the_verilog_plays_shaped_codes(played: Path) -> None:
     all_shaped(run("verify", played, "--sim", "icarus", "--axis", "blocks"))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("name", "pattern", "new", "target"),
     [
@@ -207,7 +207,7 @@ TAMPERINGS: list[tuple[tuple[str, ...], Any]] = [
 ]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("place", "value"), TAMPERINGS, ids=lambda value: str(value)[:50])
 def test_a_tampering_is_found(place: tuple[str, ...], value: Any, tmp_path: Path) -> None:
     made = build(tmp_path, Variant({**SHORT, "dac.shaping": "scanner"}, {"y.resonance": SECOND_ORDER}))

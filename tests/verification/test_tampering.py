@@ -120,7 +120,7 @@ C = [
 ]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("file", "pattern", "new"), [row[1:] for row in C], ids=[row[0] for row in C])
 def test_c_that_is_tampered_with_is_heard(folder: Path, file: str, pattern: str, new: str) -> None:
     substitute(folder / f"dac_{file}", pattern, new)
@@ -167,7 +167,7 @@ STATED_ONLY = {
 }  # fmt: skip
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_every_number_of_a_manifest_follows_from_others(folder: Path) -> None:
     """Each is changed by itself, its hash made right; nothing is played."""
     manifest = json.loads((folder / "manifest.json").read_bytes())

@@ -67,7 +67,7 @@ MODES = (
 ON_BLOCKS = ("left_aligned", "narrow_table_wide_dac")
 PLACED = [
     *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "direct_steps")]),
-    *(pytest.param((name, "blocks"), marks=pytest.mark.common) for name in ON_BLOCKS),
+    *(pytest.param((name, "blocks"), marks=pytest.mark.rest) for name in ON_BLOCKS),
     pytest.param(("bits_24", "pipelined"), marks=pytest.mark.rest),
 ]
 
@@ -127,7 +127,7 @@ def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
     assert {verdicts(outcome)[axis, "integer model"] for axis in "xy"} == {"ok"}
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("seed", "placed"), [pytest.param(1, "pipelined", marks=pytest.mark.rest), (2, "blocks")], ids=str
 )
@@ -160,7 +160,7 @@ def test_verilator_finds_the_same(folder: Path, tmp_path: Path) -> None:
     assert verdicts(outcome) == verdicts(on_icarus)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_what_was_not_played_is_said(short: Build) -> None:
     outcome = verify(short.folder)
     assert outcome.status == 0
@@ -215,7 +215,7 @@ def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit:
     assert "first difference: tick " in outcome.err
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("suffix", ["sine.mem", "x_fourier.mem", "y_fourier.mem"])
 def test_a_flipped_bit_of_what_the_session_does_not_play_is_found(folder: Path, suffix: str) -> None:
     flip(folder / f"{NAME}_{suffix}", 3, 0)
@@ -268,7 +268,7 @@ def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) 
     assert wrong_constants(built.folder, stored_content(read_build(built.folder)))[1] == []
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
     """Rounding down in place of to the nearest: one code too low here and there, told with tick, expected and got."""
     edit(folder / "dac_interpolator.v", *ROUNDED_DOWN)
@@ -552,7 +552,7 @@ def test_a_python_without_its_shared_library_is_status_6_with_its_remedy(short: 
     )
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("begun", ["job.json", "capture.hex"])
 def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, begun: str) -> None:
@@ -569,7 +569,7 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
     check_interruption(built.folder, tmp_path / "temporary", number, "icarus", "--ticks", "40000", within_popen=True)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("arguments", "late"),
     [

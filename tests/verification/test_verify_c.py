@@ -163,7 +163,7 @@ def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     return Benches(stored, step, fill)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 1 << 32), st.integers(1000, 6000))
 def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed: int, ticks: int) -> None:
@@ -341,7 +341,7 @@ PLAYED = [
 ]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("constant", "change", "fails"), PLAYED, ids=[row[0] for row in PLAYED])
 def test_a_damaged_constant_is_played_and_found(
     folder: Path, constant: str, change: Callable[[int], int], fails: tuple[str, str] | None
@@ -461,7 +461,7 @@ def coded(tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("coded"), Variant(scan))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("file", "pattern", "new", "fails"), [row[1:] for row in MUTANTS], ids=[row[0] for row in MUTANTS]
 )
@@ -670,7 +670,7 @@ def test_nothing_of_cocotb_is_needed(short: Build) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(("begun", "within_popen"), [("job.json", False), ("step/stream_bench", False), ("step", True)])
 def test_an_interruption_leaves_nothing_behind(

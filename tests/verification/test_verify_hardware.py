@@ -13,6 +13,7 @@ import pytest
 from building import EXAMPLE, NAME, REMOVED, VARIANTS, Build, Variant, build
 from editing import run
 from manifest_integers import played_codes
+from sets import common
 from verifying import edit_manifest, make_right
 
 from tablegen.certificate.certificate import certify
@@ -104,7 +105,7 @@ def test_the_slew_of_one_amplifier_is_the_guard_of_its_axis_alone(mixed: Build) 
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("options", [("c",), ("verilog", "--axis", "blocks")], ids=["c", "verilog"])
+@pytest.mark.parametrize("options", common([("c",)], [("c",), ("verilog", "--axis", "blocks")]), ids=["c", "verilog"])
 def test_both_sequencers_play_it(mixed: Build, options: tuple[str, ...]) -> None:
     outcome = run("verify", mixed.folder, "--target", *options)
     assert outcome.status == 0, outcome.out + outcome.err

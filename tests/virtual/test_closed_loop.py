@@ -108,6 +108,7 @@ def test_points_serve_where_one_peak_does_not(calibration: Calibration) -> None:
     assert at_points["forward"][0] < 0.5 < at_law["forward"][0]
 
 
+@pytest.mark.rest
 def test_images_alone_serve_nearly_as_well(calibration: Calibration, example: Setup) -> None:
     """Within 1.5 times of what the sensor reaches, at small and large scans."""
     sharp = with_scan(example, size_v=50.0, rate_hz=SHARP_RATE_HZ, band_limit=SHARP)
@@ -220,6 +221,7 @@ def test_traces_keep_the_tip_velocity(example: Setup, monkeypatch: pytest.Monkey
     assert np.array(taken[:3]) == pytest.approx(np.array([(20.0, 80.0), (40.0, 80.0), (80.0, 40.0)]))
 
 
+@pytest.mark.rest
 def test_noise_comes_from_the_seed(example: Setup) -> None:
     one, again, other = (calibrate(example, SCANNER, seed=seed, amplitudes=(0.5,)).setup.scanner for seed in (3, 3, 4))
     assert one == again

@@ -23,7 +23,7 @@ from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 ROOT = Path(__file__).parents[2]
 RATE = 5.0

@@ -95,7 +95,7 @@ def test_sizes_over_voltage(axis: VirtualAxis, targets: Targets, rate_hz: float)
     assert found["actual_nm"] == pytest.approx(wanted, rel=0.006)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("axis", "targets", "rate_hz"), [(X, X_TARGETS, 100.0), (Y, Y_TARGETS, 1.0)], ids=["x", "y"])
 def test_one_factor_serves_all_sizes(axis: VirtualAxis, targets: Targets, rate_hz: float) -> None:
     """What (1) is good for: m times the drive of the middle makes the same scan elsewhere, large or small, to 1.3 %."""

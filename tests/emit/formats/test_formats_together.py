@@ -89,7 +89,7 @@ def test_the_command_line_builds_and_verifies_all(tmp_path: Path) -> None:
     assert {row.split()[0] for row, against in told if against == "manifest"} == set(own_names())
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_the_default_target_verifies_all(tmp_path: Path) -> None:
     assert all_at_once(tmp_path).status == 0
     outcome = run("verify", "--ticks", "2000", "--axis", "blocks", tmp_path / "out")
