@@ -226,6 +226,7 @@ CASES = [(top, values, reason) for top, cases in ILLEGAL.items() for values, rea
 NAMES = [f"{top}-{reason}-{index}" for index, (top, _, reason) in enumerate(CASES)]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("top", "values", "reason"), CASES, ids=NAMES)
 def test_an_illegal_parameter_is_refused_by_icarus(top: str, values: Values, reason: str, tmp_path: Path) -> None:
     assert re.search(rf"error: Unknown module type: \w*{reason}", icarus(top, values, tmp_path))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from programs import random_dual
-from sets import LONG_TEST, quick
+from sets import LONG_TEST
 from stream_benches import equal
 from stream_configurations import (
     SMALL,
@@ -33,7 +33,8 @@ def small_on_verilator(tmp_path_factory: pytest.TempPathFactory) -> SequencerBen
     return SequencerBench("verilator", SMALL, tmp_path_factory.mktemp("small"))
 
 
-@pytest.mark.parametrize("pace", quick([1], [1, 3]))
+@pytest.mark.common
+@pytest.mark.parametrize("pace", [1, 3])
 def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 3, 16, 1, 2, 16)
     rng = np.random.default_rng(pace)

@@ -37,6 +37,7 @@ def runtime(built: Build) -> list[Path]:
     return [built.folder / f"{TOP}.v", *sorted(built.folder.glob("dac_*.v"))]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", common(("direct x", "cubic", "shaped"), SCANS))
 def test_it_plays_the_words_of_the_model(name: str, tmp_path: Path) -> None:
     built = short(tmp_path, SCANS[name])

@@ -21,6 +21,8 @@ from tablegen.images.image_grating import find_grating
 from tablegen.images.indexer import find_cell
 from tablegen.images.searched_part import aliased, central_part, complete_part
 
+pytestmark = pytest.mark.common
+
 SIZE = 384
 REAL = real_folder()
 
@@ -236,7 +238,6 @@ def test_half_an_image_is_said() -> None:
 
 if REAL is not None:  # else the run says so at its end
 
-    @pytest.mark.common
     def test_half_of_the_pixels_of_silicon_say_which_cells_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
         """The weak spots of one cell are lost in the noise: both cells are named."""
         heights = tablegen.lattice(REAL / "si7x7_50nm.sxm", channel="Z forward", lattice_nm=2.688).scan.heights

@@ -23,6 +23,8 @@ from tablegen.images.pair_fit import fit_pair
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.imaging import FrameImages, SweepImage
 
+pytestmark = pytest.mark.common
+
 GAPS = ("pixels", "rows", "block", "half", "clipped", "stopped")
 FULL = [0.037, 0.37, 0.080, 0.48]  # beta and u_peak of the scanner's branches
 
@@ -131,7 +133,6 @@ def test_branches_of_images_with_gaps(gap: str) -> None:
     assert any("have no data; they have no weight" in str(one) for one in remarks)
 
 
-@pytest.mark.common
 @pytest.mark.parametrize("gap", ["rows", "half"])
 def test_the_size_of_images_with_gaps(gap: str) -> None:
     constant = 80.0

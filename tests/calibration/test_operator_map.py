@@ -3,12 +3,15 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from operator_files import operator_file, write_operator_scan
 
 from tablegen.calibration.operator.advice import possible_rms
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.uncertainty import possible_errors
+
+pytestmark = pytest.mark.common
 
 
 def operator(folder: Path) -> Operator:

@@ -22,6 +22,8 @@ from tablegen.compensation.operator.uncertainty import (
 )
 from tablegen.numerics.arrays import Floats
 
+pytestmark = pytest.mark.common
+
 SIX = tuple((stroke, 0.5) for stroke in (0.1, 0.25, 0.45, 0.65, 0.82, 0.97))
 TEN = (*SIX, (0.25, 0.7), (0.58, 0.7), (0.12, 0.85), (0.28, 0.85))
 NOTHING = (0.0, 0.0, 0.0, 0.0)

@@ -57,6 +57,7 @@ def stepped(u: Floats) -> Floats:
     return out
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("turn", [0.5, 0.7])
 @pytest.mark.parametrize("size_nm", [100.0, 600.0])
 def test_plays_that_are_stepped_follow_it_straight(turn: float, size_nm: float) -> None:

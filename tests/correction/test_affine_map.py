@@ -18,6 +18,8 @@ from tablegen.correction.old_scan import OldScan
 from tablegen.correction.scan_images import Choice, Images, read_scan
 from tablegen.numerics.arrays import Floats
 
+pytestmark = pytest.mark.common
+
 REAL = real_folder()
 SIDE_NM = 10.0
 ROWS, COLUMNS = 120, 128
@@ -216,13 +218,11 @@ def test_contradictions_of_options(words: tuple[str, ...], reason: str) -> None:
 
 if REAL is not None:  # else the run says so at its end
 
-    @pytest.mark.common
     def test_graphite_by_its_constant() -> None:
         images = read_scan(REAL / "hopg_11nm_iso28600.spm", None, Choice())
         scan = by_affine_map(images, 0.246, "hexagonal")
         assert scan.size_nm == pytest.approx((10.59, 12.66), rel=0.01)
 
-    @pytest.mark.common
     def test_a_moire_of_fewer_than_three_periods_is_hexagonal_afterwards() -> None:
         """Both directions have the same map by themselves."""
         images = read_scan(REAL / "moire_10nm.sxm", None, Choice())
@@ -231,7 +231,6 @@ if REAL is not None:  # else the run says so at its end
         assert scan.agreement is not None
         assert scan.agreement.worst == pytest.approx((5.77, 0.47), abs=0.05)
 
-    @pytest.mark.common
     def test_frames_of_a_movie_have_one_map() -> None:
         maps = []
         for frames in ((0, 8), (8, 16)):
@@ -242,7 +241,6 @@ if REAL is not None:  # else the run says so at its end
             error = np.hypot(first["standard_error"], second["standard_error"])
             assert abs(first["value"] - second["value"]) < 2.5 * error, name
 
-    @pytest.mark.common
     def test_bent_rows_of_silicon_are_left_to_the_fit() -> None:
         images = read_scan(REAL / "si7x7_50nm.sxm", None, Choice())
         with pytest.raises(Unphysical, match=r"the rows along y are bent by -2\.1 \+- 0\.18 %"):

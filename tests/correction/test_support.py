@@ -52,6 +52,7 @@ def test_a_fifth_of_a_pixel_is_supported_along_its_axis(seed: int) -> None:
     assert 0.1 < moved(scan, 0) < 0.3
 
 
+@pytest.mark.common
 def test_the_note_says_which_axis_is_not_displaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name, seed in (("trace", 1), ("retrace", 101)):

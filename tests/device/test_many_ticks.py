@@ -44,6 +44,7 @@ def one_by_one(sequencer: Sequencer, most: int) -> tuple[LineTicks, Ints] | None
     return None
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("shape", SHAPES, ids=["interpolated", "direct"])
 def test_it_is_what_single_steps_make(shape: SequencerShape, monkeypatch: pytest.MonkeyPatch) -> None:
     lengths, seen, at_once = [0], Counter[str](), Sequencer.ahead

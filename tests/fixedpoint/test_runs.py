@@ -76,6 +76,7 @@ def check_every_tick_is_in_its_run(program: Program) -> None:
     assert np.array_equal(np.repeat(split.codes, split.lengths), codes)
 
 
+@pytest.mark.common
 @settings(max_examples=10, deadline=None)
 @given(st.one_of(programs(), splines()))
 def test_every_tick_is_in_its_run(program: Program) -> None:

@@ -49,6 +49,7 @@ def link(folder: Path, main_object: Path, *options: str) -> str:
     return done.stderr
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("option", OTHER_VALUES)
 def test_objects_of_different_options_do_not_link(option: str, main_object: Path, tmp_path: Path) -> None:
     """Whether they call each other or not; and the control: they do where the options are written out the same."""

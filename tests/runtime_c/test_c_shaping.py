@@ -100,6 +100,7 @@ def with_shaping(program: DualProgram, axis: str, order: int, zero: int) -> Dual
     return replace(program, **{axis: replace(own, output=replace(own.output, shaping=Shaping(order, zero)))})
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_an_order_that_was_not_compiled_is_refused(libraries: dict[int, Library], axis: str) -> None:
     for highest, library in libraries.items():

@@ -14,6 +14,8 @@ from libraries import NAMES, write_library
 from tablegen.verification.build_report import Report
 from tablegen.verification.library_report import verify_library
 
+pytestmark = pytest.mark.common
+
 TABLES, FOURIER = "lines_library_tables.mem", "lines_library_fourier.mem"
 OFFSET_WORD = 2 + 16 + 4  # of a record: two counts, the words of the scan, those of x
 

@@ -191,6 +191,7 @@ def test_every_number_of_a_manifest_follows_from_others(folder: Path) -> None:
     assert count > 150
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("path", "value"),
     [
