@@ -134,7 +134,10 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
     if forward > 0.0 and backward < -least:
         raise Unphysical(f"the retrace bends the wrong way, as one that is mirrored; {advice}{ALIASING_HINT}")
     if forward < -least and backward >= 0.0:
-        raise Unphysical("the trace bends the wrong way; is it mirrored? The left end must be where the trace begins")
+        raise Unphysical(
+            "the trace bends the wrong way: it is mirrored (the left end must be where the trace begins), or its lines"
+            " were straightened already, by the controller or a closed loop"
+        )
 
 
 def row_order() -> int:
