@@ -34,6 +34,8 @@ class Format(ABC):
     """What it is for, in one line."""
     file_names: ClassVar[str]
     """Its files in words, with NAME for the scan's name."""
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Formats whose files it names: a build with it has these too."""
     comment: ClassVar[str | None] = None
     """How a line of comment begins, where the files begin with such lines; they are not compared with a manifest."""
 

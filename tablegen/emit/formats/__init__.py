@@ -121,14 +121,14 @@ def _kind(value: object) -> str:
 
 
 def chosen(names: Iterable[str]) -> list[Format]:
-    """Return the formats of these names, each once.
+    """Return the formats of these names, and those that they need, each once.
 
     Raises
     ------
     UnknownFormat
         If a name is unknown.
     """
-    return [get(name) for name in dict.fromkeys(names)]
+    return [get(name) for name in dict.fromkeys(each for name in names for each in (name, *get(name).needs))]
 
 
 @cache

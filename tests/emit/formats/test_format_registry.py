@@ -179,8 +179,9 @@ def test_a_dependency_file_names_what_the_chosen_format_is_made_of(name: str) ->
     modules = {
         path.stem.replace("_", "-") for path in found if path.parent.name == "formats" and path.stem != "__init__"
     }
-    assert modules == {name}
-    assert {path for path in found if path.is_relative_to(templates)} == set(get(name).sources())
+    assert modules == {name, *get(name).needs}
+    sources = [path for each in (name, *get(name).needs) for path in get(each).sources()]
+    assert {path for path in found if path.is_relative_to(templates)} == set(sources)
 
 
 # Other packages

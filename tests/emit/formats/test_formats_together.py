@@ -64,8 +64,10 @@ def test_a_build_and_its_manifest_make_the_same_bytes(
     first, second = (formatted(folder, build, name).files for _ in range(2))
     assert first == second
     found = get(name)
-    made = found.files(stored_content(read_build(folder / f"{build}-{name}")))
-    assert made.keys() == first.keys() - {path.name for path in found.runtime()} - {"manifest.json"}
+    content = stored_content(read_build(folder / f"{build}-{name}"))
+    made, others = found.files(content), [get(each) for each in found.needs]
+    beside = {path.name for each in (found, *others) for path in each.runtime()} | {"manifest.json"}
+    assert made.keys() == first.keys() - beside.union(*(each.files(content) for each in others))
     for file, content in made.items():
         if name not in ("c", "verilog"):  # which have their own checks
             assert found._after_comment(content)[1] == found._after_comment(first[file])[1], file
