@@ -142,15 +142,16 @@ def _sat(read: str, how: str, folder: Path, success: str) -> bool:
     return proven
 
 
-@pytest.mark.parametrize("name", long(PROOFS.keys() - {"slew_16_bits"}, PROOFS))  # which takes two minutes
+@pytest.mark.parametrize("name", long(PROOFS.keys() - {"slew_8_bits", "slew_16_bits"}, PROOFS))  # half a minute and two
 def test_holds_for_ever(name: str, tmp_path: Path) -> None:
     assert _proven(PROOFS[name], tmp_path)
 
 
+SLOW = {"play_cubic", "sequencer_of_look_up_tables", "sequencer_that_shapes"}
 COVERED = [name for name, proof in PROOFS.items() if proof.covers]
 
 
-@pytest.mark.parametrize("name", long(set(COVERED) - {"play_cubic", "sequencer_of_look_up_tables"}, COVERED))
+@pytest.mark.parametrize("name", long(set(COVERED) - SLOW, COVERED))
 def test_is_not_vacuous(name: str, tmp_path: Path) -> None:
     """Reach every cover statement: what the assumptions leave still plays a second program and images."""
     proof = PROOFS[name]

@@ -42,7 +42,9 @@ def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("kind", [pytest.param(each, marks=LONG_TEST if each == "images" else ()) for each in CASES])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(each, marks=LONG_TEST if each in ("hysteresis", "images") else ()) for each in CASES]
+)
 def test_the_truth_lies_within_two_errors_in_95_of_100(kind: str) -> None:
     """Of 1,000 trials a share of 95.45 % is measured to 0.66 %: three times of that are allowed. Images take longer."""
     count = 300 if kind == "images" else 1000

@@ -111,7 +111,7 @@ def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
     assert accepted >= 22
 
 
-@pytest.mark.rest
+@pytest.mark.long
 def test_of_many_images_95_percent_are_accepted_and_none_wrong() -> None:
     accepted, wrong = accepted_and_wrong(range(7000, 7160))
     assert wrong == []

@@ -249,7 +249,7 @@ def test_some_scans_that_a_person_might_write(folder: Path) -> None:
     assert statuses_of_setups(folder, 40).count(0) >= 10
 
 
-@pytest.mark.rest
+@pytest.mark.long
 @settings(STEADY, max_examples=80)
 @given(setups())
 def test_a_scan_that_a_person_might_write_is_built_or_refused(folder: Path, setup: tuple[str, str]) -> None:

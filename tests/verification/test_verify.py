@@ -16,7 +16,7 @@ import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from kept_plays import kept_plays, own_program_alone
-from sets import quick
+from sets import LONG_TEST, quick
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -128,9 +128,7 @@ def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(
-    ("seed", "placed"), [pytest.param(1, "pipelined", marks=pytest.mark.rest), (2, "blocks")], ids=str
-)
+@pytest.mark.parametrize(("seed", "placed"), [pytest.param(1, "pipelined", marks=LONG_TEST), (2, "blocks")], ids=str)
 def test_a_whole_frame_verifies(short: Build, seed: int, placed: str) -> None:
     """Codes of all of a line and of a frame, frames that follow, a swap in mid-frame; by any seed."""
     outcome = verify(short.folder, "--seed", seed, "--axis", placed, ticks=300000)
@@ -576,7 +574,7 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
         pytest.param(["--axis", "blocks"], 24, marks=pytest.mark.rest),
         pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
         (["--axis", "blocks", "--fourier"], 24),
-        pytest.param(["--axis", "serial", "--fourier"], 41, marks=pytest.mark.rest),
+        pytest.param(["--axis", "serial", "--fourier"], 41, marks=LONG_TEST),
         pytest.param(["--fourier"], 36, marks=pytest.mark.rest),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
