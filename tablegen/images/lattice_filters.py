@@ -6,6 +6,7 @@ leaves a few extreme slopes there, which are clipped.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -31,6 +32,11 @@ class FilteredImage:
     name: str
     values: Floats
     weight: Floats
+
+    @cached_property
+    def weighted(self) -> Floats:
+        """The values times their weight."""
+        return self.values * self.weight
 
 
 def filtered_images(heights: Floats) -> list[FilteredImage]:
