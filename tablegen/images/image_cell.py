@@ -8,7 +8,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.images.ambiguous_cell import AmbiguousCell
 from tablegen.images.autocorrelation import WEAKEST, Spots, significant_spots
 from tablegen.images.cell_choice import NO_LATTICE, chosen_cell
-from tablegen.images.cell_errors import fit_cell
+from tablegen.images.cell_errors import CellFit, fit_cell
 from tablegen.images.cell_spots import explained_spots, same_lattice
 from tablegen.images.cell_vectors import area, sides_and_angle
 from tablegen.images.hum import hum_waves
@@ -30,13 +30,14 @@ TOO_LARGE = "crop the image to a quarter, or save it with fewer pixels"
 class ImageCell:
     """The cell of an image in pixels.
 
-    ``vectors`` are its reduced sides, shape (2, 2), x and y; ``covariance`` that of a_x, a_y, b_x, b_y; ``spots`` the
-    significant ones of the spectrum, ``explained`` those that the cell explains; ``filter_name`` how it was found,
-    ``part`` where.
+    ``vectors`` are its reduced sides, shape (2, 2), x and y; ``covariance`` that of a_x, a_y, b_x, b_y, and
+    ``block_covariance`` without what levelling makes of them; ``spots`` the significant ones of the spectrum,
+    ``explained`` those that the cell explains; ``filter_name`` how it was found, ``part`` where.
     """
 
     vectors: Floats
     covariance: Floats
+    block_covariance: Floats
     spots: Spots
     explained: Bools
     level: float
@@ -49,7 +50,7 @@ class ImageCell:
         return self.part.pixels / area(self.vectors)
 
 
-_ViewCell = tuple[Floats, Floats, Spots, Bools, float, str]  # vectors to level of a cell, and the name of the filter
+_ViewCell = tuple[CellFit, Floats, Spots, Bools, str]  # with the scatter of the views, and the name of the filter
 
 
 def cell_of_part(
@@ -61,16 +62,17 @@ def cell_of_part(
     try:
         cell = _cell_of_views(views, None if other is None else part.of_other_direction(other), expected)
         if part.cropped:
-            _check_periods(cell[0], views[0].extent, _LEAST_PERIODS_OF_CENTRE, TOO_LARGE)
+            _check_periods(cell[0].vectors, views[0].extent, _LEAST_PERIODS_OF_CENTRE, TOO_LARGE)
     except AmbiguousCell as reason:
         raise reason.in_pixels(block) from None
     except Unphysical as reason:
         if not part.cropped:
             raise
         raise Unphysical(f"{reason}; so large an image is searched in its centre, {part}") from None
-    vectors, covariance, spots, explained, level, name = cell
+    fit, scatter, spots, explained, name = cell
     spots = Spots(spots.waves / block, spots.contrast, spots.power)
-    return ImageCell(block * vectors, block**2 * covariance, spots, explained, level, part, name)
+    blocks = block**2 * fit.covariance
+    return ImageCell(block * fit.vectors, blocks + block**2 * scatter, blocks, spots, explained, fit.level, part, name)
 
 
 def _cell_of_views(views: list[View], other: Floats | None, expected_area: float | None) -> _ViewCell:
@@ -93,13 +95,24 @@ def _cell_of_views(views: list[View], other: Floats | None, expected_area: float
     # A view whose own maxima gave the cell comes first.
     for view in sorted(views, key=lambda view: not any(same_lattice(cell.vectors, vectors) for cell in view.cells)):
         try:
-            return _fitted(view, vectors)
+            return _fitted(view, vectors, [one for one in views if one is not view])
         except Unphysical as reason:
             reasons.append(reason)
     raise reasons[-1]
 
 
-def _fitted(view: View, vectors: Floats) -> _ViewCell:
+def _scatter(views: list[View], vectors: Floats) -> Floats:
+    """Return the covariance that other views add to that of the blocks, shape (4, 4).
+
+    Levelling, and the edges of terraces, move the maxima of the autocorrelation of heights and of slopes differently,
+    and those of all blocks of a view alike.
+    """
+    fits = [fit_cell(view.image, vectors) for view in views]
+    off = [(fit.vectors - vectors).ravel() for fit in fits if fit is not None and same_lattice(fit.vectors, vectors)]
+    return np.diag(np.sum(np.square(off), axis=0)) if off else np.zeros((4, 4))
+
+
+def _fitted(view: View, vectors: Floats, others: list[View]) -> _ViewCell:
     """Fit a cell to the maxima of a view's autocorrelation. Raise ``Unphysical`` if it is none of them."""
     spots = view.spots
     fit = fit_cell(view.image, vectors)
@@ -116,7 +129,7 @@ def _fitted(view: View, vectors: Floats) -> _ViewCell:
             f"lattice? Crop to a region with one, or scan with less drift"
         )
     explained = explained_spots(fit.vectors, spots)[0]
-    return fit.vectors, fit.covariance, spots, explained, fit.level, view.image.name
+    return fit, _scatter(others, fit.vectors), spots, explained, view.image.name
 
 
 def _check_periods(vectors: Floats, extent: Floats, least: float, advice: str) -> None:
