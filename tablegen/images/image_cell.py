@@ -22,6 +22,9 @@ _LEAST_CELLS = 4.0  # in the image
 _LEAST_PERIODS = 2.2  # of each side's rows in the image
 _LEAST_PERIODS_OF_CENTRE = 8.0  # in the centre of an image, which is searched alone because of its fine waves
 _MOST_ERROR = 0.05  # of a side
+_FAST = 0.38  # periods a pixel along x or y: waves beyond half a period look like slower ones
+_FAST_POWER = 0.06  # of the strongest spot: a quarter of its amplitude
+_MOST_FAST = 2  # spots of this power, and not of the lowest order: hum may have some
 _LEAST_LEVEL = 0.04  # of the variance, at the lattice points
 TOO_LARGE = "crop the image to a quarter, or save it with fewer pixels"
 
@@ -91,6 +94,7 @@ def _cell_of_views(views: list[View], other: Floats | None, expected_area: float
         raise Unphysical(NO_LATTICE)
     vectors = chosen_cell(views, hum, expected_area)
     _check_periods(vectors, np.array([shape[1], shape[0]]), _LEAST_PERIODS, "scan more of them")
+    _check_sampling(vectors, views[0].spots)
     reasons: list[Unphysical] = []
     # A view whose own maxima gave the cell comes first.
     for view in sorted(views, key=lambda view: not any(same_lattice(cell.vectors, vectors) for cell in view.cells)):
@@ -130,6 +134,18 @@ def _fitted(view: View, vectors: Floats, others: list[View]) -> _ViewCell:
         )
     explained = explained_spots(fit.vectors, spots)[0]
     return fit, _scatter(others, fit.vectors), spots, explained, view.image.name
+
+
+def _check_sampling(vectors: Floats, spots: Spots) -> None:
+    """Check that the waves of a lattice end before half a period a pixel: faster ones would look like other waves."""
+    fast = np.max(np.abs(spots.waves), axis=1, initial=0.0) > _FAST
+    fast &= spots.power > _FAST_POWER * np.max(spots.power, initial=0.0)
+    fast &= np.max(np.abs(np.round(spots.waves @ vectors.T)), axis=1, initial=0.0) > 1.0
+    if np.sum(fast) > _MOST_FAST:
+        raise Unphysical(
+            "the lattice has strong waves as fast as the pixels show, as of sites narrower than a pixel: still faster "
+            "ones would look like those of another cell; scan a smaller area, or with more pixels"
+        )
 
 
 def _check_periods(vectors: Floats, extent: Floats, least: float, advice: str) -> None:

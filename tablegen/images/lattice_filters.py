@@ -21,6 +21,7 @@ _BESIDE = 10  # pixels on either side of an edge, whose medians tell a terrace f
 _STEP_SHARE = 0.5  # of the slope at an edge that remains as a step between these medians
 _LEAST_TERRACE = 6  # pixels of a row: a shorter part is not levelled by itself
 _FILLED_GAP = 0.02  # of the rows: a longer gap would make spots of its own if it were interpolated
+_MOST_REGULAR = 0.04  # amplitude of a wave of missing rows: filled, they make spots beside those of the lattice
 _BOW_DEGREE = 2
 _WIDTH = 1.0  # pixels: standard deviation of the Gaussian that smooths slopes
 
@@ -75,9 +76,16 @@ def complete_region(heights: Floats) -> tuple[slice, slice]:
     there = valid[:, valid.any(axis=0)]
     complete = np.mean(there, axis=1) >= COMPLETE if there.size else np.zeros(len(valid), dtype=np.bool_)
     rows = longest_run(complete, int(_FILLED_GAP * len(valid)))
+    if _regular(~complete[rows]) > _MOST_REGULAR:
+        rows = longest_run(complete)
     part = valid[rows][complete[rows]]
     columns = longest_run(np.mean(part, axis=0) >= COMPLETE) if part.size else slice(0, 0)
     return rows, columns
+
+
+def _regular(gaps: Bools) -> float:
+    """Return the largest amplitude of a wave in which rows are missing: their share, if they are at equal distances."""
+    return float(np.max(np.abs(np.fft.rfft(gaps)[1:]), initial=0.0)) / max(len(gaps), 1)
 
 
 def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
