@@ -17,7 +17,7 @@ from tablegen.images import image_cell
 from tablegen.images.ambiguous_cell import likelihoods
 from tablegen.images.autocorrelation import Spots
 from tablegen.images.cell_spots import same_lattice
-from tablegen.images.cell_vectors import reduced, sides_and_angle
+from tablegen.images.cell_vectors import area, reduced, sides_and_angle
 from tablegen.images.indexer import find_cell
 from tablegen.images.measured_cell import measured_cell
 
@@ -192,6 +192,25 @@ def test_a_grating_is_one_direction_and_has_a_pitch() -> None:
     assert pitch.standard_error < 0.01 * pitch.value
 
 
+def with_hum(heights: np.ndarray, forward: bool, seed: int = 1) -> np.ndarray:
+    """The second and the fifth harmonic of a wave in time, which are at no fraction of the lattice's waves."""
+    rows, columns = heights.shape
+    elapsed = np.arange(columns) / columns * (1.0 if forward else -1.0)
+    time = np.arange(rows)[:, None] * 2.2613 + elapsed
+    hum = sum(np.cos(2.0 * np.pi * n * 7.13 * time + n) for n in (2, 5))
+    noise = np.random.default_rng(seed).normal(size=heights.shape)
+    return np.asarray(heights + 0.15 * np.std(heights) * hum + 0.1 * np.std(heights) * noise)
+
+
+def test_hum_of_a_retrace_alone_is_refused_as_what_it_is() -> None:
+    """With the trace beside it, whose hum is mirrored, the cell is found; all spots were called strange."""
+    heights, cell = three_sites(30004)
+    trace, retrace = with_hum(heights, True), with_hum(heights, False, 2)
+    with pytest.raises(Unphysical, match=r"spectrum: 4 of 38 significant spots remain; .* which tell hum"):
+        find_cell(retrace, None, area(cell))
+    assert same_lattice(find_cell(retrace, trace, area(cell)).vectors, cell)
+
+
 def test_too_few_periods_are_refused() -> None:
     with pytest.raises(Unphysical):
         find_cell(plain_lattice(90.0)[0])
@@ -253,6 +272,24 @@ if REAL is not None:  # else the run says so at its end
             assert 2.99 < cell.a.value < 3.02
             assert 3.38 < cell.b.value < 3.56
             assert 77.0 < cell.angle_deg.value < 79.0
+
+    def test_the_retrace_of_silicon_alone() -> None:
+        """Its hum is told by the trace of the file; without the trace it is refused for the spots of hum."""
+        file = REAL / "si7x7_50nm.sxm"
+        for constant in (None, 2.688):
+            result = tablegen.lattice(file, channel="Z backward", lattice_nm=constant)
+            assert 2.99 < result.cell.a.value < 3.02
+            assert 3.38 < result.cell.b.value < 3.56
+            assert 77.0 < result.cell.angle_deg.value < 79.0
+        image = tablegen.read_image(file, channel="Z backward")
+        with pytest.raises(Unphysical, match=r"may be 15\.44 x 17\.49 pixels at 77\.1 degrees \(above 99 %\)"):
+            find_cell(image.heights)
+        with pytest.raises(Unphysical, match=r"4 of 54 significant spots remain.*trace and retrace, which tell hum"):
+            tablegen.lattice(image, lattice_nm=2.688)
+        with pytest.raises(Unphysical, match="the fitted channel is a retrace"):
+            tablegen.correct(file, channel="Z backward", fit=True, lattice_nm=2.688)
+        with pytest.raises(Unphysical, match=r"the lattice is ambiguous: the cell may be 15\.44 x 17\.49"):
+            tablegen.correct(image.heights, fit=True, lattice_nm=2.688)
 
     @pytest.mark.common
     def test_the_protein_of_a_movie_is_hexagonal() -> None:
