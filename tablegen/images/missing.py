@@ -95,17 +95,20 @@ def valid_pixels(heights: Floats) -> Bools:
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
     valid = np.isfinite(heights)
-    low = np.min(np.where(valid, heights, np.inf), axis=1)
-    high = np.max(np.where(valid, heights, -np.inf), axis=1)
+    whole = bool(valid.all())
+    low = np.min(heights if whole else np.where(valid, heights, np.inf), axis=1)
+    high = np.max(heights if whole else np.where(valid, heights, -np.inf), axis=1)
     flat = ~(high > low)
     constants = np.unique(low[flat & np.isfinite(low)])
     cut = np.zeros(len(heights), dtype=np.bool_)
     if len(constants) == 1:  # the row in which the scan was stopped
         cut = np.sum(heights == constants[0], axis=1) >= _PADDED
-    valid &= ~(flat | cut)[:, None]
-    if valid.any():
-        limits = float(np.min(heights[valid])), float(np.max(heights[valid]))
-        clipped = np.max([np.mean(heights == limit, axis=1) for limit in limits], axis=0) > 1.0 - COMPLETE
+    there = ~(flat | cut)
+    valid &= there[:, None]
+    if there.any():
+        limits = float(np.min(low[there])), float(np.max(high[there]))
+        counts = np.max([np.count_nonzero(heights == limit, axis=1) for limit in limits], axis=0)
+        clipped = counts / heights.shape[1] > 1.0 - COMPLETE
         if np.mean(clipped) <= _MOST_CLIPPED:
             valid &= ~clipped[:, None]
     valid[:, _empty_columns(heights, valid)] = False
