@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.images.lattice_filters import FilteredImage
-from tablegen.numerics.arrays import Bools, Complexes, Floats, Ints
+from tablegen.images.lattice_filters import FilteredImage, power_of
+from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _LEAST_OVERLAP = 1e-3  # of the window with itself
 _PADDING = 2
@@ -68,7 +68,7 @@ def autocorrelation(image: FilteredImage) -> Autocorrelation:
     """Return the autocorrelation of a filtered image."""
     rows, columns = image.values.shape
     shape = (2 * rows, 2 * columns)
-    product, overlap = np.fft.irfft2(_power(image.spectrum), shape), _overlap(image)
+    product, overlap = np.fft.irfft2(image.power, shape), _overlap(image)
     values = np.fft.fftshift(product / np.maximum(overlap, _LEAST_OVERLAP * overlap[0, 0]))
     x, y = columns // 2, rows // 2
     values = values[rows - y : rows + y + 1, columns - x : columns + x + 1]
@@ -79,13 +79,8 @@ def _overlap(image: FilteredImage) -> Floats:
     """Return the sum of products of the window with itself at each lag, of twice its shape; lag 0 comes first."""
     if image.factors is None:
         shape = (2 * image.weight.shape[0], 2 * image.weight.shape[1])
-        return np.fft.irfft2(_power(np.fft.rfft2(image.weight, shape)), shape)
-    return np.outer(*(np.fft.irfft(_power(np.fft.rfft(one, 2 * len(one))), 2 * len(one)) for one in image.factors))
-
-
-def _power(spectrum: Complexes) -> Floats:
-    """Return the squares of the absolute values."""
-    return np.asarray(spectrum.real**2 + spectrum.imag**2, dtype=np.float64)
+        return np.fft.irfft2(power_of(np.fft.rfft2(image.weight, shape)), shape)
+    return np.outer(*(np.fft.irfft(power_of(np.fft.rfft(one, 2 * len(one))), 2 * len(one)) for one in image.factors))
 
 
 def maxima(correlation: Autocorrelation, least: float) -> tuple[Floats, Floats]:
@@ -143,7 +138,7 @@ def power_spectrum(image: FilteredImage) -> tuple[Floats, Floats, Floats]:
         Power, shape (len(v), len(u)), and the waves per pixel along x, from 0, and along y, from -0.5.
     """
     size = tuple(_PADDING * count for count in image.values.shape)
-    power = _power(image.spectrum)
+    power = image.power
     u, v = np.fft.rfftfreq(size[1]), np.fft.fftshift(np.fft.fftfreq(size[0]))
     return _smoothed(np.fft.fftshift(power, axes=0)), u.astype(np.float64), np.asarray(v, dtype=np.float64)
 

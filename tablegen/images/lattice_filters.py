@@ -48,10 +48,15 @@ class FilteredImage:
         return (rows, columns) if off <= _SEPARABLE * np.max(rows) else None
 
     @cached_property
-    def spectrum(self) -> Complexes:
-        """One half of the transform of the weighted values, padded to twice the rows and columns."""
+    def power(self) -> Floats:
+        """One half of the power of the weighted values, padded to twice the rows and columns."""
         rows, columns = self.values.shape
-        return np.fft.rfft2(self.weighted, (2 * rows, 2 * columns))
+        return power_of(np.fft.rfft2(self.weighted, (2 * rows, 2 * columns)))
+
+
+def power_of(spectrum: Complexes) -> Floats:
+    """Return the squares of the absolute values."""
+    return np.asarray(spectrum.real**2 + spectrum.imag**2, dtype=np.float64)
 
 
 def filtered_images(heights: Floats) -> list[FilteredImage]:
