@@ -100,6 +100,18 @@ def _has_retrace(path: Path, channel: str | None) -> bool:
         return True  # the reader of pairs reports the fault
 
 
+def read_trace_beside(path: ImageSource, channel: str | None) -> ScanImage | None:
+    """Read the trace of the same signal where a channel of a file is a retrace; None where there is not one trace."""
+    if not isinstance(path, str | Path):
+        return None
+    channels = channels_of(Path(path))
+    chosen = choose(channels, channel, "trace")
+    traces = [one for one in channels if one.direction == "trace" and one.signal == chosen.signal]
+    if chosen.direction != "retrace" or len(traces) != 1:
+        return None
+    return read_image(Path(path), str(traces[0].number))
+
+
 def known_sample(
     *,
     lattice_nm: float | None = None,

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tablegen.api.image_input import ImageSource, read_trace_and_perhaps_retrace
+from tablegen.api.image_input import ImageSource, read_trace_and_perhaps_retrace, read_trace_beside
 from tablegen.api.result import Result
 from tablegen.base.blas_threads import one_blas_thread
 from tablegen.base.input_errors import Problem, Rejected, Unphysical
@@ -88,7 +88,8 @@ def lattice(
     kind = "hexagonal" if lattice is None and lattice_nm is not None else lattice
     expected = _expected_area(kind, lattice_nm, pixel)
     other = others[0].heights if others else None
-    cell = find_cell(scan.heights, other, expected)
+    reference = read_trace_beside(image, how["channel"]) if other is None and frames is None else None
+    cell = find_cell(scan.heights, other if reference is None else reference.heights, expected)  # to tell hum
     second = shift = None
     if other is not None:
         second = find_cell(other, scan.heights, expected)

@@ -127,10 +127,10 @@ def _shift(trace: Floats, retrace: Floats) -> float | None:
     strip = strip - np.mean(strip, axis=1, keepdims=True)
 
     def residual(by: float) -> Floats:
-        at = margin + by + np.arange(inner)
-        low = np.floor(at).astype(np.int64)
-        low = np.minimum(low, retrace.shape[1] - 2)
-        there = retrace[:, low] + (at - low) * (retrace[:, low + 1] - retrace[:, low])
+        first = int(np.floor(margin + by))
+        there = retrace[:, first : first + inner]
+        if share := margin + by - first:
+            there = there + share * (retrace[:, first + 1 : first + 1 + inner] - there)
         return np.asarray(strip - (there - np.mean(there, axis=1, keepdims=True)), dtype=np.float64)
 
     costs = np.array([float(np.mean(residual(by) ** 2)) for by in range(-_REACH, _REACH + 1)])

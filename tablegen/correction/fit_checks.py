@@ -406,13 +406,14 @@ def _without_shear(displacement: Floats) -> Floats:
 
 def _bow(displacement: Floats) -> tuple[float, float]:
     """Return the sagitta of the best cubic along the columns, and the largest deviation from the cubic, in pixels."""
-    lines, count = displacement.shape
-    place = np.broadcast_to(np.linspace(-1.0, 1.0, count), (lines, count))
+    count = displacement.shape[1]
+    powers = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, count), 3)
     there = np.isfinite(displacement)
-    cubic = np.polynomial.Polynomial.fit(place[there], displacement[there], 3, domain=(-1.0, 1.0))
-    bow = cubic(place[0])
+    weighted = powers.T * np.sum(there, axis=0)  # the lines of a column have one place: their sums are enough
+    sums = np.sum(np.where(there, displacement, 0.0), axis=0)
+    bow = powers @ np.linalg.lstsq(weighted @ powers, powers.T @ sums, rcond=None)[0]
     chord = np.linspace(bow[0], bow[-1], count)
-    return float(np.max(np.abs(bow - chord))), float(np.nanmax(np.abs(displacement - cubic(place))))
+    return float(np.max(np.abs(bow - chord))), float(np.nanmax(np.abs(displacement - bow)))
 
 
 def check_agreement(agreement: Agreement | None) -> None:

@@ -43,10 +43,10 @@ def levelled_cell(heights: Floats, cell: ImageCell) -> tuple[Floats, Floats]:
         model = next(one for one in filtered_images(_model(view, vectors)) if one.name == cell.filter_name)
         fit = fit_cell(model, vectors)
         if fit is None or not same_lattice(fit.vectors, vectors):
-            return cell.vectors, cell.covariance
+            return cell.vectors, cell.block_covariance
         vectors = np.asarray(cell.vectors - (fit.vectors - vectors), dtype=np.float64)
     shift = _UNCERTAIN * (vectors - cell.vectors).ravel()
-    return vectors, np.asarray(cell.covariance + np.diag(shift**2), dtype=np.float64)
+    return vectors, np.asarray(cell.block_covariance + np.diag(shift**2), dtype=np.float64)
 
 
 def _model(view: FilteredImage, vectors: Floats) -> Floats:

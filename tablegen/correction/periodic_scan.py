@@ -171,7 +171,6 @@ def periodic_scan(
         try:
             spot, bends = begin(geometry, heights, retrace_mirrored)
             model, state, free = fit_spots(geometry, heights, spot, bends)
-            check_fit(model, state, free)
         except Unphysical:
             if several is not None:
                 raise several from None
@@ -182,8 +181,13 @@ def periodic_scan(
             geometry, complete.heights, lambda level: fit_cell_spots(geometry, level, retrace_mirrored, waves)
         )
         model, state, free, scaled, stepped = fit.model, fit.state, fit.free, fit.scaled, fit.stepped
-    check_fit(model, state, free)
-    model, state = _bent(model, state, free)
+    try:
+        check_fit(model, state, free)
+        model, state = _bent(model, state, free)
+    except Unphysical:
+        if several is not None:
+            raise several from None
+        raise
     if complete.has_gaps:
         scaled = replace(complete, heights=scaled).with_model(model.periodic_parts(state))
     scan = _scan(model, state)
@@ -234,7 +238,7 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
             return model, state
     raise Unphysical(
         f"the fit does not settle, up to {100.0 * change:.2g} % of the line is left; is it one scan of a periodic "
-        "sample?"
+        "sample, without hum?"
     )
 
 

@@ -293,4 +293,9 @@ def timed(images: Images, conditions: OldScan) -> OldScan:
 def check_reference(images: Images) -> None:
     """Check that each direction that the file has is among the channels that are fitted."""
     if len(images.reference) == 1 and not all(images.forward) and any(images.forward):
+        if not images.forward[images.reference[0]]:
+            raise Unphysical(
+                "the fitted channel is a retrace, which does not tell how to correct the traces of the file; give the "
+                "trace as --channel, and this one as --retrace-channel"
+            )
         raise Unphysical("has channels of the retrace, but none of the fitted signal; give --retrace-channel")

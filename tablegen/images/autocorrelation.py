@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.images.lattice_filters import FilteredImage
+from tablegen.images.lattice_filters import FilteredImage, power_of
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _LEAST_OVERLAP = 1e-3  # of the window with itself
@@ -68,14 +68,19 @@ def autocorrelation(image: FilteredImage) -> Autocorrelation:
     """Return the autocorrelation of a filtered image."""
     rows, columns = image.values.shape
     shape = (2 * rows, 2 * columns)
-    product, overlap = (
-        np.fft.irfft2(np.abs(np.fft.rfft2(values, shape)) ** 2, shape)
-        for values in (image.values * image.weight, image.weight)
-    )
+    product, overlap = np.fft.irfft2(image.power, shape), _overlap(image)
     values = np.fft.fftshift(product / np.maximum(overlap, _LEAST_OVERLAP * overlap[0, 0]))
     x, y = columns // 2, rows // 2
     values = values[rows - y : rows + y + 1, columns - x : columns + x + 1]
     return Autocorrelation(values / values[y, x], (x, y))
+
+
+def _overlap(image: FilteredImage) -> Floats:
+    """Return the sum of products of the window with itself at each lag, of twice its shape; lag 0 comes first."""
+    if image.factors is None:
+        shape = (2 * image.weight.shape[0], 2 * image.weight.shape[1])
+        return np.fft.irfft2(power_of(np.fft.rfft2(image.weight, shape)), shape)
+    return np.outer(*(np.fft.irfft(power_of(np.fft.rfft(one, 2 * len(one))), 2 * len(one)) for one in image.factors))
 
 
 def maxima(correlation: Autocorrelation, least: float) -> tuple[Floats, Floats]:
@@ -132,9 +137,8 @@ def power_spectrum(image: FilteredImage) -> tuple[Floats, Floats, Floats]:
     tuple
         Power, shape (len(v), len(u)), and the waves per pixel along x, from 0, and along y, from -0.5.
     """
-    rows, columns = image.values.shape
-    size = (_PADDING * rows, _PADDING * columns)
-    power = np.abs(np.fft.rfft2(image.values * image.weight, size)) ** 2
+    size = tuple(_PADDING * count for count in image.values.shape)
+    power = image.power
     u, v = np.fft.rfftfreq(size[1]), np.fft.fftshift(np.fft.fftfreq(size[0]))
     return _smoothed(np.fft.fftshift(power, axes=0)), u.astype(np.float64), np.asarray(v, dtype=np.float64)
 
@@ -200,8 +204,13 @@ def _smoothed(power: Floats) -> Floats:
         padded = np.pad(power, edge, mode="reflect")
         count = power.shape[axis]
         line = np.moveaxis(padded, axis, 0)
-        parts = (share / 16.0 * line[at : at + count] for at, share in enumerate(_KERNEL))
-        power = np.moveaxis(sum(parts, start=np.zeros(line[:count].shape)), 0, axis)
+        total = _KERNEL[2] * line[2 : 2 + count]
+        for at in (0, 1):
+            beside = line[at : at + count] + line[4 - at : 4 - at + count]
+            beside *= _KERNEL[at]
+            total += beside
+        total /= sum(_KERNEL)
+        power = np.moveaxis(total, 0, axis)
     return power
 
 

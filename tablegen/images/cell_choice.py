@@ -191,12 +191,21 @@ def _why_none(cells: list[Candidate], spots: Spots) -> str:
             "the autocorrelation has no maxima of a lattice; image more periods, average frames with --frames, or "
             "choose another --channel"
         )
-    return unexplained(len(waves), len(waves))
+    return unexplained(min(_remaining(cell.vectors, spots) for cell in cells), len(waves))
+
+
+def _remaining(vectors: Floats, spots: Spots) -> int:
+    """Return how many spots a cell does not explain: all of them, if it explains few of those that tell."""
+    explained, informative = explained_spots(fitted_to_spots(vectors, spots), spots)
+    if np.sum(informative & explained) < _OWN_SHARE * np.sum(informative):
+        return len(spots.waves)
+    return max(1, int(np.sum(informative & ~explained)))
 
 
 def unexplained(count: int, total: int) -> str:
     """Return the text that refuses an image of which no cell explains so many of the significant spots."""
     return (
         f"no cell explains the spectrum: {count} of {total} significant spots remain; is the sample one lattice, and "
-        f"the image without hum? Crop to a region with one lattice, or choose another --channel"
+        f"the image without hum? Give trace and retrace, which tell hum; crop to a region with one lattice, or choose "
+        f"another --channel"
     )

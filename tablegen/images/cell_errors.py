@@ -1,6 +1,7 @@
 """Refine a cell over the maxima of the autocorrelation, with errors by a bootstrap over blocks of the image."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def fit_cell(image: FilteredImage, start: Floats) -> CellFit | None:
     cells = _cells(points, _places(sums, draws, lags, step)[0], weight)
     vectors = _cells(points, places[:, used], weight)[0]
     covariance = np.cov(cells.reshape(_SAMPLES, 4), rowvar=False)
-    variance = np.sum(image.values**2 * image.weight**2) / np.sum(image.weight**2)
+    variance = np.sum(image.weighted**2) / np.sum(image.weight**2)
     return CellFit(vectors, covariance, float(np.mean(weight) / variance))
 
 
@@ -91,14 +92,28 @@ def block_sums(one: FilteredImage, other: FilteredImage, lag: tuple[int, int], b
     x, y = lag
     first = (slice(max(-y, 0), rows - max(y, 0)), slice(max(-x, 0), columns - max(x, 0)))
     second = (slice(max(y, 0), rows - max(-y, 0)), slice(max(x, 0), columns - max(-x, 0)))
-    window = one.weight[first] * other.weight[second]
-    product = one.values[first] * other.values[second] * window
-    return np.stack([_summed(product, blocks), _summed(window, blocks)])
+    product = _summed(one.weighted[first], other.weighted[second], blocks)
+    if one.factors is None or other.factors is None:
+        return np.stack([product, _summed(one.weight[first], other.weight[second], blocks)])
+    window = np.outer(
+        *(
+            np.add.reduceat(of_one[i] * of_other[j], _edges(i.stop - i.start, blocks)[:-1])
+            for of_one, of_other, i, j in zip(one.factors, other.factors, first, second, strict=True)
+        )
+    )
+    return np.stack([product, window.ravel()])
 
 
-def _summed(values: Floats, blocks: int) -> Floats:
-    edges = [np.linspace(0, count, blocks, endpoint=False).astype(np.int64) for count in values.shape]
-    return np.asarray(np.add.reduceat(np.add.reduceat(values, edges[0], axis=0), edges[1], axis=1).ravel())
+def _summed(one: Floats, other: Floats, blocks: int) -> Floats:
+    """Return the products of two arrays, summed over blocks, shape (blocks^2,)."""
+    rows, columns = (_edges(count, blocks) for count in one.shape)
+    bands = [np.einsum("ij,ij->j", one[i:j], other[i:j]) for i, j in pairwise(rows.tolist())]
+    return np.asarray(np.add.reduceat(np.stack(bands), columns[:-1], axis=1).ravel())
+
+
+def _edges(count: int, blocks: int) -> Ints:
+    """Return the first pixel of each block, and the one after the last."""
+    return np.linspace(0, count, blocks + 1).astype(np.int64)
 
 
 def _blocks(vectors: Floats, rows: int, columns: int) -> int:

@@ -1,5 +1,6 @@
 """Vectors of a cell: reduction, sides and angle, and the lattice that indices generate."""
 
+from functools import lru_cache
 from itertools import product
 from math import gcd
 
@@ -71,7 +72,10 @@ def lattices_of_index(index: int) -> list[Ints]:
     ]
 
 
+@lru_cache
 def lattice_points(reach: int) -> Floats:
-    """Return the whole numbers (n, m) of one half of a lattice up to ``reach``, without the origin."""
+    """Return the whole numbers (n, m) of one half of a lattice up to ``reach``, without the origin; not writable."""
     span = range(-reach, reach + 1)
-    return np.array([(n, m) for n, m in product(span, span) if n > 0 or (n == 0 and m > 0)], dtype=np.float64)
+    points = np.array([(n, m) for n, m in product(span, span) if n > 0 or (n == 0 and m > 0)], dtype=np.float64)
+    points.flags.writeable = False
+    return points

@@ -36,7 +36,7 @@ def direction_shift(trace: Floats, retrace: Floats, cell: ImageCell) -> Directio
     """
     block, vectors = cell.part.block, cell.vectors / cell.part.block
     one, other = (filtered_images(cell.part.of(heights))[0] for heights in (trace, retrace))
-    spectra = [np.fft.rfft2(image.values * image.weight) for image in (one, other)]
+    spectra = [np.fft.rfft2(image.weighted) for image in (one, other)]
     rows, columns = one.values.shape
     match = np.fft.irfft2(np.conj(spectra[0]) * spectra[1], (rows, columns))
     y = (np.arange(rows) + rows // 2) % rows - rows // 2
@@ -53,7 +53,7 @@ def direction_shift(trace: Floats, retrace: Floats, cell: ImageCell) -> Directio
     draws = np.concatenate([np.ones((1, blocks)), draws])
     product, window = np.moveaxis(np.einsum("kwb,db->dkw", sums, draws), -1, 0)
     places, _ = parabola_maxima((product / np.maximum(window, 1e-300))[:, None], middle, step)
-    power = [float(np.sum(image.values**2 * image.weight**2)) for image in (one, other)]
+    power = [float(np.sum(image.weighted**2)) for image in (one, other)]
     return DirectionShift(
         block * places[0, 0],
         block * np.std(places[1:, 0], axis=0),

@@ -44,16 +44,18 @@ def candidates(correlation: Autocorrelation) -> list[Candidate]:
     chosen = np.union1d(near, np.arange(min(int(high.sum()), _HIGHEST)))
     both = NearbyMaxima(np.concatenate([lags, -lags]), np.concatenate([heights, heights]))
     cells: list[Candidate] = []
+    known = np.empty((0, 2, 2))
     for i, j in combinations(chosen.tolist(), 2):
         pair = lags[[i, j]]
         if area(pair) < _LEAST_SINE * float(np.prod(np.hypot(*pair.T))):
             continue
         vectors = reduced(pair)
-        if np.hypot(*vectors[0]) < _LEAST_SIDE or _known(vectors, cells):
+        if np.hypot(*vectors[0]) < _LEAST_SIDE or _known(vectors, known):
             continue
         level = _sums(vectors, correlation, both)
         if level >= _LEAST_HEIGHT * min(heights[i], heights[j]):
             cells.append(_refined(Candidate(vectors, level, np.inf), both))
+            known = np.concatenate([known, cells[-1].vectors[None]])
     return distinct(cells)
 
 
@@ -61,16 +63,17 @@ def distinct(cells: list[Candidate]) -> list[Candidate]:
     """Return the cells that differ, the smallest first."""
     unique: list[Candidate] = []
     for cell in sorted(cells, key=lambda one: one.area):
-        if not _known(cell.vectors, unique):
+        if not _known(cell.vectors, np.array([one.vectors for one in unique])):
             unique.append(cell)
     return unique
 
 
-def _known(vectors: Floats, cells: list[Candidate]) -> bool:
-    if not cells:
+def _known(vectors: Floats, cells: Floats) -> bool:
+    """Return True if a cell is nearly one of others, shape (n, 2, 2)."""
+    if not len(cells):
         return False
     side = abs(float(vectors[0, 0])) + abs(float(vectors[0, 1]))
-    off = np.abs(np.array([cell.vectors for cell in cells]) - vectors)
+    off = np.abs(cells - vectors)
     return bool(np.min(np.max(off, axis=(1, 2))) < _SAME * side)
 
 
@@ -96,11 +99,17 @@ def _refined(cell: Candidate, peaks: NearbyMaxima) -> Candidate:
         near = max(_NEAR * float(np.hypot(*vectors[0])), 1.5)
         nearest, matched = peaks.nearest(points @ vectors, near)
         matched &= peaks.heights[nearest] > 0.0
-        if np.linalg.matrix_rank(points[matched]) < 2:
+        if not _span(points[matched]):
             break
         weight, places = peaks.heights[nearest[matched]], peaks.lags[nearest[matched]]
-        fit = np.linalg.lstsq(points[matched] * weight[:, None], places * weight[:, None], rcond=None)[0]
+        weighted = points[matched] * weight[:, None]
+        fit = np.linalg.solve(weighted.T @ weighted, weighted.T @ (places * weight[:, None]))
         vectors = np.asarray(fit, dtype=np.float64)
         scatter = float(np.sqrt(np.mean(np.sum((points[matched] @ fit - places) ** 2, axis=1))))
     a, _, _ = sides_and_angle(vectors)
     return Candidate(reduced(vectors) if a > 0.0 else cell.vectors, cell.level, scatter)
+
+
+def _span(points: Floats) -> bool:
+    """Return True if whole numbers, shape (n, 2), are not all in one direction."""
+    return bool(np.any(points[:1, 0] * points[:, 1] != points[:1, 1] * points[:, 0]))

@@ -6,12 +6,13 @@ leaves a few extreme slopes there, which are clipped.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from tablegen.images.missing import COMPLETE, longest_run, valid_pixels
-from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.numerics.arrays import Bools, Complexes, Floats, Ints
 
 _CLIPPED = 1.0  # percent of the heights at either end
 _SLOPE_LIMIT = 3.0  # times the usual slope: the edge of a terrace has more
@@ -20,6 +21,8 @@ _BESIDE = 10  # pixels on either side of an edge, whose medians tell a terrace f
 _STEP_SHARE = 0.5  # of the slope at an edge that remains as a step between these medians
 _LEAST_TERRACE = 6  # pixels of a row: a shorter part is not levelled by itself
 _FILLED_GAP = 0.02  # of the rows: a longer gap would make spots of its own if it were interpolated
+_MOST_REGULAR = 0.04  # amplitude of a wave of missing rows: filled, they make spots beside those of the lattice
+_SEPARABLE = 1e-12  # of the weight
 _BOW_DEGREE = 2
 _WIDTH = 1.0  # pixels: standard deviation of the Gaussian that smooths slopes
 
@@ -31,6 +34,29 @@ class FilteredImage:
     name: str
     values: Floats
     weight: Floats
+
+    @cached_property
+    def weighted(self) -> Floats:
+        """The values times their weight."""
+        return self.values * self.weight
+
+    @cached_property
+    def factors(self) -> tuple[Floats, Floats] | None:
+        """The weight as a function of the row times one of the column, if it is such a product."""
+        rows, columns = np.max(self.weight, axis=1), np.max(self.weight, axis=0) / np.max(self.weight)
+        off = np.max(np.abs(np.outer(rows, columns) - self.weight))
+        return (rows, columns) if off <= _SEPARABLE * np.max(rows) else None
+
+    @cached_property
+    def power(self) -> Floats:
+        """One half of the power of the weighted values, padded to twice the rows and columns."""
+        rows, columns = self.values.shape
+        return power_of(np.fft.rfft2(self.weighted, (2 * rows, 2 * columns)))
+
+
+def power_of(spectrum: Complexes) -> Floats:
+    """Return the squares of the absolute values."""
+    return np.asarray(spectrum.real**2 + spectrum.imag**2, dtype=np.float64)
 
 
 def filtered_images(heights: Floats) -> list[FilteredImage]:
@@ -69,9 +95,16 @@ def complete_region(heights: Floats) -> tuple[slice, slice]:
     there = valid[:, valid.any(axis=0)]
     complete = np.mean(there, axis=1) >= COMPLETE if there.size else np.zeros(len(valid), dtype=np.bool_)
     rows = longest_run(complete, int(_FILLED_GAP * len(valid)))
+    if _regular(~complete[rows]) > _MOST_REGULAR:
+        rows = longest_run(complete)
     part = valid[rows][complete[rows]]
     columns = longest_run(np.mean(part, axis=0) >= COMPLETE) if part.size else slice(0, 0)
     return rows, columns
+
+
+def _regular(gaps: Bools) -> float:
+    """Return the largest amplitude of a wave in which rows are missing: their share, if they are at equal distances."""
+    return float(np.max(np.abs(np.fft.rfft(gaps)[1:]), initial=0.0)) / max(len(gaps), 1)
 
 
 def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
@@ -97,13 +130,18 @@ def terrace_edges(heights: Floats) -> tuple[Floats, Ints, Ints, Floats]:
 
 def _rows_levelled(heights: Floats, valid: Bools) -> Floats:
     """Subtract each row's median, and the bow that all rows share."""
-    level = np.zeros(heights.shape)
-    for row in np.flatnonzero(valid.any(axis=1)):
-        level[row] = np.where(valid[row], heights[row] - np.median(heights[row][valid[row]]), 0.0)
+    level = np.where(valid, heights - _medians(heights, valid)[:, None], 0.0)
     place = np.linspace(-1.0, 1.0, heights.shape[1])
-    usual = np.array([np.median(level[valid[:, i], i]) if valid[:, i].any() else 0.0 for i in range(len(place))])
+    usual = _medians(level.T, valid.T)
     bow = np.polynomial.Polynomial.fit(place, usual, _BOW_DEGREE, domain=(-1.0, 1.0))(place)
     return np.where(valid, level - bow, 0.0)
+
+
+def _medians(heights: Floats, valid: Bools) -> Floats:
+    """Return the median of the valid pixels of each row, 0 where there are none."""
+    if valid.all():
+        return np.asarray(np.median(np.ascontiguousarray(heights), axis=1))
+    return np.array([np.median(row[use]) if use.any() else 0.0 for row, use in zip(heights, valid, strict=True)])
 
 
 def _terraces_levelled(level: Floats, valid: Bools) -> Floats:

@@ -1,8 +1,9 @@
 """Rows and pixels of images without data: which they are, and images without gaps for fits and spectra.
 
 A pixel is missing where it is NaN. A row is missing where a fifth of it is, where it is constant, as what a stopped
-scan leaves, or where a fifth of it is at the end of the range, as of a clipped row. Gaps are filled by interpolation;
-a missing row has no weight in a fit. An image without gaps is returned as it is.
+scan leaves, or where a fifth of it is at the end of the range, as of a clipped row. A column is missing where it is
+constant; so are rows and columns that repeat the one before, as in an image that was enlarged. Gaps are filled by
+interpolation; a missing row has no weight in a fit. An image without gaps is returned as it is.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,8 @@ COMPLETE = 0.8  # share of valid pixels: a row or column with fewer is missing
 _LEAST_ROWS = 32
 _LEAST_SHARE = 0.7  # of the rows from the first with data to the last: gaps beyond that make spots of their own
 _MOST_CLIPPED = 0.3  # share of the rows: where more are clipped, the image is saturated, or has a few levels
+_REPEATED = 0.05, 0.9  # share of the rows or columns that repeat: beyond, the image is without noise, and symmetric
+_PROBES = 8  # pixels of a row or column that are compared first
 _PADDED = 3  # pixels with the value of the rows that were never scanned: a row with as many ends there
 
 
@@ -92,20 +95,50 @@ def valid_pixels(heights: Floats) -> Bools:
         Heights in any unit, shape (rows, columns); NaN where a pixel is missing.
     """
     valid = np.isfinite(heights)
-    low = np.min(np.where(valid, heights, np.inf), axis=1)
-    high = np.max(np.where(valid, heights, -np.inf), axis=1)
+    whole = bool(valid.all())
+    low = np.min(heights if whole else np.where(valid, heights, np.inf), axis=1)
+    high = np.max(heights if whole else np.where(valid, heights, -np.inf), axis=1)
     flat = ~(high > low)
     constants = np.unique(low[flat & np.isfinite(low)])
     cut = np.zeros(len(heights), dtype=np.bool_)
     if len(constants) == 1:  # the row in which the scan was stopped
         cut = np.sum(heights == constants[0], axis=1) >= _PADDED
-    valid &= ~(flat | cut)[:, None]
-    if valid.any():
-        limits = float(np.min(heights[valid])), float(np.max(heights[valid]))
-        clipped = np.max([np.mean(heights == limit, axis=1) for limit in limits], axis=0) > 1.0 - COMPLETE
+    there = ~(flat | cut)
+    valid &= there[:, None]
+    if there.any():
+        limits = float(np.min(low[there])), float(np.max(high[there]))
+        counts = np.max([np.count_nonzero(heights == limit, axis=1) for limit in limits], axis=0)
+        clipped = counts / heights.shape[1] > 1.0 - COMPLETE
         if np.mean(clipped) <= _MOST_CLIPPED:
             valid &= ~clipped[:, None]
+    valid[:, _empty_columns(heights, valid)] = False
+    valid[_empty_columns(heights.T, valid.T)] = False
     return np.asarray(valid, dtype=np.bool_)
+
+
+def _empty_columns(heights: Floats, valid: Bools) -> Bools:
+    """Return True for columns that are constant, or repeat the one before, shape (columns,).
+
+    Where nearly all are, the sample does not change along one axis: then none is.
+    """
+    known = np.flatnonzero(valid.any(axis=1))
+    probe = heights[known[:: max(1, len(known) // _PROBES)]]
+    constant, repeated = (_equal(probe, one) for one in (probe[:1], np.roll(probe, 1, axis=1)))
+    repeated[0] = False
+    for column in np.flatnonzero(constant | repeated).tolist():
+        own, use = heights[known, column], valid[known, column]
+        constant[column] &= bool(np.all(own[use] == own[use][:1]))
+        repeated[column] &= bool(np.all(own[use] == heights[known, column - 1][use]))
+    if np.mean(constant) > _REPEATED[1]:
+        constant[:] = False
+    if not _REPEATED[0] < np.mean(repeated & ~constant) <= _REPEATED[1]:
+        repeated[:] = False
+    return constant | repeated
+
+
+def _equal(probe: Floats, other: Floats) -> Bools:
+    """Return True for columns that are equal but for missing pixels."""
+    return np.asarray(np.all((probe == other) | np.isnan(probe) | np.isnan(other), axis=0), dtype=np.bool_)
 
 
 def rows_with_data(heights: Floats) -> Bools:

@@ -265,7 +265,7 @@ class PeriodicModel:
         for (_, heights), column in zip(self.images, columns, strict=True):
             r, c = rows[0], column[0]
             matrix += _gram(plain, _products(r, c))
-            aim += np.real(plain @ np.sum(r * (c @ heights.T), axis=1))
+            aim += np.real(plain @ np.sum(r * _with_real(c, heights.T), axis=1))
         solved = np.linalg.lstsq(matrix, aim, rcond=1e-12)[0]
         amplitudes = solved[:count] + 1j * solved[count:]
         terms = self._terms(parameters, amplitudes)
@@ -274,10 +274,9 @@ class PeriodicModel:
         residuals, steepness = [], []
         for (forward, heights), column in zip(self.images, columns, strict=True):
             coefficients = terms[0] if forward else terms[1]
-            modelled = (rows[0].T * amplitudes) @ column[0]
-            residuals.append(heights - np.real(modelled))
+            residuals.append(heights - _real_product(rows[0].T * amplitudes, column[0]))
             waves = 2j * pi * (self.spots @ self.q(parameters))
-            steepness.append(np.real((rows[0].T * (amplitudes * waves)) @ column[0]))
+            steepness.append(_real_product(rows[0].T * (amplitudes * waves), column[0]))
             r, c, places = self._laid_out(rows, column)
             first, second = _products(r, c, places)
             hessian += _gram(coefficients, (first, second))
@@ -326,7 +325,8 @@ class PeriodicModel:
         """
         rows = self._every_row(state.parameters)[0]
         return [
-            np.real((rows.T * state.amplitudes) @ self._waves(state.parameters, forward)) for forward, _ in self.images
+            _real_product(rows.T * state.amplitudes, self._waves(state.parameters, forward))
+            for forward, _ in self.images
         ]
 
     def row_waves(self, state: FitState, spots: Ints) -> Complexes:
@@ -520,7 +520,7 @@ def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
             if trial_state is not None and trial_state.cost <= state.cost:
                 break
             damping = max(4.0 * damping, 1e-6)
-            if damping > 1e8:
+            if damping > 1e8 or float(gradient @ step) <= 1e-11 * state.cost:  # less than rounding makes of the cost
                 return state
         gained = state.cost - trial_state.cost
         start, state = trial, trial_state
@@ -546,8 +546,20 @@ def _scores(
 ) -> Floats:
     """Return, for each row, the residual times each parameter's derivative, summed: (rows, parameters)."""
     row, column, (at, across) = laid_out
-    scores: Floats = np.real(coefficients @ ((column @ residual.T)[across] * row[at])).T
-    return scores
+    return _real_product(coefficients, _with_real(column, residual.T)[across] * row[at]).T
+
+
+def _real_product(one: Complexes, other: Complexes) -> Floats:
+    """Return the real part of a product of matrices, without the imaginary one."""
+    left, right = np.concatenate([one.real, -one.imag], axis=1), np.concatenate([other.real, other.imag])
+    return np.asarray(left @ right)
+
+
+def _with_real(one: Complexes, other: Floats) -> Complexes:
+    """Return a complex matrix times a real one, which is not made complex first."""
+    parts = np.concatenate([one.real, one.imag]) @ other
+    product: Complexes = parts[: len(one)] + 1j * parts[len(one) :]
+    return product
 
 
 def _gram(coefficients: Complexes, products: tuple[Complexes, Complexes]) -> Floats:

@@ -100,7 +100,11 @@ def complete_part(heights: Floats) -> SearchedPart:
     part = SearchedPart((heights.shape[0], heights.shape[1]), (rows.start, rows.stop), (columns.start, columns.stop))
     if min(part.size) < MIN_PIXELS:
         size = " x ".join(map(str, part.size))
-        raise Unphysical(f"without missing rows the image has {size} pixels; crop it to a region without missing rows")
+        raise Unphysical(
+            f"without missing rows and columns the image has {size} pixels; rows and columns that are constant, or "
+            f"repeat the one before, are missing: give the image as it was scanned, or crop it to a region without "
+            f"missing rows"
+        )
     return part
 
 

@@ -14,13 +14,14 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.images.pair_checks import MAX_PERIODS_PER_COLUMN, MIN_PERIODS, FinePeriods
 from tablegen.images.periodic_model import Geometry
-from tablegen.numerics.arrays import Bools, Floats
+from tablegen.numerics.arrays import Bools, Complexes, Floats
 
 _MIN_SEARCHED_PERIODS = 1.4  # periods; slower waves are removed with the parabola of the rows
 _MAX_BEND = 0.13  # first coordinate of a branch: a tenth of the scan, and what a skew peak adds
 _MAX_SKEW = 0.2  # second coordinate
 _COARSE_STEP = 0.02
 _FINE_STEP_PERIODS = 0.25  # periods between neighbours of the search
+_FINE_STEPS = 8  # to either side
 _MIN_SECOND_AMPLITUDE = 0.1  # share of the strongest amplitude
 _MIN_SIDE_DISTANCE = 0.12  # share of the frame: over it another wave of the same q, of another s, averages out
 _MIN_SPOT_POWER = 25.0  # times the mean power: white noise does not reach it
@@ -112,7 +113,7 @@ def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, arou
     skew_count = int(
         np.ceil(_MAX_SKEW / (2.4 * step))
     )  # skew moves the line by a fifth of what bend does, at two places
-    q = spot.q + np.arange(-8, 9) * _FINE_STEP_PERIODS
+    q = spot.q + np.arange(-_FINE_STEPS, _FINE_STEPS + 1) * _FINE_STEP_PERIODS
     best = Bend(spot.q, BranchShape(), 0.0)
     u = geometry.sweep(forward)
     for bend, skew in product(
@@ -123,11 +124,22 @@ def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, arou
         if tau is None:
             continue
         x = tau if forward else 1.0 - tau
-        match = np.abs(np.exp(-2j * np.pi * np.outer(q, x)) @ profile)
+        match = _matches(spot.q, x, profile)
         at = int(np.argmax(match))
         if match[at] > best.match:
             best = Bend(float(q[at]), BranchShape.at(coordinates), float(match[at]))
     return best
+
+
+def _matches(q: float, x: Floats, profile: Complexes) -> Floats:
+    """Return the amplitudes of the waves of q and its neighbours, which are q's times powers of one step."""
+    wave, step = np.exp(-2j * np.pi * np.outer([q, _FINE_STEP_PERIODS], x))
+    powers = np.ones((_FINE_STEPS + 1, len(x)), dtype=np.complex128)
+    for number in range(_FINE_STEPS):
+        np.multiply(powers[number], step, out=powers[number + 1])
+    product = wave * profile
+    faster, slower = np.abs(powers @ np.stack([product, np.conj(product)], axis=1)).T
+    return np.concatenate([slower[:0:-1], faster])
 
 
 def row_polynomial(

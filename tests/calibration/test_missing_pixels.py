@@ -7,7 +7,7 @@ import pytest
 from calibrating import V_MAX, Scanner, lattice
 from correcting import old_frame
 from distorted_lattices import DistortedLattice, deviation, images_of
-from lattice_images import without_lattice
+from lattice_images import narrow_sites, without_lattice
 
 import tablegen
 from tablegen.base.input_errors import Rejected, Unphysical
@@ -15,6 +15,8 @@ from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, Samp
 from tablegen.calibration.laws.images import Pair, fit_images
 from tablegen.correction.by_fit import by_fit
 from tablegen.correction.old_scan import OldScan
+from tablegen.images import image_cell, lattice_filters, missing
+from tablegen.images.cell_spots import same_lattice
 from tablegen.images.files import read_image
 from tablegen.images.indexer import find_cell
 from tablegen.images.line_length import Cell
@@ -112,6 +114,72 @@ def test_the_cell_is_within_its_error(gap: str, tmp_path: Path) -> None:
         assert one.standard_error < 0.01 * side
     assert "missing: " in result.summary()
     assert any(result.record["missing"].values())
+
+
+def with_gaps(heights: Floats, gap: str) -> Floats:
+    """Heights of which columns or rows are missing at equal distances, or repeat the one before."""
+    heights = heights.copy()
+    match gap:
+        case "zero columns":
+            heights[:, 1::2] = 0.0
+        case "equal columns":
+            heights[:, 1::2] = heights[:, ::2]
+        case "equal rows":
+            heights[1::2] = heights[::2]
+        case "third columns":
+            heights[:, 1::3] = heights[:, :-1:3]
+        case "fourth rows":
+            heights[3::4] = np.nan
+    return heights
+
+
+@pytest.mark.parametrize(
+    ("gap", "seed"),
+    [("zero columns", 1), ("equal columns", 8), ("equal rows", 1), ("third columns", 4), ("fourth rows", 3)],
+)
+def test_columns_and_rows_missing_at_equal_distances_are_refused(gap: str, seed: int) -> None:
+    with pytest.raises(Unphysical, match="constant, or repeat the one before, are missing"):
+        find_cell(with_gaps(narrow_sites(seed)[0], gap))
+
+
+@pytest.mark.parametrize(("gap", "seed"), [("zero columns", 1), ("equal columns", 8), ("fourth rows", 11)])
+def test_missing_columns_that_count_as_data_make_a_larger_cell(
+    gap: str, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the check of missing columns and rows refuses would have another cell."""
+    monkeypatch.setattr(missing, "_empty_columns", lambda heights, valid: np.zeros(heights.shape[1], dtype=bool))
+    monkeypatch.setattr(lattice_filters, "_MOST_REGULAR", 1.0)
+    monkeypatch.setattr(image_cell, "_MOST_FAST", 1000)
+    heights, cell = narrow_sites(seed)
+    assert not same_lattice(find_cell(with_gaps(heights, gap)).vectors, cell)
+
+
+def test_sites_narrower_than_a_pixel_have_no_wrong_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    heights, cell = narrow_sites(0)
+    with pytest.raises(Unphysical, match="sites narrower than a pixel"):
+        find_cell(heights)
+    monkeypatch.setattr(image_cell, "_MOST_FAST", 1000)
+    assert not same_lattice(find_cell(heights).vectors, cell)
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("gap", ["", "zero columns", "equal columns", "equal rows", "third columns", "fourth rows"])
+def test_no_narrow_sites_have_a_wrong_cell(gap: str) -> None:
+    for seed in range(40):
+        heights, cell = narrow_sites(seed)
+        try:
+            result = find_cell(with_gaps(heights, gap))
+        except Unphysical:
+            continue
+        assert same_lattice(result.vectors, cell), seed
+
+
+def test_a_sample_without_noise_may_be_constant_along_an_axis() -> None:
+    """The rows of a grating repeat each other, and so do two columns in the middle of a symmetric image."""
+    wave = np.cos(2.0 * np.pi * (np.arange(64) - 31.5) / 10.0)
+    for heights in (np.tile(wave, (64, 1)), wave + np.linspace(0.0, 1.0, 64)[:, None]):
+        assert missing.valid_pixels(heights).all()
+    assert count_missing(np.repeat(np.random.default_rng(0).normal(size=(32, 64)), 2, axis=0)).rows == 32
 
 
 def test_half_of_noise_is_no_lattice() -> None:

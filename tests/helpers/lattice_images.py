@@ -147,3 +147,15 @@ def without_lattice(seed: int, size: int = 128) -> Floats:
                 u, v, width = rng.uniform(0.0, size), rng.uniform(0.0, size), rng.uniform(2.0, 5.0)
                 heights += rng.uniform(0.5, 1.5) * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2.0 * width**2))
             return heights
+
+
+def narrow_sites(seed: int, size: int = 128) -> tuple[Floats, Floats]:
+    """Return an image of a hexagonal lattice whose sites are narrower than a pixel, and its cell in pixels."""
+    rng = np.random.default_rng(seed)
+    side, width, turn = rng.uniform(4.0, 9.0), rng.uniform(0.3, 0.8), rng.uniform(0.0, np.pi)
+    cell = side * np.array([[np.cos(turn + a), np.sin(turn + a)] for a in (0.0, np.pi / 3.0)])
+    y, x = np.mgrid[:size, :size].astype(np.float64)
+    at = np.stack([x, y], axis=-1) @ np.linalg.inv(cell)
+    heights = np.exp(-np.sum(((at - np.round(at)) @ cell) ** 2, axis=-1) / (2.0 * width**2))
+    noise = np.random.default_rng(seed).normal(size=heights.shape)
+    return heights + 0.1 * heights.std() * noise, cell
