@@ -295,7 +295,7 @@ def test_an_outlier_is_named_by_its_line(lab: Path) -> None:
     path = write_csv(lab / "size.csv", drive_v=DRIVES, actual_nm=sizes)
     path.write_text("# Monday\n" + path.read_text("utf-8"), "utf-8")
     outcome = run("calibrate", "size", "--axis", "x", "size.csv", "--v-max", "100")
-    assert "outlier: size.csv:6: far from the other points, but used." in outcome.out
+    assert "outlier: size.csv:6: far from the other points, but used; next: " in outcome.out
 
 
 @pytest.mark.parametrize(
