@@ -289,7 +289,7 @@ class Build(Result):
     @property
     def notes(self) -> list[str]:
         """Advice to read before the image is trusted, in sentences: the most serious first."""
-        return [one.text for one in self.findings]
+        return [one.full_text for one in self.findings]
 
     @property
     def findings(self) -> list[Finding]:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from msgspec import Struct, field
 
-from tablegen.base.warnings import Axis, FindingCode, axis_name
+from tablegen.base.remedies import FindingCode
+from tablegen.base.warnings import Axis, axis_name
 
 MOST_PROBLEMS = 50  # of one run; more are no help, and a file may have a million
 _MOST_KEY, _MOST_WHY = 200, 1000  # characters

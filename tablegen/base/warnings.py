@@ -9,65 +9,9 @@ from typing import Literal
 
 from msgspec import Struct
 
+from tablegen.base.remedies import IN_TEXT, REMEDIES, FindingCode
+
 Weight = Literal["limit", "spoils", "expect", "note"]
-FindingCode = Literal[
-    "",
-    "ambiguous-shift",
-    "aperiodic-contrast",
-    "assumed-unit",
-    "assumed-value",
-    "changed-file",
-    "clipped-sensor",
-    "controller-volts",
-    "converter-error",
-    "damaged-build",
-    "drive-shape",
-    "expected-scaling-error",
-    "expected-size-error",
-    "extrapolated-parameter",
-    "failed-check",
-    "few-periods",
-    "few-pixels",
-    "few-points",
-    "image-offset",
-    "image-timing",
-    "imaged-pixels",
-    "insignificant-fit",
-    "inverted-sensor",
-    "mains-hum",
-    "mismatch-only",
-    "missing-pixels",
-    "mixed-offsets",
-    "model-mismatch",
-    "noise-limit",
-    "offset-drift",
-    "operator-distance",
-    "other-verify-record",
-    "outlying-samples",
-    "pair-voltages",
-    "period-slip",
-    "poor-fit",
-    "resonance",
-    "rounded-pixels",
-    "scaling-error",
-    "scan-angle",
-    "sensor-delay",
-    "shaped-travel",
-    "size-error",
-    "standard-errors",
-    "step-guard",
-    "uncompared-inputs",
-    "uncompensated-hysteresis",
-    "undetermined-parameter",
-    "uneven-drift",
-    "unlike-images",
-    "unmeasured-response",
-    "unverified-build",
-    "way-up-only",
-    "weak-registration",
-    "widened-errors",
-    "wrong-length-unit",
-]
 Axis = Literal["", "x", "y"]
 Tone = Literal["", "good", "warn", "bad", "quiet"]
 _ORDER: tuple[Weight, ...] = ("limit", "spoils", "expect", "note")
@@ -84,7 +28,8 @@ class Finding(Struct, frozen=True):
     """A sentence, its weight, and the percentage of the scan that ranks it within that.
 
     ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal. ``code`` names the
-    kind of finding for programs, which go by it and by ``axis``, never by the sentence; "" where it has none.
+    kind of finding for programs, which go by it and by ``axis``, never by the sentence; "" where it has none. The code
+    has a remedy in ``tablegen.base.remedies``.
     """
 
     weight: Weight
@@ -97,7 +42,17 @@ class Finding(Struct, frozen=True):
 
     def record(self) -> dict[str, str]:
         """Return the finding as JSON outputs have it."""
-        return {"code": self.code, "axis": self.axis, "text": self.text}
+        return {"code": self.code, "axis": self.axis, "text": self.text, "remedy": self.remedy}
+
+    @property
+    def remedy(self) -> str:
+        """What to do about a finding of its code; "" where nothing is needed."""
+        return REMEDIES.get(self.code, "")
+
+    @property
+    def full_text(self) -> str:
+        """The sentence with the remedy of its code, unless it names one itself with the values of the case."""
+        return f"{self.text}; next: {self.remedy}" if self.remedy and self.code not in IN_TEXT else self.text
 
     @property
     def tone(self) -> Tone:
@@ -112,7 +67,7 @@ class Finding(Struct, frozen=True):
     @property
     def line(self) -> str:
         """The finding as a line of a terminal."""
-        return f"{self.label}: {self.text}"
+        return f"{self.label}: {self.full_text}"
 
 
 class Remark(str):

@@ -17,7 +17,6 @@ def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[
     points
         True if measured values are written in place of a law.
     """
-    part = "image" if fit.images else "row"
     findings = [
         Finding("limit", 0.0, text, "\u2717 means nothing", "warning", "insignificant-fit")
         for text in doubts(fit, points)
@@ -26,7 +25,7 @@ def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[
         Finding(
             "spoils",
             abs(float(fit.residual_percent[row])) if row < len(fit.residual_percent) else 0.0,
-            f"{place}: far from the other points, but used. Remove the {part} if the measurement was wrong",
+            f"{place}: far from the other points, but used",
             "! outlier",
             "outlier",
             "outlying-samples",

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.base.input_errors import Problem, Rejected, Unphysical
-from tablegen.base.warnings import FindingCode, Remark, spoils
+from tablegen.base.remedies import FindingCode
+from tablegen.base.warnings import Remark, spoils
 from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine, periodic_line
 from tablegen.calibration.spans import LEAST_SPAN
@@ -243,7 +244,7 @@ def _inverted(names: Sequence[str], signs: Sequence[bool]) -> Remark:
     which = "every trace" if all(signs) else ", ".join(listed[:3]) + (", ..." if len(listed) > 3 else "")
     text = (
         f"{which}: the displacement falls where the drive rises; its sign was inverted. The sensor counts against the "
-        "axis, or its leads are exchanged: invert the column; if the sensor is right, the axis is wired backwards"
+        "axis, or its leads are exchanged; if the sensor is right, the axis is wired backwards"
     )
     if all(signs):
         return Remark(text, code="inverted-sensor")
@@ -343,8 +344,7 @@ def hum_remarks(trace: Trace, line: PeriodicLine) -> list[Remark]:
             hz = f"{mains:g} Hz"
             text = (
                 f"a line at {hz} of {100.0 * share:.2g} % of the displacement stands out of the residual: this looks "
-                f"like mains hum. Shield the sensor and its leads, ground them at one point, and record at a rate of "
-                f"which {hz} is no multiple, over many periods"
+                "like mains hum"
             )
             return [spoils(text, 100.0 * share, "mains-hum")]
     return []

@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import Struct
 
 from tablegen.base.input_errors import Document, Problem
-from tablegen.base.warnings import FindingCode
+from tablegen.base.remedies import CAUSE_REMEDIES, REMEDIES, FindingCode
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
@@ -104,17 +104,15 @@ def broken_limits(
     problems = []
     for axis, certificate in certificates.items():
         if certificate.largest_step > certificate.max_step:
-            why = (
-                f"the {axis} axis steps by {certificate.largest_step} codes, above its guard of {certificate.max_step}"
-            )
+            guard = f"above its guard of {certificate.max_step}; {REMEDIES['step-guard']}"
+            why = f"the {axis} axis steps by {certificate.largest_step} codes, {guard}"
             key = "amplifier.max_slew_v_per_s"
             problem = file.problem(key, why) if hardware_problem is None else hardware_problem(axis, key, why)
             problems.append(problem.coded("step-guard", axis))
         limit = plan.limits.max_error_lsb
         if limit is not None and certificate.max_error_lsb > limit:
             why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "
-            remedy = _finer_table(plan.x if axis == "x" else plan.y)
-            remedy = remedy if limit > 0.5 else "a code alone is rounded by up to 0.5"
+            remedy = REMEDIES["converter-error"] if limit > 0.5 else "a code alone is rounded by up to 0.5"
             problems.append(file.problem("limits.max_error_lsb", why + remedy).coded("converter-error", axis))
         limit = plan.limits.max_scaling_error_percent
         if limit is None:
@@ -123,14 +121,15 @@ def broken_limits(
         if worst > limit or abs(size) > limit:
             what = f"scaling error of {worst:.4g} %" if worst > limit else f"size error of {size:+.4g} %"
             parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
-            remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
+            cause = cause_of(plan.x if axis == "x" else plan.y, parts)
+            remedy = f"most of it is the {cause}: {CAUSE_REMEDIES[cause]}"
             why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
             code: FindingCode = "scaling-error" if worst > limit else "size-error"
             problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
         elif expected := _expected_excess(certificate, limit):
             code, excess = expected
             why = f"on the scanner the {axis} axis is expected to have a {excess}"
-            why = "; ".join(filter(None, (why, advise(axis))))
+            why = "; ".join(filter(None, (why, REMEDIES[code], advise(axis))))
             problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
     return problems
 
@@ -158,24 +157,15 @@ def _expected_excess(certificate: Certificate, limit: float) -> tuple[FindingCod
     return None
 
 
-def _finer_table(line: LinePlan, written: str = "lengthen or widen {}") -> str:
-    """Return the advice for a table with smaller errors, one that is written or one that the build chooses."""
-    table = f"{line.axis}.table"
-    return written.format(table) if line.table_request is None else f"a lower {table}.max_error_lsb"
-
-
-def _remedy(line: LinePlan, parts: ScalingError) -> str:
-    axis = line.axis
+def cause_of(line: LinePlan, parts: ScalingError) -> str:
+    """Return the largest part of an error, as ``CAUSE_REMEDIES`` names it."""
     largest = max(parts.band_limit, parts.quantisation, parts.model)
-    if largest == parts.band_limit and line.kept_percent is not None:
-        return f"most of it is the band limit: a lower {axis}.band_limit.max_scaling_error_percent"
     if largest == parts.band_limit:
-        return f"most of it is the band limit: more {axis}.band_limit.harmonics, a narrower window or method = 'window'"
+        return "band limit"
     if largest == parts.model:
-        return "most of it is dynamics that max_boost_db leaves: fewer harmonics or a lower line rate"
-    if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits:  # a word of the table is more than a code
-        return f"most of it is quantisation: {_finer_table(line, 'more {}.bits')}"
-    return f"most of it is quantisation: more dac.bits, or an amplifier whose range fits the {axis} scan"
+        return "model"
+    # A word of the table is more than a code, or the converter is the coarser one.
+    return "table" if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits else "converter"
 
 
 def _certify(line: LinePlan) -> Certificate:

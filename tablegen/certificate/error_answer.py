@@ -11,11 +11,14 @@ from typing import Any, Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from tablegen.certificate.certificate import Certificate
+from tablegen.base.remedies import CAUSE_REMEDIES, REMEDIES, FindingCode
+from tablegen.certificate.certificate import Certificate, cause_of
+from tablegen.certificate.excess import excess
+from tablegen.certificate.expectation_checks import expectation_warnings
 from tablegen.certificate.expected import forward_residual
 from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.config.load import Setup
-from tablegen.config.schema import Refinement
+from tablegen.config.schema import Limits, Refinement
 from tablegen.device.schedule import Schedule
 from tablegen.planning.line_plan import LinePlan, Plan
 
@@ -28,12 +31,14 @@ Of = Literal["rms", "rms of one way, at least", "trace to retrace, rms", "trace 
 class ErrorAnswer(Struct, frozen=True):
     """The error of one axis in percent of the line, nm and pixels, where it is from, its limit and the next step.
 
-    ``percent``, ``nm`` and ``pixels`` are None where nothing is known of the piezo, and ``of`` is then empty.
+    ``code`` is that of the axis' most serious finding, and ``next_step`` the remedy of this. ``percent``, ``nm`` and
+    ``pixels`` are None where nothing is known of the piezo, and ``of`` is then empty.
     """
 
     axis: str
     basis: Basis
     source: str
+    code: FindingCode
     next_step: str
     of: Of | None = None
     percent: float | None = None
@@ -68,6 +73,7 @@ class ErrorAnswer(Struct, frozen=True):
             "pixels": self.pixels,
             "source": self.source,
             "limit": self.limit or None,
+            "code": self.code or None,
             "next": self.next_step or None,
             "text": str(self),
         }
@@ -80,10 +86,14 @@ def short(value: float) -> str:
 
 def error_answers(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[ErrorAnswer]:
     """Return the answer of each axis: measured before predicted, and predicted by traces before the laws alone."""
-    return [
-        _answer(line, plan.schedule, certificates[line.axis], getattr(setup.scan, line.axis).refinement)
-        for line in plan.lines
-    ]
+    answers = []
+    for line in plan.lines:
+        certificate = certificates[line.axis]
+        answer = _answer(line, plan.schedule, certificate, getattr(setup.scan, line.axis).refinement)
+        if fault := _fault(line, certificate, plan.limits):  # refine cannot learn what the scan itself spoils
+            answer = replace(answer, code=fault[0], next_step=fault[1])
+        answers.append(answer)
+    return answers
 
 
 def first_lines(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
@@ -91,9 +101,9 @@ def first_lines(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate
     return [*map(str, error_answers(setup, plan, certificates)), duration(plan.schedule)]
 
 
-def measured_answer(line: LinePlan, count: int, of: Of, percent: float, source: str, next_step: str) -> ErrorAnswer:
+def measured_answer(line: LinePlan, count: int, of: Of, percent: float, source: str, code: FindingCode) -> ErrorAnswer:
     """Return the answer of a measurement of the running scan, whose window has ``count`` pixels along the axis."""
-    return _with_figures(line, count, of, percent, basis="measured", source=source, next_step=next_step)
+    return _with_figures(line, count, of, percent, basis="measured", source=source, code=code)
 
 
 def pixel_count(line: LinePlan, schedule: Schedule) -> int:
@@ -132,41 +142,35 @@ def time_text(seconds: float) -> str:
 def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
     axis, expected, count = line.axis, certificate.expected, pixel_count(line, schedule)
     if line.drive.resting:
-        return ErrorAnswer(axis, "rests", f"rests at {line.drive.v_offset:.6g} V", "")
+        return ErrorAnswer(axis, "rests", f"rests at {line.drive.v_offset:.6g} V", "", "")
     if line.layer is not None:
         return _refined(line, count, certificate, refinement)
-    refine = "refine"
     if expected is not None and expected.basis == "traces" and expected.rms:
         figure = max(expected.rms.values(), key=lambda one: one.value)
         source = "predicted by the operator"
         if figure.uncertainty is not None:
             source += f" +- {short(figure.uncertainty)} % for {LEVEL_PERCENT} % of scans"
-        answer = _with_figures(line, count, "rms", figure.value, basis="predicted", source=source, next_step=refine)
+        answer = _with_figures(line, count, "rms", figure.value, basis="predicted", source=source)
         return _limited(answer, line, certificate)
     if not line.drive.hysteresis.compensates:
-        return ErrorAnswer(
-            axis,
-            "uncompensated",
-            "hysteresis is not corrected, typically some 10 % of the line",
-            f"take images or traces, then tablegen calibrate images --axis {axis} (or hysteresis)",
-        )
+        source = "hysteresis is not corrected, typically some 10 % of the line"
+        return _without_figures(axis, "uncompensated", source, "uncompensated-hysteresis")
     source = "laws of the scanner file alone"
     if expected is not None and expected.mismatch is not None:
         of: Of = "trace to retrace, at most"
-        return _with_figures(line, count, of, expected.mismatch.value, basis="laws", source=source, next_step=refine)
+        return _with_figures(line, count, of, expected.mismatch.value, basis="laws", source=source)
     if line.band_limit.directions == "forward" and (residual := forward_residual(line)) is not None:
         # What the laws do not describe comes on top, and no retrace shows it.
         one_way: Of = "rms of one way, at least"
-        return _with_figures(line, count, one_way, residual, basis="laws", source=source, next_step=refine)
+        return _with_figures(line, count, one_way, residual, basis="laws", source=source)
     why = "which have no branches for the stroke that is played, so the size of the error is unknown"
-    return ErrorAnswer(axis, "laws", f"{source}, {why}", refine)
+    return _without_figures(axis, "laws", f"{source}, {why}")
 
 
 def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: Refinement | None) -> ErrorAnswer:
     """Return the answer of an axis with a layer: what was measured when it was learnt."""
-    again = "refine"
     if refinement is None or refinement.before_percent is None:
-        return ErrorAnswer(line.axis, "laws", "refined, but its layer does not say what was measured", again)
+        return _without_figures(line.axis, "laws", "refined, but its layer does not say what was measured")
     of: Of = "trace to retrace, rms" if refinement.before_of == "mismatch" else "rms"
     # The best of the rounds has the measurement that was made while it was played itself.
     best = refinement.best is True
@@ -175,7 +179,7 @@ def _refined(line: LinePlan, count: int, certificate: Certificate, refinement: R
         source = "measured (refine) before the layer of the last round"
         if refinement.after_percent is not None:
             source += f", with which refine predicts {short(refinement.after_percent)} %"
-    answer = _with_figures(line, count, of, refinement.before_percent, basis="measured", source=source, next_step=again)
+    answer = _with_figures(line, count, of, refinement.before_percent, basis="measured", source=source)
     return _limited(answer, line, certificate, final=best)
 
 
@@ -183,20 +187,38 @@ def _limited(answer: ErrorAnswer, line: LinePlan, certificate: Certificate, fina
     """Add what limits the error: the converter where its codes make most of it, else the piezo."""
     assert answer.percent is not None
     if converter_percent(line, certificate) < _CONVERTER_SHARE * answer.percent:
-        step = "nothing: more rounds did not help" if final else answer.next_step
-        return _replaced(answer, "the piezo", step)
-    shaped = line.program.output.shaping.order > 0
-    step = "more dac.bits, or an amplifier whose range fits" if shaped else "shaping of the [dac]"
-    return _replaced(answer, "the converter", step)
+        code: FindingCode = "final-round" if final else answer.code
+        return replace(answer, limit="the piezo", code=code, next_step=REMEDIES[code])
+    return replace(answer, limit="the converter", code="converter-limit", next_step=REMEDIES["converter-limit"])
 
 
-def _replaced(answer: ErrorAnswer, limit: str, next_step: str) -> ErrorAnswer:
-    return replace(answer, limit=limit, next_step=next_step)
+def _fault(line: LinePlan, certificate: Certificate, limits: Limits) -> tuple[FindingCode, str] | None:
+    """Return the code and the remedy of the worst warning or broken limit of an axis; None where there is none."""
+    if certificate.largest_step > certificate.max_step:
+        return "step-guard", REMEDIES["step-guard"]
+    exceeded = excess(certificate.scaling) or excess(certificate.scaling, limits.max_scaling_error_percent)
+    if exceeded is not None:
+        return exceeded.code, CAUSE_REMEDIES[cause_of(line, exceeded.parts)]
+    if limits.max_error_lsb is not None and certificate.max_error_lsb > limits.max_error_lsb:
+        return "converter-error", REMEDIES["converter-error"]
+    warnings = expectation_warnings(line, certificate)
+    return (warnings[0].code, REMEDIES[warnings[0].code]) if warnings else None
 
 
 def _with_figures(
-    line: LinePlan, count: int, of: Of, percent: float, *, basis: Basis, source: str, next_step: str
+    line: LinePlan,
+    count: int,
+    of: Of,
+    percent: float,
+    *,
+    basis: Basis,
+    source: str,
+    code: FindingCode = "model-mismatch",
 ) -> ErrorAnswer:
     nm = 0.01 * percent * line.drive.size_nm
     pixels = nm * count / line.drive.window_nm
-    return ErrorAnswer(line.axis, basis, source, next_step, of, percent, nm, pixels)
+    return ErrorAnswer(line.axis, basis, source, code, REMEDIES[code], of, percent, nm, pixels)
+
+
+def _without_figures(axis: str, basis: Basis, source: str, code: FindingCode = "model-mismatch") -> ErrorAnswer:
+    return ErrorAnswer(axis, basis, source, code, REMEDIES[code])

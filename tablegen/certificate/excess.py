@@ -5,7 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from tablegen.base.warnings import FindingCode
+from tablegen.base.remedies import FindingCode
 from tablegen.certificate.line_errors import ScalingError
 
 LARGEST_PERCENT = 1.0  # the largest error without a warning

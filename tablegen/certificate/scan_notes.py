@@ -34,8 +34,7 @@ def shaped_travel(axis: str, shaped: Changes, rounded: Changes) -> list[Finding]
         return []
     text = (
         f"shaped codes of {axis} go to and fro, {100.0 * extra:.3g} % further in all than without shaping: a piezo "
-        "whose hysteresis follows every step then leaves its model, which no error of the position here contains. "
-        "`dac.shaping` of a lower order or a lower update_rate_hz make it less"
+        "whose hysteresis follows every step then leaves its model, which no error of the position here contains"
     )
     return [Finding("expect", 0.0, text, code="shaped-travel", axis=axis_name(axis))]
 
@@ -85,7 +84,7 @@ def note_findings(plan: Plan) -> list[Finding]:
             text = (
                 f"{beyond:.2g} % of the line of {line.axis}, rms, are harmonics of its position above "
                 f"{line.drive.response.highest_hz:.6g} Hz, where the response was not measured; they are taken to "
-                "have the gain measured there, and any phase. Measure the response further up"
+                "have the gain measured there, and any phase"
             )
             axis = axis_name(line.axis)
             findings.append(Finding("expect", beyond, text, code="unmeasured-response", axis=axis))

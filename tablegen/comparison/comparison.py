@@ -73,7 +73,7 @@ class SideBySide:
     @property
     def notes(self) -> list[str]:
         """The sentences of the findings."""
-        return [one.text for one in self.findings]
+        return [one.full_text for one in self.findings]
 
     @property
     def verdict(self) -> str:

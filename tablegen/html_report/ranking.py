@@ -22,7 +22,7 @@ def ranked(subject: Subject) -> list[Finding]:
 def _findings(subject: Subject) -> Iterator[Finding]:
     for state in subject.files:
         if state.wrong:
-            yield Finding("limit", 1000.0, f"{state.name} {state.wrong}; build it again", code="changed-file")
+            yield Finding("limit", 1000.0, f"{state.name} {state.wrong}", code="changed-file")
     yield from _verified(subject.verified, subject)
     planned, reported = subject.planned, set[tuple[str, str]]()
     groups: list[list[Finding]] = [[finding for axis, entry in subject.axes for finding in _expected(axis, entry)]]

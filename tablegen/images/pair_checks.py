@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.base.remedies import REMEDIES
 from tablegen.images.missing import valid_pixels
 from tablegen.numerics.arrays import Floats, Ints
 
@@ -143,7 +144,7 @@ def check_periods(periods: float, span: float, columns: int) -> None:
         If they are too few to fit.
     """
     if periods * span > MAX_PERIODS_PER_COLUMN * columns:
-        raise FinePeriods(f"{periods:.3g} periods in {columns} columns are too fine; scan less, or take more pixels")
+        raise FinePeriods(f"{periods:.3g} periods in {columns} columns are too fine; {REMEDIES['few-pixels']}")
     if periods < MIN_PERIODS - 0.2:
         raise Unphysical(
             f"the line has about {periods:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them"

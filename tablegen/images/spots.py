@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.base.remedies import REMEDIES
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.images.pair_checks import MAX_PERIODS_PER_COLUMN, MIN_PERIODS, FinePeriods
 from tablegen.images.periodic_model import Geometry
@@ -86,7 +87,7 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
     s = row + (0.5 * float(peak[0] - peak[2]) / bend if bend < 0.0 else 0.0)
     q = column / span
     if q * (geometry.window[1] - geometry.window[0]) > MAX_PERIODS_PER_COLUMN * geometry.columns:
-        raise FinePeriods(f"{q:.3g} periods in {geometry.columns} columns are too fine; scan less, or take more pixels")
+        raise FinePeriods(f"{q:.3g} periods in {geometry.columns} columns are too fine; {REMEDIES['few-pixels']}")
     if q < MIN_PERIODS - 0.5:
         raise Unphysical(f"the line has about {q:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
     return Spot(q, s - count if s > count / 2 else s, sharpest)

@@ -214,11 +214,10 @@ def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
     return [
         spoils(
             f"the line of x is {nm:.5g} nm where the scan file asks for {requested:.5g} nm "
-            f"({100.0 * (nm / requested - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
-            f"corrects it at every size, or ask for {requested * requested / nm:.5g} nm to have {requested:.5g} nm "
-            f"here",
+            f"({100.0 * (nm / requested - 1.0):+.2f} %); sizes are not learnt; "
+            f"{requested * requested / nm:.5g} nm in the scan file give {requested:.5g} nm here",
             100.0 * abs(nm / requested - 1.0),
-            code="size-error",
+            code="measured-size-error",
         )
     ]
 
@@ -228,16 +227,14 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate)
     if line.axis == "y" and len(frames) == 1:
         texts.append(
             spoils(
-                "a drift that becomes faster or slower counts as an error of y; give two consecutive frames, "
-                "which separate the two",
+                "a drift that becomes faster or slower counts as an error of y",
                 code="uneven-drift",
             )
         )
     if line.axis == "y" and line.band_limit.directions == "both":
         texts.append(
             Remark(
-                "y was learnt on its way up, which these images show; its way down stays as it was. For both take a "
-                "trace of a sensor, or scan with frame = 'flyback', whose images all go up",
+                "y was learnt on its way up, which these images show; its way down stays as it was",
                 code="way-up-only",
             )
         )
@@ -259,7 +256,7 @@ def _remarks_of(frame: LatticeLine) -> list[Remark]:
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
         remarks.append(
             Remark(
-                f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels",
+                f"the shortest period has {geometry.columns / span:.2g} pixels",
                 code="few-pixels",
             )
         )
@@ -267,7 +264,7 @@ def _remarks_of(frame: LatticeLine) -> list[Remark]:
         remarks.append(
             spoils(
                 f"trace and retrace are {frame.start.mismatch:.2g} periods apart, and beyond half a period they would "
-                f"be taken for the next one; calibrate first, or take a sample of a longer period",
+                f"be taken for the next one",
                 code="period-slip",
             )
         )
@@ -355,14 +352,12 @@ def _learning_remarks(update: LayerUpdate) -> list[Remark]:
     if update.harmonics == 0:
         remarks.append(
             Remark(
-                "the error is within the noise of the images: there is nothing more to learn from them",
+                "the error is within the noise of the images",
                 code="noise-limit",
             )
         )
     elif mostly_noise(update):
-        remarks.append(
-            Remark("most of the remaining error is noise: give several frames, or stop refining", code="noise-limit")
-        )
+        remarks.append(Remark("most of the remaining error is noise", code="noise-limit"))
     return [
         *remarks,
         Remark("images do not show that the build of this scan file was running", code="unverified-build"),

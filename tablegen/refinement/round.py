@@ -8,7 +8,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.base.warnings import FindingCode, Remark, spoils
+from tablegen.base.remedies import FindingCode
+from tablegen.base.warnings import Remark, spoils
 from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.spans import check_spans
 from tablegen.certificate.line_errors import CHORD
@@ -279,9 +280,9 @@ def _remarks(
         remarks.append(
             spoils(
                 f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
-                f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining",
+                f"({100.0 * by:+.2f} %); sizes are not learnt",
                 100.0 * abs(by),
-                code="size-error",
+                code="measured-size-error",
             )
         )
     if update.before.size_nm < 0.0:
@@ -297,14 +298,12 @@ def _remarks(
     if update.harmonics == 0:
         remarks.append(
             Remark(
-                "the error is within the noise of the sensor: there is nothing more to learn from this trace",
+                "the error is within the noise of the sensor",
                 code="noise-limit",
             )
         )
     elif mostly_noise(update):
-        remarks.append(
-            Remark("most of the remaining error is noise: record more periods, or stop refining", code="noise-limit")
-        )
+        remarks.append(Remark("most of the remaining error is noise", code="noise-limit"))
     if measured.correlated > 3.0:
         remarks.append(
             Remark(
@@ -315,7 +314,7 @@ def _remarks(
             )
         )
     if measured.periods < 1.99:
-        remarks.append(Remark("drift cannot be determined from a single period; record several", code="few-periods"))
+        remarks.append(Remark("drift cannot be determined from a single period", code="few-periods"))
     if phase.drive is None:
         remarks.append(
             Remark("without drive_v it is not checked that the trace belongs to this build", code="unverified-build")

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tablegen.base.data_files import Source
+from tablegen.base.remedies import FindingCode
 from tablegen.base.warnings import of_remarks, worst_first
 from tablegen.certificate.error_answer import ErrorAnswer, Of, measured_answer
 from tablegen.config.frame import lines_inside
@@ -42,19 +43,19 @@ def refine_text(result: Round, name: str, sources: Sequence[Source]) -> list[str
 
 def round_answer(result: Round) -> ErrorAnswer:
     """Return the error of the axis that the measurement of a round shows, and the next step."""
-    step = "build, upload, record again"
+    code: FindingCode = "learnt-round"
     if result.worse:
-        step = "find out why it grew; do not use this round"
+        code = "worse-round"
     elif result.stopped:
-        step = "build and upload with the best layer" if result.best is not None else "remove the layer"
+        code = "stopped-round" if result.best is not None else "useless-layer"
     elif not result.update.harmonics:
-        step = "nothing: only noise is left"
+        code = "noise-limit"
     scan = result.setup.scan
     limit, line_count = scan.y.band_limit, scan.timing.lines
     rows = lines_inside(scan.y.turn, limit.window, limit.directions == "both", line_count)[0][1]
     of: Of = "trace to retrace, rms" if isinstance(result, MismatchRound) else "rms"
     count = scan.timing.pixels if result.line.axis == "x" else max(rows, 1)
-    return measured_answer(result.line, count, of, result.update.before.rms_percent, "measured (refine)", step)
+    return measured_answer(result.line, count, of, result.update.before.rms_percent, "measured (refine)", code)
 
 
 def _what(result: Round, sources: Sequence[Source]) -> str:

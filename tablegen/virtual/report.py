@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.base.warnings import Finding, worst_first
+from tablegen.base.remedies import FindingCode
+from tablegen.base.warnings import Finding, Weight, axis_name, worst_first
+from tablegen.compensation.models import UNCOMPENSATED
 from tablegen.virtual.line_error import BranchError, ideal_triangle
 from tablegen.virtual.parameters import Truth
 from tablegen.virtual.simulation import AxisRun, Run
@@ -64,10 +66,14 @@ def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
             side = max(residuals, key=lambda name: residuals[name])
             error = f"the {run.model} model leaves {residuals[side]:.2g} % of the line of {one.axis}, {side}, at most"
             text = f"on this virtual scanner {error}"
-            findings.append(Finding("spoils" if residuals[side] > _LARGE_PERCENT else "expect", residuals[side], text))
+            weight: Weight = "spoils" if residuals[side] > _LARGE_PERCENT else "expect"
+            code: FindingCode = "uncompensated-hysteresis" if run.model == UNCOMPENSATED else "model-mismatch"
+            findings.append(Finding(weight, residuals[side], text, code=code, axis=axis_name(one.axis)))
             by = one.size_error_percent
             if abs(by) > _LARGE_PERCENT:
-                findings.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
+                text = f"the image is {by:+.2g} % off in the size of {one.axis}"
+                code = "measured-size-error"
+                findings.append(Finding("spoils", abs(by), text, code=code, axis=axis_name(one.axis)))
     return worst_first(findings)
 
 

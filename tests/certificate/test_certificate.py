@@ -7,6 +7,7 @@ import pytest
 from replacing import replace
 from variants import plan_of, setup_of
 
+from tablegen.base.remedies import CAUSE_REMEDIES, REMEDIES
 from tablegen.certificate.certificate import broken_limits, certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.compensation.hysteresis import BranchShape
@@ -197,15 +198,15 @@ def test_a_line_that_touches_its_own_guard_is_refused(tmp_path: Path) -> None:
     problems = broken_limits(tight, certify(tight), setup.scan_file)
     assert [(one.code, one.axis) for one in problems] == [("step-guard", "x")]
     text = list(map(str, problems))
-    assert "amplifier.max_slew_v_per_s: the x axis steps by 24 codes, above its guard of 20" in text[0]
+    assert "amplifier.max_slew_v_per_s: the x axis steps by 24 codes, above its guard of 20; a lower" in text[0]
 
 
 def test_a_coarse_table_is_told_from_a_coarse_converter(tmp_path: Path) -> None:
-    for edits, remedy in (({"x.table.bits": "8"}, "more x.table.bits"), ({"dac.bits": "12"}, "more dac.bits, or an")):
+    for edits, cause in (({"x.table.bits": "8"}, "table"), ({"dac.bits": "12"}, "converter")):
         setup = setup_of(tmp_path, {**edits, "limits.max_error_lsb": ""})
         plan = make_plan(setup)
         text = str(broken_limits(plan, certify(plan), setup.scan_file)[0])
-        assert f"most of it is quantisation: {remedy}" in text
+        assert f"most of it is the {cause}: {CAUSE_REMEDIES[cause]}" in text
 
 
 def test_broken_limits_name_the_part_and_the_remedy(tmp_path: Path) -> None:
@@ -215,6 +216,6 @@ def test_broken_limits_name_the_part_and_the_remedy(tmp_path: Path) -> None:
     problems = broken_limits(plan, certify(plan), setup.scan_file)
     assert [(one.code, one.axis) for one in problems] == [("scaling-error", "x"), ("converter-error", "y")]
     text = list(map(str, problems))
-    assert "limits.max_error_lsb: the y axis errs by up to 0.7406 LSB, above 0.7; lengthen or widen y.table" in text[1]
+    assert text[1].endswith(f"the y axis errs by up to 0.7406 LSB, above 0.7; {REMEDIES['converter-error']}")
     assert "limits.max_scaling_error_percent: the x axis has a scaling error of " in text[0]
-    assert "above 0.5 %; most of it is the band limit: more x.band_limit.harmonics" in text[0]
+    assert f"above 0.5 %; most of it is the band limit: {CAUSE_REMEDIES['band limit']}" in text[0]

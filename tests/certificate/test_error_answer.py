@@ -11,6 +11,7 @@ from editing import run
 from msgspec.structs import replace
 
 import tablegen
+from tablegen.base.remedies import REMEDIES
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.error_answer import (
     converter_percent,
@@ -116,7 +117,7 @@ def test_a_measurement_goes_before_a_prediction(built: tablegen.Build) -> None:
 def test_the_converter_limits_what_is_small(built: tablegen.Build) -> None:
     own = converter_percent(built.plan.x, built.certificates["x"])
     small, large = (answer(built, layer=True, refinement=learnt(before_percent=own * by)) for by in (1.5, 3.0))
-    assert (small.limit, small.next_step) == ("the converter", "shaping of the [dac]")
+    assert (small.limit, small.next_step) == ("the converter", REMEDIES["converter-limit"])
     assert large.limit == "the piezo"
 
 
@@ -154,6 +155,7 @@ def test_json_has_the_first_lines_as_data(built: tablegen.Build) -> None:
     assert plain["duration"] == built.duration
     x, own = plain["answers"]["x"], built.answers[0]
     assert (x["basis"], x["of"], x["source"], x["next"]) == (own.basis, own.of, own.source, own.next_step)
+    assert (x["code"], x["next"]) == ("model-mismatch", REMEDIES["model-mismatch"])
     assert (x["percent"], x["nm"], x["pixels"]) == (own.percent, own.nm, own.pixels)
 
 

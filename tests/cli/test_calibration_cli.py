@@ -295,7 +295,7 @@ def test_an_outlier_is_named_by_its_line(lab: Path) -> None:
     path = write_csv(lab / "size.csv", drive_v=DRIVES, actual_nm=sizes)
     path.write_text("# Monday\n" + path.read_text("utf-8"), "utf-8")
     outcome = run("calibrate", "size", "--axis", "x", "size.csv", "--v-max", "100")
-    assert "outlier: size.csv:6: far from the other points, but used." in outcome.out
+    assert "outlier: size.csv:6: far from the other points, but used; next: " in outcome.out
 
 
 @pytest.mark.parametrize(
@@ -475,7 +475,7 @@ def test_traces_at_several_offsets_make_points_of_each(lab: Path) -> None:
     outcome = run(*command, "--points", "--write")
     assert (outcome.status, outcome.err) == (0, "")
     assert "offset [V]" in outcome.out
-    assert "(22) is one for the offsets of 50, 72 V; --points writes them by offset" in outcome.out
+    assert "(22) is one for the offsets of 50, 72 V; next: `--points` writes them by offset" in outcome.out
     (branch,) = tomllib.loads((lab / "scanner.toml").read_text("utf-8"))["x"]["hysteresis"]["branches"]
     points = branch["forward"]["points"]
     assert [point["offset_v"] for point in points] == pytest.approx([50.0] * len(TRACES) + [72.0], abs=0.1)
@@ -551,4 +551,4 @@ def test_remarks_have_codes_in_json(lab: Path) -> None:
     data = json.loads(calibrate("offset", "--json").out)
     assert {one["code"] for one in data["findings"]} >= {"few-points", "extrapolated-parameter"}
     assert {one["text"] for one in data["findings"]} >= set(data["remarks"]) > set()
-    assert all(set(one) == {"code", "axis", "text"} and one["code"] for one in data["findings"])
+    assert all(set(one) == {"code", "axis", "text", "remedy"} and one["code"] for one in data["findings"])

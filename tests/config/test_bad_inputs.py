@@ -1285,8 +1285,9 @@ TIMING = [
         "x.band_limit.window = [0.001, 0.999]",
         says=(
             "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 132.5 %, above "
-            "0.5 %; most of it is the band limit: more x.band_limit.harmonics, a narrower window or method = "
-            "'window'; no remedy that was tried is enough; the best: x.band_limit.window = [0.2, 0.8] leaves 12.3 %"
+            "0.5 %; most of it is the band limit: more `harmonics` or a lower `max_scaling_error_percent`; "
+            'a narrower `window` or `method = "window"`; no remedy that was tried is enough; the best: '
+            "x.band_limit.window = [0.2, 0.8] leaves 12.3 %"
         ),
         status=3,
     ),
@@ -1296,8 +1297,8 @@ LIMITS = [
     case(
         "limits.max_error_lsb = 0.6",
         says=(
-            "scan.toml:55: limits.max_error_lsb: the y axis errs by up to 0.7406 LSB, above 0.6; lengthen or "
-            "widen y.table"
+            "scan.toml:55: limits.max_error_lsb: the y axis errs by up to 0.7406 LSB, above 0.6; a longer "
+            "or wider table, or a lower `max_error_lsb` of the table"
         ),
         status=3,
     ),
@@ -1306,13 +1307,13 @@ LIMITS = [
         says=[
             (
                 "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 0.3104 %, above "
-                "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the x scan; "
+                "0.3 %; most of it is the converter: more `dac.bits`, or an amplifier whose range fits; "
                 "tried: amplifier.gain = 8.7 with amplifier.bias_v = 49.99 leaves 0.282 %; or dac.bits = 17 leaves "
                 "0.18 %"
             ),
             (
                 "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3498 %, above "
-                "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan; "
+                "0.3 %; most of it is the converter: more `dac.bits`, or an amplifier whose range fits; "
                 "tried: amplifier.gain = 7.7 with amplifier.bias_v = 49.99 leaves 0.283 %; or dac.bits = 17 leaves "
                 "0.2 %"
             ),
@@ -1323,8 +1324,8 @@ LIMITS = [
         "x.band_limit.method = 'truncate'",
         says=(
             "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 11.74 %, above "
-            "0.5 %; most of it is the band limit: more x.band_limit.harmonics, a narrower window or method = "
-            "'window'; tried: x.band_limit.method = \"window\" leaves 0.31 %"
+            "0.5 %; most of it is the band limit: more `harmonics` or a lower `max_scaling_error_percent`; "
+            'a narrower `window` or `method = "window"`; tried: x.band_limit.method = "window" leaves 0.31 %'
         ),
         status=3,
     ),
@@ -1334,7 +1335,7 @@ LIMITS = [
         "limits.max_scaling_error_percent = 0.34",
         says=(
             "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3436 %, above "
-            "0.34 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan; tried: "
+            "0.34 %; most of it is the converter: more `dac.bits`, or an amplifier whose range fits; tried: "
             "amplifier.gain = 8.9 with amplifier.bias_v = 49.99 leaves 0.315 %; or dac.bits = 17 leaves 0.204 %"
         ),
         status=3,

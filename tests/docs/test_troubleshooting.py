@@ -8,7 +8,7 @@ import pytest
 from building import REPOSITORY
 from click.testing import CliRunner
 
-from tablegen.base.warnings import FindingCode
+from tablegen.base.remedies import IN_TEXT, REMEDIES, FindingCode
 from tablegen.cli import cli
 from tablegen.cli.shared.exit_status import ExitStatus
 
@@ -53,8 +53,34 @@ def test_the_codes_of_findings_are_those_of_the_program() -> None:
     table = PAGE[PAGE.index("### Codes of findings") : PAGE.index("## Messages of calibrate")]
     codes = [code for code in get_args(FindingCode) if code]
     assert re.findall(r"^\| `([a-z-]+)` \|", table, re.MULTILINE) == sorted(codes) == codes
-    users = "\n".join(text for path, text in SOURCES.items() if path.name != "warnings.py")
+    users = "\n".join(text for path, text in SOURCES.items() if path.name != "remedies.py")
     assert [code for code in codes if f'"{code}"' not in users] == []
+
+
+def test_the_remedies_of_the_page_are_those_of_the_program() -> None:
+    """Each code has a remedy, and the table has the same, at most with a link to its page."""
+    table = PAGE[PAGE.index("### Codes of findings") : PAGE.index("## Messages of calibrate")]
+    rows = dict(re.findall(r"^\| `([a-z-]+)` \| .* \| ([^|]+) \|$", table, re.MULTILINE))
+    plain = {
+        code: re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", re.sub(r": \[[^]]*\]\([^)]*\)$", "", rows[code])) for code in rows
+    }
+    assert plain == {code: remedy or "none is needed" for code, remedy in REMEDIES.items()}
+    assert set(REMEDIES) == set(get_args(FindingCode)) - {""}
+    assert [code for code, remedy in REMEDIES.items() if not remedy] == ["imaged-pixels", "standard-errors"]
+
+
+def test_no_other_module_states_a_remedy() -> None:
+    """A remedy that is appended stands in the list alone, not in a text of the program as well."""
+    sources = {path: joined(text) for path, text in SOURCES.items() if path.name != "remedies.py"}
+    appended = [one for code, one in REMEDIES.items() if code not in IN_TEXT and len(one.split()) > 2]
+    copies = [
+        (path.name, one)
+        for one in appended
+        for path, text in sources.items()
+        if re.search(re.escape(one) + r"['\"]", text)
+    ]
+    assert len(appended) > 20
+    assert copies == []
 
 
 def test_every_remark_of_a_measurement_has_a_code() -> None:

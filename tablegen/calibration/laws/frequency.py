@@ -82,9 +82,7 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
         raise Unphysical(f"alpha = {alpha.value:.3g} is not a loss of a few percent per decade; are these gains?")
     expected = solution.values[1] * scale * (1.0 - raw * decades)
     if solution.freedom == 0:
-        remarks.append(
-            Remark("two points fit exactly, so errors cannot be estimated; measure more frequencies", code="few-points")
-        )
+        remarks.append(Remark("two points fit exactly, so errors cannot be estimated", code="few-points"))
     if "alpha" in solution.undetermined:
         remarks.append(
             spoils(

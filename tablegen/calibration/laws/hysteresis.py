@@ -148,7 +148,7 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
             listed = ", ".join(f"{volts:g}" for volts in sorted(set(offsets)))
             remarks.append(
                 Remark(
-                    f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset",
+                    f"turn {turn:.4g}: (22) is one for the offsets of {listed} V",
                     code="mixed-offsets",
                 )
             )
@@ -194,7 +194,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         remarks.append(
             spoils(
                 f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
-                "the fit assumes a triangle; `calibrate operator` takes any record",
+                "the fit assumes a triangle",
                 100.0 * fit.triangle.departure,
                 code="drive-shape",
             )

@@ -223,7 +223,7 @@ def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
         / float(np.max(np.abs(line.waves[:, 0])))
     )
     if finest < _MIN_PIXELS_PER_PERIOD:
-        remarks.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels", code="few-pixels"))
+        remarks.append(Remark(f"a period has {finest:.2g} pixels", code="few-pixels"))
     if line.strays:
         numbers = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
         remarks.append(

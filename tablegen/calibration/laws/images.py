@@ -74,7 +74,7 @@ def fit_images(
     if len(set(volts)) < len(volts):
         remarks.append(
             spoils(
-                "some pairs have the same voltage; the piezo voltage peak to peak of each is needed",
+                "some pairs have the same voltage",
                 code="pair-voltages",
             )
         )
@@ -113,7 +113,7 @@ def _remarks(fit: ImageFit) -> list[Remark]:
     if fit.pixels_a_period < _MIN_PIXELS_PER_PERIOD:
         remarks.append(
             Remark(
-                f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels",
+                f"the shortest period has {fit.pixels_a_period:.2g} pixels",
                 code="few-pixels",
             )
         )

@@ -147,14 +147,14 @@ def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[Remark]:
     if solution.freedom == 0 and solution.absolute_errors:
         remarks.append(
             Remark(
-                "three points fit exactly: errors are those of the images alone; measure at two more offsets",
+                "three points fit exactly: errors are those of the images alone",
                 code="few-points",
             )
         )
     elif solution.freedom == 0:
         remarks.append(
             Remark(
-                "three points fit exactly, so errors cannot be estimated; measure at two more offsets",
+                "three points fit exactly, so errors cannot be estimated",
                 code="few-points",
             )
         )

@@ -250,14 +250,14 @@ def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actu
     if solution.absolute_errors and len(solution.residuals) == len(solution.names):
         remarks.append(
             Remark(
-                "as many sizes as parameters: errors are those of the images alone; measure more sizes",
+                "as many sizes as parameters: errors are those of the images alone",
                 code="few-points",
             )
         )
     elif solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
         remarks.append(
             Remark(
-                "as many points as parameters fit exactly, so errors cannot be estimated; measure more points",
+                "as many points as parameters fit exactly, so errors cannot be estimated",
                 code="few-points",
             )
         )
