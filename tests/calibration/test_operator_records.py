@@ -101,6 +101,23 @@ def test_several_records_are_better_than_one() -> None:
     assert [one.record.name for one in both.errors] == ["record.csv", "other.csv"]
 
 
+@pytest.mark.common
+def test_the_misfit_is_what_is_left_beyond_noise() -> None:
+    """Of plays there is hardly any, of another family some; noise is none of it, though it is most of the rms."""
+    for core, low, high in ((PLAYS, 0.0, 0.12), (BoucWen(), 0.25, 0.6)):
+        fits = []
+        for noise in (0.0005, 0.003):
+            u = random_triangle(3)
+            time = np.linspace(0.0, SECONDS, len(u))
+            fits.append(fitted(Trace("a.csv", time, V_MAX * u, recorded(core, u, time, noise))))
+        quiet, loud = (fit.operator.misfit_percent for fit in fits)
+        assert quiet is not None
+        assert loud is not None
+        assert low < quiet < high
+        assert loud < quiet + 0.12
+        assert fits[1].errors[0].rms > quiet + 0.12 if core is PLAYS else fits[1].errors[0].rms > 0.4
+
+
 def test_gaps_and_uneven_times_are_no_matter() -> None:
     whole = trace(random_triangle(3))
     random = np.random.default_rng(2)

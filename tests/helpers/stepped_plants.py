@@ -12,6 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from foreign_plants import BIAS, CREEP_PER_DECADE, V_MAX, ForeignPlant, ManyPlays, OneState
 
+from tablegen.virtual.duhem import Duhem, Lags
+from tablegen.virtual.preisach import Preisach, TurningPoints
+
 Floats = npt.NDArray[np.float64]
 Play = Callable[[list[Floats]], list[Floats]]  # nm of drives one after the other, from rest at 0 on
 
@@ -60,6 +63,27 @@ def one_state_played(core: OneState) -> Play:
         return out
 
     return play
+
+
+def virtual_played(core: Preisach | Duhem) -> Play:
+    """A core of a virtual scanner, of drives that leave 0..1 by no more than a rounding."""
+
+    def play(parts: list[Floats]) -> list[Floats]:
+        out, memory = [], None
+        for u in parts:
+            moved, memory = step(np.clip(u, 0.0, 1.0), memory)
+            out.append(moved)
+        return out
+
+    step: Callable[[Floats, TurningPoints | Lags | None], tuple[Floats, TurningPoints | Lags]] = core.play  # type: ignore[assignment]
+    return play
+
+
+def play_of(core: ManyPlays | OneState | Preisach | Duhem) -> Play:
+    """The player of a core."""
+    if isinstance(core, ManyPlays):
+        return plays_played(core)
+    return one_state_played(core) if isinstance(core, OneState) else virtual_played(core)
 
 
 @dataclass(frozen=True)
@@ -128,10 +152,11 @@ def random_triangle(seed: int, sweeps: int = 24, samples: int = 40) -> Floats:
     return np.concatenate([np.linspace(a, b, samples, endpoint=False) for a, b in pairwise(turns)])
 
 
-def recorded(core: ManyPlays | OneState, u: Floats, time_s: Floats, noise: float = 0.001, seed: int = 1) -> Floats:
+def recorded(
+    core: ManyPlays | OneState | Preisach | Duhem, u: Floats, time_s: Floats, noise: float = 0.001, seed: int = 1
+) -> Floats:
     """Noisy nm of a foreign piezo that has been up to 1 and back, now at rest at 0, with creep of 2.6 % a decade."""
-    play = plays_played(core) if isinstance(core, ManyPlays) else one_state_played(core)
-    played = play([_EARLIER, u])[1]
+    played = play_of(core)([_EARLIER, u])[1]
     state, late = np.full(len(_TERMS_S), played[0]), np.empty(len(u))
     late[0] = float(np.sum(state))
     for k in range(1, len(u)):
@@ -141,6 +166,13 @@ def recorded(core: ManyPlays | OneState, u: Floats, time_s: Floats, noise: float
     moved = played + CREEP_PER_DECADE / 3.0 * late
     random = np.random.default_rng(seed).standard_normal(len(u))
     return np.asarray(moved + noise * float(np.ptp(moved)) * random)
+
+
+def settled(core: ManyPlays | OneState | Preisach | Duhem, u: Floats, rate_hz: float) -> Floats:
+    """nm of one period that has lasted for ever, of the same piezo."""
+    f_hz = rate_hz * np.arange(len(u) // 2 + 1)
+    late = sum(CREEP_PER_DECADE / 3.0 / (1.0 + 2j * np.pi * f_hz * tau_s) for tau_s in _TERMS_S)
+    return np.fft.irfft(np.fft.rfft(core.settled(np.clip(u, 0.0, 1.0))) * (1.0 + late), len(u))
 
 
 def scan_through_steps(

@@ -61,6 +61,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
         v_max=Driver.of(driver).v_max,
         v_min=Driver.of(driver).v_min,
         centre=operator.centre,
+        misfit_percent=operator.misfit_percent,
         creep=CreepTable(
             loss_per_decade=creep.loss_per_decade,
             fastest_s=creep.fastest_s,

@@ -420,7 +420,8 @@ def _assembled(
             for line in lines
         ]
     )
-    operator = replace(bare, size=through(points, sizes[:, None], _LENGTHS))
+    misfit = max(_misfit(problem, i, whole, one) for i, one in enumerate(errors))
+    operator = replace(bare, size=through(points, sizes[:, None], _LENGTHS), misfit_percent=misfit)
     gain = 1.0 - float(np.sqrt(max(free.cost, 0.0) / whole.cost)) if whole.cost > 0.0 else 0.0
     delay = (
         Estimate(whole.delay_s, _DELAY_STEP * problem.period_s * _SHARPEST) if fits_delay else Estimate(whole.delay_s)
@@ -441,6 +442,19 @@ def _assembled(
         int(sum(np.sum(use) for use in problem.whole)),
         int(np.count_nonzero(whole.weights)),
     )
+
+
+def _misfit(problem: _Problem, i: int, whole: _Solution, errors: RecordErrors) -> float:
+    """Return what the fit of a record, or the prediction of its last part, leaves beyond noise, percent of its stroke.
+
+    The noise is that of neighbouring samples. What of it the weights follow is a part of the misfit.
+    """
+    measured, fitted = problem.displacement(i, whole)
+    error = (measured - fitted)[problem.whole[i]]
+    # The second differences of white noise have six times its variance.
+    noise = float(np.mean(np.diff(error, 2) ** 2)) / 6.0 * (100.0 / problem.spans_nm[i]) ** 2
+    followed = noise * np.count_nonzero(whole.weights) / sum(np.sum(use) for use in problem.whole)
+    return float(np.sqrt(max(max(errors.rms, errors.predicted_rms) ** 2 - noise, 0.0) + followed))
 
 
 def _creep_of(problem: _Problem, loss: float) -> LogarithmicCreep:

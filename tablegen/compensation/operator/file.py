@@ -118,6 +118,7 @@ class OperatorFile(_Table, frozen=True, kw_only=True):
     bouc_wen: BoucWenTable
     lengths: LengthsTable
     response: ResponseTable | None = None
+    misfit_percent: Annotated[float, Meta(ge=0.0, le=1e3)] | None = None
     lines: Annotated[list[LineTable], Meta(min_length=1, max_length=1000)]
 
 
@@ -205,7 +206,7 @@ def _operator(file: OperatorFile) -> Operator:
     sweep = None
     if file.response is not None:
         sweep = SweepLoss(file.response.loss_deg / 360.0, creep if file.response.creep else None)
-    return Operator(family, residual, size, creep, file.centre, lines, bias_memory, sweep)
+    return Operator(family, residual, size, creep, file.centre, lines, bias_memory, sweep, file.misfit_percent)
 
 
 def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
@@ -218,7 +219,10 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
     out.append(f"v_max = {float(file.v_max)!r}")
     if file.v_min != 0.0:
         out.append(f"v_min = {float(file.v_min)!r}")
-    out += [f"centre = {_float(file.centre)}", "", "[creep]"]
+    out.append(f"centre = {_float(file.centre)}")
+    if file.misfit_percent is not None:
+        out.append(f"misfit_percent = {_float(file.misfit_percent)}")
+    out += ["", "[creep]"]
     out += [f"{name} = {_float(getattr(file.creep, name))}" for name in file.creep.__struct_fields__]
     if file.bias_memory is not None:
         out += ["", "[bias_memory]"]

@@ -30,7 +30,8 @@ class Operator:
     ``residual`` has rows of 2 K + 2 Chebyshev coefficients, those of the rising branch first: measured less family, of
     positions from 0 to 1. ``size`` has one column: the measured extent over ``expected_extent``, less 1. ``centre`` is
     the one at which most lines were measured, of v_max. ``bias_memory`` is None where it was not measured; ``sweep`` is
-    what the axis' measured response contains of hysteresis and creep.
+    what the axis' measured response contains of hysteresis and creep. ``misfit_percent`` is what the fit to records in
+    time leaves beyond the noise, of their widest stroke; None where settled lines were fitted.
     """
 
     family: Family
@@ -41,6 +42,7 @@ class Operator:
     lines: tuple[MeasuredLine, ...]
     bias_memory: BiasMemory | None = None
     sweep: SweepLoss | None = None
+    misfit_percent: float | None = None
 
     def dynamics(self, response: Response | None) -> Response | None:
         """Return the dynamics behind the operator: a measured response without what the operator has itself."""

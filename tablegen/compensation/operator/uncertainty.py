@@ -24,6 +24,7 @@ from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.field import SAME_CENTRE, Lengths, covariance
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.record_uncertainty import possible_record_errors
 from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.linear import Cholesky
@@ -231,6 +232,9 @@ def _possible_errors_of(operator: Operator) -> PossibleErrors:
 
 def possible_errors(operator: Operator, stroke: float, centre: float) -> Figures:
     """Return by how much rms, scaling error, mismatch and size may be off at a stroke and a centre, in percent."""
+    if operator.misfit_percent is not None:
+        units = loop_shape(operator, stroke, centre).units
+        return possible_record_errors(operator.family, operator.lines, operator.misfit_percent, (stroke, centre), units)
     return _possible_errors_of(operator).at(stroke, centre, loop_shape(operator, stroke, centre)).together
 
 
