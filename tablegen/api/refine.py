@@ -79,7 +79,8 @@ def refine(
     Raises
     ------
     Rejected
-        A file is wrong, or a column is missing.
+        A file is wrong, a column is missing, or images do not show which periods of trace and retrace belong together;
+        where their delay is known, ``delay_pixels`` decides, 0 if they are not late.
     Unphysical
         The measurement is not of this scan.
 
