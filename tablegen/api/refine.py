@@ -79,7 +79,8 @@ def refine(
     Raises
     ------
     Rejected
-        A file is wrong, or a column is missing.
+        A file is wrong, a column is missing, or images do not show which periods of trace and retrace belong together;
+        where their delay is known, ``delay_pixels`` decides, 0 if they are not late.
     Unphysical
         The measurement is not of this scan.
 
@@ -139,13 +140,18 @@ def _of_images(
         raise TypeError("mismatch is for a sample without a period; it has no constant")
     pairs = [read_trace_and_retrace(pair[0], pair[1] if pair[1:] else None, how) for pair in images]
     heights = [(one.heights, other.heights) for one, other in pairs]
-    stored = ImageOptions(bool(how.get("retrace_mirrored", False)), float(how.get("delay_pixels", 0.0)))
+    delay = how.get("delay_pixels")
+    stored = ImageOptions(bool(how.get("retrace_mirrored", False)), None if delay is None else float(delay))
     sources = tuple(image.source for pair in pairs for image in pair)
     result: Round
     if mismatch:
         result = refine_mismatch(setup, axis, heights, options, stored)
     else:
-        result = refine_images(setup, axis, heights, options, stored, sample_of(how) if has_constant else None)
+        try:
+            result = refine_images(setup, axis, heights, options, stored, sample_of(how) if has_constant else None)
+        except WrongRecord as fault:
+            names = " and ".join(dict.fromkeys(image.file for pair in pairs for image in pair))
+            raise Rejected([Problem(names, 0, "", str(fault)).coded(fault.code, axis)]) from None
     remarks = running_scan_remarks(image for pair in pairs for image in pair)
     return replace(result, remarks=(*remarks, *result.remarks)), sources
 

@@ -84,7 +84,7 @@ _BY_CAUSE = "; ".join(f"{cause}: {remedy}" for cause, remedy in CAUSE_REMEDIES.i
 
 # Remedies that the findings' own texts have, with the values of the case.
 IN_TEXT: dict[FindingCode, str] = {
-    "ambiguous-shift": "`--within`, or images closer in time",
+    "ambiguous-shift": "`--within`, or images closer in time; `--delay-pixels` of `refine`",
     "assumed-unit": "write it into the header, or `--columns time=1:ms`",
     "assumed-value": "measure it, or give it",
     "clipped-sensor": "more range of the sensor or its recorder, or a smaller stroke",

@@ -28,6 +28,7 @@ _COLUMN_TERMS = 5  # 1, x, and x by both coordinates; the time within the line; 
 _MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a trial branch
 _ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
 _MAX_STEPS = 100
+_LEAST_PERIODS = 1.0  # in the line, of a wave that the parabola of a row cannot follow
 
 
 @dataclass(frozen=True)
@@ -318,15 +319,18 @@ class PeriodicModel:
     def periodic_parts(self, state: FitState) -> list[Floats]:
         """Return the periodic part of each image without levelling, in missing rows too.
 
+        It has no wave with less than a period in the line: levelled rows do not determine its amplitude.
+
         Returns
         -------
         list of Floats
             In heights, shape (rows, columns) each.
         """
         rows = self._every_row(state.parameters)[0]
+        slow = np.abs(self.spots @ self.q(state.parameters)) < _LEAST_PERIODS
+        amplitudes = np.where(slow, 0.0, state.amplitudes)
         return [
-            _real_product(rows.T * state.amplitudes, self._waves(state.parameters, forward))
-            for forward, _ in self.images
+            _real_product(rows.T * amplitudes, self._waves(state.parameters, forward)) for forward, _ in self.images
         ]
 
     def row_waves(self, state: FitState, spots: Ints) -> Complexes:

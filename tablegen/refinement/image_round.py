@@ -31,6 +31,7 @@ from tablegen.refinement.round import (
     with_layer_update,
 )
 from tablegen.refinement.slow_line import slow_line
+from tablegen.refinement.whole_periods import check_periods_apart
 from tablegen.refinement.window_line import WindowLine, averaged
 
 _MIN_EXPLAINED = 0.03  # share of the variance of an image
@@ -88,12 +89,16 @@ def refine_images(
     Rejected
         If the scan, or the scan with the new layer, cannot be planned.
     Unphysical
-        If the images are not of this scan, or a bound forbids learning.
+        If the images are not of this scan, nothing shows which periods of trace and retrace belong together, or a bound
+        forbids learning.
     """
     plan = make_plan(setup)
     line: LinePlan = getattr(plan, axis)
     limits = learning_bound(line, options)
-    frames = _frames(plan, pairs, images or ImageOptions(), sample)
+    images = images or ImageOptions()
+    frames = _frames(plan, pairs, images, sample)
+    if axis == "x":  # a shift of x does not change the rows
+        check_periods_apart(frames, images.delay_pixels)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     size = None if sample is None else _size(plan, frames, sample)
     update = learn(line, measured, options.gain, limits.used)

@@ -26,10 +26,18 @@ _LEAST_SIZE = 1e-3  # of the largest singular value: waves that others contain
 
 @dataclass(frozen=True)
 class ImageOptions:
-    """Storage of the images; see ``docs/refine.md``."""
+    """Storage of the images; see ``docs/refine.md``.
+
+    ``delay_pixels`` is None if the delay of the images is not known; it is then taken to be 0.
+    """
 
     retrace_mirrored: bool = False
-    delay_pixels: float = 0.0
+    delay_pixels: float | None = None
+
+    @property
+    def delay(self) -> float:
+        """Columns by which the images are late."""
+        return 0.0 if self.delay_pixels is None else self.delay_pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +146,7 @@ def lattice_line(
     turn, window = line.drive.turn, line.band_limit.window
     if options.retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
-    geometry, heights = prepare_heights(trace, retrace, turn, window, options.delay_pixels)
+    geometry, heights = prepare_heights(trace, retrace, turn, window, options.delay)
     moves = plan.y.program.hold == 1
     modes = column_modes(plan, geometry, START_DEGREE)
     advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"

@@ -181,11 +181,11 @@ def _tracked(
     phase, whole = (np.concatenate(parts) for parts in zip(*tracks, strict=True))
     if moves:
         phase = phase - polynomial[0] / geometry.rows * modes.time
-    first, second = np.split(phase, 2)
+    first, second = np.split(phase - straight.q * modes.requested, 2)  # columns of late images show other positions
     inside = tracks[0][1] & tracks[1][1]
-    turns = round(float(np.median((first - second)[inside])))
-    second = second + turns
-    phase = np.concatenate([first, second])
+    apart = (first - second)[inside]
+    turns = round(float(np.median(apart)))
+    phase = phase + np.repeat([0.0, turns], geometry.columns)
     columns = np.column_stack([np.ones_like(phase), modes.requested, straight.q * modes.values.T])[whole]
     c = np.linalg.lstsq(columns, phase[whole], rcond=None)[0]
-    return float(c[1]), c[2:] * straight.q / float(c[1]), float(np.max(np.abs((first - second)[inside])))
+    return float(c[1]), c[2:] * straight.q / float(c[1]), float(np.max(np.abs(apart - turns)))

@@ -57,7 +57,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
     window = line.band_limit.window
     if options.retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
-    geometry, heights = prepare_heights(trace, retrace, line.drive.turn, window, options.delay_pixels)
+    geometry, heights = prepare_heights(trace, retrace, line.drive.turn, window, options.delay)
     advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
     check_mirrored(heights[0], heights[1], advice)
     modes = column_modes(plan, geometry, _DEGREES[-1])

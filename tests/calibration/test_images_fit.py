@@ -369,3 +369,15 @@ def test_steps_of_terraces_are_removed(angle: float, monkeypatch: pytest.MonkeyP
         return
     assert before.explained < 0.5
     assert before.forward.beta.standard_error > 3.0 * fit.forward.beta.standard_error
+
+
+def test_steps_at_14_degrees_are_removed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first fit has a wave that hardly changes along a line: its amplitude was beyond all bounds, and hid them."""
+    images = pair(OnTerraces(lattice(9.3, 11.0), 6.0, 14.0), 0.02, seed=3)
+    fit = fitted(images)
+    assert fit.explained > 0.8
+    assert max(map(abs, distances(fit))) < 4.0
+    assert shapes(fit) == pytest.approx(FULL, abs=0.005)
+    monkeypatch.setattr("tablegen.images.periodic_model._LEAST_PERIODS", 0.0)
+    wrong = fitted(images)
+    assert max(abs(one - truth) for one, truth in zip(shapes(wrong), FULL, strict=True)) > 0.02

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calibrating import V_MAX, Scanner, lattice
 from correcting import old_frame
-from distorted_lattices import DistortedLattice, deviation, images_of
-from lattice_images import narrow_sites, without_lattice
+from distorted_lattices import DistortedLattice, deviation, distorted_lattice, images_of
+from lattice_images import narrow_sites, three_sites, without_lattice
 
 import tablegen
 from tablegen.base.input_errors import Rejected, Unphysical
@@ -182,6 +182,30 @@ def test_a_sample_without_noise_may_be_constant_along_an_axis() -> None:
     assert count_missing(np.repeat(np.random.default_rng(0).normal(size=(32, 64)), 2, axis=0)).rows == 32
 
 
+@pytest.mark.parametrize("gap", ["half", "stopped"])
+def test_weak_lowest_orders_in_part_of_a_frame_give_the_whole_cell(gap: str) -> None:
+    heights, cell = three_sites(0)
+    vectors = find_cell(lacking(heights, gap)).vectors
+    assert same_lattice(vectors, cell)
+    strong = np.stack([(cell[0] + cell[1]) / 3.0, cell[1]])  # the cell of the strong spots alone
+    assert not same_lattice(vectors, strong)
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("gap", ["half", "stopped"])
+def test_no_cell_of_part_of_a_frame_is_wrong(gap: str) -> None:
+    accepted = 0
+    for seed in range(50):
+        heights, cell = three_sites(seed)
+        try:
+            vectors = find_cell(lacking(heights, gap)).vectors
+        except Unphysical:
+            continue
+        accepted += 1
+        assert same_lattice(vectors, cell), seed
+    assert accepted >= 45
+
+
 def test_half_of_noise_is_no_lattice() -> None:
     for seed in range(3):
         with pytest.raises(Unphysical):
@@ -220,6 +244,33 @@ def distorted(gap: str) -> tuple[DistortedLattice, Floats, Floats]:
     )
 
 
+def rows_of(whole: DistortedLattice, first: int, stop: int) -> DistortedLattice:
+    """Part of a frame."""
+    part = [
+        SweepImage(*(one[first:stop] for one in (i.heights, i.x_nm, i.y_nm)), tuple(d[first:stop] for d in i.drift_nm))
+        for i in (whole.frame.trace, whole.frame.retrace)
+    ]
+    return DistortedLattice(FrameImages(*part), whole.constant_nm, whole.kind)
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("gap", ["half", "stopped"])
+def test_weak_lowest_orders_in_part_of_a_frame_are_corrected_or_refused(seed: int, gap: str) -> None:
+    """With the size and the constant, and without them."""
+    whole = distorted_lattice(seed)
+    trace, retrace = (lacking(one.heights, gap) for one in (whole.frame.trace, whole.frame.retrace))
+    size = float(np.ptp(whole.frame.trace.x_nm)), float(np.ptp(whole.frame.trace.y_nm))
+    for known, nm, constant in (("size and constant", size, whole.constant_nm), ("nothing", None, None)):
+        kind = None if constant is None else whole.kind
+        try:
+            scan, _ = by_fit(images_of(trace, retrace, nm), OldScan(), lattice_nm=constant, kind=kind)
+        except Unphysical:
+            continue
+        part = rows_of(whole, *scan.record["imaged_rows"])
+        assert not deviation(scan.distortion, part, known).wrong
+
+
 @pytest.mark.rest
 @pytest.mark.parametrize("gap", GAPS)
 def test_a_correction_is_as_good_with_gaps(gap: str) -> None:
@@ -227,11 +278,8 @@ def test_a_correction_is_as_good_with_gaps(gap: str) -> None:
     size = float(np.ptp(whole.frame.trace.x_nm)), float(np.ptp(whole.frame.trace.y_nm))
     scan, _ = by_fit(images_of(trace, retrace, size), OldScan(), lattice_nm=60.0, kind="hexagonal")
     first, stop = scan.record.get("imaged_rows", [0, len(trace)])
-    part = [
-        SweepImage(*(one[first:stop] for one in (i.heights, i.x_nm, i.y_nm)), tuple(d[first:stop] for d in i.drift_nm))
-        for i in (whole.frame.trace, whole.frame.retrace)
-    ]
-    off = deviation(scan.distortion, DistortedLattice(FrameImages(*part), 60.0, "hexagonal"), "size and constant")
+    part = rows_of(whole, first, stop)
+    off = deviation(scan.distortion, part, "size and constant")
     assert not off.wrong
     assert off.displacement < 0.3
     assert "missing" in scan.record or "imaged_rows" in scan.record

@@ -18,6 +18,8 @@ SCAN = scan_text(
     "- x.size_nm", "x.size_v = 60.0", "- y.size_nm", "y.size_v = 60.0", "timing.lines = 100", "timing.pixels = 128"
 )
 
+ON_TIME = ("--delay-pixels", "0")  # clean bars look the same a period further
+
 
 def take(folder: Path, sample: Sample = GRATING, seed: int = 0, count: int = 1) -> list[Path]:
     """Images of the scan in the folder as it stands, trace and retrace of each frame."""
@@ -46,7 +48,7 @@ def test_rounds_by_hand(folder: Path) -> None:
     residuals = []
     for seed in range(2):
         files = take(folder, seed=seed)
-        outcome = refining(folder, files, "--write", "--json")
+        outcome = refining(folder, files, "--write", "--json", *ON_TIME)
         assert outcome.status == 0, outcome.err
         data = json.loads(outcome.out)
         residuals.append(data["measured"]["residual_rms_percent"])
@@ -62,11 +64,11 @@ def test_rounds_by_hand(folder: Path) -> None:
     assert "trace1_0.npy, sha256 " in rows[1]
     assert "retrace1_0.npy, sha256 " in rows[1]
     assert "periods in the line" in rows[1]
-    again = refining(folder, files, "--write")
+    again = refining(folder, files, "--write", *ON_TIME)
     assert again.status == 2
     assert "was already refined by these images; build, upload and record again" in again.err
     (folder / "scan.toml").write_text(text.replace("before_percent = ", "before_percent = 0.00001 # "), "utf-8")
-    worse = refining(folder, take(folder, seed=7), "--write")
+    worse = refining(folder, take(folder, seed=7), "--write", *ON_TIME)
     assert worse.status == 2
     assert "the residual grew from 1e-05 % to" in worse.err
     assert "--force" in worse.err
@@ -133,9 +135,9 @@ def test_one_file_may_have_both(folder: Path) -> None:
 
     trace, retrace = (np.load(path) for path in take(folder))
     gwy(folder / "both.gwy", HeightTrace=trace, HeightRetrace=retrace)
-    both = refining(folder, [folder / "both.gwy"], "--channel", "Height", "--json")
+    both = refining(folder, [folder / "both.gwy"], "--channel", "Height", "--json", *ON_TIME)
     assert both.status == 0, both.err
-    apart = refining(folder, take(folder), "--json")
+    apart = refining(folder, take(folder), "--json", *ON_TIME)
     assert json.loads(both.out)["measured"] == json.loads(apart.out)["measured"]
 
 
@@ -155,6 +157,16 @@ def test_options_that_do_not_go_together(folder: Path, words: tuple[str, ...], m
     outcome = run("refine", folder / "scan.toml", "--axis", "x", *words)
     assert outcome.status == 2
     assert message in outcome.err
+
+
+def test_clean_bars_without_a_known_delay_are_refused(folder: Path) -> None:
+    """A period further they look the same: the layer was wrong, with status 0."""
+    files = take(folder)
+    outcome = refining(folder, files, "--write")
+    assert outcome.status == 2
+    assert f"{files[0]} and {files[1]}: ambiguous shift of the sample" in outcome.err
+    assert "give --delay-pixels, 0 if they are not late" in outcome.err
+    assert "refinement" not in (folder / "scan.toml").read_text("utf-8")
 
 
 def test_a_file_that_is_no_image_is_named(folder: Path) -> None:

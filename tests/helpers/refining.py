@@ -18,6 +18,7 @@ from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.refinement.departure import Departure, departure
 from tablegen.refinement.displacement import Displacement
 from tablegen.refinement.image_round import refine_images, refine_mismatch
+from tablegen.refinement.lattice_line import ImageOptions
 from tablegen.refinement.round import Options, Round, refine
 from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.imaging import Conditions, Surface, grating, hexagonal, rough, running_frame
@@ -138,23 +139,42 @@ def rounds(
         setup = found.setup
 
 
+_LITTERED = 2.0  # lines of 60 V: a square that has all places of the scanner
+ON_TIME = ImageOptions(delay_pixels=0.0)  # the images are known not to be late
 IMAGED = Conditions(noise=0.05, drift=(0.02, 0.01), tilt=(0.5, 0.3))
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A sample of so many periods, or grains, in a line."""
+    """A sample of so many periods, or grains, in a line, with ``debris`` per square of a line."""
 
     name: str
     periods: float
     angle_deg: float = 7.0
+    debris: int = 0
 
     def of(self, size_nm: float) -> Surface:
         """On a line of this size."""
         if self.name == "rough":
             return rough(size_nm / self.periods)
         kind = grating if self.name == "grating" else hexagonal
-        return kind(size_nm / self.periods, self.angle_deg)
+        surface = kind(size_nm / self.periods, self.angle_deg)
+        return littered(surface, size_nm, self.debris) if self.debris else surface
+
+
+def littered(surface: Surface, size_nm: float, debris: int, seed: int = 0) -> Surface:
+    """The surface with so many bumps per square of a line, some 2 % of the line wide and as high as its waves."""
+    random = np.random.default_rng(seed)
+    count = round(debris * _LITTERED**2)
+    centres = random.uniform(0.0, _LITTERED * size_nm, (count, 2))
+    widths, tops = 0.02 * size_nm * random.uniform(0.5, 1.5, count), random.uniform(0.5, 1.5, count)
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        bumps = zip(centres, widths, tops, strict=True)
+        away = ((top, ((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2.0 * wide**2)) for at, wide, top in bumps)
+        return np.asarray(surface(x, y) + sum(top * np.exp(-square) for top, square in away))
+
+    return height
 
 
 GRATING, LATTICE, ROUGH = Sample("grating", 15.0, 3.0), Sample("lattice", 17.0), Sample("rough", 30.0)
@@ -197,7 +217,7 @@ def image_rounds(
             yield step
             return
         pairs = frames_of(setup, sample, frames or (1 if name == "x" else 2), seed, plant)
-        found = learn_from(setup, name, pairs, Options())
+        found = learn_from(setup, name, pairs, Options(), ON_TIME)
         yield replace(step, round=found)
         setup = found.setup
 

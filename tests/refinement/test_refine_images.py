@@ -9,6 +9,7 @@ from refining import (
     GRATING,
     IMAGED,
     LATTICE,
+    ON_TIME,
     ROUGH,
     SLOPING,
     Sample,
@@ -66,7 +67,7 @@ def rms(values: np.ndarray) -> float:
 @pytest.mark.parametrize("sample", [LATTICE, replace(GRATING, periods=12.0)], ids=lambda one: one.name)
 def test_images_show_the_true_error_of_the_line(setup: Setup, sample: Sample) -> None:
     """In 128 x 85 pixels with 5 % of noise, drift and tilt: to 0.02 % of the line, and within the errors it states."""
-    found = refine_images(setup, "x", frames_of(setup, sample), Options())
+    found = refine_images(setup, "x", frames_of(setup, sample), Options(), ON_TIME)
     true = play(setup, "x", scanner().x).true
     off = 100.0 * (found.update.before.error - true.error)
     assert true.rms_percent > 0.3
@@ -103,7 +104,8 @@ def test_errors_are_those_of_many_images(setup: Setup) -> None:
     """The stated errors of the coefficients against their spread over noise."""
     small = replace(setup, scan=setup.scan)
     found = [
-        refine_images(small, "x", frames_of(setup, replace(GRATING, periods=8.0), seed=s), Options()) for s in range(6)
+        refine_images(small, "x", frames_of(setup, replace(GRATING, periods=8.0), seed=s), Options(), ON_TIME)
+        for s in range(6)
     ]
     coefficients = np.stack([one.measured.coefficients for one in found])
     stated = np.sqrt(np.mean([np.diag(one.measured.line_covariance) for one in found], axis=0))
@@ -257,10 +259,10 @@ def test_a_retrace_that_was_stored_mirrored_can_be_told(setup: Setup, lattice: P
 def test_a_grating_exchanged_is_refused_in_the_next_round(setup: Setup) -> None:
     """Nothing in the images tells it; the layer that it teaches makes the scan worse, and that does."""
     wrong = [pair[::-1] for pair in frames_of(setup, GRATING)]
-    taught = refine_images(setup, "x", wrong, Options())
+    taught = refine_images(setup, "x", wrong, Options(), ON_TIME)
     assert taught.worse == ""
     again = [pair[::-1] for pair in frames_of(taught.setup, GRATING, seed=1)]
-    assert "the residual grew" in refine_images(taught.setup, "x", again, Options()).worse
+    assert "the residual grew" in refine_images(taught.setup, "x", again, Options(), ON_TIME).worse
 
 
 def test_half_a_period_between_the_images_is_refused(setup: Setup, bars: Pair) -> None:

@@ -8,9 +8,10 @@ from typing import Any, TypeVar
 
 import click
 
-from tablegen.cli.calibrate.options import delay_pixels_option, mirrored_option
+from tablegen.cli.calibrate.options import mirrored_option
 from tablegen.cli.images.pairs import channel_option, frame_option, require_readers, retrace_channel_option
 from tablegen.cli.images.samples import NO_RETRACE, check_sample, constant_options
+from tablegen.cli.shared.common import finite
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -21,7 +22,7 @@ class ImageArguments:
 
     pairs: tuple[tuple[Path, Path], ...]
     retrace_mirrored: bool
-    delay_pixels: float
+    delay_pixels: float | None
     channel: str | None
     retrace_channel: str | None
     frame: int | None
@@ -57,7 +58,7 @@ class ImageArguments:
             "--retrace-channel": self.retrace_channel,
             "--frame": self.frame,
             "--retrace-mirrored": self.retrace_mirrored or None,
-            "--delay-pixels": self.delay_pixels or None,
+            "--delay-pixels": self.delay_pixels,
             "--mismatch": self.mismatch or None,
         }
         option = next((name for name, value in of_images.items() if value is not None), None)
@@ -95,7 +96,14 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     ),
     constant_options,
     mirrored_option,
-    delay_pixels_option,
+    click.option(
+        "--delay-pixels",
+        type=float,
+        callback=finite,
+        metavar="N",
+        help="Delay of the images relative to the drive in pixels; give 0 if it is known that they are not late.  "
+        "[default: 0, but not known]",
+    ),
     channel_option,
     retrace_channel_option,
     frame_option,
