@@ -21,6 +21,7 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.synthesis import FourierWords
 
 CLOCK_NS = 10
+NOWHERE = 0x3C
 AMOUNT = float(os.environ.get("BUS_AMOUNT", "1"))
 
 
@@ -214,8 +215,9 @@ async def ended(rig: Rig, *, reset: bool) -> None:
     word = ADDRESSES["program"] + 4 * 47
     rig.master.pause(0)
     await rig.write(ADDRESSES["command"], 2)
-    for clocks in range(1, 14, 1 if AMOUNT == 1 else 2):
-        for write, address in ((False, ADDRESSES["identity"]), (True, word), (True, ADDRESSES["arm"])):
+    begun = ((False, ADDRESSES["identity"]), (False, NOWHERE), (True, word), (True, ADDRESSES["arm"]))
+    for clocks in range(1, 14) if AMOUNT == 1 else (1, 2, 3, 4, 5, 7):
+        for write, address in begun:
             await rig.write(ADDRESSES["interrupt_enable"], 3)
             await interrupted(rig.master, clocks, write, address, clocks)
             if reset:
