@@ -70,3 +70,27 @@ def test_the_headers_have_the_numbers_of_the_map(tmp_path: Path) -> None:
     verilog = (BUS / "dac_registers.vh").read_text("ascii")
     constants = re.findall(r"^localparam (\w+) = 32'h([0-9A-F]{8});$", verilog, re.MULTILINE)
     assert {name: int(value, 16) for name, value in constants} == expected
+
+
+def ports(text: str) -> dict[str, str]:
+    """The direction of each port of a module."""
+    return {
+        name: way for way, name in re.findall(r"^ +(input|output) +(?:wire|reg) +(?:\S+ +)?(\w+)[,\n ]", text, re.M)
+    }
+
+
+@pytest.mark.parametrize("front", ["dac_axi_lite", "dac_wishbone"])
+def test_the_host_port_is_that_of_the_sequencer_and_of_the_top_of_a_build(front: str) -> None:
+    own = {
+        name: way
+        for name, way in ports((BUS / f"{front}.v").read_text("ascii")).items()
+        if not name.startswith(("s_axi_", "wb_")) and name not in ("clock", "reset", "irq")
+    }
+    core = ports((BUS / "dac_bus.v").read_text("ascii"))
+    assert own.items() <= core.items()
+    opposite = {name: {"input": "output", "output": "input"}[way] for name, way in own.items()}
+    assert len(opposite) == 23
+    top = ports((BUS.parent / "top.v.j2").read_text("utf-8"))
+    assert {name: top.get(name) for name in opposite} == opposite
+    sequencer = ports((BUS.parent / "dac_sequencer.v").read_text("ascii"))
+    assert {name for name in opposite if sequencer.get(name) != opposite[name]} == {"booting", "missing"}
