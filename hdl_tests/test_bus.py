@@ -63,12 +63,10 @@ MUTANTS = [
     ("axi_lite", "dac_bus.v", "read_data <= effective ? value : 32'd0", "read_data <= value | {32{!effective}}"),
     ("wishbone", "dac_bus_map.v", "address[19:8] == 12'd4", "address[17:8] == 10'd4"),
     ("axi_lite", "dac_axi_lite.v", "outside = above != 0", "outside = 1'b0"),
-    ("axi_lite", "dac_axi_lite.v", "w_kept && !s_axi_bvalid", "w_kept"),
     ("axi_lite", "dac_axi_lite.v", "may_write = aw_kept && w_kept", "may_write = aw_kept"),
     ("axi_lite", "dac_axi_lite.v", "s_axi_rvalid ? !s_axi_rready : done && !writes", "done && !writes"),
     ("axi_lite", "dac_axi_lite.v", "            ar_kept <= 1'b0;\n            works", "            works"),
     ("wishbone", "dac_wishbone.v", "wb_ack_o = done && waits && cycle", "wb_ack_o = done && cycle"),
-    ("wishbone", "dac_wishbone.v", "wb_err_o = done && waits && cycle", "wb_err_o = done && waits"),
 ]
 
 

@@ -147,6 +147,16 @@ async def traffic(rig: Rig, count: int) -> None:
     await rig.read_all()
 
 
+async def late(rig: Rig) -> None:
+    """While a program waits to be taken, a word and another commit fail, and no other bit of that command acts."""
+    await rig.upload()
+    await rig.write(ADDRESSES["command"], 1)
+    for name, data in (("command", 1), ("command", 0b11011), ("program", 0), ("y_table", 0)):
+        await rig.write(ADDRESSES[name], data)
+        await rig.read(ADDRESSES["status"])
+    await rig.write(ADDRESSES["command"], 2)
+
+
 async def burst(rig: Rig) -> None:
     """AXI: more accesses at once than are kept, each channel at its own pace; every answer is that of its access."""
     master = rig.master
@@ -216,7 +226,7 @@ async def ended(rig: Rig, *, reset: bool) -> None:
     rig.master.pause(0)
     await rig.write(ADDRESSES["command"], 2)
     begun = ((False, ADDRESSES["identity"]), (False, NOWHERE), (True, word), (True, ADDRESSES["arm"]))
-    for clocks in range(1, 14) if AMOUNT == 1 else (1, 2, 3, 4, 5, 7):
+    for clocks in range(1, 12) if AMOUNT == 1 else (1, 2, 3, 4, 5):
         for write, address in begun:
             await rig.write(ADDRESSES["interrupt_enable"], 3)
             await interrupted(rig.master, clocks, write, address, clocks)
@@ -273,9 +283,10 @@ async def accesses(dut: Any) -> None:
         await same_clock(rig)
     await pace(rig)
     await ended(rig, reset=True)
+    await late(rig)
     await traffic(rig, round(300 * AMOUNT))
     rig.master.pause(0)
-    await traffic(rig, round(200 * AMOUNT))
+    await traffic(rig, round(100 * AMOUNT))
     rig.happened()
 
 
