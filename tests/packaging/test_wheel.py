@@ -31,9 +31,10 @@ def shipped_files() -> set[str]:
     }
     found |= {f"tablegen/html_report/page.{kind}" for kind in ("css", "html.j2", "js")}
     found |= {f"tablegen/virtual/{path.name}" for path in REPOSITORY.glob("tablegen/virtual/*.toml")}
-    for language in (REPOSITORY / "firmware_templates").iterdir():
-        if language.is_dir() and language.name != "__pycache__":
-            found |= {f"tablegen/firmware_templates/{language.name}/{path.name}" for path in language.iterdir()}
+    for folder in (REPOSITORY / "firmware_templates").rglob("*"):
+        if folder.is_dir() and folder.name != "__pycache__":
+            paths = (path for path in folder.iterdir() if path.is_file())
+            found |= {f"tablegen/{path.relative_to(REPOSITORY).as_posix()}" for path in paths}
     return found
 
 

@@ -1,0 +1,96 @@
+"""The files that are made of dac_registers.rdl are up to date, and have its numbers."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from bus_model import BUS, MAP, make_registers
+from systemrdl import RDLCompiler
+from systemrdl.node import MemNode, RegNode
+
+
+def test_the_made_files_are_up_to_date() -> None:
+    """Run ``python firmware_templates/verilog/bus/make_registers.py --write`` after a change of the map."""
+    for path, text in make_registers.made_files(MAP).items():
+        assert path.read_text("utf-8") == text, path.name
+
+
+@pytest.mark.parametrize(("old", "new"), [("@ 0x38", "@ 0x3C"), ("park[3:3]", "park[5:5]"), ("= 48;", "= 47;")])
+def test_a_change_of_the_map_changes_all_of_them(old: str, new: str, tmp_path: Path) -> None:
+    changed = tmp_path / "dac_registers.rdl"
+    text = make_registers.SOURCE.read_text("utf-8")
+    assert text.count(old) == 1
+    changed.write_text(text.replace(old, new), "utf-8")
+    for path, made in make_registers.made_files(make_registers.read_map(changed)).items():
+        assert path.read_text("utf-8") != made, path.name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("@ 0x4000;", "@ 0x5000;", "y_fourier: does not begin at a multiple of its size"),
+        ("= 48;\n        memwidth = 32;\n        sw = w;", "= 48; memwidth = 32; sw = rw;", "program: has"),
+        ("frames[15:0];", 'frames[15:0]; field { sw = r; desc = "One more."; } more[16:16];', "arm: has fields"),
+    ],
+)
+def test_a_map_that_the_rtl_does_not_serve_is_refused(old: str, new: str, reason: str, tmp_path: Path) -> None:
+    changed = tmp_path / "dac_registers.rdl"
+    text = make_registers.SOURCE.read_text("utf-8")
+    assert text.count(old) == 1
+    changed.write_text(text.replace(old, new), "utf-8")
+    with pytest.raises(ValueError, match=reason):
+        make_registers.read_map(changed)
+
+
+def test_the_headers_have_the_numbers_of_the_map(tmp_path: Path) -> None:
+    """Read by the compiler of SystemRDL and by gcc, without the program that makes the headers."""
+    compiler = RDLCompiler()
+    compiler.compile_file(str(BUS / "dac_registers.rdl"))
+    expected = {}
+    for node in compiler.elaborate().top.children(unroll=True):
+        name = f"DAC_{node.inst_name.upper()}"
+        expected[f"{name}_ADDRESS"] = node.absolute_address
+        if isinstance(node, MemNode):
+            expected[f"{name}_WORDS"] = node.get_property("mementries")
+        assert isinstance(node, MemNode | RegNode)
+        for field in node.fields() if isinstance(node, RegNode) else []:
+            own = f"{name}_{field.inst_name.upper()}"
+            if field.width < 32:
+                expected |= {f"{own}_SHIFT": field.low, f"{own}_MASK": (2**field.width - 1) << field.low}
+            if name in ("DAC_IDENTITY", "DAC_VERSION"):
+                expected[own] = field.get_property("reset")
+    lines = "".join(f'printf("%s %lu\\n", "{name}", (unsigned long){name});\n' for name in expected)
+    program = f'#include <stdio.h>\n#include "dac_registers.h"\nint main(void) {{\n{lines}return 0;\n}}\n'
+    (tmp_path / "print.c").write_text(program, "ascii")
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", f"-I{BUS}"]
+    subprocess.run(["gcc", *flags, tmp_path / "print.c", "-o", tmp_path / "print"], check=True)
+    printed = subprocess.run([tmp_path / "print"], capture_output=True, text=True, check=True).stdout
+    assert {name: int(value) for name, value in map(str.split, printed.splitlines())} == expected
+    verilog = (BUS / "dac_registers.vh").read_text("ascii")
+    constants = re.findall(r"^localparam (\w+) = 32'h([0-9A-F]{8});$", verilog, re.MULTILINE)
+    assert {name: int(value, 16) for name, value in constants} == expected
+
+
+def ports(text: str) -> dict[str, str]:
+    """The direction of each port of a module."""
+    return {
+        name: way for way, name in re.findall(r"^ +(input|output) +(?:wire|reg) +(?:\S+ +)?(\w+)[,\n ]", text, re.M)
+    }
+
+
+@pytest.mark.parametrize("front", ["dac_axi_lite", "dac_wishbone"])
+def test_the_host_port_is_that_of_the_sequencer_and_of_the_top_of_a_build(front: str) -> None:
+    own = {
+        name: way
+        for name, way in ports((BUS / f"{front}.v").read_text("ascii")).items()
+        if not name.startswith(("s_axi_", "wb_")) and name not in ("clock", "reset", "irq")
+    }
+    core = ports((BUS / "dac_bus.v").read_text("ascii"))
+    assert own.items() <= core.items()
+    opposite = {name: {"input": "output", "output": "input"}[way] for name, way in own.items()}
+    assert len(opposite) == 23
+    top = ports((BUS.parent / "top.v.j2").read_text("utf-8"))
+    assert {name: top.get(name) for name in opposite} == opposite
+    sequencer = ports((BUS.parent / "dac_sequencer.v").read_text("ascii"))
+    assert {name for name in opposite if sequencer.get(name) != opposite[name]} == {"booting", "missing"}
