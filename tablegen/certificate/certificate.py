@@ -129,7 +129,7 @@ def broken_limits(
         elif expected := _expected_excess(certificate, limit):
             code, excess = expected
             why = f"on the scanner the {axis} axis is expected to have a {excess}"
-            why = "; ".join(filter(None, (why, REMEDIES[code], advise(axis))))
+            why = f"{why}; {advise(axis) or REMEDIES[code]}"  # what was tried says more than its kind
             problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
     return problems
 
