@@ -83,7 +83,7 @@ def law(played: list[tuple[int, int]], widths: Widths) -> list[bool]:
     return found
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", WIDTHS)
 def test_what_fits_is_what_the_registers_hold(name: str, tmp_path: Path) -> None:
     """Every power of two and its neighbours in every word; what is spoilt stays so until it is discarded."""

@@ -38,7 +38,7 @@ def test_converters_receive_every_sample_that_is_not_missed(all_played: dict[str
     assert len(want.missed) > 10, "and to miss"
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", SETUPS)
 def test_strobes_a_tick_apart_do_not_wait(all_played: dict[str, Played], name: str) -> None:
     """The formula of the clocks that a tick takes: the first strobes of a stimulus are exactly that apart."""

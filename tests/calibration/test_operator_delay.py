@@ -39,7 +39,7 @@ def late(traces: Sequence[Trace], delay_s: float) -> list[PeriodicLine]:
     return [periodic_line(replace(one, displacement_nm=nm), V_MAX) for one, nm in zip(traces, moved, strict=True)]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("kind", [ManyPlays, BoucWen])
 @pytest.mark.parametrize(
     ("rate_hz", "turn", "share"), [(100.0, 0.5, 0.0), (100.0, 0.5, 0.002), (1000.0, 0.5, -0.01), (100.0, 0.8, 0.002)]

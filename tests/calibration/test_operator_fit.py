@@ -96,6 +96,7 @@ def test_the_family_and_the_creep_are_found() -> None:
     assert [fit.operator.creep.reference_hz for fit in (plays, other)] == pytest.approx([100.0, 100.0], rel=1e-3)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("kind", "protocol", "centre", "strokes", "scaling", "mismatch", "size"),
     [

@@ -140,7 +140,7 @@ def test_keywords_are_refused_in_any_case(language: str) -> None:
     assert [word for word in refused if not why_not_a_name(word.upper()) or not why_not_a_name(word.title())] == []
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("compiler", "language"), VOUCHED)
 def test_a_compiler_vouches_for_the_keywords(compiler: str, language: str, tmp_path: Path) -> None:
     """The table holds no word that its language would take: otherwise the first test would demand too much."""

@@ -63,7 +63,7 @@ def test_a_lattice_by_a_fit(plant: str, tmp_path: Path) -> None:
     assert max(scan.lattice.worst) < 0.01 * REACH_PERCENT * 256
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("plant", common(["duhem", "plays"], PLANTS))
 def test_any_sample_by_the_operator(plant: str, tmp_path: Path) -> None:
     """Of six traces at 100 Hz; the slow axis by its own operator, of traces at 100 Hz too."""

@@ -21,6 +21,7 @@ finally:
 pytestmark = pytest.mark.common
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", make_gallery.SCANS)
 def test_the_table_is_what_the_scan_gives(name: str, tmp_path: Path) -> None:
     shown = [line for line in PAGE.splitlines() if line.startswith(f"| {name} |")]

@@ -177,7 +177,7 @@ def test_three_rounds_take_the_error_away() -> None:
     assert "build, upload and record again" in said("refine")  # a trace is used once
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_images_are_straight_afterwards() -> None:
     """By the lattice only noise is left between trace and retrace; by the file of another scanner something is."""
     lattice, file = re.findall(r"differ by ([\d.]+) before, ([\d.]+) after", said("correct"))

@@ -21,7 +21,7 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 PAGE = REPOSITORY / "docs" / "paper" / "README.md"

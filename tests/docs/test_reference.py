@@ -78,7 +78,7 @@ def test_the_manual_is_clean_and_whole(tmp_path: Path) -> None:
         assert [row.name for row in page.options if " ".join(row.name.split()) not in shown] == []
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("wrong", [".NOSUCH macro", "\\[nosuchglyph]"])
 def test_a_wrong_manual_page_is_found(tmp_path: Path, wrong: str) -> None:
     make_man.main(tmp_path)

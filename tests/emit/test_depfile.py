@@ -190,7 +190,7 @@ def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
     assert set(deciding) <= set(listed)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_of_an_installation_the_record_is_named_which_has_the_version(installed: Path) -> None:
     code = "from tablegen.emit.depfile import deciding_files; print(*deciding_files(['c']), sep='\\n')"
     listed = python(installed.parent, "-c", code, path=installed).splitlines()

@@ -191,7 +191,7 @@ def check_parts_do_not_show(program: Program, size: int) -> None:
     assert np.array_equal(parts.codes, whole.codes)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @settings(max_examples=5, deadline=None)
 @given(st.one_of(programs(), splines()), st.integers(1, 40))
 def test_parts_do_not_show(program: Program, size: int) -> None:

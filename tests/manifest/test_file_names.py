@@ -26,7 +26,7 @@ NAMES = [
 ]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", NAMES)
 def test_an_operator_may_have_any_name(tmp_path: Path, name: str) -> None:
     scan, out = write_operator_scan(tmp_path, operator_file(), "- [limits]"), tmp_path / "out"

@@ -545,6 +545,7 @@ def two(request: pytest.FixtureRequest, tmp_path: Path, installed: Path) -> Proj
     return project
 
 
+@pytest.mark.rest
 def test_two_scans_are_built_once_each_and_one_by_itself(two: Project) -> None:
     if two.tool != "make":
         where = two.call(two.program, "paths", "--cmake").stdout.strip()

@@ -98,7 +98,7 @@ def test_nothing_is_not_counted(golden: dict[str, Any]) -> None:
 # Random dialogues
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("key", [b"", KEY], ids=["open", "keyed"])
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_random_dialogue_is_that_of_the_model(name: str, key: bytes) -> None:

@@ -71,7 +71,7 @@ def test_random_programs(name: str, benches: Benches, tmp_path: Path) -> None:
         assert all(seen[name] for name in (*FLAGS, *FAULTS[:2])), seen
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", common(("bits_16", "bits_24", "direct", "cubic"), LONG))
 def test_long_lines(name: str, benches: Benches) -> None:
     script = long_play(name, 60_000)

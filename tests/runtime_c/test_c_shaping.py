@@ -56,7 +56,7 @@ def test_a_runtime_of_a_lower_order(order: int, benches: dict[int, Benches]) -> 
     everywhere(benches[order], long_play("bits_16", 20_000, order, order), LONG["bits_16"][0])
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("name", SHORT)
 def test_short_lines_that_clamp_are_held_back_and_take_each_other_s_place(
     name: str, benches: dict[int, Benches]

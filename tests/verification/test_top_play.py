@@ -77,6 +77,7 @@ def test_the_top_of_a_build_plays_the_model(name: str, tmp_path: Path) -> None:
     assert judge(short(tmp_path, SCANS[name]).folder, tmp_path / "work") is None
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("breaks", quick(("the width of a table word",), EDITS))
 def test_an_edit_of_the_top_is_found_by_its_play(breaks: str, built: Build, tmp_path: Path) -> None:
     folder = shutil.copytree(built.folder, tmp_path / "build")

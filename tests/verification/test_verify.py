@@ -309,7 +309,7 @@ def test_unknown_codes_are_found(folder: Path) -> None:
     assert "got       undefined" in outcome.err
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("name", "also"),
     [(f"{NAME}.h", None), ("dac_spi.v", "dac_spi.v is missing"), (f"{NAME}_x.mem", f"{NAME}_x.mem is missing")],
@@ -480,7 +480,7 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     assert told.manifest_sha256 == sha256((short.folder / "manifest.json").read_bytes()).hexdigest()
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
     edit(folder / "dac_interpolator.v", *ROUNDED_DOWN)
     report = tmp_path / "verify.xml"

@@ -184,7 +184,7 @@ def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed:
         assert told.failure is None
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("variant", ["short_frame", "bits_8", "bits_24", "longest_table", "mixed", "cubic"])
 def test_tables_that_are_rendered_verify(variant: str, tmp_path: Path) -> None:
     """dac_synthesize makes the words that were emitted; a direct table is played as it is."""
@@ -639,7 +639,7 @@ def test_a_compiler_without_a_c_library_is_status_6_with_its_remedy(short: Build
     assert done.stderr == f"{compiler} finds no headers of the C library: apt-get install libc6-dev\n"
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_compiler_and_its_options_are_the_environments(short: Build, compiler: str) -> None:
     """Sanitizers have nothing to say either; an option that no compiler knows shows that options arrive."""

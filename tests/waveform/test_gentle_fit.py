@@ -59,7 +59,7 @@ def test_rows_are_the_derivatives_of_the_series(derivative: int) -> None:
 
 
 # Wherever the programme has a solution: at H = 16 nothing below 0.6 % can be had.
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("harmonics", "percent"),
     [
