@@ -34,7 +34,7 @@ def test_the_figures_of_records_hold() -> None:
     assert possible_errors(old, 0.3, 0.5)[1] > 3.0 * possible_errors(operator, 0.3, 0.5)[1]
 
 
-@pytest.mark.rest
+@pytest.mark.long
 def test_piezos_that_were_kept_aside_are_covered_as_often_as_it_says() -> None:
     judged = [
         one

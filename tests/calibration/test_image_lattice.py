@@ -153,7 +153,7 @@ def test_the_errors_contain_what_levelling_shifts(seed: int, monkeypatch: pytest
     assert blocks_alone > 3.0
 
 
-@pytest.mark.rest
+@pytest.mark.long
 def test_of_200_images_2_percent_are_beyond_three_standard_errors() -> None:
     """A side or the angle; by the blocks alone, 9 % were."""
     ratios = [ratio for seed in range(30000, 30200) if (ratio := largest_ratio(seed)) is not None]

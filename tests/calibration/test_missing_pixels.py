@@ -162,7 +162,7 @@ def test_sites_narrower_than_a_pixel_have_no_wrong_cell(monkeypatch: pytest.Monk
     assert not same_lattice(find_cell(heights).vectors, cell)
 
 
-@pytest.mark.rest
+@pytest.mark.long
 @pytest.mark.parametrize("gap", ["", "zero columns", "equal columns", "equal rows", "third columns", "fourth rows"])
 def test_no_narrow_sites_have_a_wrong_cell(gap: str) -> None:
     for seed in range(40):
@@ -191,7 +191,7 @@ def test_weak_lowest_orders_in_part_of_a_frame_give_the_whole_cell(gap: str) -> 
     assert not same_lattice(vectors, strong)
 
 
-@pytest.mark.rest
+@pytest.mark.long
 @pytest.mark.parametrize("gap", ["half", "stopped"])
 def test_no_cell_of_part_of_a_frame_is_wrong(gap: str) -> None:
     accepted = 0
@@ -254,7 +254,7 @@ def rows_of(whole: DistortedLattice, first: int, stop: int) -> DistortedLattice:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("gap", ["half", "stopped"])
 def test_weak_lowest_orders_in_part_of_a_frame_are_corrected_or_refused(seed: int, gap: str) -> None:
     """With the size and the constant, and without them."""

@@ -121,7 +121,7 @@ def test_one_shift_alone_has_to_be_clear(correlations: list[float], decided: int
     assert PeriodsApart(shifts, np.array(correlations)).decided == decided
 
 
-@pytest.mark.rest
+@pytest.mark.long
 def test_no_frame_is_a_period_off(setup: Setup) -> None:
     """The counts of docs/refine.md: 66 frames of 9 or 15 bars, clean or with debris, delayed either way."""
     plan, counts, before = make_plan(setup), Counter[tuple[bool, str]](), 0
