@@ -76,7 +76,7 @@ FindingCode = Literal[
 # The remedies of the scaling or size error of a waveform, by the largest part of the error.
 CAUSE_REMEDIES = {
     "band limit": 'more `harmonics` or a lower `max_scaling_error_percent`; a narrower `window` or `method = "window"`',
-    "model": "fewer `harmonics` or a lower line rate",
+    "uncorrected dynamics": "fewer `harmonics` or a lower line rate",
     "converter": "more `dac.bits`, or an amplifier whose range fits",
     "table": "a longer or wider table, or a lower `max_error_lsb` of the table",
 }

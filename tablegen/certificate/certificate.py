@@ -163,7 +163,7 @@ def cause_of(line: LinePlan, parts: ScalingError) -> str:
     if largest == parts.band_limit:
         return "band limit"
     if largest == parts.model:
-        return "model"
+        return "uncorrected dynamics"
     # A word of the table is more than a code, or the converter is the coarser one.
     return "table" if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits else "converter"
 

@@ -1,7 +1,5 @@
 """A core description for FuseSoC, in its CAPI 2, which names the files of the Verilog format."""
 
-from pathlib import PurePath
-
 from tablegen.base.resources import verilog_runtime
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
@@ -36,7 +34,7 @@ class FuseSoC(Format):
             "  # $readmemh looks in the folder where the tool runs.",
             "  memories:",
             "    files:",
-            *(f"      - {each}: {{copyto: {each}}}" for each in written if PurePath(each).suffix == ".mem"),
+            *(f"      - {each}: {{copyto: {each}}}" for each in written if each.endswith(".mem")),
             "    file_type: user",
             "targets:",
             "  default: &default",
