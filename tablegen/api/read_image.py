@@ -79,7 +79,7 @@ def read_image(
     Raises
     ------
     Rejected
-        A file cannot be read, or has several channels and ``channel`` names none of them.
+        A file cannot be read; or ``channel`` is no channel of it; or it is None, and not one channel alone is a height.
 
     Examples
     --------

@@ -11,7 +11,7 @@ from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.correction.old_scan import OldScan
 from tablegen.correction.straight import ScanPicture
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
-from tablegen.images.formats.channel import Channel, Direction, channel_list, choose, partner, quote
+from tablegen.images.formats.channel import Channel, Direction, channel_list, choose, is_height, partner, quote
 from tablegen.images.frame_registration import registered
 from tablegen.images.missing import count_missing, imaged_rows, valid_pixels
 from tablegen.images.scan_angle import is_turned
@@ -261,7 +261,7 @@ def _trace(listed: Sequence[Channel], whole: Sequence[Channel]) -> Channel:
     """
 
     def rank(one: Channel) -> tuple[bool, bool, bool]:
-        return one.direction != "trace", not _retraces(listed, one), not _height(one)
+        return one.direction != "trace", not _retraces(listed, one), not is_height(one)
 
     best = min(whole, key=rank)
     alike = [one for one in whole if one.title == best.title and rank(one) == rank(best)]
@@ -278,10 +278,6 @@ def _retraces(listed: Sequence[Channel], trace: Channel) -> list[Channel]:
     others = [one for one in listed if one.direction == "retrace"]
     same = [one for one in others if one.signal == trace.signal]
     return same or (others if len(others) == 1 and len(listed) == 2 else [])
-
-
-def _height(channel: Channel) -> bool:
-    return any(word in channel.title.lower() for word in ("height", "topo", "zsensor", "z sensor"))
 
 
 def timed(images: Images, conditions: OldScan) -> OldScan:

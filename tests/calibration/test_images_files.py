@@ -101,7 +101,7 @@ def test_tiff(kind: str, tmp_path: Path) -> None:
 
 def test_channels_by_title_and_by_number(tmp_path: Path) -> None:
     other = HEIGHTS[::-1]
-    gwy(tmp_path / "a.gwy", Height=HEIGHTS, Phase=other)
+    gwy(tmp_path / "a.gwy", Current=HEIGHTS, Phase=other)
     put(tmp_path, "a.npy", npy(np.stack([HEIGHTS, other]).reshape(2, 40, 48)))
     pages = [Pillow.fromarray(one.astype(np.float32)) for one in (HEIGHTS, other)]
     pages[0].save(tmp_path / "a.tiff", save_all=True, append_images=pages[1:])

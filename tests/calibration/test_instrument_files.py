@@ -40,7 +40,7 @@ from tablegen.base.input_errors import Rejected
 from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
 from tablegen.images.formats.asd import asd_channels
-from tablegen.images.formats.channel import Channel, rotation_deg, split_direction
+from tablegen.images.formats.channel import Channel, channel_of_array, choose, rotation_deg, split_direction
 from tablegen.images.formats.createc import createc_channels
 from tablegen.images.formats.gxsm import gxsm_channels
 from tablegen.images.formats.h5_jpk import h5_jpk_channels
@@ -467,7 +467,6 @@ def test_what_is_no_pair_is_said(tmp_path: Path) -> None:
     def refused(*arguments: Path | str | None) -> str:
         return why(*arguments, read=read_pair)  # type: ignore[arg-type]
 
-    assert f"a.ibw: has several channels, {there}; choose with --channel" in refused(both)
     assert f"a.ibw: has no channel 'Phase'; there is {there}" in refused(both, None, "Phase")
     assert "t.ibw: channel 0 ('HeightTrace') is the trace by the file; the retrace is needed here" in refused(one)
     assert "r.ibw: channel 0 ('HeightRetrace') is the retrace by the file; the trace is needed" in refused(other, one)
@@ -475,6 +474,27 @@ def test_what_is_no_pair_is_said(tmp_path: Path) -> None:
     assert "has several channels" in why(
         put(tmp_path, "a.sxm", sxm({"Z": (T, R)}))
     )  # of an image, either could be meant
+
+
+@pytest.mark.parametrize(
+    ("titles", "chosen"),
+    [
+        (("AmplitudeTrace", "HeightTrace", "ZSensorTrace"), "HeightTrace"),  # the exact name before a longer one
+        (("Current forward", "Z forward"), "Z forward"),
+        (("Phase", "Height Sensor"), "Height Sensor"),
+        (("Phase", "Height Sensor", "Topo raw"), None),  # two could be meant
+        (("Phase", "Current"), None),
+        (("Phase", "Zeta"), None),  # begins like a height
+    ],
+)
+def test_the_height_is_the_channel_where_none_is_named(titles: tuple[str, ...], chosen: str | None) -> None:
+    listed = [channel_of_array(number, title, T) for number, title in enumerate(titles)]
+    if chosen is None:
+        with pytest.raises(ValueError, match=r"has several channels, 0 .*; choose with --channel"):
+            choose(listed, None, "trace")
+    else:
+        assert choose(listed, None, "trace").title == chosen
+        assert choose(listed, "0", "trace").title == titles[0]  # a name or number goes first
 
 
 OTHERS: dict[str, tuple[bytes, str, float, float, str, str | None]] = {

@@ -127,7 +127,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @click.option(
     "--channel",
     metavar="NAME|N",
-    help="Channel to fit and to compare; all channels are corrected.  [default: the height, if the file names it]",
+    help="Channel to fit and to compare; all channels are corrected.  [default: the height, if the file names one]",
 )
 @click.option("--retrace-channel", metavar="NAME|N", help="Retrace of that channel.  [default: by its name]")
 @click.option(

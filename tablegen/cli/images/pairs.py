@@ -41,7 +41,7 @@ channel_option = click.option(
     "--channel",
     metavar="NAME|N",
     help="Data channel, for image files with several channels. `tablegen channels FILE` lists them. A name without "
-    "the direction, such as Height, selects trace and retrace.",
+    "the direction, such as Height, selects trace and retrace.  [default: the height, if the file names one]",
 )
 retrace_channel_option = click.option(
     "--retrace-channel",

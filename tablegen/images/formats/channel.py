@@ -24,6 +24,8 @@ _MAX_LISTED = 12  # channels in a message
 _MAX_TITLE = 60  # characters of a channel in a message
 _MAX_SPLIT = 1000  # characters of a title that is searched for a direction
 _DIRECTION = re.compile(r"(.+?)[\s_\-\[(]*(retrace|trace|forward|backward)\s*[\])]*", re.IGNORECASE | re.DOTALL)
+_HEIGHTS = ("height", "z", "topography", "topo", "tp")  # names of a height; the last is that of high-speed AFM
+_HEIGHT_WORDS = ("height", "topo", "zsensor", "z sensor")  # in longer names
 _MEANT: dict[str, Direction] = {"trace": "trace", "forward": "trace", "retrace": "retrace", "backward": "retrace"}
 
 
@@ -79,6 +81,8 @@ def split_direction(title: str) -> tuple[str, Direction | None]:
 def choose(channels: Sequence[Channel], name: str | None, direction: Direction | None) -> Channel:
     """Choose the channel that a title, a signal or a number names, and ``direction`` of a signal with both.
 
+    Without a name it is the only channel, or the only height among several.
+
     Raises
     ------
     ValueError
@@ -88,9 +92,9 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
         raise ValueError("contains no image")
     there = channel_list(channels)
     if name is None:
-        matches = list(channels)
-        if len({one.signal for one in channels}) == 1:
-            matches = _of_direction(channels, direction)
+        matches = _heights(channels) if len({one.signal for one in channels}) > 1 else list(channels)
+        if len({one.signal for one in matches}) == 1:
+            matches = _of_direction(matches, direction)
         if len(matches) > 1:
             raise ValueError(f"has several channels, {there}; choose with --channel")
         return matches[0]
@@ -105,6 +109,18 @@ def choose(channels: Sequence[Channel], name: str | None, direction: Direction |
         of_name = channel_list(matches)
         raise ValueError(f"has more than one channel {quote(name)}: {of_name}; choose one by its number")
     return matches[0]
+
+
+def is_height(channel: Channel) -> bool:
+    """Return True if the title of a channel calls it a height."""
+    signal = channel.signal.strip().lower()
+    return signal in _HEIGHTS or any(word in channel.title.lower() for word in _HEIGHT_WORDS)
+
+
+def _heights(channels: Sequence[Channel]) -> list[Channel]:
+    """Return the channels named exactly as a height, or else all that are heights by a longer name, or else all."""
+    exact = [one for one in channels if one.signal.strip().lower() in _HEIGHTS]
+    return exact or [one for one in channels if is_height(one)] or list(channels)
 
 
 def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
