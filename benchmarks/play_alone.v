@@ -34,11 +34,11 @@ module play_alone;
     dac_boot #(
         .PROGRAM_FILE(ANNEXIN_200NM_PROGRAM_FILE), .X_FILE(ANNEXIN_200NM_X_TABLE_FILE),
         .Y_FILE(ANNEXIN_200NM_Y_TABLE_FILE), .X_WORDS(ANNEXIN_200NM_X_TABLE_LENGTH),
-        .Y_WORDS(ANNEXIN_200NM_Y_TABLE_LENGTH)
+        .Y_WORDS(ANNEXIN_200NM_Y_TABLE_LENGTH), .START_CLOCKS(0)
     ) boot (
         .clock(clock), .reset(1'b0), .host_write(1'b0), .host_region(3'd0), .host_address(16'd0), .host_data(32'd0),
         .host_commit(1'b0), .writable(writable), .write(write), .write_region(region), .write_address(address),
-        .write_data(data), .commit(commit), .booting(), .missing()
+        .write_data(data), .commit(commit), .starting(), .booting(), .missing()
     );
 
     dac_sequencer #(

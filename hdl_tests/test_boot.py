@@ -1,7 +1,7 @@
 """dac_boot: the program of the memory files and nothing else, wherever it has to wait or begins again; then the host.
 
 A boot is every program word, every word of both tables (or their Fourier words) and a commit, each once and in order,
-on clocks on which the sequencer takes a write. It is held up on each of its clocks, and reset on each. What the words
+on clocks on which the sequencer takes a write, none of them right after power-up. It is held up on each of its clocks, and reset on each. What the words
 are follows from the programs, not from the files that are read.
 """
 
@@ -46,14 +46,14 @@ class Setup:
     writes: Sequence[Write]
 
 
-def setup(seed: int, shape: SequencerShape, harmonics: tuple[int, int] | None = None) -> Setup:
+def setup(seed: int, shape: SequencerShape, harmonics: tuple[int, int] | None = None, start_clocks: int = 0) -> Setup:
     """A random program of a shape; from its tables, or from Fourier words of so many harmonics."""
     rng = np.random.default_rng(seed)
     program = random_dual(rng, shape, (9, 13), lines=(2, 3))
     fourier = [random_fourier(rng, each).in_order for each in harmonics or (1, 1)]
     made = memory_files("boot", program.schedule, program.x, program.y, {"x": fourier[0], "y": fourier[1]})
     kind, region, tables = ("_fourier", X_FOURIER, fourier) if harmonics else ("", X_TABLE, None)
-    parameters = {"FOURIER": int(harmonics is not None)}
+    parameters = {"FOURIER": int(harmonics is not None), "START_CLOCKS": start_clocks}
     registers = program_words(program.schedule, program.x, program.y, harmonics or (0, 0))
     writes = [(0, address, word) for address, word in enumerate(registers)]
     for index, (name, axis) in enumerate((("X", program.x), ("Y", program.y))):
@@ -70,6 +70,7 @@ SETUPS = {
     "interpolated": setup(1, SequencerShape(16, 1, 4, 16, 1, 3, 12)),
     "direct": setup(2, SequencerShape(12, 0, 5, 8, 0, 5, 24)),
     "fourier": setup(3, SequencerShape(16, 1, 4, 16, 1, 3, 12), (4, 1)),
+    "late": setup(5, SequencerShape(16, 1, 4, 16, 1, 3, 12), start_clocks=37),
     "longest": setup(4, SequencerShape(16, 1, 16, 16, 1, 3, 16)),
 }
 
@@ -114,12 +115,13 @@ def stimulus(name: str) -> list[Clock]:
     clocks = len(SETUPS[name].writes) + AT_BOTH_ENDS
     rng = random.Random(name)
     levels = list(boots(clocks)) if name != "longest" else []
+    start = [(int(clock == 10), clock % 2) for clock in range(SETUPS[name].parameters["START_CLOCKS"])]
     return [
         Clock(
             reset, writable, rng.getrandbits(1), int(rng.random() < 0.2),
             (rng.getrandbits(3), rng.getrandbits(16), rng.getrandbits(32)),
         )
-        for reset, writable in [*levels, *[(0, 1)] * (clocks + AFTER)]
+        for reset, writable in [*start, *levels, *[(0, 1)] * (clocks + AFTER)]
     ]  # fmt: skip
 
 
@@ -135,9 +137,10 @@ class Mutant(mutants.Mutant):
 
 
 FAULTS: dict[str, tuple[str, ...]] = {
-    "a_word_is_lost": ("writing <= reading;", "writing <= reading && write_at[0];"),
+    "it_begins_at_once": ("started = waited == START[START_BITS-1:0]", "started = 1'b1", "late"),
+    "a_word_is_lost": ("writing <= reading &&", "writing <= reading && write_at[0] &&"),
     "the_word_does_not_wait": ("now = writing && writable", "now = writing"),
-    "the_address_does_not_wait": ("end else if (reading && writable)", "end else if (reading)"),
+    "the_address_does_not_wait": ("end else if (reading && started && writable)", "end else if (reading && started)"),
     "the_word_read_does_not_wait": ("        if (writable) begin", "        if (1'b1) begin"),
     "x_has_no_sign": ("{{32{x_word[X_WORD_BITS-1]}}, x_word[", "{32'd0, x_word["),
     "y_has_no_sign": ("{{32{y_word[Y_WORD_BITS-1]}}, y_word[", "{32'd0, y_word["),
@@ -222,9 +225,13 @@ def check(name: str, lines: Sequence[str]) -> int:
     if len(lines) != len(clocks):
         raise Wrong("a capture of another length")
     ended = at = idle = 0
-    for asked, line in zip(clocks, lines, strict=True):
+    for clock, (asked, line) in enumerate(zip(clocks, lines, strict=True)):
         flags, *where = line.split()
         missing, booting, write, commit = (hexadecimal(flags) >> bit & 1 for bit in (3, 2, 1, 0))
+        if clock < SETUPS[name].parameters["START_CLOCKS"]:
+            if write or commit or not booting:
+                raise Wrong("a boot before the memories can be read")
+            continue
         if missing:
             raise Wrong("a file was taken to be missing")
         if not booting:

@@ -106,6 +106,7 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({**BOOT, "Y_HARMONICS": 513, "Y_WORDS": 1027}, "Y_HARMONICS_is_not_1_to_512"),
         ({**BOOT, "X_WORDS": 4}, "X_WORDS_is_not_two_X_HARMONICS_and_one"),
         ({**BOOT, "Y_HARMONICS": 2}, "Y_WORDS_is_not_two_Y_HARMONICS_and_one"),
+        ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
     ],
     "dac_fourier": [
         ({"X_INDEX_BITS": 2}, "X_INDEX_BITS_is_not_3_to_16"),
@@ -187,7 +188,7 @@ LEGAL: dict[str, list[Values]] = {
         {**LARGE, "Y_INTERPOLATED": 3, "Y_INDEX_BITS": 14, "Y_WORD_BITS": 21},
     ],
     "dac_boot": [
-        {"X_WORDS": 1, "Y_WORDS": 1, "X_WORD_BITS": 8, "Y_WORD_BITS": 24},
+        {"X_WORDS": 1, "Y_WORDS": 1, "X_WORD_BITS": 8, "Y_WORD_BITS": 24, "START_CLOCKS": 0},
         BOOT,
         {"X_WORDS": 65536, "Y_WORDS": 65536},
     ],

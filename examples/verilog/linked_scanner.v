@@ -17,7 +17,8 @@ module linked_scanner #(
     parameter CLOCKS_PER_TICK = 100,  // a 50 MHz clock, for the 500 kHz of the scan
     parameter CLOCKS_PER_BIT = 434,   // 115200 baud
     parameter MEMORY_BYTES = 2048,
-    parameter SHAPING = 0             // the highest order of shaping that it plays, 0 to 3
+    parameter SHAPING = 0,            // the highest order of shaping that it plays, 0 to 3
+    parameter START_CLOCKS = 4096     // clocks after power-up before a block RAM is read
 ) (
     input  wire clock,
     input  wire line_in,
@@ -52,7 +53,8 @@ module linked_scanner #(
         tick <= divider == 16'd0;
     end
 
-    wire host_write, host_commit, write, commit, writable, booting, withdraw, arm, trigger, park, clear_faults;
+    wire starting, booting;
+    wire host_write, host_commit, write, commit, writable, withdraw, arm, trigger, park, clear_faults;
     wire [2:0] host_region, region;
     wire [15:0] host_address, address, arm_frames;
     wire [31:0] host_data, data;
@@ -76,7 +78,7 @@ module linked_scanner #(
         .Y_MAX_STEP(ANNEXIN_200NM_Y_MAX_STEP),
         .UPDATE_RATE(ANNEXIN_200NM_UPDATE_RATE_MILLIHZ / 1000), .BOOT_HASH(ANNEXIN_200NM_HASH)
     ) loader (
-        .clock(clock), .reset(1'b0), .line_in(line_in), .line_out(line_out), .permit(permit), .boot(32'd0),
+        .clock(clock), .reset(starting), .line_in(line_in), .line_out(line_out), .permit(permit), .boot(32'd0),
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
         .write_data(host_data), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
         .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
@@ -85,7 +87,7 @@ module linked_scanner #(
     );
 
     dac_boot #(
-        .PROGRAM_FILE(ANNEXIN_200NM_PROGRAM_FILE), .FOURIER(1),
+        .PROGRAM_FILE(ANNEXIN_200NM_PROGRAM_FILE), .FOURIER(1), .START_CLOCKS(START_CLOCKS),
         .X_FILE(ANNEXIN_200NM_X_FOURIER_FILE), .X_WORDS(ANNEXIN_200NM_X_FOURIER_LENGTH), .X_WORD_BITS(32),
         .X_HARMONICS(ANNEXIN_200NM_X_HARMONICS),
         .Y_FILE(ANNEXIN_200NM_Y_FOURIER_FILE), .Y_WORDS(ANNEXIN_200NM_Y_FOURIER_LENGTH), .Y_WORD_BITS(32),
@@ -93,8 +95,8 @@ module linked_scanner #(
     ) boot (
         .clock(clock), .reset(1'b0), .host_write(host_write), .host_region(host_region), .host_address(host_address),
         .host_data(host_data), .host_commit(host_commit), .writable(writable), .write(write), .write_region(region),
-        .write_address(address), .write_data(data), .commit(commit), .booting(booting),
-        .missing(missing)
+        .write_address(address), .write_data(data), .commit(commit), .starting(starting),
+        .booting(booting), .missing(missing)
     );
 
     dac_sequencer #(
@@ -106,7 +108,7 @@ module linked_scanner #(
         .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE), .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw || (booting && missing)),
+        .writable(writable), .refused(refused), .commit(commit), .withdraw(booting ? missing : withdraw),
         .committed(), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick && !booting), .underrun(missed), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code),

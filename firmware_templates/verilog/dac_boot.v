@@ -5,6 +5,9 @@
 // they take less memory. PROGRAM_FILE is <name>_program.mem either way. The boot ends with a commit; arm and trigger
 // are left to the host. A file that is missing or has too few words is not committed: the boot ends without, and
 // `missing` is high.
+//
+// It reads nothing for START_CLOCKS after power-up: block RAMs of iCE40 parts read as 0 for some microseconds after the
+// configuration. 4096 clocks are 41 us at 100 MHz.
 
 `default_nettype none
 
@@ -18,7 +21,8 @@ module dac_boot #(
     parameter X_WORD_BITS = 16,   // bits of a word in X_FILE; 32 with FOURIER
     parameter Y_WORD_BITS = 16,
     parameter X_HARMONICS = 0,    // with FOURIER: number of harmonics in X_FILE
-    parameter Y_HARMONICS = 0
+    parameter Y_HARMONICS = 0,
+    parameter START_CLOCKS = 4096 // clocks after power-up before the first read
 ) (
     input  wire        clock,
     input  wire        reset,           // starts the boot again
@@ -33,6 +37,7 @@ module dac_boot #(
     output wire [15:0] write_address,
     output wire [31:0] write_data,
     output wire        commit,
+    output wire        starting,        // the START_CLOCKS; a loader that reads block RAMs is held in reset by it
     output reg         booting,         // the boot is running; host writes are lost
     output reg         missing          // a file has not all of its words: there was no commit
 );
@@ -43,6 +48,8 @@ module dac_boot #(
     localparam [1:0] PROGRAM = 2'd0, X = 2'd1, COMMIT = 2'd3;  // 2 is Y
     localparam X_ADDRESS_BITS = X_WORDS > 1 ? $clog2(X_WORDS) : 1;
     localparam Y_ADDRESS_BITS = Y_WORDS > 1 ? $clog2(Y_WORDS) : 1;
+    localparam START_BITS = START_CLOCKS > 0 ? $clog2(START_CLOCKS + 1) : 1;
+    localparam [31:0] START = START_CLOCKS;
 
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
     // module is the one complaint of Verilog-2005 that every tool takes for an error.
@@ -80,6 +87,9 @@ module dac_boot #(
         if (FOURIER != 0 && Y_WORDS != 2 * Y_HARMONICS + 1) begin : guard_10
             dac_boot_Y_WORDS_is_not_two_Y_HARMONICS_and_one stop ();
         end
+        if (START_CLOCKS < 0 || START_CLOCKS > 16777216) begin : guard_11
+            dac_boot_START_CLOCKS_is_not_0_to_16777216 stop ();
+        end
     endgenerate
 
     // The bit above a word is 1 in the last word of a memory that no file has filled. Where one has, it is 0
@@ -97,6 +107,8 @@ module dac_boot #(
     end
 
     // A word is read on one clock and written on the next; both wait while the sequencer accepts no write.
+    reg [START_BITS-1:0] waited;
+    wire started = waited == START[START_BITS-1:0];
     reg [1:0] reads, writes;
     reg [16:0] read_at;
     reg [15:0] write_at;
@@ -109,6 +121,7 @@ module dac_boot #(
     wire last = {15'd0, read_at} == (reads == PROGRAM ? LAST_PROGRAM : reads == X ? LAST_X : LAST_Y);
 
     initial begin
+        waited = 0;
         reads = PROGRAM;
         writes = PROGRAM;
         read_at = 17'd0;
@@ -120,11 +133,12 @@ module dac_boot #(
     end
 
     always @(posedge clock) begin
+        if (!started) waited <= waited + 1'b1;
         if (writable) begin
             program_word <= program_words[read_at[5:0]];
             x_word <= x_words[read_at[X_ADDRESS_BITS-1:0]];
             y_word <= y_words[read_at[Y_ADDRESS_BITS-1:0]];
-            writing <= reading;
+            writing <= reading && started;
             writes <= reads;
             write_at <= read_at[15:0];
         end
@@ -134,7 +148,7 @@ module dac_boot #(
             reading <= 1'b1;
             writing <= 1'b0;
             booting <= 1'b1;
-        end else if (reading && writable) begin
+        end else if (reading && started && writable) begin
             read_at <= last ? 17'd0 : read_at + 1;
             if (last) reads <= reads + 1;
             if (reads == COMMIT) reading <= 1'b0;
@@ -147,8 +161,9 @@ module dac_boot #(
     wire [Y_WORD_BITS+31:0] y_wide = {{32{y_word[Y_WORD_BITS-1]}}, y_word[Y_WORD_BITS-1:0]};
     wire [31:0] program_data = FOURIER != 0 && write_at[5:0] == X_HARMONICS_AT ? X_H :
                                FOURIER != 0 && write_at[5:0] == Y_HARMONICS_AT ? Y_H : program_word[31:0];
-    wire unused = &{read_at, x_wide, y_wide};
+    wire unused = &{START, read_at, x_wide, y_wide};
 
+    assign starting = !started;
     assign write = booting ? now && writes != COMMIT : host_write;
     assign write_region = !booting ? host_region : writes == PROGRAM ? 3'd0 : {1'b0, writes} + (FOURIER ? 3'd2 : 3'd0);
     assign write_address = booting ? write_at : host_address;

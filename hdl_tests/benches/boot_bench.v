@@ -19,7 +19,8 @@ module boot_bench #(
     parameter X_WORD_BITS = 16,
     parameter Y_WORD_BITS = 16,
     parameter X_HARMONICS = 0,
-    parameter Y_HARMONICS = 0
+    parameter Y_HARMONICS = 0,
+    parameter START_CLOCKS = 0
 ) (
     input  wire clock,
     output reg  done
@@ -53,12 +54,12 @@ module boot_bench #(
     dac_boot #(
         .PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(FOURIER), .X_WORDS(X_WORDS),
         .Y_WORDS(Y_WORDS), .X_WORD_BITS(X_WORD_BITS), .Y_WORD_BITS(Y_WORD_BITS), .X_HARMONICS(X_HARMONICS),
-        .Y_HARMONICS(Y_HARMONICS)
+        .Y_HARMONICS(Y_HARMONICS), .START_CLOCKS(START_CLOCKS)
     ) boot (
         .clock(clock), .reset(entry[54]), .host_write(entry[52]), .host_region(entry[50:48]),
         .host_address(entry[47:32]), .host_data(entry[31:0]), .host_commit(entry[51]), .writable(entry[53]),
         .write(write), .write_region(region), .write_address(address), .write_data(data), .commit(commit),
-        .booting(booting), .missing(missing)
+        .starting(), .booting(booting), .missing(missing)
     );
 endmodule
 

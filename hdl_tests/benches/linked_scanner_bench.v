@@ -13,7 +13,7 @@ module linked_scanner_bench #(
     reg [8*64-1:0] request;  // +bytes of them, the first one highest
     integer bytes, i, j, k;
 
-    linked_scanner #(.CLOCKS_PER_BIT(CLOCKS_PER_BIT)) dut (
+    linked_scanner #(.CLOCKS_PER_BIT(CLOCKS_PER_BIT), .START_CLOCKS(0)) dut (
         .clock(clock), .line_in(line), .line_out(answer), .permit(1'b1), .sclk(), .select_n(), .x_data(), .y_data(),
         .load_n(), .line(), .frame(), .pixel(), .backward(), .image(), .fault()
     );

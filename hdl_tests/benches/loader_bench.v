@@ -189,12 +189,12 @@ module loader_bench #(
         end else begin : booted
             dac_boot #(
                 .PROGRAM_FILE(BOOT_PROGRAM), .X_FILE(BOOT_X), .X_WORDS(1 << X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
-                .Y_FILE(BOOT_Y), .Y_WORDS(1 << Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS)
+                .Y_FILE(BOOT_Y), .Y_WORDS(1 << Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .START_CLOCKS(0)
             ) boot (
                 .clock(clock), .reset(1'b0), .host_write(host_write), .host_region(host_region),
                 .host_address(host_address), .host_data(host_word), .host_commit(host_commit), .writable(writable),
                 .write(write), .write_region(region), .write_address(address), .write_data(word), .commit(commit),
-                .booting(booting)
+                .starting(), .booting(booting)
             );
         end
     endgenerate

@@ -453,6 +453,9 @@ OUTPUT: tuple[Edit, ...] = (
         ("            reads <= PROGRAM;\n            read_at <= 17'd0;"),
         "            read_at <= 17'd0;",
     ),
+    Edit(
+        "a boot begins at once", "dac_boot", "wire started = waited == START[START_BITS-1:0];", "wire started = 1'b1;"
+    ),
     Edit("a boot does not wait", "dac_boot", "wire now = writing && writable;", "wire now = writing;"),
     Edit("a daisy chain shifts x alone", "dac_spi", "!PARALLEL && tail[FRAME_BITS-1]};", "1'b0};"),
     Edit("the second frame comes without a gap", "dac_spi", "GAP_LAST = GAP - 1;", "GAP_LAST = 0;"),

@@ -306,7 +306,7 @@ module check_boot #(
     output reg [31:0] errors
 );
     localparam FILE_WORDS = 9, LACKS_WORDS = LACKS_PROGRAM || X_WORDS > FILE_WORDS || Y_WORDS > FILE_WORDS;
-    localparam PROGRAM_WORDS = 48, WORD_BITS = FOURIER ? 32 : 16, HARMONICS = 4, CLOCKS = 400, RESET_AT = 80;  // in the tables
+    localparam PROGRAM_WORDS = 48, WORD_BITS = FOURIER ? 32 : 16, HARMONICS = 4, CLOCKS = 400, RESET_AT = 80, START_CLOCKS = 9;  // in the tables
     reg [31:0] program_words [0:PROGRAM_WORDS-1];
     reg [15:0] x_words [0:FILE_WORDS-1], y_words [0:FILE_WORDS-1];
     reg reset = 0, writable = 0, host_write = 0, host_commit = 0, has_ended = 0;
@@ -332,12 +332,12 @@ module check_boot #(
     dac_boot #(
         .PROGRAM_FILE(LACKS_PROGRAM ? "" : PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(FOURIER), .X_WORDS(X_WORDS),
         .Y_WORDS(Y_WORDS), .X_WORD_BITS(WORD_BITS), .Y_WORD_BITS(WORD_BITS), .X_HARMONICS(HARMONICS),
-        .Y_HARMONICS(HARMONICS)
+        .Y_HARMONICS(HARMONICS), .START_CLOCKS(START_CLOCKS)
     ) boot (
         .clock(clock), .reset(reset), .host_write(host_write), .host_region(host_region),
         .host_address(host_address), .host_data(host_data), .host_commit(host_commit), .writable(writable),
         .write(write), .write_region(region), .write_address(address), .write_data(data), .commit(commit),
-        .booting(booting), .missing(missing)
+        .starting(), .booting(booting), .missing(missing)
     );
 
     wire is_program = at < PROGRAM_WORDS, is_x = at < PROGRAM_WORDS + X_WORDS;
@@ -361,6 +361,7 @@ module check_boot #(
                 data !== host_data || (LACKS_WORDS ? !missing : missing || !committed))
                 errors = errors + 1;
         end else begin
+            if ((write || commit) && clocks < START_CLOCKS) errors = errors + 1;
             if (has_ended && clocks > RESET_AT + 2) errors = errors + 1;
             if (write) begin
                 if (!writable || region !== (is_program ? 3'd0 : (is_x ? 3'd1 : 3'd2) + (FOURIER ? 3'd2 : 3'd0)) ||

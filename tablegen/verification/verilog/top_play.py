@@ -62,7 +62,7 @@ module top_play #(
     wire [31:0] x_sent = x_word, y_sent = y_word;
     integer upload, booted, played, clocks = 0;
 
-    {name}_top #(.PLAIN_MULTIPLIER(1)) device (
+    {name}_top #(.PLAIN_MULTIPLIER(1), .START_CLOCKS(50)) device (
         .clock(clock), .reset(1'b0), .write(write), .write_region(word[50:48]), .write_address(word[47:32]),
         .write_data(word[31:0]), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
         .committed(committed), .booting(booting), .missing(missing), .arm(start), .arm_frames(16'd0),
