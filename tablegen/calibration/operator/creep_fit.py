@@ -11,13 +11,12 @@ import numpy as np
 from tablegen.calibration.operator.branches import branch_residual
 from tablegen.calibration.operator.family import CreepOf
 from tablegen.calibration.operator.periodic_line import PeriodicLine
-from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.creep import SEVERAL_RATES, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.numerics.arrays import Floats
 
 _LOSSES = tuple(0.004 * i for i in range(13))  # of creep, per decade
-_SEVERAL_RATES = 2.0  # ratio of the highest rate to the lowest, from which sizes determine creep
 _SAME_TURN = 0.1  # in periods: largest difference of turns of lines whose shapes determine creep
 _STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 _CENTRE_LENGTH = 1.0
@@ -36,7 +35,7 @@ def creep_of_fields(
     """
     rates = [line.rate_hz for line in lines]
     turns = [float(np.mean(line.rising)) for line in lines]
-    several = max(rates) >= _SEVERAL_RATES * min(rates)
+    several = max(rates) >= SEVERAL_RATES * min(rates)
     if not several and max(turns) - min(turns) > _SAME_TURN:
         return creep_of(0.0)
 

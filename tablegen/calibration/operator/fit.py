@@ -18,6 +18,7 @@ from tablegen.calibration.operator.plausible import Unsettled
 from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrink
 from tablegen.calibration.operator.sweep_loss_fit import fit_sweep_loss
+from tablegen.calibration.operator.turns import with_turns
 from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Measured, Response
 from tablegen.compensation.identification import MeasuredLine
@@ -78,7 +79,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     """
     _check(lines)
     sweep, dynamics = sweep_loss_of(lines, response)
-    still = [line.without(dynamics, None) for line in lines]
+    still = [_still(line, dynamics) for line in lines]
     main = _main_centre(still)
     names = (*FAMILIES, NONE)
     creep_of = _creep_of(lines, None if sweep is None else sweep.creep)
@@ -98,6 +99,13 @@ def sweep_loss_of(lines: Sequence[PeriodicLine], response: Response | None) -> t
         return None, response
     sweep = fit_sweep_loss(response, _creep_of(lines))
     return sweep, response if sweep is None else sweep.without(response)
+
+
+def _still(line: PeriodicLine, dynamics: Response | None) -> PeriodicLine:
+    """Return a line without dynamics."""
+    if dynamics is None:
+        return line
+    return with_turns(line.without(dynamics, None), line.highest_corrected_hz(dynamics))
 
 
 def _check(lines: Sequence[PeriodicLine]) -> None:

@@ -139,9 +139,9 @@ def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
     """Return the operator at this rate, and the factor of its loops at this offset."""
     factor = request.factor_at(request.v_share) / request.factor_at(operator.centre)
     operator = replace(operator, creep=operator.creep.down_to(request.rate_hz))
-    if request.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
-        reference = operator.creep.reference_hz
-        factor *= request.rate_gain(request.rate_hz) / request.rate_gain(reference)
+    # (23), a straight line over the logarithm of the rate, says what it does to the size where creep does not.
+    if request.rate_gain is not None and not operator.knows_rates:
+        factor *= request.rate_gain(request.rate_hz) / request.rate_gain(operator.creep.reference_hz)
         operator = replace(operator, creep=structs.replace(operator.creep, reference_hz=request.rate_hz))
     return operator, factor
 
@@ -286,7 +286,7 @@ def _uncertainty(operator: Operator, request: LineRequest, solution: LearntWavef
 
 def _rate_change(operator: Operator, request: LineRequest, rate_hz: float) -> float:
     """Return by which share lines are larger at a rate than at that of the scan."""
-    if request.rate_gain is not None:
+    if request.rate_gain is not None and not operator.knows_rates:
         return request.rate_gain(request.rate_hz) / request.rate_gain(rate_hz) - 1.0
     both = np.array([rate_hz, request.rate_hz])
     real, imaginary = operator.creep.response(both)

@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.elementary import exp
 
+SEVERAL_RATES = 2.0  # ratio of the highest rate to the lowest, from which sizes determine creep
 _TERMS_PER_DECADE = 3
 _PERIODS = 10.0  # of a line: terms that are slower only shift it
 _LN10 = 2.302585092994046

@@ -16,6 +16,11 @@ class Family:
     plays: Plays
     bouc_wen: BoucWen | None = None
 
+    @property
+    def has_hysteresis(self) -> bool:
+        """False for the family ``none``, which is a straight line."""
+        return self.bouc_wen is not None or len(self.plays.thresholds) > 0
+
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
         """Return the displacement on one branch of a settled line, up to a constant.
 

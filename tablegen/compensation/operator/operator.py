@@ -10,7 +10,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import Measured, Response
 from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.operator.bias_memory import BiasMemory
-from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.creep import SEVERAL_RATES, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
@@ -43,6 +43,17 @@ class Operator:
     bias_memory: BiasMemory | None = None
     sweep: SweepLoss | None = None
     misfit_percent: float | None = None
+
+    @property
+    def knows_rates(self) -> bool:
+        """True if the creep says what the rate does to the size.
+
+        It does beside a family, and where the lines have several rates; from the shapes of one rate alone it is less
+        certain than (23).
+        """
+        rates = [line.rate_hz for line in self.lines]
+        several = max(rates, default=1.0) >= SEVERAL_RATES * min(rates, default=1.0)
+        return self.creep.loss_per_decade > 0.0 and (self.family.has_hysteresis or several)
 
     def dynamics(self, response: Response | None) -> Response | None:
         """Return the dynamics behind the operator: a measured response without what the operator has itself."""
