@@ -1,7 +1,7 @@
 """Predict the position of an axis for any drive, on the operator of its scanner file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +20,7 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.in_time import OperatorInTime, Start
+from tablegen.compensation.operator.in_time import OperatorInTime, Start, repeated_samples
 from tablegen.compensation.operator.operator import STROKE_REACH, Operator
 from tablegen.compensation.operator.uncertainty import possible_errors
 from tablegen.config.load import load_scanner
@@ -39,7 +39,7 @@ def predict(
     *,
     axis: Literal["x", "y"],
     against: str | Path | None = None,
-    start: Literal["settled", "rest"] = "rest",
+    start: Literal["settled", "line", "rest"] = "rest",
     delay_s: float = 0.0,
     columns: Columns | None = None,
     drive_gain: float | None = None,
@@ -58,8 +58,8 @@ def predict(
     against : str or Path, optional
         Table with time and displacement that were measured; it may be the same file.
     start : str
-        State at the first sample: "rest", at the first voltage after v_min, or "settled", after many repetitions of
-        the record.
+        State at the first sample: "rest", at the first voltage after v_min; "line", after many repetitions of the
+        first line of the record; or "settled", after many repetitions of the record.
     delay_s : float
         Delay of the measurement against the drive in s, as ``calibrate operator`` took or fitted it.
     columns : str or dict, optional
@@ -123,8 +123,11 @@ def predict(
         )
     if problem:
         raise Rejected([Problem(table.file, 0, DRIVE.name, problem)])
-    mean = float(np.mean(u))
-    in_time = OperatorInTime(known.operator, known.factor(mean), known.response)
+    in_time = OperatorInTime(known.operator_of(time_s), known.factor, known.response)
+    try:
+        repeated_samples(time_s, u, state)
+    except Unphysical as reason:
+        raise Rejected([Problem(table.file, 0, DRIVE.name, str(reason))]) from None
     try:
         position = in_time.position(time_s, u, state)
     except Unphysical as reason:
@@ -177,9 +180,14 @@ class _KnownAxis:
             if its.offset is not None:
                 surface = offset_surface(its.offset, driver, size_law_of(its.size, driver))
         with problems.at(document, f"{axis}.resonance"):
-            response = None if its.resonance is None else dynamics_of(its.resonance, path.parent)
+            response = None if its.resonance is None else operator.dynamics(dynamics_of(its.resonance, path.parent))
         problems.stop_if_any()
         return cls(operator, driver, surface, response)
+
+    def operator_of(self, time_s: Floats) -> Operator:
+        """Return the operator with terms of creep as slow as a record shows: creep has no slowest time constant."""
+        span_s = float(time_s[-1] - time_s[0])
+        return replace(self.operator, creep=self.operator.creep.down_to(1.0 / span_s))
 
     def factor(self, mean: float) -> float:
         """Return m of (1) at a mean over that at the operator's centre."""
