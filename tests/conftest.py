@@ -16,7 +16,7 @@ settings.register_profile("tablegen", settings(), deadline=None)
 settings.load_profile("tablegen")
 
 # The run says so at its end.
-collect_ignore = [] if real_folder() else ["calibration/test_real_files.py", "calibration/test_real_traces.py"]
+collect_ignore = [] if real_folder() else [f"calibration/test_real_{of}.py" for of in ("files", "images", "traces")]
 
 # A shell that starts the tests in the background has SIGINT ignored, and nohup SIGHUP. Whatever the tests start would
 # ignore it too, but for a handler, which is not handed on.

@@ -1,7 +1,7 @@
 """Predict the position of an axis for any drive, on the operator of its scanner file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any, Literal
@@ -20,9 +20,9 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.in_time import OperatorInTime, Start
+from tablegen.compensation.operator.in_time import OperatorInTime, Start, mean_of, repeated_samples
 from tablegen.compensation.operator.operator import STROKE_REACH, Operator
-from tablegen.compensation.operator.uncertainty import possible_errors
+from tablegen.compensation.operator.prediction_uncertainty import possible_prediction_errors
 from tablegen.config.load import load_scanner
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
@@ -39,7 +39,7 @@ def predict(
     *,
     axis: Literal["x", "y"],
     against: str | Path | None = None,
-    start: Literal["settled", "rest"] = "rest",
+    start: Literal["settled", "line", "rest"] = "rest",
     delay_s: float = 0.0,
     columns: Columns | None = None,
     drive_gain: float | None = None,
@@ -58,8 +58,8 @@ def predict(
     against : str or Path, optional
         Table with time and displacement that were measured; it may be the same file.
     start : str
-        State at the first sample: "rest", at the first voltage after v_min, or "settled", after many repetitions of
-        the record.
+        State at the first sample: "rest", at the first voltage after v_min; "line", after many repetitions of the
+        first line of the record; or "settled", after many repetitions of the record.
     delay_s : float
         Delay of the measurement against the drive in s, as ``calibrate operator`` took or fitted it.
     columns : str or dict, optional
@@ -70,7 +70,8 @@ def predict(
     Returns
     -------
     Predicted
-        ``time_s``, ``volts``, ``position_nm``, ``uncertainty_nm``; ``error_nm`` with ``against``.
+        ``time_s``, ``volts``, ``position_nm``, ``sweep_uncertainty_nm``, ``uncertainty_nm``; ``error_nm`` with
+        ``against``.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def predict(
         )
         raise Rejected([Problem(table.file, int(table.lines[at]), DRIVE.name, why)])
     u = known.driver.share(volts)
-    stroke, centre = (high - low) / known.driver.span, float(known.driver.share(0.5 * (low + high)))
+    stroke = (high - low) / known.driver.span
     largest = max(line.stroke for line in known.operator.lines)
     problem = ""
     if stroke < _LEAST_STROKE:
@@ -123,14 +124,15 @@ def predict(
         )
     if problem:
         raise Rejected([Problem(table.file, 0, DRIVE.name, problem)])
-    mean = float(np.mean(u))
-    in_time = OperatorInTime(known.operator, known.factor(mean), known.response)
+    in_time = OperatorInTime(known.operator_of(time_s), known.factor, known.response)
+    try:
+        repeated_samples(time_s, u, state)
+    except Unphysical as reason:
+        raise Rejected([Problem(table.file, 0, DRIVE.name, str(reason))]) from None
     try:
         position = in_time.position(time_s, u, state)
     except Unphysical as reason:
         raise Rejected([Problem(str(scanner), 0, f"{axis}.hysteresis.file", str(reason))]) from None
-    rms, _, _, size = possible_errors(known.operator, stroke, centre)
-    extent = float(np.max(position) - np.min(position))
     measured = None
     if against is not None:
         # What an amplifier does to the drive is no matter of a file of positions.
@@ -143,8 +145,8 @@ def predict(
             )
             raise Rejected([Problem(other.file, 0, TIME.name, why)])
         measured = np.interp(time_s + delay_s, other[TIME], other[DISPLACEMENT])
-    bound = 0.01 * extent * sqrt(rms * rms + 0.25 * size * size) if state is Start.SETTLED else None
-    return Predicted(axis, state, time_s, volts, position, bound, measured)
+    bounds = possible_prediction_errors(known.operator, u, position, state)
+    return Predicted(axis, state, time_s, volts, position, bounds, measured)
 
 
 @dataclass(frozen=True)
@@ -177,9 +179,14 @@ class _KnownAxis:
             if its.offset is not None:
                 surface = offset_surface(its.offset, driver, size_law_of(its.size, driver))
         with problems.at(document, f"{axis}.resonance"):
-            response = None if its.resonance is None else dynamics_of(its.resonance, path.parent)
+            response = None if its.resonance is None else operator.dynamics(dynamics_of(its.resonance, path.parent))
         problems.stop_if_any()
         return cls(operator, driver, surface, response)
+
+    def operator_of(self, time_s: Floats) -> Operator:
+        """Return the operator with terms of creep as slow as a record shows: creep has no slowest time constant."""
+        span_s = float(time_s[-1] - time_s[0])
+        return replace(self.operator, creep=self.operator.creep.down_to(1.0 / span_s))
 
     def factor(self, mean: float) -> float:
         """Return m of (1) at a mean over that at the operator's centre."""
@@ -205,9 +212,9 @@ def _check_times(table: MeasuredTable) -> None:
 class Predicted(Result):
     """Predicted positions of an axis; ``measured_nm`` is None without a measurement.
 
-    Arrays have the shape (samples,). ``uncertainty_nm`` is the rms error below which 90 % of settled lines stay, by the
-    traces that were left out; None for a start at rest, of which no trace tells. Positions count from the lower turn of
-    the widest loop.
+    Arrays have the shape (samples,). ``sweep_uncertainty_nm`` is, for the samples of each sweep, the rms error below
+    which 90 % of predictions stay, without the mean of the whole record. Positions count from the lower turn of the
+    widest loop.
     """
 
     axis: str
@@ -215,8 +222,13 @@ class Predicted(Result):
     time_s: Floats
     volts: Floats
     position_nm: Floats
-    uncertainty_nm: float | None
+    sweep_uncertainty_nm: Floats
     measured_nm: Floats | None
+
+    @property
+    def uncertainty_nm(self) -> float:
+        """The rms error of the whole record below which 90 % of predictions stay."""
+        return sqrt(mean_of(self.time_s, self.sweep_uncertainty_nm**2))
 
     @property
     def extent_nm(self) -> float:
@@ -258,7 +270,8 @@ class Predicted(Result):
 
     def csv(self) -> bytes:
         """Return the table that ``-o`` writes."""
-        names, columns = ["time_s", "drive_v", "displacement_nm"], [self.time_s, self.volts, self.position_nm]
+        names = ["time_s", "drive_v", "displacement_nm", "uncertainty_nm"]
+        columns = [self.time_s, self.volts, self.position_nm, self.sweep_uncertainty_nm]
         if self.measured_nm is not None and self.error_nm is not None:
             names, columns = [*names, "measured_nm", "error_nm"], [*columns, self.measured_nm, self.error_nm]
         rows = (
@@ -282,10 +295,7 @@ class Predicted(Result):
     def _lines(self) -> Sequence[str]:
         span_s = float(self.time_s[-1] - self.time_s[0])
         first = f"prediction of {self.axis}: {len(self.time_s)} samples, {span_s:.4g} s, start {self.start.value}"
-        bound = "its error is known with --against alone"
-        if self.uncertainty_nm is not None:
-            bound = f"rms error below {self.uncertainty_nm:.2g} nm if every period is like the last (90 %)"
-        lines = [first, f"stroke {self.extent_nm:.6g} nm, {bound}"]
+        lines = [first, f"stroke {self.extent_nm:.6g} nm, rms error below {self.uncertainty_nm:.2g} nm (90 %)"]
         errors = self.errors_percent
         if errors is not None:
             lines.append(f"measured: rms error {errors[0]:.3g} %, worst {errors[1]:.3g} % of the stroke")

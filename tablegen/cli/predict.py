@@ -35,10 +35,10 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 @click.option("--against", type=_path, metavar="FILE", help="Measured positions; print the error of the prediction.")
 @click.option(
     "--start",
-    type=click.Choice(["rest", "settled"]),
+    type=click.Choice(["rest", "line", "settled"]),
     default="rest",
     show_default=True,
-    help="State at the first sample: at rest after v_min, or after many repetitions of the record.",
+    help="State at the first sample: at rest after v_min, or after many repetitions of the first line or of all.",
 )
 @click.option(
     "--delay-s",
@@ -57,7 +57,7 @@ def predict(
     axis: Literal["x", "y"],
     output: Path | None,
     against: Path | None,
-    start: Literal["settled", "rest"],
+    start: Literal["settled", "line", "rest"],
     delay_s: float,
     recorder: "Recorder",
     plot: Path | None,
@@ -68,8 +68,9 @@ def predict(
     DRIVE.CSV has the columns time_s and drive_v, in the order of time, at even or uneven steps. The scanner file has
     `model = "operator"` in the hysteresis table of the axis (`tablegen calibrate operator`).
 
-    Hysteresis depends on the turning points of the drive; creep and resonance depend on time too. The sensitivity is
-    that at the mean of the drive. The mean of the error is subtracted, because the zero of a sensor is arbitrary.
+    Hysteresis depends on the turning points of the drive; creep and dynamics depend on time too. The sensitivity is
+    that at the mean of the drive, or follows its running mean where `calibrate operator --step` measured how. The mean
+    of the error is subtracted, because the zero of a sensor is arbitrary.
     """
     quiet_blas()
     check_plot(plot, as_json)

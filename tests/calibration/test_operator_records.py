@@ -172,7 +172,7 @@ def test_a_late_sensor_is_found_and_named() -> None:
 def test_a_known_resonance_is_taken_out() -> None:
     response = SecondOrder(400.0, 5.0, 1e-4)
     record = trace(chirp())
-    y = resonant(record.time_s, record.displacement_nm, response, False)
+    y = resonant(record.time_s, record.displacement_nm, response, 0)
     y = np.interp(record.time_s - response.delay_s, record.time_s, y)
     records = [time_record(Trace("ringing", record.time_s, record.drive_v, y), V_MAX)]
     assert (
@@ -183,7 +183,7 @@ def test_a_known_resonance_is_taken_out() -> None:
     assert modes is not None
     assert lag_s == response.delay_s
     column = late_sum(record.time_s, record.drive_v[:, None], *modes)[:, 0]
-    assert column == pytest.approx(resonant(record.time_s, record.drive_v, response, False), abs=1e-9 * V_MAX)
+    assert column == pytest.approx(resonant(record.time_s, record.drive_v, response, 0), abs=1e-9 * V_MAX)
 
 
 def test_few_samples_give_a_simple_operator_that_says_so() -> None:

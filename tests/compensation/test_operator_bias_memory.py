@@ -22,6 +22,7 @@ from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.compensation.operator.bias_memory import BiasMemory, late_terms
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.in_time import OperatorInTime, Start
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.transient import SettledLine, after_offset, after_size, transient_between
 from tablegen.numerics.arrays import Floats
@@ -183,6 +184,68 @@ def test_frames_after_a_step_of_20_v_drift_as_predicted(name: str, centres: tupl
 
     assert float(np.max(np.abs(predicted(late.memory) - measured))) < 0.5
     assert float(np.max(np.abs(predicted(None) - measured))) > 3.0
+
+    def in_time(memory: BiasMemory | None) -> Floats:
+        at_main = offset_law(name)(fitted.centre)
+        axis = OperatorInTime(replace(fitted, bias_memory=memory), lambda mean: offset_law(name)(mean) / at_main)
+        moved = axis.position(truth[0], truth[1] / V_MAX, Start.LINE)
+        return moved[30 * 20 :].reshape(1600, 20)
+
+    lines_nm = in_time(late.memory)
+    assert float(np.max(np.abs(drifts(lines_nm.mean(axis=1)) - measured))) < 0.4
+    assert float(np.max(np.abs(drifts(in_time(None).mean(axis=1)) - measured))) > 2.7
+    sizes = np.ptp(lines_nm, axis=1) / np.ptp(truth[2][30 * 20 :].reshape(1600, 20), axis=1)
+    assert np.all(np.abs(sizes[5:] - 1.0) < {"plays": 0.06, "Bouc-Wen": 0.25}[name])  # as docs/operator.md says
+
+
+@pytest.mark.parametrize("start", [Start.SETTLED, Start.LINE])
+def test_a_memory_does_not_change_settled_lines(start: Start) -> None:
+    model, without = REMEMBERING, replace(REMEMBERING, bias_memory=None)
+    u = np.append(np.tile(0.5 + 0.2 * np.abs(np.arange(40) / 20.0 - 1.0), 60), 0.7)
+    for first in (0, 13, 20):
+        u = np.append(np.roll(u[:-1], -first), np.roll(u[:-1], -first)[0])
+        t = 2.5e-4 * np.arange(len(u))
+        one, other = (OperatorInTime(each, law_of_size).position(t, u, start) for each in (model, without))
+        assert np.max(np.abs(one - other)) < 1e-9 * np.ptp(other)
+
+
+def law_of_size(mean: float) -> float:
+    return 1.0 - 0.1 * (mean - 0.5) + 0.04 * (mean - 0.5) ** 2
+
+
+def law_of_family(mean: float) -> float:
+    """Return the factor with which the sensitivity does not depend on the mean of the drive, beside its memory."""
+    return operator().sensitivity(mean, 1.0)
+
+
+def test_the_sensitivity_follows_by_share_and_time_of_either_direction() -> None:
+    """Of lines whose offset goes up and down again: what is late is a share of the step, and decays."""
+    model = replace(operator(), bias_memory=BiasMemory(0.2, 20.0, 0.1, 12.0))
+    line = 0.05 * np.abs(np.arange(20) / 10.0 - 1.0)
+    u = np.concatenate([np.tile(line + at, 3000) for at in (0.4, 0.6, 0.4)])
+    t = 5e-4 * np.arange(len(u))
+    y, settled = (OperatorInTime(one, law_of_family).position(t, u, Start.LINE) for one in (model, operator()))
+    late = (settled - y).reshape(-1, 20).mean(axis=1)
+    lines = settled.reshape(-1, 20).mean(axis=1)
+    up, down = lines[5900] - lines[100], lines[8900] - lines[5900]
+    assert np.max(np.abs(late[:2999])) < 1e-9
+    assert late[3002] == pytest.approx(0.2 * up, rel=0.02)
+    assert late[5000] / late[3002] == pytest.approx(np.exp(-1998 * LINE_S / 20.0), rel=1e-2)
+    rest = 0.2 * up * np.exp(-1.5)  # the way up was not over
+    assert late[6002] == pytest.approx(0.1 * (down + rest / 0.2), rel=0.02)
+    assert late[8000] / late[6002] == pytest.approx(np.exp(-1998 * LINE_S / 12.0), rel=1e-2)
+
+
+def test_a_drive_that_rests_is_followed_too() -> None:
+    """Steps without lines: the position goes on by the share of a step, and creeps by no more."""
+    model = replace(operator(), bias_memory=BiasMemory(0.2, 5.0, 0.1, 5.0))
+    u = np.concatenate([np.full(100, 0.3), np.full(900, 0.6)])
+    t = 0.1 * np.arange(1000)
+    y, at_once = (OperatorInTime(one, law_of_family).position(t, u, Start.REST) for one in (model, operator()))
+    step = at_once[-1] - at_once[0]
+    assert at_once[100] - y[100] == pytest.approx(0.2 * step, rel=1e-6)
+    assert at_once[150] - y[150] == pytest.approx(0.2 * step * np.exp(-1.0), rel=1e-6)
+    assert y[-1] == pytest.approx(at_once[-1], abs=1e-4)
 
 
 @pytest.mark.common

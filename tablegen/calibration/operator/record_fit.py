@@ -39,6 +39,7 @@ from tablegen.numerics.arrays import Bools, Floats
 
 Factor = Callable[[float], float]
 _RIDGE = 1e-3  # weight of the penalty on weights, of the sensitivity
+_SMOOTH = 1e-2  # weight of the penalty on steps of their density along the threshold
 _LEAST_SLOPE = 0.2  # of the static curve, of the sensitivity, so that the smallest loops have a slope
 _HELD_OUT = 0.25  # of the travel of a record's drive
 _HIGHEST = 0.495  # threshold; above it no play moves
@@ -219,7 +220,7 @@ class _Problem:
         self._choices[key] = used
         c, plays = loss / 3.0, self.basis.plays
         count = plays + self.basis.degree
-        gram, right, power = _RIDGE**2 * np.eye(count), np.zeros(count), 0.0
+        gram, right, power = self.basis.penalty(_RIDGE, _SMOOTH), np.zeros(count), 0.0
         for i, (a, late, aa, al, ll, q) in enumerate(self._grams(key)):
             y = self.weight(i, used[i]) * self.measured(i, delay_s)[used[i]]
             y = y - q @ (q.T @ y)

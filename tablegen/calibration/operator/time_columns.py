@@ -39,6 +39,33 @@ class PlayBasis:
         """The number of plays."""
         return len(self.thresholds) * len(self.bends)
 
+    def penalty(self, ridge: float, smooth: float) -> Floats:
+        """Return the penalty on squares of all weights, and on steps of the density of plays along the threshold.
+
+        So loops that are smaller than those of the records follow from the density of plays that these have moved.
+
+        Parameters
+        ----------
+        ridge
+            Weight of the weights.
+        smooth
+            Weight of the steps: of neighbours, each weight over the way to the next lower threshold, relative to the
+            mean way.
+
+        Returns
+        -------
+        Floats
+            Shape (plays + degree, plays + degree).
+        """
+        count = len(self.thresholds)
+        ways = np.diff(self.thresholds, prepend=0.0)
+        steps = np.diff(np.diag(np.mean(ways) / ways), axis=0)
+        out = ridge * ridge * np.eye(self.plays + self.degree)
+        for first in range(0, self.plays, count):
+            part = slice(first, first + count)
+            out[part, part] += smooth * smooth * steps.T @ steps
+        return out
+
     def columns(self, u: Floats, begin: Begin) -> Floats:
         """Return the positions of the plays, then the powers of the drive.
 

@@ -1,11 +1,13 @@
-"""The position in time for any drive: hysteresis by its memory of turns, creep and a resonance by their modes.
+"""The position in time for any drive: hysteresis by its memory of turns, creep and dynamics in time.
 
 Hysteresis remembers the turns that no later one has gone beyond (return-point memory). From the last of them the axis
 goes towards the one before on the branch of the settled loop between both, and past it on the branch on which it was
 before that loop. So a settled line is the closed form itself, and every family, and the measured residual over it,
-has its motion in time.
+has its motion in time. Where the memory of the bias was measured, the sensitivity follows the running mean of the
+drive; else it is that at the mean of the whole drive.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -14,27 +16,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.compensation.dynamics import Response, SecondOrder
+from tablegen.compensation.dynamics import Measured, Response, SecondOrder
+from tablegen.compensation.operator.bias_in_time import Periods, remembered
+from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.loop import Loop
+from tablegen.compensation.operator.measured_in_time import behind_measured
 from tablegen.compensation.operator.operator import Operator
 from tablegen.numerics.arrays import Floats
 
 LEAST_SWING = 1e-3  # of the driver's range: what goes back by less, such as the noise of a recorder, is no turn
+_MEANS = 129  # means of the drive at which the sensitivity is computed; linear between them
+_LEAST_TURNS = 4  # of a record that begins with a line: its first sample, three turns, and one sample more
+
+
+_SAME_LEVEL = 0.2  # of the stroke of the first line, by which it may end elsewhere than it began
 
 
 class Start(StrEnum):
-    """The state in which a record begins: after many repetitions of itself, or at rest after the range's lower end."""
+    """The state in which a record begins: after many repetitions of it or of its first line, or at rest after v_min."""
 
     SETTLED = "settled"
+    LINE = "line"
     REST = "rest"
+
+
+def _constant(_: float) -> float:
+    return 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class OperatorInTime:
-    """An axis in time; ``factor`` is that of ``Operator.loop`` at the mean of the drive."""
+    """An axis in time; ``factor_at`` is that of ``Operator.loop`` at a mean of the drive."""
 
     operator: Operator
-    factor: float = 1.0
+    factor_at: Callable[[float], float] = _constant
     response: Response | None = None
 
     def position(self, time_s: Floats, u: Floats, start: Start = Start.SETTLED) -> Floats:
@@ -52,24 +67,57 @@ class OperatorInTime:
         Raises
         ------
         Unphysical
-            If a branch of the operator would run backwards, or the dynamics are not a resonance and a delay.
+            If a branch of the operator would run backwards, or the record does not begin with a line that repeats.
         """
-        settled = start is Start.SETTLED
-        y = self.hysteresis(u, start)
-        span_s = float(time_s[-1] - time_s[0])
+        repeated = repeated_samples(time_s, u, start)
+        mean = mean_of(time_s, u)
+        y = self.hysteresis(u, start, mean, repeated)
+        if self.operator.bias_memory is not None:
+            y = self._sensitive(self.operator.bias_memory, time_s, u, y, mean, repeated)
         creep = self.operator.creep
-        late = [share * late_mode(time_s, y, tau_s, settled).real for share, tau_s in creep.terms()]
+        late = [share * late_mode(time_s, y, tau_s, repeated).real for share, tau_s in creep.terms()]
         y = creep.direct * y + np.sum(late, axis=0) if late else y
         if self.response is None:
             return y
+        if isinstance(self.response, Measured):
+            return behind_measured(time_s, y, self.response, repeated)
         if not isinstance(self.response, SecondOrder):
-            raise Unphysical("in time a resonance and its delay are known, not a response that was measured in points")
-        y = resonant(time_s, y, self.response, settled)
+            raise Unphysical("in time a resonance with its delay is known, or a response that was measured in points")
+        y = resonant(time_s, y, self.response, repeated)
         ago = time_s - self.response.delay_s
-        delayed: Floats = np.interp(ago, time_s, y, period=span_s) if settled else np.interp(ago, time_s, y)
+        if repeated:
+            period_s = float(time_s[repeated - 1] - time_s[0])
+            ago = np.where(ago < time_s[0], time_s[0] + (ago - time_s[0]) % period_s, ago)
+        delayed: Floats = np.interp(ago, time_s, y)
         return delayed
 
-    def hysteresis(self, u: Floats, start: Start = Start.SETTLED) -> Floats:
+    def _sensitive(
+        self, memory: BiasMemory, time_s: Floats, u: Floats, y: Floats, mean: float, repeated: int
+    ) -> Floats:
+        """Return the position with the sensitivity at the running mean of the drive, which follows it late."""
+        periods = Periods.of(time_s, u, turns_of(u), repeated, min(memory.rise_time_s, memory.fall_time_s))
+        means = periods.mean(u)
+        grid = np.arange(_MEANS) / (_MEANS - 1)
+        at = np.array([self.operator.sensitivity(float(one), self.factor_at(float(one))) for one in grid])
+        here = np.interp(means, grid, at) / np.interp(mean, grid, at)
+        low, highest = float(np.min(u)), self._reach(float(np.max(u)))
+        from_low = 0.0
+        if repeated == len(u) and low > 0.0:  # else positions are from v_min on already
+            ends = self.operator.family.branch(np.array([0.0, low]), 0.0, highest, True)
+            from_low = self.operator.sensitivity(mean, self.factor_at(mean)) * float(ends[1] - ends[0])
+        whole = from_low + y
+        settled_at = periods.mean(whole)  # a share is of a step of which both ends are as sensitive
+        first = None if repeated == len(u) else float(settled_at[0] if repeated else whole[0])
+        out: Floats = here * whole * remembered(memory, periods, settled_at, first) - from_low
+        return out
+
+    def _reach(self, high: float) -> float:
+        """Return the highest drive that the axis has been at before it rested."""
+        return max([high, *(line.centre + 0.5 * line.stroke for line in self.operator.lines)])
+
+    def hysteresis(
+        self, u: Floats, start: Start = Start.SETTLED, mean: float | None = None, repeated: int = 0
+    ) -> Floats:
         """Return the position in nm without creep and dynamics.
 
         Parameters
@@ -78,26 +126,64 @@ class OperatorInTime:
             Normalised drives, shape (n,).
         start
             The state before the first of them.
+        mean
+            Mean of the drive, to which the sensitivity belongs; by default that of the samples.
+        repeated
+            The number of samples that were repeated before, for the start in a line.
 
         Raises
         ------
         Unphysical
             If a branch of the operator would run backwards.
         """
-        mean, low, high = float(np.mean(u)), float(np.min(u)), float(np.max(u))
-        if start is Start.REST:
-            reach = max(line.centre + 0.5 * line.stroke for line in self.operator.lines)
-            low, high = min(low, 0.0), max(high, reach)
-        memory = _Memory(self.operator, self.factor, mean, low, high)
-        if start is Start.REST:
+        mean = float(np.mean(u)) if mean is None else mean
+        low, high = float(np.min(u)), float(np.max(u))
+        if start is not Start.SETTLED:
+            low, high = min(low, 0.0), self._reach(high)
+        memory = _Memory(self.operator, self.factor_at(mean), mean, low, high)
+        if start is not Start.SETTLED:
             memory.move(np.array([low, float(u[0])]))
-        else:
-            _along(memory, u)
-            memory.move(u[[-1, 0]])
+        before = {Start.SETTLED: len(u), Start.LINE: repeated, Start.REST: 0}[start]
+        if before:
+            _along(memory, np.append(u[:before], u[0]))
         return _along(memory, u)
 
 
-def late_mode(time_s: Floats, y: Floats, tau_s: complex, settled: bool) -> NDArray[np.complex128]:
+def mean_of(time_s: Floats, u: Floats) -> float:
+    """Return the mean over the time of drives that are linear between the times, shapes (n,)."""
+    return float(np.sum(0.5 * np.diff(time_s) * (u[1:] + u[:-1])) / (time_s[-1] - time_s[0]))
+
+
+def repeated_samples(time_s: Floats, u: Floats, start: Start) -> int:
+    """Return how many samples from the first one on are a drive that was repeated before: all, a line, or none.
+
+    Parameters
+    ----------
+    time_s, u
+        Ascending times in s and normalised drives, shapes (n,).
+    start
+        The state at the first time.
+
+    Raises
+    ------
+    Unphysical
+        If the start is in a line, and the record does not begin with one.
+    """
+    if start is not Start.LINE:
+        return len(u) if start is Start.SETTLED else 0
+    turns = turns_of(u)
+    if len(turns) > _LEAST_TURNS:
+        period_s = float(time_s[turns[3]] - time_s[turns[1]])
+        end = int(np.argmin(np.abs(time_s - time_s[0] - period_s)))
+        line = u[: end + 1]
+        if abs(float(line[-1] - line[0])) <= _SAME_LEVEL * float(np.ptp(line)):
+            return end + 1
+    raise Unphysical(
+        "the record does not begin with lines of one size and offset, two at least; start in another state"
+    )
+
+
+def late_mode(time_s: Floats, y: Floats, tau_s: complex, repeated: int) -> NDArray[np.complex128]:
     """Return s of tau s' = y - s, exactly for a y that is linear between the times.
 
     Parameters
@@ -106,8 +192,8 @@ def late_mode(time_s: Floats, y: Floats, tau_s: complex, settled: bool) -> NDArr
         Ascending times in s and the input, shapes (n,).
     tau_s
         Time constant, of a complex mode a complex one, with a positive real part of its inverse.
-    settled
-        True if y repeats with the length of the record; else s begins as the first y.
+    repeated
+        How many samples from the first one on were repeated before; 0 if s begins as the first y.
 
     Returns
     -------
@@ -125,12 +211,12 @@ def late_mode(time_s: Floats, y: Floats, tau_s: complex, settled: bool) -> NDArr
         gain[step:] = gain[step:] + factor[step:] * gain[:-step]
         factor[step:] = factor[step:] * factor[:-step]
         step *= 2
-    begin = gain[-1] / (1.0 - factor[-1]) if settled else y[0]
+    begin = gain[repeated - 1] / (1.0 - factor[repeated - 1]) if repeated else y[0]
     out: NDArray[np.complex128] = gain + factor * begin
     return out
 
 
-def resonant(time_s: Floats, y: Floats, response: SecondOrder, settled: bool) -> Floats:
+def resonant(time_s: Floats, y: Floats, response: SecondOrder, repeated: int) -> Floats:
     """Return the output of a resonance, without its delay, by its two modes.
 
     Parameters
@@ -139,11 +225,11 @@ def resonant(time_s: Floats, y: Floats, response: SecondOrder, settled: bool) ->
         Ascending times in s and the input, shapes (n,).
     response
         The resonance.
-    settled
-        True if y repeats with the length of the record; else it begins at rest.
+    repeated
+        How many samples from the first one on were repeated before; 0 if it begins at rest.
     """
     taus_s, gains = resonance_modes(response)
-    modes = [gain * late_mode(time_s, y, tau_s, settled) for tau_s, gain in zip(taus_s, gains, strict=True)]
+    modes = [gain * late_mode(time_s, y, tau_s, repeated) for tau_s, gain in zip(taus_s, gains, strict=True)]
     return np.asarray(np.sum(modes, axis=0).real, dtype=np.float64)
 
 
@@ -185,6 +271,8 @@ class _Memory:
                 here = loop.position(u[first:until], rising)
                 share = here if rising else 1.0 - here
                 out[first:until] = y_last + (y_aim - y_last) * share
+                if u[until - 1] == aim:  # the branches of a measured loop have a gap there, which lines would add up
+                    out[until - 1] = y_aim
             first = until
             if first < len(u) or u[-1] == aim:
                 if len(self._turns) > 2:

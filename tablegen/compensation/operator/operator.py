@@ -97,6 +97,11 @@ class Operator:
         small = self.family.extent(SMALL_STROKE, self.centre) / self.family.extent(SMALL_STROKE, centre)
         return here * small / factor
 
+    def sensitivity(self, centre: float, factor: float) -> float:
+        """Return the factor of ``expected_extent`` beyond the family's extent: that of the mean of the drive."""
+        at_main, here = (self.family.extent(SMALL_STROKE, at) for at in (self.centre, centre))
+        return at_main / (here * factor)
+
     def distance(self, stroke: float, centre: float) -> float:
         """Return how far a line is from the nearest measured one, in shares of v_max."""
         return min(max(abs(stroke - line.stroke), abs(centre - line.centre)) for line in self.lines)
