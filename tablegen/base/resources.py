@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 PACKAGE = Path(__file__).parent.parent
-_C_LINK = "dac_link"
+_C_LINK, _C_STORE = "dac_link", "dac_store"
 
 
 def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
@@ -22,12 +22,17 @@ def verilog_runtime() -> list[Path]:
 
 def c_runtime() -> list[Path]:
     """Return the C sequencer, headers and sources, in order of name; every build copies it."""
-    return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith(_C_LINK)]
+    return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith((_C_LINK, _C_STORE))]
 
 
 def c_link() -> list[Path]:
     """Return the device's end of the serial link in C, which needs the sequencer; every build copies it too."""
     return [path for path in _runtime("c", ".c", ".h") if path.name.startswith(_C_LINK)]
+
+
+def c_store() -> list[Path]:
+    """Return the kept programs in C, which need ``dac_link_frame.c``; every build copies them too."""
+    return [path for path in _runtime("c", ".c", ".h") if path.name.startswith(_C_STORE)]
 
 
 def own_runtime_folders() -> tuple[Path, ...]:

@@ -13,7 +13,7 @@ import pytest
 from building import run
 from sets import by_tool
 
-from tablegen.base.resources import c_link, c_runtime, verilog_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store, verilog_runtime
 from tablegen.config.names import of_the_runtime, why_not_a_name
 
 C = """
@@ -202,7 +202,7 @@ def test_names_that_only_resemble_them_are_accepted(name: str) -> None:
 
 def test_no_scan_can_be_called_as_a_file_or_identifier_of_the_sequencer_begins() -> None:
     """What is emitted is called NAME or begins with NAME_; so no such beginning of a name of the sequencer is free."""
-    files = [*c_runtime(), *c_link(), *verilog_runtime()]
+    files = [*c_runtime(), *c_link(), *c_store(), *verilog_runtime()]
     words = {path.stem for path in files}
     for path in files:
         text = path.read_text("utf-8")

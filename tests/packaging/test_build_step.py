@@ -21,13 +21,13 @@ from installing import write_command
 from sets import common
 
 from tablegen import __version__
-from tablegen.base.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store
 
 pytestmark = pytest.mark.common
 
 TOOLS = ("make", "Unix Makefiles", "Ninja")
 OF_THE_SCAN = {"main", NAME, f"{NAME}_program"}  # what includes its header
-BUILT = {*OF_THE_SCAN, *(path.stem for path in (*c_runtime(), *c_link()) if path.suffix == ".c")}
+BUILT = {*OF_THE_SCAN, *(path.stem for path in (*c_runtime(), *c_link(), *c_store()) if path.suffix == ".c")}
 LINKED = {"example"}
 STAMPS = {"tablegen-build.d", "tablegen-build.options"}  # of make, beside what tablegen writes
 

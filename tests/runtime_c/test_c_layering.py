@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from building import run_clean
 
-from tablegen.base.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store
 
-EVERYTHING = [*c_runtime(), *c_link()]
-PUBLIC = {"dac_sequencer.h", "dac_link.h"}  # their types stand below everything, the functions that they declare above
+EVERYTHING = [*c_runtime(), *c_link(), *c_store()]
+# Their types stand below everything, the functions that they declare above.
+PUBLIC = {"dac_sequencer.h", "dac_link.h", "dac_store.h"}
 Graph = Mapping[str, set[str]]
 # What these compile makes other calls.
 CHOICES = {

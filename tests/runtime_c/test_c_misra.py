@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from building import REPOSITORY, run, tool
 
-from tablegen.base.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store
 
 pytestmark = pytest.mark.rest
 
@@ -32,7 +32,7 @@ def documented() -> set[str]:
 
 
 def test_the_deviations_are_those_of_the_documentation() -> None:
-    found = set().union(*(reported([*c_runtime(), *c_link()], *options) for options in OPTIONS))
+    found = set().union(*(reported([*c_runtime(), *c_link(), *c_store()], *options) for options in OPTIONS))
     assert found == documented()
 
 

@@ -9,9 +9,9 @@ import pytest
 from building import run, run_clean
 from sets import LONG_TEST, by_tool, in_pairs
 
-from tablegen.base.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store
 
-EVERYTHING = [*c_runtime(), *c_link()]
+EVERYTHING = [*c_runtime(), *c_link(), *c_store()]
 SOURCES = [path for path in EVERYTHING if path.suffix == ".c"]
 HEADERS = {path.name: path for path in EVERYTHING if path.suffix == ".h"}
 WARNINGS = [

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tablegen.base.reading import BUILD_FILE, read_text
-from tablegen.base.resources import c_link, c_runtime, resource_folder
+from tablegen.base.resources import c_link, c_runtime, c_store, resource_folder
 from tablegen.emit.constants import (
     axis_constants,
     scan_constants,
@@ -50,7 +50,7 @@ class C(Format):
 
     def runtime(self) -> list[Path]:
         """List the files of the C sequencer and its link."""
-        return [*c_runtime(), *c_link()]
+        return [*c_runtime(), *c_link(), *c_store()]
 
     def sources(self) -> list[Path]:
         """Return the runtime and the templates."""
