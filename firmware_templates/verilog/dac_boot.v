@@ -93,14 +93,20 @@ module dac_boot #(
     endgenerate
 
     // The bit above a word is 1 in the last word of a memory that no file has filled. Where one has, it is 0
-    // throughout, and a synthesiser takes it away.
+    // throughout, and a synthesiser takes it away. In a synthesis only memories without a name have it: yosys gives an
+    // assignment precedence over $readmemh, whatever their order, and it stops where a file is missing.
     reg [32:0] program_words [0:PROGRAM_WORDS-1];
     reg [X_WORD_BITS:0] x_words [0:X_WORDS-1];
     reg [Y_WORD_BITS:0] y_words [0:Y_WORDS-1];
+`ifdef SYNTHESIS
+    localparam SYNTHESISED = 1;
+`else
+    localparam SYNTHESISED = 0;
+`endif
     initial begin
-        program_words[PROGRAM_WORDS-1] = {1'b1, 32'd0};
-        x_words[X_WORDS-1] = {1'b1, {X_WORD_BITS{1'b0}}};
-        y_words[Y_WORDS-1] = {1'b1, {Y_WORD_BITS{1'b0}}};
+        if (PROGRAM_FILE == "" || !SYNTHESISED) program_words[PROGRAM_WORDS-1] = {1'b1, 32'd0};
+        if (X_FILE == "" || !SYNTHESISED) x_words[X_WORDS-1] = {1'b1, {X_WORD_BITS{1'b0}}};
+        if (Y_FILE == "" || !SYNTHESISED) y_words[Y_WORDS-1] = {1'b1, {Y_WORD_BITS{1'b0}}};
         if (PROGRAM_FILE != "") $readmemh(PROGRAM_FILE, program_words);
         if (X_FILE != "") $readmemh(X_FILE, x_words);
         if (Y_FILE != "") $readmemh(Y_FILE, y_words);

@@ -112,12 +112,18 @@ module dac_fourier #(
     // and read while busy, and a synthesiser sees that: what a read of the word being written gives is of no account.
     reg [31:0] coefficients [0:(2 << ADDRESS_BITS)-1];
     // The bit above a word of the sine is 1 where no file has filled it. Where one has, it is 0 throughout, and a
-    // synthesiser takes it away.
+    // synthesiser takes it away. In a synthesis only a sine without a file has it, as in dac_boot.
     reg [30:0] quarter_sine [0:(1 << QUARTER_BITS)-1];
     integer i;
+`ifdef SYNTHESIS
+    localparam SYNTHESISED = 1;
+`else
+    localparam SYNTHESISED = 0;
+`endif
 
     initial begin
-        for (i = 0; i < 1 << QUARTER_BITS; i = i + 1) quarter_sine[i] = {1'b1, 30'd0};
+        if (SINE_FILE == "" || !SYNTHESISED)
+            for (i = 0; i < 1 << QUARTER_BITS; i = i + 1) quarter_sine[i] = {1'b1, 30'd0};
         if (SINE_FILE != "") $readmemh(SINE_FILE, quarter_sine);
     end
 

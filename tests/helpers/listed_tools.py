@@ -15,6 +15,7 @@ PROGRAMS: Mapping[str, tuple[str, ...]] = {
     "clang": ("clang", "clang++", "nm", "ar", "ld", "as"),
     "cmake": ("cmake", "ctest"),
     "cppcheck": ("cppcheck",),
+    "fpga-icestorm": ("icepack",),
     "g++": ("g++", "c++", *_GCC),
     "gcc": _GCC,
     "gcc-arm-none-eabi": ("arm-none-eabi-gcc", "arm-none-eabi-g++", "arm-none-eabi-size", "arm-none-eabi-nm"),
