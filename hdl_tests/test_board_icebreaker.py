@@ -29,14 +29,14 @@ LIMIT = 400_000  # clocks; an answer to HELLO takes 125,000
 AD5541A = Converter(frame_bits=16, cpol=0, cpha=0)
 VERILATOR_MAKE = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20 VM_PARALLEL_BUILDS=0 OPT_FAST=-O1"
 WAIT = 0x100  # for the end of an answer
-# Block RAMs that read as 0 for +asleep clocks.
+# Block RAMs that read as 0 for +asleep clocks; the library counts picoseconds.
 RAM_READS = "RDATA_I <= memory[RADDR[7:0]]"
 SLEEPY = "RDATA_I <= {16{awake}} & memory[RADDR[7:0]]"
 WAKES = """
 	reg awake = 0;
 	integer asleep;
 	initial begin
-		if ($value$plusargs("asleep=%d", asleep)) #(10 * asleep);
+		if ($value$plusargs("asleep=%d", asleep)) #(10000 * asleep);
 		awake = 1;
 	end
 """
@@ -125,6 +125,6 @@ def test_the_bitstream_plays_the_model_once_it_is_triggered(board: Path, cells: 
 
 @pytest.mark.rest
 def test_memories_that_sleep_longer_than_the_start_are_seen(cells: Path) -> None:
-    """The control: without the wait the board would play nothing."""
-    fault, _, words = played(cells, START_CLOCKS + 200)
-    assert (fault, words) == (True, [])
+    """The control: without the wait the board would neither answer nor play."""
+    _, answers, words = played(cells, START_CLOCKS + 200)
+    assert (answers, words) == ([], [])
