@@ -93,6 +93,12 @@
 #define DAC_LINK_CHALLENGE_MS 10000 /* how long the nonce of a CHALLENGE may be used */
 #endif
 
+/* Kept programs. */
+
+#ifndef DAC_STORE
+#define DAC_STORE 0 /* 1: dac_store.c has code; it needs dac_link_frame.c */
+#endif
+
 /* Every object defines a symbol whose value has the options on which types and calls depend. A linker accepts this
  * again and again with one value, and refuses a second value. It takes no memory and no instruction. */
 #if defined(__GNUC__) && defined(__ELF__)

@@ -3,7 +3,10 @@
 
 #include <stddef.h>
 
+#include "dac_config.h"
 #include "dac_link_frame.h"
+
+#if DAC_STORE
 
 enum { RECORD_MAGIC = 0x31525354, PLACE_MAGIC = 0x31505354 }; /* "TSR1", "TSP1" */
 enum { HEADER = 64, IMAGE_BYTES = 32, IMAGE_CRC = 36 };
@@ -331,3 +334,5 @@ dac_store_result dac_store_delete(dac_store *s, uint8_t slot)
         state.trial = DAC_STORE_NONE;
     return make_certain(s) ? change(s, &state) : DAC_STORE_FAILED;
 }
+
+#endif

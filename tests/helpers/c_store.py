@@ -57,7 +57,8 @@ def compile_store(folder: Path, changes: tuple[tuple[str, str], ...] = ()) -> ct
         sources.append(folder / path.name)
     target = folder / "store.so"
     files = [path for path in sources if path.suffix == ".c"]
-    run_clean(["cc", "-std=c99", "-O1", "-fPIC", "-shared", "-Wall", "-Wextra", *files, "-o", target])
+    options = ["-DDAC_STORE=1", f"-I{c_store()[0].parent}"]
+    run_clean(["cc", "-std=c99", *options, "-O1", "-fPIC", "-shared", "-Wall", "-Wextra", *files, "-o", target])
     library = ctypes.CDLL(str(target))
     library.dac_store_start.restype = c_uint8
     library.dac_store_info.restype = library.dac_store_read.restype = c_bool

@@ -24,7 +24,7 @@ CHOICES = {
     "narrow_words_wide_codes": ["-DDAC_OUTPUT_STORAGE_BITS=32", "-DDAC_REQUESTS=128"],
     "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"],
     "small": ["-DDAC_SMALL=1", "-Os"],
-    "spline": ["-DDAC_SPLINE=1"],
+    "spline": ["-DDAC_SPLINE=1", "-DDAC_STORE=1"],
     "spline_wide": ["-DDAC_SPLINE=1", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
     "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
