@@ -10,7 +10,12 @@ from tablegen.base.resources import c_link, c_runtime, c_store
 
 pytestmark = pytest.mark.rest
 
-OPTIONS = ((), ("-DDAC_TABLE_STORAGE_BITS=32",), ("-DDAC_SPLINE=1", "-DDAC_STORE=1"), ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SMALL=1"))
+OPTIONS = (
+    (),
+    ("-DDAC_TABLE_STORAGE_BITS=32",),
+    ("-DDAC_SPLINE=1", "-DDAC_STORE=1"),
+    ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SMALL=1"),
+)
 
 
 def reported(sources: list[Path], *options: str) -> set[str]:
