@@ -10,6 +10,7 @@ from c_store import CStore, compile_store
 from cut_flash import CutFlash
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sets import LONG_TEST
 from store_cuts import LAYOUT, SCRIPT, SIZE, Step, faults, image_of, kept, take
 
 from tablegen.link.store import NONE, Layout, Store, StoreError
@@ -194,7 +195,7 @@ def test_no_second_cut_of_the_whole_script_makes_a_mixture(library: CDLL) -> Non
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", MUTANTS)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=LONG_TEST if one in BY_TWO_CUTS else ()) for one in MUTANTS])
 def test_every_fault_put_into_the_store_is_found(name: str, tmp_path: Path) -> None:
     mutant = compile_store(tmp_path, (MUTANTS[name],))
     assert next(faults(mutant, second=name in BY_TWO_CUTS), "")
