@@ -1,0 +1,237 @@
+"""One axis that plays a fast and a slow part: a table mixed once a line, a gain of the line, and an offset that ramps.
+
+In line l of a frame, at tick k of L, as docs/decisions/0089 has it::
+
+    table(l)[i] = saturate(fast[i] + round(ratio(l) second[i], 12))
+    slow(l)     = slow_gain S_slow(l) + offset_word
+    ramp(l)     = (slow(l + 1) - slow(l)) step / 2^32, towards 0, with step = floor(2^32 / L)
+    c           = round(gain(l) S(table(l), k) + slow(l) + k ramp(l), gain_q)
+
+Clamp, slew guard and coding of the converter follow as for every program. Shaping is not part of this module.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.phase import PHASE_BITS, RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.rounding import saturate, shift_round, signed_limits
+from tablegen.fixedpoint.shaping import OFF
+from tablegen.fixedpoint.spline import cubic
+from tablegen.numerics.arrays import Ints, freeze
+
+RATIO_BITS = 16
+RATIO_FRACTION_BITS = 12  # with 14 the ratios of turned scans overflow
+SECOND_BITS = 8
+SLOW_BITS = 43  # of an offset word
+SUM_BITS = 44  # of product and offset before the rounding
+MOST_KNOTS = 65
+
+
+class Knots(Struct, frozen=True, eq=False):
+    """A word for each line of a frame: straight between knots that are ``spacing`` lines apart, the first at line 0.
+
+    ``words`` has shape (n,), 2 <= n <= 65. The last knot is at line (n - 1) spacing, at the end of the frame or behind.
+    """
+
+    words: Ints
+    spacing: int
+
+    def __post_init__(self) -> None:
+        if not (2 <= len(self.words) <= MOST_KNOTS and self.spacing >= 1):
+            raise ValueError(f"{len(self.words)} knots, {self.spacing} lines apart; 2..{MOST_KNOTS} are possible")
+        freeze(self.words)
+
+    @property
+    def lines(self) -> int:
+        """The lines that the knots reach."""
+        return (len(self.words) - 1) * self.spacing
+
+    def at(self, line: Ints) -> Ints:
+        """Return the nearest whole numbers to the straight lines between the knots, ties up; a knot is met exactly.
+
+        A device needs one division a knot: a step and its remainder, as in a phase, whose accumulator begins at half
+        of ``spacing``.
+
+        Parameters
+        ----------
+        line
+            Lines in [0, lines], any shape.
+
+        Returns
+        -------
+        Ints
+            Shape of ``line``.
+        """
+        left = np.minimum(np.asarray(line) // self.spacing, len(self.words) - 2)
+        ahead = line - left * self.spacing
+        difference = self.words[left + 1] - self.words[left]
+        return np.asarray(self.words[left] + (difference * ahead + self.spacing // 2) // self.spacing)
+
+
+class SlowTable(Struct, frozen=True, eq=False):
+    """The slow part, once a line: the sample of a cubic table over the frame, in the units of an offset word.
+
+    ``words`` are the coefficients of a spline, shape (2^P,).
+    """
+
+    words: Ints
+    gain_word: int
+    offset_word: int
+
+    def __post_init__(self) -> None:
+        freeze(self.words)
+
+    def at(self, line: Ints, lines: int) -> Ints:
+        """Return offset words at lines of a frame; the line after the last one is the first.
+
+        Parameters
+        ----------
+        line
+            Lines in [0, lines], any shape.
+        lines
+            Lines of the frame.
+
+        Returns
+        -------
+        Ints
+            Codes with gain_q fraction bits, shape of ``line``.
+        """
+        samples = cubic(self.words, RationalPhase(lines).at(np.asarray(line) % lines))
+        return np.asarray(self.gain_word * samples + self.offset_word)
+
+
+class FrameProgram(Struct, frozen=True, eq=False):
+    """One axis of a program with a slow part.
+
+    ``fast`` has the table of a line and the output stage, whose gain and offset words it does not use. ``second`` has
+    the words that are mixed into the table, of its shape.
+    """
+
+    fast: Program
+    lines: int
+    gains: Knots
+    ratios: Knots
+    second: Ints
+    slow: SlowTable
+
+    def __post_init__(self) -> None:
+        freeze(self.second)
+        if self.fast.hold != 1 or self.fast.mode == "direct" or self.fast.output.shaping != OFF:
+            raise ValueError("a frame program has an unshaped table of lines or of a spline, which advances every tick")
+        if len(self.second) != len(self.fast.words):
+            raise ValueError(f"{len(self.second)} words are mixed into {len(self.fast.words)}")
+        slow = self.slow.at(np.arange(self.lines), self.lines)
+        for name, words, bits in (
+            ("gain", self.gains.words, GAIN_BITS),
+            ("ratio", self.ratios.words, RATIO_BITS),
+            ("word of the second table", self.second, SECOND_BITS),
+            ("slow part", slow, SLOW_BITS),
+        ):
+            low, high = signed_limits(bits)
+            if int(np.min(words)) < low or int(np.max(words)) > high:
+                raise OverflowError(f"a {name} does not fit {bits} bits")
+        for name, knots in (("gains", self.gains), ("ratios", self.ratios)):
+            if knots.lines < self.lines:
+                raise ValueError(f"the {name} reach {knots.lines} lines of {self.lines}")
+
+    @classmethod
+    def straight(cls, program: Program, lines: int) -> "FrameProgram":
+        """Return the frame program that plays what a program of a line plays, in each line of a frame."""
+        words = np.zeros(8, dtype=np.int64)
+        still = SlowTable(words, 0, program.output.offset_word)
+        gains, ratios = (Knots(np.full(2, word, dtype=np.int64), lines) for word in (program.output.gain_word, 0))
+        return cls(program, lines, gains, ratios, np.zeros_like(program.words), still)
+
+    @property
+    def memory_bits(self) -> int:
+        """The bits of all words of the program: tables, knots and the slow table, whose words are as wide as fast ones.
+
+        A table, gain or ratio that does nothing counts all the same.
+        """
+        tables = len(self.fast.words) * self.fast.bits + len(self.second) * SECOND_BITS
+        knots = len(self.gains.words) * GAIN_BITS + len(self.ratios.words) * RATIO_BITS
+        return tables + knots + len(self.slow.words) * self.fast.bits
+
+    def table(self, line: int) -> Ints:
+        """Return the words of the table that plays in a line.
+
+        Parameters
+        ----------
+        line
+            Line in [0, lines).
+
+        Returns
+        -------
+        Ints
+            Saturated to the width of the fast words, of their shape.
+        """
+        ratio = int(self.ratios.at(np.array(line)))
+        return saturate(self.fast.words + shift_round(ratio * self.second, RATIO_FRACTION_BITS), self.fast.bits)
+
+    def ramps(self) -> Ints:
+        """Return by how much the slow part moves in a tick of each line, in the units of an offset word.
+
+        ``k ramp`` never passes the slow part of the line after it. It stays behind by less than L (1 + |distance| /
+        2^32) at the end of a line.
+
+        Returns
+        -------
+        Ints
+            Shape (lines,).
+        """
+        step = RationalPhase(self.fast.phase.ticks).step
+        slow = self.slow.at(np.arange(self.lines + 1), self.lines).tolist()
+        return np.array([ramp(after - here, step) for here, after in pairwise(slow)], dtype=np.int64)
+
+    def sums(self, line: int) -> Ints:
+        """Return gain times sample plus slow part at all ticks of a line, before they are rounded to codes.
+
+        Parameters
+        ----------
+        line
+            Line in [0, lines).
+
+        Returns
+        -------
+        Ints
+            Codes with gain_q fraction bits, shape (ticks of a line,).
+        """
+        return self._sums(line, int(self.ramps()[line]))
+
+    def frame(self) -> Ints:
+        """Return the codes of a frame before the slew guard.
+
+        Returns
+        -------
+        Ints
+            Codes in [code_min, code_max], shape (lines, ticks of a line).
+        """
+        ramps = self.ramps().tolist()
+        sums = np.stack([self._sums(line, ramps[line]) for line in range(self.lines)])
+        output = self.fast.output
+        return output.clamp(shift_round(sums, output.gain_q))
+
+    def _sums(self, line: int, ramp_word: int) -> Ints:
+        k = np.arange(self.fast.phase.ticks, dtype=np.int64)
+        samples = replace(self.fast, words=self.table(line)).samples(k)
+        gain, slow = int(self.gains.at(np.array(line))), int(self.slow.at(np.array(line), self.lines))
+        return np.asarray(gain * samples + slow + k * ramp_word)
+
+
+def ramp(distance: int, step: int) -> int:
+    """Return the ramp of a tick towards the next line: distance step / 2^32, cut off towards 0.
+
+    Parameters
+    ----------
+    distance
+        From the slow part of this line to that of the next one.
+    step
+        Step of the line's phase, floor(2^32 / L).
+    """
+    size = (abs(distance) * step) >> PHASE_BITS
+    return -size if distance < 0 else size
