@@ -25,6 +25,7 @@ from tablegen.link.messages import Request
 EXAMPLES = REPOSITORY / "examples"
 BENCH = BENCHES / "icebreaker_bench.v"
 CLOCKS_PER_TICK, TICKS, START_CLOCKS = 96, 40, 4096
+PARKED = 50  # ticks before the trigger: the slew guard has reached the park codes
 LIMIT = 400_000  # clocks; an answer to HELLO takes 125,000
 AD5541A = Converter(frame_bits=16, cpol=0, cpha=0)
 VERILATOR_MAKE = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20 VM_PARALLEL_BUILDS=0 OPT_FAST=-O1"
@@ -107,7 +108,7 @@ def played(program: Path, asleep: int) -> tuple[bool, list[Frame], list[list[int
 
 
 def expected_words(program: DualProgram) -> list[list[int]]:
-    ticks = model_ticks(program, TICKS)[1:]
+    ticks = model_ticks(program, TICKS, PARKED)[PARKED:]
     return [[getattr(program, axis).output.word(getattr(tick, axis)) for tick in ticks] for axis in ("x", "y")]
 
 
