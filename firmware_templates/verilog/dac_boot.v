@@ -3,8 +3,9 @@
 // With FOURIER = 0 X_FILE and Y_FILE are the tables, <name>_x.mem and <name>_y.mem; with FOURIER = 1 the Fourier
 // words, <name>_x_fourier.mem and <name>_y_fourier.mem, from which a sequencer with FOURIER = 1 computes its tables;
 // they take less memory. PROGRAM_FILE is <name>_program.mem either way. The boot ends with a commit; arm and trigger
-// are left to the host. A file that is missing or has too few words is not committed: the boot ends without, and
-// `missing` is high.
+// are left to the host. In simulation a file that is missing or has too few words is not committed: the boot ends
+// without, and `missing` is high. In synthesis, where the macro SYNTHESIS has to be defined, only a name that is empty
+// is seen: some tools would let the mark of an unfilled memory win over the file.
 //
 // It reads nothing for START_CLOCKS after power-up: block RAMs of iCE40 parts read as 0 for some microseconds after the
 // configuration. 4096 clocks are 41 us at 100 MHz.

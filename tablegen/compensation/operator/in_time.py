@@ -28,7 +28,6 @@ LEAST_SWING = 1e-3  # of the driver's range: what goes back by less, such as the
 _MEANS = 129  # means of the drive at which the sensitivity is computed; linear between them
 _LEAST_TURNS = 4  # of a record that begins with a line: its first sample, three turns, and one sample more
 
-
 _SAME_LEVEL = 0.2  # of the stroke of the first line, by which it may end elsewhere than it began
 
 

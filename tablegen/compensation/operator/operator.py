@@ -89,16 +89,11 @@ class Operator:
         return loop
 
     def expected_extent(self, stroke: float, centre: float, factor: float) -> float:
-        """Return the nm between the turns, by the family and the offset law, without the field of sizes.
-
-        The part of the factor beyond the family, at a small stroke, is a sensitivity that depends on the offset.
-        """
-        here = self.family.extent(stroke, centre)
-        small = self.family.extent(SMALL_STROKE, self.centre) / self.family.extent(SMALL_STROKE, centre)
-        return here * small / factor
+        """Return the nm between the turns, by the family and the offset law, without the field of sizes."""
+        return self.family.extent(stroke, centre) * self.sensitivity(centre, factor)
 
     def sensitivity(self, centre: float, factor: float) -> float:
-        """Return the factor of ``expected_extent`` beyond the family's extent: that of the mean of the drive."""
+        """Return the part of the sensitivity at a mean of the drive that the family has not, at a small stroke."""
         at_main, here = (self.family.extent(SMALL_STROKE, at) for at in (self.centre, centre))
         return at_main / (here * factor)
 

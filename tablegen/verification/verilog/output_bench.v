@@ -306,7 +306,9 @@ module check_boot #(
     output reg [31:0] errors
 );
     localparam FILE_WORDS = 9, LACKS_WORDS = LACKS_PROGRAM || X_WORDS > FILE_WORDS || Y_WORDS > FILE_WORDS;
-    localparam PROGRAM_WORDS = 48, WORD_BITS = FOURIER ? 32 : 16, HARMONICS = 4, CLOCKS = 400, RESET_AT = 80, START_CLOCKS = 9;  // in the tables
+    localparam PROGRAM_WORDS = 48, WORD_BITS = FOURIER ? 32 : 16, HARMONICS = 4, CLOCKS = 400;
+    localparam RESET_AT = 80;  // clock: the tables are being written
+    localparam START_CLOCKS = 9;
     reg [31:0] program_words [0:PROGRAM_WORDS-1];
     reg [15:0] x_words [0:FILE_WORDS-1], y_words [0:FILE_WORDS-1];
     reg reset = 0, writable = 0, host_write = 0, host_commit = 0, has_ended = 0;
