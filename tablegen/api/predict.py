@@ -20,7 +20,7 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.in_time import OperatorInTime, Start, mean_of, repeated_samples
+from tablegen.compensation.operator.in_time import OperatorInTime, Start, mean_of, repeated_samples, turns_of
 from tablegen.compensation.operator.operator import STROKE_REACH, Operator
 from tablegen.compensation.operator.prediction_uncertainty import possible_prediction_errors
 from tablegen.config.load import load_scanner
@@ -124,7 +124,8 @@ def predict(
         )
     if problem:
         raise Rejected([Problem(table.file, 0, DRIVE.name, problem)])
-    in_time = OperatorInTime(known.operator_of(time_s), known.factor, known.response)
+    operator = known.operator_of(time_s, u)
+    in_time = OperatorInTime(operator, known.factor, known.response)
     try:
         repeated_samples(time_s, u, state)
     except Unphysical as reason:
@@ -145,7 +146,7 @@ def predict(
             )
             raise Rejected([Problem(other.file, 0, TIME.name, why)])
         measured = np.interp(time_s + delay_s, other[TIME], other[DISPLACEMENT])
-    bounds = possible_prediction_errors(known.operator, u, position, state)
+    bounds = possible_prediction_errors(operator, u, position, state)
     return Predicted(axis, state, time_s, volts, position, bounds, measured)
 
 
@@ -183,10 +184,15 @@ class _KnownAxis:
         problems.stop_if_any()
         return cls(operator, driver, surface, response)
 
-    def operator_of(self, time_s: Floats) -> Operator:
-        """Return the operator with terms of creep as slow as a record shows: creep has no slowest time constant."""
+    def operator_of(self, time_s: Floats, u: Floats) -> Operator:
+        """Return the operator at the mean rate of a record, with terms of creep as slow as the record shows.
+
+        Creep has no slowest time constant.
+        """
         span_s = float(time_s[-1] - time_s[0])
-        return replace(self.operator, creep=self.operator.creep.down_to(1.0 / span_s))
+        sweeps = len(turns_of(u)) - 1
+        at_rate = self.operator.at_rate(0.5 * sweeps / span_s)
+        return replace(at_rate, creep=self.operator.creep.down_to(1.0 / span_s))
 
     def factor(self, mean: float) -> float:
         """Return m of (1) at a mean over that at the operator's centre."""

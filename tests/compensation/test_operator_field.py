@@ -36,6 +36,17 @@ def test_a_shape_is_that_of_the_same_stroke_at_another_centre() -> None:
         assert there == pytest.approx(here, rel=0.03)
 
 
+def test_a_share_of_the_field_is_that_of_the_rate() -> None:
+    points = np.array([(0.4, 0.5, 2.0), (0.4, 0.5, 3.0)])
+    field = through(points, np.array([[1.0], [3.0]]), Lengths(0.8, 1.0, 1e-8, 0.1))
+    at = [field.at_rate(rate_hz).at(0.4, 0.5)[0] for rate_hz in (100.0, 10.0**2.5, 1000.0)]
+    assert at == pytest.approx([1.0, 2.0, 3.0], abs=0.02)
+    alone = through(points[:1], np.array([[1.0]]), Lengths(0.8, 1.0, 1e-8, 0.1))
+    assert alone.at_rate(1e8).at(0.4, 0.5)[0] == pytest.approx(0.9, abs=1e-3)
+    everywhere = through(points, np.array([[1.0], [1.0]]), Lengths(0.8, 1.0, 1e-3))
+    assert everywhere.at_rate(1e8) is everywhere
+
+
 def test_far_from_all_points_a_field_is_nothing() -> None:
     assert through(POINTS, np.ones((4, 1)), Lengths(0.05, 0.05, 1e-6)).at(5.0, 5.0)[0] == pytest.approx(0.0, abs=1e-12)
 

@@ -183,6 +183,23 @@ class ForeignPlant:
         return (1.0 + late) / abs(1.0 + at_100_hz)
 
 
+@dataclass
+class RateDependentPlant(ForeignPlant):
+    """One whose loops depend on the rate: a number of its core grows by a share per decade from 100 Hz on."""
+
+    number: str = "thresholds"
+    growth: float = 0.1
+
+    def settled(self, volts: Floats, rate_hz: float) -> Floats:
+        """nm of one period of volts at the piezo."""
+        at_100_hz = getattr(self.core, self.number)
+        setattr(self.core, self.number, at_100_hz * (1.0 + self.growth * float(np.log10(rate_hz / 100.0))))
+        try:
+            return super().settled(volts, rate_hz)
+        finally:
+            setattr(self.core, self.number, at_100_hz)
+
+
 def triangle(count: int, centre: float, stroke: float, turn: float = 0.5) -> Floats:
     """One period in V, from the minimum on; centre and stroke are shares of ``V_MAX``."""
     t = np.arange(count) / count

@@ -1,7 +1,7 @@
 """Advise the next trace: the stroke and centre whose measurement helps the scans most, and the rate."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -11,7 +11,7 @@ from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.identification import MeasuredLine
 from tablegen.compensation.models.operator import CENTRE_REACH
-from tablegen.compensation.operator.field import covariance
+from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.compensation.operator.operator import STROKE_REACH, Operator
 from tablegen.compensation.operator.uncertainty import possible_errors
 from tablegen.numerics.arrays import Bools, Floats
@@ -108,7 +108,7 @@ def _served(lines: Sequence[_Line]) -> list[tuple[float, float]]:
 
 def _gain(fit: OperatorFit, traces: Floats, scans: Floats) -> Floats:
     """Return by how much a trace lowers the relative variance at each scan: shape (traces, scans)."""
-    points, lengths = fit.operator.residual.points, fit.operator.residual.lengths
+    points, lengths = fit.operator.residual.points, _lengths(fit)
     inverse = _inverse(fit)
     near = covariance(traces, points, lengths)
     joint = covariance(traces, scans, lengths) - near @ inverse @ covariance(points, scans, lengths)
@@ -150,13 +150,18 @@ def possible_rms(operator: Operator, strokes: Floats, centres: Floats) -> Floats
     return np.stack([np.interp(strokes, coarse[0], column) for column in rows.T], axis=1)
 
 
+def _lengths(fit: OperatorFit) -> Lengths:
+    """Return the lengths of the fields, for traces and scans of any rate."""
+    return replace(fit.operator.residual.lengths, rate_share=0.0)
+
+
 def _inverse(fit: OperatorFit) -> Floats:
     points = fit.operator.residual.points
-    prior = covariance(points, points, fit.operator.residual.lengths)
+    prior = covariance(points, points, _lengths(fit))
     return np.asarray(np.linalg.inv(prior + _JITTER * np.eye(len(points))), dtype=np.float64)
 
 
 def _unknown(fit: OperatorFit, points: Floats) -> Floats:
     """Return the relative variance of the fields at points: 1 without data, 0 without uncertainty."""
-    near = covariance(points, fit.operator.residual.points, fit.operator.residual.lengths)
+    near = covariance(points, fit.operator.residual.points, _lengths(fit))
     return np.asarray(1.0 - np.einsum("ij,jk,ik->i", near, _inverse(fit), near), dtype=np.float64)

@@ -68,11 +68,12 @@ class _WeightsFit:
 class FamilyProblem(ABC):
     """The lines of a fit. ``shape_limits`` and ``shape_steps`` are those of the family's own numbers.
 
-    ``starts`` are shapes and creep to begin from; ``penalty`` are the rows of a quadratic penalty on the weights.
+    A number whose step is 0 stays as it is. ``starts`` are shapes and creep to begin from; ``penalty`` are the rows of
+    a quadratic penalty on the weights.
     """
 
     shape_limits: ClassVar[tuple[tuple[float, float], ...]]
-    shape_steps: ClassVar[tuple[float, ...]]
+    shape_steps: tuple[float, ...]
     starts: ClassVar[tuple[Floats, ...]]
     penalty: Floats
 
@@ -196,7 +197,7 @@ class FamilyProblem(ABC):
         for i, step in enumerate([*self.shape_steps, _LOSS_STEP, *[_GAIN_STEP] * self._gains]):
             numbers = at.numbers.copy()
             numbers[i] += step
-            rows.append((self.best_weights(numbers).residual - at.residual) / step)
+            rows.append((self.best_weights(numbers).residual - at.residual) / step if step else 0.0 * at.residual)
         return np.stack(rows, axis=1)
 
     def _limited(self, numbers: Floats) -> Floats:

@@ -1,5 +1,6 @@
 """Format an operator fit as the file that the scanner file names."""
 
+import dataclasses
 from collections.abc import Sequence
 
 from msgspec.structs import asdict
@@ -73,6 +74,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
             thresholds=plays.thresholds.tolist(),
             weights=plays.weights.tolist(),
             bends=plays.bends.tolist(),
+            growth_per_decade=plays.growth,
             reversible=plays.reversible.tolist(),
         ),
         bouc_wen=BoucWenTable(
@@ -83,7 +85,7 @@ def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: 
             asymmetry=loop.asymmetry,
             bend=list(loop.bend),
         ),
-        lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),
+        lengths=LengthsTable(**dataclasses.asdict(lengths)),
         response=None if sweep is None else ResponseTable(loss_deg=360.0 * sweep.loss_turns, creep=bool(sweep.creep)),
         lines=lines,
     )

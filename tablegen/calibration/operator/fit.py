@@ -22,16 +22,18 @@ from tablegen.calibration.operator.turns import with_turns
 from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Measured, Response
 from tablegen.compensation.identification import MeasuredLine
-from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
+from tablegen.compensation.operator.creep import NO_CREEP, SEVERAL_RATES, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
-from tablegen.compensation.operator.field import Field, Lengths, through
+from tablegen.compensation.operator.field import Field, Lengths, points_of, through
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import NO_PLAYS
 from tablegen.compensation.operator.sweep_loss import SweepLoss
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.elementary import log10
 
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)
+_RATE_SHARE = 0.1  # of the fields, which depends on the rate, if rates differ; chosen on three piezos whose loops do
 _NOISE = 1e-9  # variance of the noise in the fields, whose rows have none
 _NOISE_OF_TWINS = 1e-4  # where two lines of one point differ slightly by their rates or turns
 _TWINS = 0.03  # of v_max: largest difference of strokes and centres of such lines
@@ -175,7 +177,9 @@ class _Fitted:
         self.lines, self.main = lines, main
         self.family, self.creep, self.solution = family, creep, solution
         self.settled = [line.without(None, creep) for line in lines]
-        self.residuals = [branch_residual(line, family) for line in self.settled]
+        self.residuals = [
+            branch_residual(line, family.at_decades(log10(line.rate_hz / creep.reference_hz))) for line in self.settled
+        ]
 
     def operator(self, lengths: Lengths, factor: Factor) -> tuple[Operator, Floats, Floats]:
         """Fit both fields to the residuals.
@@ -185,12 +189,13 @@ class _Fitted:
         tuple
             The operator; the rows of its residual field, shape (lines, 2 DEGREE + 2); its relative sizes, (lines,).
         """
-        points = np.array([(line.stroke, line.centre) for line in self.settled])
+        points = points_of(self.settled)
         rows = shrink(points, self.residuals, lengths)
         residual = through(points, rows, lengths, straight=True)
-        sizes = _sizes(self.family, residual, self.settled, self.residuals, self.main, factor)
+        sizes = _sizes(self.family, residual, self.creep, self.settled, self.residuals, self.main, factor)
         size = through(points, sizes[:, None], lengths)
-        return Operator(self.family, residual, size, self.creep, self.main, ()), rows, sizes
+        operator = Operator(self.family, residual, size, self.creep, self.main, ())
+        return operator.at_rate(self.creep.reference_hz), rows, sizes
 
     def weighted(self, share: float, other: "_Fitted") -> "_Fitted":
         """Mix a share of this family with the rest of another one, for the same lines."""
@@ -235,9 +240,12 @@ def _with_best_lengths(candidate: _Candidate, lines: Sequence[PeriodicLine], fac
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
     noise = _NOISE_OF_TWINS if _any_twins(lines) else _NOISE
+    rates = [line.rate_hz for line in lines]
+    centres = CENTRE_LENGTHS if several else CENTRE_LENGTHS[-1:]
+    rate_share = _RATE_SHARE if max(rates) >= SEVERAL_RATES * min(rates) else 0.0
     trials = []
-    for stroke, centre in product(STROKE_LENGTHS, CENTRE_LENGTHS if several else CENTRE_LENGTHS[-1:]):
-        lengths = Lengths(stroke, centre, noise)
+    for stroke, centre in product(STROKE_LENGTHS, centres):
+        lengths = Lengths(stroke, centre, noise, rate_share)
         out = [
             _errors(line, one.operator(lengths, factor)[0], factor) for line, one in zip(alone, without, strict=True)
         ]
@@ -262,19 +270,20 @@ def _straight(lines: Sequence[PeriodicLine]) -> Family:
 def _sizes(
     family: Family,
     residual: Field,
+    creep: LogarithmicCreep,
     lines: Sequence[PeriodicLine],
     residuals: Sequence[BranchResidual],
     main: float,
     factor: Factor,
 ) -> Floats:
     """Return measured extents over expected ones, less 1."""
-    nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
-    bare = Operator(family, residual, nothing, NO_CREEP, main, ())
+    nothing = Field(np.zeros((0, 3)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
+    bare = Operator(family, residual, nothing, creep, main, ())
 
     def extent(line: PeriodicLine) -> float:
         here = factor(line.mean) / factor(main)
         try:
-            return bare.loop(line.low, line.high, here, line.mean).extent_nm
+            return bare.at_rate(line.rate_hz).loop(line.low, line.high, here, line.mean).extent_nm
         except Unphysical:  # possible where a line is left out; its errors are the worst then
             return bare.expected_extent(line.stroke, line.mean, here)
 
@@ -282,7 +291,8 @@ def _sizes(
 
 
 def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:
+    here = factor(line.mean) / factor(operator.centre)
     try:
-        return compare(line, operator.loop(line.low, line.high, factor(line.mean) / factor(operator.centre), line.mean))
+        return compare(line, operator.at_rate(line.rate_hz).loop(line.low, line.high, here, line.mean))
     except Unphysical:
         return WORST

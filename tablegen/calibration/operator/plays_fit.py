@@ -7,8 +7,9 @@ import numpy as np
 
 from tablegen.calibration.operator.family import DEGREE, STRIDE, CreepOf, FamilyProblem
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.operator.creep import SEVERAL_RATES
 from tablegen.compensation.operator.family import Family
-from tablegen.compensation.operator.plays import Plays, plays
+from tablegen.compensation.operator.plays import BENDS, Plays, plays, stretch
 from tablegen.numerics.arrays import Floats
 
 NODES = 40  # of the density of plays, linear between them
@@ -21,22 +22,27 @@ _SPACING = 1.5  # thresholds grow with this power of their number
 _TREND, _SCATTER = 1.25, 0.35
 _LEAST_NOISE, _MOST_NOISE, _UNKNOWN_NOISE = 8e-5, 1.2e-2, 4e-4  # unknown where no line has two periods
 _RIDGE = 1e-5
+_MOST_GROWTH = 0.3  # of thresholds, per decade of the rate: a factor of 2
+_GROWTH_STEP = 0.01
 _MOST_BEND = 0.6  # an envelope still rises everywhere
 
 
 class PlaysProblem(FamilyProblem):
-    """Fit of the four bends of the envelopes, and of the density of plays."""
+    """Fit of the four bends of the envelopes, of the density of plays, and of the growth of thresholds a decade."""
 
-    shape_limits = ((-_MOST_BEND, _MOST_BEND),) * 4
-    shape_steps = (0.02,) * 4
+    shape_limits = (*((-_MOST_BEND, _MOST_BEND),) * 4, (-_MOST_GROWTH, _MOST_GROWTH))
     # No start has two equal envelopes: its derivatives could not separate them.
     starts: ClassVar[tuple[Floats, ...]] = tuple(
-        np.array([*bends, 0.02])
+        np.array([*bends, 0.0, 0.02])
         for bends in ((-0.1, 0.0, 0.1, 0.0), (-0.3, 0.0, -0.1, 0.0), (0.1, 0.0, 0.3, 0.0), (0.0, -0.2, 0.0, 0.2))
     )
 
     def __init__(self, lines: Sequence[PeriodicLine], main: float, creep: CreepOf) -> None:
         super().__init__(lines, main, creep)
+        reference_hz = creep(0.0).reference_hz
+        self._decades = [float(np.log10(line.rate_hz / reference_hz)) for line in lines]
+        several = max(self._decades) - min(self._decades) >= np.log10(SEVERAL_RATES)
+        self.shape_steps = (0.02,) * 4 + (_GROWTH_STEP if several else 0.0,)
         self._thresholds = _HIGHEST * (np.arange(1, THRESHOLDS + 1) / THRESHOLDS) ** _SPACING
         self._spread = _spread(self._thresholds)
         self.penalty = _penalty(_noise(lines))
@@ -47,7 +53,7 @@ class PlaysProblem(FamilyProblem):
         Parameters
         ----------
         shape
-            The four bends, shape (4,).
+            The four bends, and the growth, shape (5,).
 
         Returns
         -------
@@ -55,10 +61,10 @@ class PlaysProblem(FamilyProblem):
             For each line, shape (phases, NODES).
         """
         out = []
-        for line, u in zip(self.lines, self.drives, strict=True):
-            rising, falling = (
-                plays(u, line.low, line.high, going, self._thresholds, shape[None, :])[0] for going in (True, False)
-            )
+        bends, growth = shape[None, :BENDS], float(shape[BENDS])
+        for line, u, decades in zip(self.lines, self.drives, self._decades, strict=True):
+            thresholds = stretch(growth, decades) * self._thresholds
+            rising, falling = (plays(u, line.low, line.high, going, thresholds, bends)[0] for going in (True, False))
             out.append((self._spread @ np.where(line.rising[::STRIDE], rising, falling)).T)
         return out
 
@@ -68,13 +74,14 @@ class PlaysProblem(FamilyProblem):
         Parameters
         ----------
         shape
-            The four bends, shape (4,).
+            The four bends, and the growth, shape (5,).
         weights
             Density at the nodes, in nm, shape (NODES,).
         reversible
             Coefficients of u, u^2, ... in nm, shape (DEGREE,).
         """
-        return Family(Plays(self._thresholds, (weights @ self._spread)[None, :], reversible, shape[None, :].copy()))
+        bends, growth = shape[None, :BENDS].copy(), float(shape[BENDS])
+        return Family(Plays(self._thresholds, (weights @ self._spread)[None, :], reversible, bends, growth))
 
 
 def _spread(thresholds: Floats) -> Floats:

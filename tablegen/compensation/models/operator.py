@@ -138,7 +138,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
     """Return the operator at this rate, and the factor of its loops at this offset."""
     factor = request.factor_at(request.v_share) / request.factor_at(operator.centre)
-    operator = replace(operator, creep=operator.creep.down_to(request.rate_hz))
+    operator = replace(operator, creep=operator.creep.down_to(request.rate_hz)).at_rate(request.rate_hz)
     # (23), a straight line over the logarithm of the rate, says what it does to the size where creep does not.
     if request.rate_gain is not None and not operator.knows_rates:
         factor *= request.rate_gain(request.rate_hz) / request.rate_gain(operator.creep.reference_hz)

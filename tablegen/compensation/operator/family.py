@@ -1,11 +1,12 @@
 """The hysteresis family of an operator: plays over a polynomial, and Bouc and Wen's equation, each with its weight."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from tablegen.compensation.operator.bouc_wen import BoucWen
-from tablegen.compensation.operator.plays import Plays
+from tablegen.compensation.operator.plays import Plays, stretch
 from tablegen.numerics.arrays import Floats
 
 
@@ -41,6 +42,10 @@ class Family:
         displacement = self.plays.branch(u, low, high, rising)
         return displacement if self.bouc_wen is None else displacement + self.bouc_wen.branch(u, low, high, rising)
 
+    def at_decades(self, decades: float) -> "Family":
+        """Return the family at a rate so many decades above that of its thresholds."""
+        return _at_decades(self, decades) if self.plays.growth else self
+
     def extent(self, stroke: float, centre: float) -> float:
         """Return the nm between the turns of a settled line."""
         low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
@@ -73,3 +78,9 @@ class Family:
         loops = [(one, by) for one, by in ((self.bouc_wen, share), (other.bouc_wen, 1.0 - share)) if one is not None]
         ((loop, by),) = loops or ((None, 0.0),)
         return Family(plays, None if loop is None else replace(loop, depth=by * loop.depth))
+
+
+@lru_cache(maxsize=64)
+def _at_decades(family: Family, decades: float) -> Family:
+    plays = family.plays
+    return replace(family, plays=replace(plays, stretch=stretch(plays.growth, decades)))

@@ -1,22 +1,25 @@
-"""The residual at the measured strokes and centres, interpolated over both without a formula: a Gaussian process.
+"""The residual at the measured strokes, centres and rates, interpolated without a formula: a Gaussian process.
 
 The covariance of two points is Matern's of order 5/2 in the distance of their strokes, times the same in that of their
-centres, each over its own length; at the points themselves the field is what was measured, but for the noise. Far from
-all of them it returns to 0, that is to the parametric hysteresis family.
+centres, each over its own length; a share of it is that of the decades of their rates, too. At the points themselves
+the field is what was measured, but for the noise. Far from all of them it returns to 0, that is to the parametric
+hysteresis family; at another rate than all of theirs only by that share.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import sqrt
+from typing import Protocol
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
-from tablegen.numerics.elementary import exp
+from tablegen.numerics.elementary import exp, log10
 from tablegen.numerics.linear import Cholesky
 
 _STRAIGHT = 0.9  # share of the covariance that vanishes at a stroke of 0; creep bends even the smallest lines
+_DECADES = 1.0  # of the rate, over which the share that depends on it changes
 SAME_CENTRE = 0.02  # of v_max: lines whose centres differ by less have one centre
 
 
@@ -24,25 +27,49 @@ SAME_CENTRE = 0.02  # of v_max: lines whose centres differ by less have one cent
 class Lengths:
     """The lengths of stroke and of centre, as shares of v_max, over which the field changes; and the noise.
 
-    ``noise`` is its variance relative to that of the field.
+    ``noise`` is its variance relative to that of the field, ``rate_share`` the share of the field that depends on the
+    rate.
     """
 
     stroke: float
     centre: float
     noise: float
+    rate_share: float = 0.0
+
+
+class Line(Protocol):
+    """A settled line, as far as a field needs it."""
+
+    @property
+    def stroke(self) -> float:
+        """Share of v_max."""
+
+    @property
+    def centre(self) -> float:
+        """Share of v_max."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Periods per second."""
+
+
+def points_of(lines: Sequence[Line]) -> Floats:
+    """Return stroke, centre and decade of the rate of lines: the decimal logarithm of its Hz; shape (lines, 3)."""
+    return np.array([(line.stroke, line.centre, log10(line.rate_hz)) for line in lines])
 
 
 def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool = False) -> Floats:
-    """Return the covariance of points in the plane of stroke and centre.
+    """Return the covariance of points in stroke, centre and rate.
 
     Without ``straight`` it is 1 where they coincide; with it the value at a stroke of 0 is nearly known to be 0.
 
     Parameters
     ----------
     points, others
-        Rows (stroke, centre), normalised drives, shapes (n, 2) and (m, 2).
+        Rows (stroke, centre, decade), normalised drives, shapes (n, 3) and (m, 3); decades may be missing where no
+        share of the field depends on the rate.
     lengths
-        Correlation lengths in stroke and centre.
+        Correlation lengths in stroke and centre, and the share that depends on the rate.
 
     Returns
     -------
@@ -50,12 +77,15 @@ def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool 
         Shape (n, m).
     """
     out = np.empty((len(points), len(others)))
-    for i, (stroke, centre) in enumerate(points.tolist()):
-        for j, (other_stroke, other_centre) in enumerate(others.tolist()):
+    for i, (stroke, centre) in enumerate(points[:, :2].tolist()):
+        for j, (other_stroke, other_centre) in enumerate(others[:, :2].tolist()):
             along = _matern((stroke - other_stroke) / lengths.stroke)
             if straight:
                 along -= _STRAIGHT * _matern(stroke / lengths.stroke) * _matern(other_stroke / lengths.stroke)
             out[i, j] = along * _matern((centre - other_centre) / lengths.centre)
+            if lengths.rate_share:
+                apart = _matern((points[i, 2] - others[j, 2]) / _DECADES)
+                out[i, j] *= 1.0 - lengths.rate_share * (1.0 - apart)
     return out
 
 
@@ -67,15 +97,21 @@ def _matern(distance: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A field of rows known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns).
+    """A field of rows known at ``points``, those of ``points_of``; ``weights`` has shape (n, columns).
 
-    A ``straight`` one tends to 0 with the stroke, but for what all strokes have in common.
+    A ``straight`` one tends to 0 with the stroke, but for what all strokes have in common. ``decade`` is that of the
+    rate of the lines for which it is computed.
     """
 
     points: Floats
     weights: Floats
     lengths: Lengths
     straight: bool = False
+    decade: float = 0.0
+
+    def at_rate(self, rate_hz: float) -> "Field":
+        """Return the field for lines of a rate."""
+        return replace(self, decade=log10(rate_hz)) if self.lengths.rate_share else self
 
     def at(self, stroke: float, centre: float) -> Floats:
         """Return the row at a stroke and a centre.
@@ -90,7 +126,8 @@ class Field:
         Floats
             Interpolated values, shape (columns,).
         """
-        near = covariance(np.array([[stroke, centre]]), self.points, self.lengths, self.straight)[0]
+        here = np.array([[stroke, centre, self.decade]])
+        near = covariance(here, self.points, self.lengths, self.straight)[0]
         total = np.zeros(self.weights.shape[1])
         for weight, row in zip(near.tolist(), self.weights, strict=True):
             total = total + weight * row
@@ -103,7 +140,7 @@ def through(points: Floats, rows: Floats, lengths: Lengths, straight: bool = Fal
     Parameters
     ----------
     points, rows
-        Shapes (n, 2) of (stroke, centre) and (n, columns).
+        Those of ``points_of``, and shape (n, columns).
     """
     known = covariance(points, points, lengths, straight)
     factor = Cholesky(known + lengths.noise * np.diag(np.diag(known)))

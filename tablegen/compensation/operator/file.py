@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from msgspec import Meta, Struct, ValidationError, convert
+from msgspec import Meta, Struct, ValidationError, convert, structs
 
 from tablegen.base.input_errors import Problem, Problems, Rejected
 from tablegen.base.toml import read_toml
@@ -16,7 +16,7 @@ from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.bouc_wen import BoucWen
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
-from tablegen.compensation.operator.field import Lengths, through
+from tablegen.compensation.operator.field import Lengths, points_of, through
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import BENDS, Plays
 from tablegen.compensation.operator.sweep_loss import SweepLoss
@@ -50,6 +50,7 @@ class PlaysTable(_Table, frozen=True, kw_only=True):
     weights: Annotated[list[list[_Number]], Meta(min_length=1, max_length=8)]
     bends: Annotated[list[list[_Bend]], Meta(min_length=1, max_length=8)]
     reversible: Annotated[list[_Number], Meta(min_length=1, max_length=16)]
+    growth_per_decade: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.0
 
 
 class BoucWenTable(_Table, frozen=True, kw_only=True):
@@ -69,6 +70,7 @@ class LengthsTable(_Table, frozen=True, kw_only=True):
     stroke: _Length
     centre: _Length
     noise: Annotated[float, Meta(ge=1e-12, le=1.0)]
+    rate_share: _Share = 0.0
 
 
 class ResponseTable(_Table, frozen=True, kw_only=True):
@@ -173,10 +175,16 @@ def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
 
 
 def _operator(file: OperatorFile) -> Operator:
-    lengths = Lengths(file.lengths.stroke, file.lengths.centre, file.lengths.noise)
+    lengths = Lengths(*structs.astuple(file.lengths))
     plays, loop = file.plays, file.bouc_wen
     family = Family(
-        Plays(*(np.array(one) for one in (plays.thresholds, plays.weights, plays.reversible, plays.bends))),
+        Plays(
+            np.array(plays.thresholds),
+            np.array(plays.weights),
+            np.array(plays.reversible),
+            np.array(plays.bends),
+            plays.growth_per_decade,
+        ),
         BoucWen(loop.depth_nm, loop.n, loop.beta, loop.gamma, loop.asymmetry, (loop.bend[0], loop.bend[1]))
         if loop.depth_nm
         else None,
@@ -184,7 +192,7 @@ def _operator(file: OperatorFile) -> Operator:
     creep = LogarithmicCreep(
         file.creep.loss_per_decade, file.creep.fastest_s, file.creep.slowest_s, file.creep.reference_hz
     )
-    points = np.array([(line.stroke, line.centre) for line in file.lines])
+    points = points_of(file.lines)
     rows = np.array([[*line.rising, *line.falling] for line in file.lines])
     residual = through(points, rows, lengths, straight=True)
     size = through(points, np.array([[line.size] for line in file.lines]), lengths)
@@ -206,7 +214,8 @@ def _operator(file: OperatorFile) -> Operator:
     sweep = None
     if file.response is not None:
         sweep = SweepLoss(file.response.loss_deg / 360.0, creep if file.response.creep else None)
-    return Operator(family, residual, size, creep, file.centre, lines, bias_memory, sweep, file.misfit_percent)
+    operator = Operator(family, residual, size, creep, file.centre, lines, bias_memory, sweep, file.misfit_percent)
+    return operator.at_rate(creep.reference_hz)
 
 
 def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
@@ -235,10 +244,13 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
     ]
     out += [f"    {numbers(row)}," for row in file.plays.weights]
     out += ["]", "bends = [", *(f"    {numbers(row)}," for row in file.plays.bends)]
-    out += ["]", f"reversible = {numbers(file.plays.reversible)}", "", "[bouc_wen]"]
+    out += ["]", f"reversible = {numbers(file.plays.reversible)}"]
+    if file.plays.growth_per_decade != 0.0:
+        out.append(f"growth_per_decade = {_float(file.plays.growth_per_decade)}")
+    out += ["", "[bouc_wen]"]
     out += [f"{name} = {_float(getattr(file.bouc_wen, name))}" for name in file.bouc_wen.__struct_fields__[:-1]]
     out += [f"bend = {numbers(file.bouc_wen.bend)}", "", "[lengths]"]
-    out += [f"{name} = {_float(getattr(file.lengths, name))}" for name in file.lengths.__struct_fields__]
+    out += [f"{name} = {_float(value)}" for name, value in structs.asdict(file.lengths).items() if value != 0.0]
     if file.response is not None:
         creep = "true" if file.response.creep else "false"
         out += ["", "[response]", f"loss_deg = {_float(file.response.loss_deg)}", f"creep = {creep}"]

@@ -1,10 +1,11 @@
 """The operator: a hysteresis family, the measured residual over it, the size at every offset, and creep."""
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from math import sqrt
 
 import numpy as np
-from msgspec.structs import replace
+from msgspec import structs
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import Measured, Response
@@ -15,10 +16,13 @@ from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.sweep_loss import SweepLoss
-from tablegen.numerics.arrays import Floats
+from tablegen.numerics.arrays import Floats, tree_sum
+from tablegen.numerics.elementary import log10
 
 SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
 STROKE_REACH = 0.05  # of v_max: an operator serves strokes this far beyond the largest that was measured
+_MOST_MISFIT = 1.5e-3  # rms of the lines' residuals; 7e-4 and less where a family fits, 3.6e-3 for Duhem's piezo
+_INSIDE = np.linspace(-0.8, 0.8, 81)  # -1 and 1 are the turns
 _END_POINTS = 48  # of a branch at either end
 _LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands still, and cannot be inverted
 
@@ -48,12 +52,34 @@ class Operator:
     def knows_rates(self) -> bool:
         """True if the creep says what the rate does to the size.
 
-        It does beside a family, and where the lines have several rates; from the shapes of one rate alone it is less
-        certain than (23).
+        It does beside a family that describes the lines, and where they have several rates; else it is less certain
+        than (23).
         """
         rates = [line.rate_hz for line in self.lines]
         several = max(rates, default=1.0) >= SEVERAL_RATES * min(rates, default=1.0)
-        return self.creep.loss_per_decade > 0.0 and (self.family.has_hysteresis or several)
+        return self.creep.loss_per_decade > 0.0 and (several or self._family_serves)
+
+    @cached_property
+    def _family_serves(self) -> bool:
+        """True if the residuals of the lines are small: their median rms about the best common line."""
+        if not self.family.has_hysteresis:
+            return False
+        rows = np.array([self.residual.at(line.stroke, line.centre) for line in self.lines])
+        half = rows.shape[-1] // 2 if len(rows) else 0
+        left = [_rms(chebyshev(row[:half], _INSIDE), chebyshev(row[half:], _INSIDE)) for row in rows]
+        return float(np.median(left)) < _MOST_MISFIT if left else True
+
+    def at_rate(self, rate_hz: float) -> "Operator":
+        """Return the operator whose plays and fields are those of lines of a rate.
+
+        Plays go on growing up to a decade beyond the measured rates.
+        """
+        if not (self.residual.lengths.rate_share or self.family.plays.growth):
+            return self
+        measured = [line.rate_hz for line in self.lines] or [rate_hz]
+        near = min(max(rate_hz, 0.1 * min(measured)), 10.0 * max(measured))
+        family = self.family.at_decades(log10(near / self.creep.reference_hz))
+        return replace(self, family=family, residual=self.residual.at_rate(near), size=self.size.at_rate(near))
 
     def dynamics(self, response: Response | None) -> Response | None:
         """Return the dynamics behind the operator: a measured response without what the operator has itself."""
@@ -80,7 +106,7 @@ class Operator:
         mean = centre if mean is None else mean
         extent = self.expected_extent(stroke, mean, factor) * (1.0 + float(self.size.at(stroke, mean)[0]))
         loop = Loop(low, high, _monotonic_ends(rising), _monotonic_ends(falling), extent)
-        loop = replace(loop, extent_nm=extent * (1.0 + loop.grown(mean)))
+        loop = structs.replace(loop, extent_nm=extent * (1.0 + loop.grown(mean)))
         if not loop.least_slope > 0.5 * _LEAST_SLOPE:
             raise Unphysical(
                 f"at a stroke of {stroke:.3g} and a centre of {centre:.3g} of v_max the operator's branches run "
@@ -117,6 +143,15 @@ def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
     rising, falling = (family.branch(u, low, high, going) for going in (True, False))
     extent = float(rising[-1] - rising[0])
     return (rising - rising[0]) / extent, (falling - rising[0]) / extent
+
+
+def _rms(rising: Floats, falling: Floats) -> float:
+    """Return the rms of two branches at ``_INSIDE`` about their best common line."""
+    middle = 0.5 * (rising + falling)
+    slope = float(tree_sum(middle * _INSIDE)) / float(tree_sum(_INSIDE * _INSIDE))
+    line = float(tree_sum(middle)) / len(middle) + slope * _INSIDE
+    square = float(tree_sum((rising - line) ** 2 + (falling - line) ** 2))
+    return sqrt(square / (2.0 * len(middle)))
 
 
 def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:

@@ -99,7 +99,9 @@ def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
     bends = np.array([_bend(random, half, max(waves, 1)) for _ in places]) * rms[:, None]
     sizes = random.standard_normal((len(places), 1)) * size_error[:, None]
     residual, size = (
-        DepartingField(field.points, field.weights, field.lengths, field.straight, places=places, departures=rows)
+        DepartingField(
+            field.points, field.weights, field.lengths, field.straight, field.decade, places=places, departures=rows
+        )
         for field, rows in ((operator.residual, bends), (operator.size, sizes))
     )
     return replace(operator, residual=residual, size=size)

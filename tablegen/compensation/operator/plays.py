@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, FloatsLike
+from tablegen.numerics.elementary import exp
 
+_LN10 = 2.302585092994046
 BENDS = 4  # numbers that bend both envelopes of a play
 # l and s of two envelopes, of which the lower one pushes where the drive rises: u, u^2 and 1 - (1 - u)^2, both alike.
 FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0, 1.0, 0.0]])
@@ -56,6 +58,11 @@ def bent(u: FloatsLike, linear: float, cubic: float) -> Floats:
     return u + linear * bow + cubic * (bow * (u - 0.5))
 
 
+def stretch(growth: float, decades: float) -> float:
+    """Return the factor of thresholds that grow by 10^``growth`` a decade, so many decades from where it is 1."""
+    return exp(_LN10 * growth * decades)
+
+
 def plays(u: Floats, low: float, high: float, rising: bool, thresholds: Floats, bends: Floats) -> Floats:
     """Return settled plays between the drives ``low`` and ``high``, of shape (bends, thresholds, drives).
 
@@ -79,13 +86,16 @@ class Plays:
     """Weighted plays and a polynomial, in units of the displacement, at normalised drives u of 0..1.
 
     ``thresholds`` has shape (k,) and ascends from above 0, ``weights`` (n, k), ``bends`` (n, 4): of each row of weights
-    the envelopes; ``reversible`` are the coefficients of u, u^2, ...
+    the envelopes; ``reversible`` are the coefficients of u, u^2, ... Thresholds grow with the rate, by a factor of
+    10^``growth`` a decade, and are ``stretch`` times as large at that of the line.
     """
 
     thresholds: Floats
     weights: Floats
     reversible: Floats
     bends: Floats = field(default_factory=lambda: FIXED_BENDS)
+    growth: float = 0.0
+    stretch: float = 1.0
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
         """Return the displacement on one branch of a settled line, up to a constant.
@@ -109,7 +119,7 @@ class Plays:
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
-        transforms = plays(u, low, high, rising, self.thresholds, self.bends)
+        transforms = plays(u, low, high, rising, self.stretch * self.thresholds, self.bends)
         for transform, weights in zip(transforms, self.weights, strict=True):
             for row, weight in zip(transform, weights, strict=True):
                 if weight:

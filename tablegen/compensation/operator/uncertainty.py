@@ -12,7 +12,7 @@ equation; ``benchmarks/expected_coverage.py`` checks them on others.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import log, sqrt
 from typing import NamedTuple
@@ -21,7 +21,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.identification import MeasuredLine
-from tablegen.compensation.operator.field import SAME_CENTRE, Lengths, covariance
+from tablegen.compensation.operator.field import SAME_CENTRE, Lengths, covariance, points_of
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.record_uncertainty import possible_record_errors
@@ -113,16 +113,17 @@ class _Hypothesis(NamedTuple):
 class PossibleErrors:
     """The possible errors at any stroke and centre, from the lines of an operator and the shape of each one's loop.
 
-    ``main`` is the centre of most lines, of v_max.
+    ``main`` is the centre of most lines, of v_max, ``rate_share`` the share of departures that depends on the rate.
     """
 
     lines: tuple[MeasuredLine, ...]
     shapes: tuple[LoopShape, ...]
     main: float
+    rate_share: float = 0.0
 
-    def at(self, stroke: float, centre: float, shape: LoopShape) -> ErrorParts:
-        """Return by how much a line may be off, whose loop has a shape."""
-        near = covariance(np.array([[stroke, centre]]), self._points, _ALIKE)[0]
+    def at(self, stroke: float, centre: float, shape: LoopShape, decade: float = 0.0) -> ErrorParts:
+        """Return by how much a line may be off, whose loop has a shape; ``decade`` is that of its rate."""
+        near = covariance(np.array([[stroke, centre, decade]]), self._points, self._alike)[0]
         solution = self._factor.solve(near)
         here = max(1.0 - _dot(near, solution), 0.0)
         weights = [value * value for value in solution.tolist()]
@@ -141,11 +142,15 @@ class PossibleErrors:
 
     @cached_property
     def _points(self) -> Floats:
-        return np.array([(line.stroke, line.centre) for line in self.lines])
+        return points_of(self.lines)
+
+    @property
+    def _alike(self) -> Lengths:
+        return replace(_ALIKE, rate_share=self.rate_share)
 
     @cached_property
     def _factor(self) -> Cholesky:
-        known = covariance(self._points, self._points, _ALIKE)
+        known = covariance(self._points, self._points, self._alike)
         return Cholesky(known + _ALIKE.noise * np.diag(np.diag(known)))
 
     @cached_property
@@ -227,7 +232,7 @@ class _ChangeField:
 @lru_cache(maxsize=8)
 def _possible_errors_of(operator: Operator) -> PossibleErrors:
     shapes = tuple(loop_shape(operator, line.stroke, line.centre) for line in operator.lines)
-    return PossibleErrors(operator.lines, shapes, operator.centre)
+    return PossibleErrors(operator.lines, shapes, operator.centre, operator.residual.lengths.rate_share)
 
 
 def possible_errors(operator: Operator, stroke: float, centre: float) -> Figures:
@@ -235,7 +240,8 @@ def possible_errors(operator: Operator, stroke: float, centre: float) -> Figures
     if operator.misfit_percent is not None:
         units = loop_shape(operator, stroke, centre).units
         return possible_record_errors(operator.family, operator.lines, operator.misfit_percent, (stroke, centre), units)
-    return _possible_errors_of(operator).at(stroke, centre, loop_shape(operator, stroke, centre)).together
+    shape = loop_shape(operator, stroke, centre)
+    return _possible_errors_of(operator).at(stroke, centre, shape, operator.residual.decade).together
 
 
 def loop_shape(operator: Operator, stroke: float, centre: float) -> LoopShape:
