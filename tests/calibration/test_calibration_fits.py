@@ -5,7 +5,7 @@ from math import isnan, sqrt
 import numpy as np
 import pytest
 from calibrating import CASES, DRIVES, FREQUENCIES, OFFSETS, RESPONSE, V_MAX, actual, apparent, distances, trials
-from sets import LONG_TEST
+from sets import long
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.frequency import fit_frequency
@@ -17,6 +17,7 @@ from tablegen.compensation.size import SizeLaw
 from tablegen.fitting.estimate import Estimate
 
 FAST = {"offset": 400, "size": 100, "hysteresis": 50, "images": 10, "frequency": 300, "resonance": 50}
+SLOW = ("hysteresis", "images", "resonance")
 COVERED = 0.9545  # by two standard errors, as they are defined
 
 
@@ -42,9 +43,7 @@ def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(
-    "kind", [pytest.param(each, marks=LONG_TEST if each in ("hysteresis", "images") else ()) for each in CASES]
-)
+@pytest.mark.parametrize("kind", long([each for each in CASES if each not in SLOW], CASES))
 def test_the_truth_lies_within_two_errors_in_95_of_100(kind: str) -> None:
     """Of 1,000 trials a share of 95.45 % is measured to 0.66 %: three times of that are allowed. Images take longer."""
     count = 300 if kind == "images" else 1000

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, JilesAtherton, ManyPlays, record, triangle
+from sets import LONG_TEST
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.hysteresis import Trace
@@ -102,13 +103,13 @@ def test_the_family_and_the_creep_are_found() -> None:
     [
         (ManyPlays, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 2.5, 0.5, 0.5),
         (ManyPlays, SIX, 0.85, (0.15, 0.28), 2.5, 0.5, 3.0),
-        pytest.param(*(ManyPlays, TEN, 0.7, (0.15, 0.35, 0.55), 1.5, 0.25, 0.5), marks=pytest.mark.rest),
-        pytest.param(*(ManyPlays, TEN, 0.85, (0.05, 0.15, 0.28), 1.5, 0.25, 0.5), marks=pytest.mark.rest),
+        pytest.param(*(ManyPlays, TEN, 0.7, (0.15, 0.35, 0.55), 1.5, 0.25, 0.5), marks=LONG_TEST),
+        (ManyPlays, TEN, 0.85, (0.05, 0.15, 0.28), 1.5, 0.25, 0.5),
         (BoucWen, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 3.0, 0.4, 0.5),
         (BoucWen, SIX, 0.85, (0.05, 0.15, 0.28), 3.0, 0.4, 1.0),
-        pytest.param(*(BoucWen, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5), marks=pytest.mark.rest),
-        pytest.param(*(JilesAtherton, SIX, 0.5, (0.15, 0.55, 0.9), 3.0, 0.4, 0.5), marks=pytest.mark.rest),
-        pytest.param(*(JilesAtherton, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5), marks=pytest.mark.rest),
+        pytest.param(*(BoucWen, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5), marks=LONG_TEST),
+        pytest.param(*(JilesAtherton, SIX, 0.5, (0.15, 0.55, 0.9), 3.0, 0.4, 0.5), marks=LONG_TEST),
+        (JilesAtherton, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5),
     ],
 )
 def test_lines_that_were_not_measured(

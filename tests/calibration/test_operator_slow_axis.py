@@ -9,6 +9,7 @@ import pytest
 from editing import SCAN, SCANNER, edited
 from foreign_plants import BoucWen, ForeignPlant, ManyPlays, record
 from replacing import replace
+from sets import LONG_TEST
 
 from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.creep_fit import creep_of_fields
@@ -117,13 +118,16 @@ def scanned(folder: Path, plant: str, fit: OperatorFit, size_nm: float, frame_hz
     return forward_scaling(imaged(folder, plant, fit, size_nm, frame_hz), 0.95)
 
 
-@pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize(
-    "protocol",
+    ("protocol", "plant"),
     [
-        pytest.param(FRAMES, id="frames"),
-        pytest.param(TURNED, id="turned", marks=pytest.mark.rest),
-        pytest.param(QUICK, id="quick", marks=pytest.mark.rest),
+        *(pytest.param(FRAMES, plant, id=f"frames-{plant}") for plant in PLANTS),
+        pytest.param(TURNED, "plays", id="turned-plays"),
+        pytest.param(QUICK, "Bouc-Wen", id="quick-Bouc-Wen"),
+        pytest.param(TURNED, "Bouc-Wen", id="turned-Bouc-Wen", marks=LONG_TEST),
+        pytest.param(TURNED, "Preisach", id="turned-Preisach", marks=LONG_TEST),
+        pytest.param(QUICK, "plays", id="quick-plays", marks=LONG_TEST),
+        pytest.param(QUICK, "Preisach", id="quick-Preisach", marks=LONG_TEST),
     ],
 )
 def test_y_at_half_a_hertz(plant: str, protocol: tuple[tuple[float, float, float], ...], tmp_path: Path) -> None:

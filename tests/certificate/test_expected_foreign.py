@@ -77,7 +77,8 @@ def judged(plant: ForeignPlant, protocol: Sequence[tuple[float, float]], folder:
     return np.array(left), np.array(most), np.tile(plain, (len(left), 1))
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_nine_of_ten_scans_leave_less_than_what_is_expected_and_its_uncertainty(tmp_path: Path) -> None:
     """From traces of the default procedure, at three offsets."""
     parts = [judged(plant, TEN, tmp_path / kind) for kind, plant in PLANTS.items()]

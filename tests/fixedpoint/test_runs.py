@@ -172,7 +172,8 @@ def test_runs_of_splines_are_no_more_than_their_bound(program: Program) -> None:
     check_runs_of_splines_are_no_more_than_their_bound(program)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 @settings(max_examples=100, deadline=None)
 @given(splines())
 def test_runs_of_splines_are_no_more_than_their_bound_of_many(program: Program) -> None:
@@ -198,7 +199,8 @@ def test_parts_do_not_show(program: Program, size: int) -> None:
     check_parts_do_not_show(program, size)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 @settings(max_examples=30, deadline=None)
 @given(st.one_of(programs(), splines()), st.integers(1, 40))
 def test_parts_do_not_show_of_many(program: Program, size: int) -> None:
