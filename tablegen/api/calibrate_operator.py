@@ -21,6 +21,7 @@ from tablegen.calibration.operator.fit import LEAST_LINES, fit_operator, sweep_l
 from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
 from tablegen.calibration.operator.plausible import Unsettled
+from tablegen.calibration.operator.response_check import response_remarks
 from tablegen.calibration.operator.units import check_size
 from tablegen.calibration.record_checks import trace_remarks
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
@@ -125,6 +126,7 @@ def calibrate_operator(
     remarks = trace_remarks(tables, replace(known, response=response), axis) if tables else ()
     try:
         lines = _sensor_lines(tables, prior.driver)
+        remarks += response_remarks(lines, response)
         if not pairs and len(lines) < LEAST_LINES:
             raise Unsettled(f"{len(lines)} settled traces are not enough for fields over size and offset")
         delay = fit_delay(lines, sweep_loss_of(lines, response)[1]) if delay_s == "fit" else Estimate(float(delay_s))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
+from math import inf
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ class Response:
 
     resonance_hz = 60e3
     half_width_hz = 2e3
+    highest_hz = inf
 
     def __init__(self, plant: ForeignPlant) -> None:
         self._plant = plant

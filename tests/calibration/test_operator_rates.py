@@ -1,5 +1,6 @@
 """One operator for all rates: turns of fast traces, creep against (23), and loops that depend on the rate."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from foreign_plants import (
     record,
     triangle,
 )
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from replacing import replace
 from sets import LONG_TEST
 from test_operator_fit import Response, factor_of, identified
@@ -27,7 +30,10 @@ from tablegen.calibration.operator import fit, plays_fit
 from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
+from tablegen.calibration.operator.response_check import response_remarks
 from tablegen.calibration.operator.turns import with_turns
+from tablegen.compensation.dynamics import Response as Dynamics
+from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.loop import Loop
@@ -231,3 +237,57 @@ def test_traces_of_one_rate_serve_all_rates_alike() -> None:
     _, found = identified(BoucWen, TEN)
     assert found.operator.at_rate(5000.0) is found.operator
     assert found.operator.residual.lengths.rate_share == 0.0
+
+
+def response_doubts(plant: ForeignPlant, response: Dynamics, rate_hz: float, samples: int) -> tuple[str, ...]:
+    trace = Trace("a.csv", *record(plant, 0.5, 0.65, rate_hz, seed=3, samples=samples))
+    return response_remarks([periodic_line(trace, 100.0)], response)
+
+
+@pytest.mark.common
+@given(
+    st.sampled_from([BoucWen, JilesAtherton]),
+    st.floats(1.0, 3000.0),
+    st.integers(60, 1000),
+    st.floats(0.2, 0.8),
+)
+@settings(max_examples=10, deadline=None)
+def test_the_response_of_the_piezo_is_not_doubted(core: type, rate_hz: float, samples: int, turn: float) -> None:
+    plant = ForeignPlant(core())
+    trace = Trace("a.csv", *record(plant, 0.5, 0.4, rate_hz, seed=3, samples=samples, turn=turn))
+    line = periodic_line(trace, 100.0)
+    for response in (Response(plant), SecondOrder(60e3, 14.0, 2e-6), SecondOrder(60e3, 5.0)):
+        assert response_remarks([line], response) == ()
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(
+    ("resonance_hz", "rate_hz", "samples"),
+    [(2e3, 100.0, 200), (8e3, 100.0, 1000), (8e3, 1000.0, 200), (45e3, 1e3, 1000)],
+)
+def test_the_response_of_another_piezo_is_named(resonance_hz: float, rate_hz: float, samples: int) -> None:
+    plant = ForeignPlant(BoucWen())
+    (doubt,) = response_doubts(plant, SecondOrder(resonance_hz, 20.0), rate_hz, samples)
+    found = re.fullmatch(
+        r"a.csv: at (\S+) Hz the axis moved (\S+) times as much as the response of the scanner file says; it is of "
+        "another piezo, or the recorder has a filter",
+        doubt,
+    )
+    assert found
+    f_hz, times = map(float, found.groups())
+    (true,) = np.abs(plant.dynamics(np.array([f_hz])))
+    real, imaginary = SecondOrder(resonance_hz, 20.0).inverse(np.array([f_hz]))
+    assert times == pytest.approx(true * np.hypot(real, imaginary)[0], rel=0.6)
+
+
+@pytest.mark.common
+def test_a_filter_of_the_recorder_is_named_and_a_sine_says_nothing() -> None:
+    plant = ForeignPlant(BoucWen())
+    sharp, slow = Response(plant), plant.dynamics
+    plant.dynamics = lambda f_hz: slow(f_hz) / (1.0 + 1j * f_hz / 1e3)  # type: ignore[method-assign]
+    sharp.inverse = SecondOrder(60e3, 14.0).inverse  # type: ignore[method-assign]
+    assert response_doubts(plant, sharp, 100.0, 1000)
+    time = np.arange(5000) / 1e5
+    volts = np.tile(50.0 - 30.0 * np.cos(2.0 * np.pi * np.arange(1000) / 1000.0), 5)
+    line = periodic_line(Trace("sine.csv", time, volts, np.tile(plant.settled(volts[:1000], 100.0), 5)), 100.0)
+    assert response_remarks([line], SecondOrder(2e3, 20.0)) == ()

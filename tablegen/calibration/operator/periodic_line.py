@@ -28,7 +28,8 @@ class PeriodicLine:
     """One period of a settled line, from the minimum of the drive on; arrays have ``PHASES`` values.
 
     ``drive`` is normalised to v_max, ``displacement_nm`` a mean over ``periods``; ``noise_nm`` is the standard
-    deviation of that mean, and ``drift_nm`` the drift over the record, which is removed.
+    deviation of that mean, and ``drift_nm`` the drift over the record, which is removed. ``samples`` is the number of
+    samples a period of the record.
     """
 
     name: str
@@ -38,6 +39,7 @@ class PeriodicLine:
     displacement_nm: Floats
     noise_nm: float
     drift_nm: float
+    samples: float = _MIN_SAMPLES
 
     @property
     def low(self) -> float:
@@ -151,7 +153,14 @@ def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
         displacement = -displacement
     _check_sweeps(shape)
     return PeriodicLine(
-        trace.name, 1.0 / period, settled, shape, displacement, spread, float(np.ptp(drift(at))) if order else 0.0
+        trace.name,
+        1.0 / period,
+        settled,
+        shape,
+        displacement,
+        spread,
+        float(np.ptp(drift(at))) if order else 0.0,
+        len(time) * period / float(time[-1] - time[0]),
     )
 
 
