@@ -1,9 +1,11 @@
 """Reproducible arithmetic against mpmath: accuracy, exact zeros, symmetry."""
 
+from decimal import Context, Decimal
+
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tablegen.numerics.arrays import tree_sum, tree_sum_down
@@ -62,9 +64,23 @@ def test_spherical_bessel_function_where_its_two_forms_meet(y: float) -> None:
     assert float(spherical_bessel_1(y)) == pytest.approx(float(reference), rel=5e-15, abs=1e-300)
 
 
-@given(st.floats(-700.0, 700.0))
+@given(st.one_of(st.floats(-709.0, 709.0), st.floats(-1e-3, 1e-3)))
 def test_exp_is_correctly_rounded(x: float) -> None:
     assert exp(x) == float(mp.exp(mp.mpf(x)))
+
+
+@given(st.floats(-760.0, -700.0))
+@example(-745.1332191019411)
+@example(-745.1332191019412)
+def test_a_subnormal_exp_is_rounded_once(x: float) -> None:
+    assert exp(x) == float(Decimal(x).exp(Context(prec=60)))
+
+
+def test_an_exp_that_is_no_double_is_refused() -> None:
+    assert exp(709.782712893384) == pytest.approx(1.797693e308, rel=1e-6)
+    for x in (709.782712893385, 711.0, 1e300):
+        with pytest.raises(OverflowError):
+            exp(x)
 
 
 @given(st.floats(1e-300, 1e300))

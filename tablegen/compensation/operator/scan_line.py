@@ -198,7 +198,9 @@ class _Learner:
         self._weight = 1.0 / np.sqrt(edge * (1.0 - edge))
         self._weight = self._weight / float(tree_sum(self._weight))
         basis = np.concatenate([np.ones((1, len(k))), self._cosines[at], self._sines[at]])
-        normal = np.stack([tree_sum(basis * (row * self._weight)) for row in basis])
+        normal = np.zeros((len(basis), len(basis)))
+        for i, row in enumerate(basis):  # what is above the diagonal is not read
+            normal[i, : i + 1] = tree_sum(basis[: i + 1] * (row * self._weight))
         square = n * n
         penalty = _SMOOTHNESS * np.concatenate([[0.0], square * square, square * square])
         self._basis = basis
