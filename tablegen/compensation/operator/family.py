@@ -48,9 +48,7 @@ class Family:
 
     def extent(self, stroke: float, centre: float) -> float:
         """Return the nm between the turns of a settled line."""
-        low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
-        ends = self.branch(np.array([low, high]), low, high, True)
-        return float(ends[1] - ends[0])
+        return _extent(self, stroke, centre)
 
     def over(self, reversible: Floats) -> "Family":
         """Return the family over another polynomial.
@@ -78,6 +76,13 @@ class Family:
         loops = [(one, by) for one, by in ((self.bouc_wen, share), (other.bouc_wen, 1.0 - share)) if one is not None]
         ((loop, by),) = loops or ((None, 0.0),)
         return Family(plays, None if loop is None else replace(loop, depth=by * loop.depth))
+
+
+@lru_cache(maxsize=256)  # of small strokes it is asked for again and again
+def _extent(family: Family, stroke: float, centre: float) -> float:
+    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
+    ends = family.branch(np.array([low, high]), low, high, True)
+    return float(ends[1] - ends[0])
 
 
 @lru_cache(maxsize=64)

@@ -199,8 +199,8 @@ class _Learner:
         self._weight = self._weight / float(tree_sum(self._weight))
         basis = np.concatenate([np.ones((1, len(k))), self._cosines[at], self._sines[at]])
         normal = np.zeros((len(basis), len(basis)))
-        for i, row in enumerate(basis):  # what is above the diagonal is not read
-            normal[i, : i + 1] = tree_sum(basis[: i + 1] * (row * self._weight))
+        for at_row, row in enumerate(basis):  # what is above the diagonal is not read
+            normal[at_row, : at_row + 1] = tree_sum(basis[: at_row + 1] * (row * self._weight))
         square = n * n
         penalty = _SMOOTHNESS * np.concatenate([[0.0], square * square, square * square])
         self._basis = basis
