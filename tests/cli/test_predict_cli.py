@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from editing import run
 from foreign_plants import SIX, BoucWen, ForeignPlant, record
+from replacing import replace
+
+from tablegen.api.predict import _KnownAxis
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +74,17 @@ def test_record_is_predicted_and_bad_input_is_named(scanner: Path, tmp_path: Pat
         assert refused.status == 2
         assert any(part in refused.err for part in why.split("|")), refused.err
     assert "calibrate operator --axis y" in run("predict", scanner, trace, "--axis", "y").err
+
+
+@pytest.mark.common
+def test_loops_are_those_of_the_mean_rate_of_a_record(scanner: Path) -> None:
+    known = _KnownAxis.read(scanner, "x")
+    plays = replace(known.operator.family.plays, growth=0.05)
+    growing = replace(known.operator, family=replace(known.operator.family, plays=plays))
+    known = replace(known, operator=growing)
+    phase = np.arange(401) / 100.0
+    triangle = 0.2 + 0.6 * np.abs(2.0 * (phase % 1.0) - 1.0)
+    for rate_hz in (50.0, 900.0):
+        found = known.operator_of(phase / rate_hz, triangle)
+        assert found.family.plays.stretch == pytest.approx(growing.at_rate(rate_hz).family.plays.stretch)
+    assert known.operator_of(phase / 50.0, triangle).family.plays.stretch < 1.0
