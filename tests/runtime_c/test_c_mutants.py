@@ -46,7 +46,8 @@ def test_every_mutant_is_found(mutant: Mutant, tmp_path: Path) -> None:
     assert judge(mutant, tmp_path).killed
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 @pytest.mark.parametrize("mutant", EQUIVALENT, ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
 def test_what_is_named_equivalent_is_not_found(mutant: Mutant, tmp_path: Path) -> None:
     """Each has its reason beside it; a test that finds one has found a wrong reason, or more than what is promised."""
