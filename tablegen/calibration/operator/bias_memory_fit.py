@@ -161,6 +161,7 @@ class _Lines:
 def _lines(before: Stretch, now: Stretch, operator: Operator, factor_at: Callable[[float], float]) -> _Lines:
     """Return the lines after a change, without the first ones, in which loops may close."""
     count, period_s = len(now.means_nm), now.line.period_s
+    operator = operator.at_rate(1.0 / period_s)
     lines, factor = (before.line, now.line), factor_at(now.centre)
     after = transient_between(replace(operator, bias_memory=None), *lines, factor)
     unit = replace(operator, creep=NO_CREEP, bias_memory=BiasMemory(1.0, 1.0, 1.0, 1.0))  # the whole change is late
