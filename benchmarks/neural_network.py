@@ -213,7 +213,8 @@ def compared(plant: ForeignPlant, protocol: Sequence[tuple[tuple[float, float], 
             span = float(np.ptp(truth))
             t = np.arange(1001) / (1000.0 * rate)
             ratio = factor(centre) / factor(operator.centre)
-            mine = OperatorInTime(operator, lambda _, by=ratio: by, RESPONSE).position(t, np.append(u, u[0]))[:-1]
+            at_rate = operator.at_rate(rate)
+            mine = OperatorInTime(at_rate, lambda _, by=ratio: by, RESPONSE).position(t, np.append(u, u[0]))[:-1]
             others = [network.predict(*settled_inputs(u, rate if several else None)) for network in networks]
             one = [(rms(p - truth, span)[0], 100.0 * abs(float(np.ptp(p)) / span - 1.0)) for p in (mine, *others)]
             rows.append((one[0], np.median(one[1:], axis=0)))
