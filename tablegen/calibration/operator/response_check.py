@@ -34,10 +34,10 @@ def response_remarks(lines: Sequence[PeriodicLine], response: Response | None) -
     """
     if response is None:
         return ()
-    found = [one for line in lines if (one := _largest(line, response)) is not None]
-    if not found:
+    departures = [one for line in lines if (one := _largest(line, response)) is not None]
+    if not departures:
         return ()
-    departure, f_hz, name = max(found, key=lambda one: abs(one[0]))
+    departure, f_hz, name = max(departures, key=lambda one: abs(one[0]))
     text = (
         f"{name}: at {f_hz:.3g} Hz the axis moved {exp(departure):.2g} times as much as the response of the scanner "
         "file says; it is of another piezo, or the recorder has a filter"
