@@ -5,7 +5,7 @@ What happens on which tick is stated in ``docs/sequencer.md``; the arithmetic st
 """
 
 from dataclasses import dataclass, field
-from enum import Enum, IntFlag
+from enum import Enum, IntEnum, IntFlag
 
 import numpy as np
 
@@ -34,6 +34,14 @@ class Fault(IntFlag):
     CLAMP = 2  # a code was clamped to [code_min, code_max]
 
 
+class CommitMode(IntEnum):
+    """Where in a running scan a committed program is swapped in, and on which line it starts."""
+
+    LINE = 0  # at the next line start, from line 0 of a frame
+    KEEP = 1  # at the next line start, and the frame goes on
+    FRAME = 2  # at the next frame start
+
+
 @dataclass(frozen=True, slots=True)
 class Tick:
     """The outputs of the sequencer on one tick: two codes, markers, what it did, and the faults so far."""
@@ -55,7 +63,8 @@ class Tick:
 class Sequencer:
     """A device, tick by tick.
 
-    ``commit`` fills the idle bank; it is swapped in at the next line start, or on the next tick while no line plays.
+    ``commit`` fills the idle bank; it is swapped in at the next line start, with ``CommitMode.FRAME`` at the next frame
+    start, or on the next tick while no line plays.
     ``arm`` and ``trigger`` start ``frames`` frames (0: without end) from line 0; ``park`` ends them at once. Parked
     and parking outputs follow the park code under the slew guard of the bank that plays. A device without a program
     (``playing`` is None) holds its ``codes``. It ignores triggers, unless its first program is committed: then the scan
@@ -65,6 +74,7 @@ class Sequencer:
     playing: DualProgram | None
     codes: tuple[int, int] = (0, 0)  # at the converters now; with a program, its park codes
     idle: DualProgram | None = None
+    mode: CommitMode = CommitMode.LINE  # of the last commit
     running: bool = False
     parked: bool = False
     armed: bool = False
@@ -95,9 +105,9 @@ class Sequencer:
             SequencerState.RUNNING if self.running else SequencerState.PARKED if self.parked else SequencerState.PARKING
         )
 
-    def commit(self, program: DualProgram) -> None:
-        """Put a complete and checked program into the idle bank, to be swapped in at the next line start."""
-        self.idle = program
+    def commit(self, program: DualProgram, mode: CommitMode = CommitMode.LINE) -> None:
+        """Put a complete and checked program into the idle bank, to be swapped in as the mode says."""
+        self.idle, self.mode = program, mode
 
     def withdraw(self) -> None:
         """Discard a committed program that was not swapped in yet, and the scan of it if it is the first one."""
@@ -145,11 +155,12 @@ class Sequencer:
     def step(self) -> Tick:
         """Play one tick and return the outputs."""
         swapped = False
-        if self.idle is not None and (not self.running or self.tick == 0):
+        if self.idle is not None and (not self.running or self._at_swap()):
+            continues = self.mode == CommitMode.KEEP and self.playing is not None and can_keep(self.playing, self.idle)
             self.playing, self.idle = self.idle, None
             swapped = True
             if self.running:
-                self._begin(self.playing)
+                self._begin(self.playing, self.line if continues else 0)
         if not self.running or self.playing is None:
             return self._rest(swapped)
 
@@ -181,10 +192,11 @@ class Sequencer:
         Returns them with their faults so far, shape (ticks,); None where nothing plays, or another program begins.
         """
         program = self.playing
-        if not self.running or program is None or (self.tick == 0 and self.idle is not None):
+        if not self.running or program is None or (self.idle is not None and self._at_swap()):
             return None
         lines, period = self._next_lines(program.schedule), program.schedule.ticks
-        if self.idle is not None:  # it is swapped in where the next line begins
+        # It is swapped in where the next line begins; lines are computed ahead up to the end of a frame at most.
+        if self.idle is not None and self.mode != CommitMode.FRAME:
             most = min(most, period - self.tick)
         part = slice(self._at, min(self._at + most, len(lines.x)))
         x = limit_slew(lines.x[part], self.codes[0], program.x.output.max_step)
@@ -217,9 +229,13 @@ class Sequencer:
             self._clamped = (self._ticks.x != unclamped[0]) | (self._ticks.y != unclamped[1])
         return self._ticks
 
-    def _begin(self, program: DualProgram) -> None:
-        """Start a program at its own line 0, unsettled, and away from where the output is."""
-        self.tick = self.line = 0
+    def _at_swap(self) -> bool:
+        """Return True if the next tick of a running scan is one on which the mode of the commit swaps."""
+        return self.tick == 0 and (self.mode != CommitMode.FRAME or self.line == 0)
+
+    def _begin(self, program: DualProgram, line: int = 0) -> None:
+        """Start a line of a program, unsettled, and away from where the output is."""
+        self.tick, self.line = 0, line
         self.settle_left = program.schedule.settle_lines
         self.catching_up = True
         self._lines, self._ticks = PlayedLines(program), None
@@ -259,3 +275,10 @@ class Sequencer:
     def _fault(self, fault: Fault) -> None:
         self.faults |= fault
         self.fault_counts[fault] += 1
+
+
+def can_keep(playing: DualProgram, program: DualProgram) -> bool:
+    """Return True if ``program`` can go on within the frame of ``playing``: y has the same place in both."""
+    old, new = playing.schedule, program.schedule
+    same_frame = (old.ticks, old.lines) == (new.ticks, new.lines)
+    return same_frame and (playing.y.hold, playing.y.phase.ticks) == (program.y.hold, program.y.phase.ticks)
