@@ -4,6 +4,9 @@
 #include "dac_barriers.h"
 
 enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
+#if DAC_COMMIT_MODES
+enum { COMMIT_KEEP = PARK + 1, COMMIT_FRAME };
+#endif
 enum { NOTHING = 2 };         /* value of `playing` before the first program */
 #define UNKNOWN UINT32_MAX /* position of the pixels after ticks that were played without markers */
 
@@ -80,6 +83,19 @@ bool dac_sequencer_commit(dac_sequencer *s)
     s->commits++;
     return true;
 }
+
+#if DAC_COMMIT_MODES
+bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode)
+{
+    if (mode == DAC_COMMIT_LINE)
+        return dac_sequencer_commit(s);
+    if ((mode != DAC_COMMIT_KEEP && mode != DAC_COMMIT_FRAME) || !s->loaded
+        || !request(s, mode == DAC_COMMIT_KEEP ? COMMIT_KEEP : COMMIT_FRAME, s->loaded_after))
+        return false;
+    s->commits = (uint8_t)(s->commits + 1u);
+    return true;
+}
+#endif
 
 bool dac_sequencer_withdraw(dac_sequencer *s) { return request(s, WITHDRAW, 0); }
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames)
@@ -174,7 +190,14 @@ DAC_CODE_ATTR static void park(dac_sequencer *s)
 DAC_CODE_ATTR static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
 {
     switch (what) {
+#if DAC_COMMIT_MODES
+    case COMMIT_KEEP:
+    case COMMIT_FRAME:
+#endif
     case COMMIT:
+#if DAC_COMMIT_MODES
+        s->commit = what;
+#endif
         s->waiting = argument == s->swaps;
         DAC_RELEASE();
         s->commits_answered = (uint8_t)(s->commits_answered + 1u);
@@ -221,16 +244,70 @@ DAC_CODE_ATTR void dac_sequencer_answer(dac_sequencer *s)
     s->tail = tail;
 }
 
+#if DAC_COMMIT_MODES
+/* Returns whether the committed program has to wait for a frame of the active scan to end. */
+DAC_CODE_ATTR static bool in_frame(const dac_sequencer *s)
+{
+    return s->commit == COMMIT_FRAME && s->running && s->line != 0;
+}
+
+/* Returns whether the committed program continues the frame of the active one. */
+DAC_CODE_ATTR static bool keeps_frame(const dac_sequencer *s)
+{
+    const dac_bank *const now = s->now;
+
+    if (s->commit != COMMIT_KEEP || !s->running || now == NULL)
+        return false;
+    const dac_bank *const next = &s->bank[s->playing == 0 ? 1 : 0];
+    return now->schedule.line_ticks == next->schedule.line_ticks
+        && now->schedule.frame_lines == next->schedule.frame_lines && now->y.holds == next->y.holds;
+}
+
+/* Continues the frame with the next line of the active program. The position of y is the number of its advances times
+ * their step, which depends on the length of the table too. The product takes additions alone, at most 62. */
+DAC_CODE_ATTR static void keep_frame(dac_sequencer *s, const dac_position *step_before)
+{
+    const dac_bank *const bank = s->now;
+    dac_position way = bank->y.step;
+
+    forget(&s->x);
+    forget(&s->y);
+    s->settle_left = bank->schedule.settle_lines;
+    s->catching_up = true;
+    if (way.high == step_before->high && way.low == step_before->low)
+        return;
+    to_start(&s->y);
+    for (uint32_t left = bank->y.holds ? s->line : s->line * bank->schedule.line_ticks; left != 0; left >>= 1) {
+        const dac_position half = way;
+        if ((left & 1u) != 0)
+            dac_advance(&s->y.at, &way);
+        dac_advance(&way, &half);
+    }
+}
+#endif
+
 /* Activates the committed program, if this tick allows it. */
 DAC_CODE_ATTR static bool swap(dac_sequencer *s)
 {
     if (!s->waiting || (s->running && s->tick != 0))
         return false;
+#if DAC_COMMIT_MODES
+    if (in_frame(s))
+        return false;
+    const bool keeps = keeps_frame(s);
+    const dac_position y_step = keeps ? s->now->y.step : s->y.at;
+#endif
     s->playing = s->playing == 0 ? 1 : 0;
     s->now = &s->bank[s->playing];
     s->swaps = s->swaps + 1;
     DAC_RELEASE(); /* from here on the other bank may be written */
     s->waiting = 0;
+#if DAC_COMMIT_MODES
+    if (keeps) {
+        keep_frame(s, &y_step);
+        return true;
+    }
+#endif
     if (s->running)
         begin(s);
     return true;
@@ -422,7 +499,11 @@ DAC_CODE_ATTR void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_outpu
         done = 0;
         if (wait != 0) {
             wait--;
+#if DAC_COMMIT_MODES
+        } else if (s->running && (s->tick != 0 || !s->waiting || in_frame(s))) {
+#else
         } else if (s->running && (s->tick != 0 || !s->waiting)) {
+#endif
             const uint32_t left = s->now->schedule.line_ticks - s->tick;
             const uint32_t possible = ticks < left ? (uint32_t)ticks : left;
             const uint32_t asked = possible < most ? possible : most;

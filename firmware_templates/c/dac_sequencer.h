@@ -285,6 +285,9 @@ typedef struct {
     volatile uint8_t markers, faults;
     /* the consumer's own */
     uint8_t running, endless, armed, catching_up;
+#if DAC_COMMIT_MODES
+    uint8_t commit; /* the request of the last commit, which has its mode */
+#endif
     /* the producer's own */
     uint8_t loaded, commits;
     uint32_t loaded_after; /* value of swaps when the bank was loaded */
@@ -321,6 +324,20 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 
 /* Commits the program in the idle bank: it is taken at the next line start, or on the next tick while no scan runs. */
 bool dac_sequencer_commit(dac_sequencer *s);
+
+#if DAC_COMMIT_MODES
+/* Where in a running scan a committed program is taken, and on which of its lines it starts. */
+typedef enum {
+    DAC_COMMIT_LINE = 0, /* at the next line start, from line 0 of a frame, as dac_sequencer_commit() */
+    DAC_COMMIT_KEEP,     /* at the next line start, and the frame goes on, if both programs have the same line_ticks,
+                          * frame_lines and hold_ticks of y; else as DAC_COMMIT_LINE */
+    DAC_COMMIT_FRAME     /* at the next frame start */
+} dac_commit_mode;
+
+/* Commits the program in the idle bank with a mode; while no scan runs it is taken on the next tick. A later commit of
+ * the same program, before it is taken, replaces the mode. Returns false for another mode too. */
+bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode);
+#endif
 
 /* Withdraws a committed program, if it was not taken yet. Once dac_sequencer_writable() returns true, status.swaps
  * tells whether the program was taken before: it has then grown. A scan that was triggered for the first program does

@@ -17,6 +17,7 @@ OTHER_VALUES = {
     "DAC_STRIDE": 1,
     "DAC_SHAPING": 3,
     "DAC_SPLINE": 1,
+    "DAC_COMMIT_MODES": 1,
     "DAC_REQUESTS": 128,
     "DAC_LONG_MULTIPLY": 0,
     "DAC_LINK_RING": 512,
@@ -24,9 +25,9 @@ OTHER_VALUES = {
 # Functions that only the producer calls.
 PRODUCER = {
     "power_up", "request", "settled", "dac_axis_serves", "dac_sequencer_init", "dac_sequencer_writable",
-    "dac_sequencer_idle", "dac_sequencer_commit", "dac_sequencer_withdraw", "dac_sequencer_arm",
-    "dac_sequencer_trigger", "dac_sequencer_park", "dac_sequencer_reset", "dac_sequencer_clear_faults",
-    "dac_sequencer_status",
+    "dac_sequencer_idle", "dac_sequencer_commit", "dac_sequencer_commit_at", "dac_sequencer_withdraw",
+    "dac_sequencer_arm", "dac_sequencer_trigger", "dac_sequencer_park", "dac_sequencer_reset",
+    "dac_sequencer_clear_faults", "dac_sequencer_status",
 }  # fmt: skip
 MAIN = '#include "dac_sequencer.h"\nint main(void)\n{\n    return 0;\n}\n'
 CC = ["cc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{FOLDER}"]

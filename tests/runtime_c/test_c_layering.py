@@ -21,6 +21,7 @@ CHOICES = {
     "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"],
     "spline": ["-DDAC_SPLINE=1"],
     "shaped": ["-DDAC_SHAPING=3"],
+    "commit_modes": ["-DDAC_COMMIT_MODES=1"],
     "store": ["-DDAC_STORE=1"],
 }
 

@@ -14,6 +14,7 @@ OPTIONS = (
     (),
     ("-DDAC_TABLE_STORAGE_BITS=32",),
     ("-DDAC_SPLINE=1", "-DDAC_STORE=1"),
+    ("-DDAC_COMMIT_MODES=1",),
     ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SMALL=1"),
 )
 

@@ -1,6 +1,7 @@
 """The C runtime as text and as symbols: warnings, static analysers, C++, what it exports and what it asks for."""
 
 import re
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ CHOICES = {
     "spline_wide": ["-DDAC_SPLINE=1", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
     "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
+    "commit_modes": ["-DDAC_COMMIT_MODES=1"],
     "first_order": ["-DDAC_SHAPING=1"],
     "shaped": ["-DDAC_SHAPING=3"],
     "shaped_wide": ["-DDAC_SHAPING=3", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
@@ -45,7 +47,14 @@ COMPILERS = {
 }
 QUICK = ("default", "small")
 # Each alternative of each #if is in one of these; the others are combinations of them.
-WHOLE = (*QUICK, "wide", "no_long_multiplication", "spline_shaped", "spline_shaped_no_long_multiplication")
+WHOLE = (
+    *QUICK,
+    "wide",
+    "no_long_multiplication",
+    "spline_shaped",
+    "spline_shaped_no_long_multiplication",
+    "commit_modes",
+)
 ANALYSED = (*WHOLE, "first_order", "shaped_wide")
 # An analyser reports what it finds in a file that is wrong in this way.
 FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
@@ -117,18 +126,21 @@ def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     assert run([*ANALYSERS[analyser], source]).returncode != 0
 
 
-def declared(*headers: str, shaped: bool = True) -> set[str]:
-    """Functions that headers declare, but for those that they define themselves; of a runtime that shapes or not."""
+def declared(*headers: str, options: Sequence[str] = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1")) -> set[str]:
+    """Functions that headers declare with these options, but for those that they define themselves."""
     text = "".join(HEADERS[name].read_text("utf-8") for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    if not shaped:
-        text = re.sub(r"^#if DAC_SHAPING\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
+    for option, given in (("DAC_SHAPING", "-DDAC_SHAPING=3"), ("DAC_COMMIT_MODES", "-DDAC_COMMIT_MODES=1")):
+        if given not in options:
+            text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
     return set(re.findall(r"^(?!static|#)\w[\w ]*?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize(
-    "options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]], ["-O2", *CHOICES["shaped"]]], ids=" ".join
+    "options",
+    [["-O0"], ["-O2"], ["-Os"], *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes"))],
+    ids=" ".join,
 )
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
@@ -139,7 +151,7 @@ def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    own = declared(*HEADERS, shaped="-DDAC_SHAPING=3" in options)
+    own = declared(*HEADERS, options=options)
     assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
     assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     # Of absolute value, for the linker to compare: they are in no memory.
