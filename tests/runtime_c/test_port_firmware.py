@@ -17,12 +17,13 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run, run_clean, run_warned, tool, write_variant
+from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, run_warned, tool, write_variant
 from converter_words import commit, follow_words, park, start
 from following import Differs
 from limits import PATIENCE_S
 from link_line import FarEnd, Line
 from pipe_board import PipeBoard
+from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
 
 from tablegen.config.load import load
@@ -155,13 +156,6 @@ def test_stm32(tmp_path: Path) -> None:
 # Arduino: the recipe of the README, with Arduino's builder, core and libraries.
 
 ARDUINO = FIRMWARE / "arduino"
-_SHARE = Path("/usr/share/arduino")
-_BUILDER = (
-    "arduino-builder", "-compile", "-hardware", "/usr/share/arduino-builder", "-hardware", _SHARE / "hardware",
-    "-tools", _SHARE / "hardware", "-warnings", "all",
-    # Debian's core 1.8.7 takes DECIMAL_DIG from a header in which Debian's avr-gcc 5.4 has it for C alone.
-    "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=__DECIMAL_DIG__",
-)  # fmt: skip
 
 
 def _recipe() -> list[str]:
@@ -188,10 +182,9 @@ def _compiled(sketch: Path, board: str, folder: Path) -> Path:
     """The sketch as the IDE compiles it; no warning is of ours."""
     out = folder / board.split(":")[0]
     out.mkdir()
-    done = run([*_BUILDER, "-fqbn", f"arduino:avr:{board}", "-build-path", out, sketch / "scan_player.ino"])
+    done = run_builder(sketch / "scan_player.ino", board, out)
     assert done.returncode == 0, done.stderr
-    warnings = [line for line in done.stderr.splitlines() if "warning:" in line]
-    assert [line for line in warnings if not line.startswith(f"{_SHARE}/hardware")] == []
+    assert own_warnings(done) == []
     return out / "scan_player.ino.elf"
 
 

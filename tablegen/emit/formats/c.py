@@ -86,6 +86,11 @@ def arrays_file(content: Content) -> str:
     return f"{content.name}.h" if content.header_only else f"{content.name}.c"
 
 
+def public_headers(content: Content) -> list[str]:
+    """List the headers that an application includes: constants, and the objects of the program unless header-only."""
+    return [f"{content.name}.h", "dac_sequencer.h" if content.header_only else f"{content.name}_program.h"]
+
+
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """Return the number of constants of the C header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.h", _constants(content)
