@@ -157,6 +157,16 @@ DAC_CODE_ATTR static void forget(dac_axis *axis)
 #endif
 }
 
+/* Begins a program away from where the outputs are, and unsettled. */
+DAC_CODE_ATTR static void unsettle(dac_sequencer *s)
+{
+    forget(&s->x);
+    forget(&s->y);
+    if (s->now != NULL)
+        s->settle_left = s->now->schedule.settle_lines;
+    s->catching_up = true;
+}
+
 /* Starts at line 0 of the active program. Without one, swap() does so again with the program that waits. */
 DAC_CODE_ATTR static void begin(dac_sequencer *s)
 {
@@ -164,11 +174,7 @@ DAC_CODE_ATTR static void begin(dac_sequencer *s)
     s->line = 0;
     to_start(&s->x);
     to_start(&s->y);
-    forget(&s->x);
-    forget(&s->y);
-    if (s->now != NULL)
-        s->settle_left = s->now->schedule.settle_lines;
-    s->catching_up = true;
+    unsettle(s);
 }
 
 DAC_CODE_ATTR static void trigger(dac_sequencer *s)
@@ -270,10 +276,7 @@ DAC_CODE_ATTR static void keep_frame(dac_sequencer *s, const dac_position *step_
     const dac_bank *const bank = s->now;
     dac_position way = bank->y.step;
 
-    forget(&s->x);
-    forget(&s->y);
-    s->settle_left = bank->schedule.settle_lines;
-    s->catching_up = true;
+    unsettle(s);
     if (way.high == step_before->high && way.low == step_before->low)
         return;
     to_start(&s->y);
