@@ -79,8 +79,8 @@ def flipped(content: bytes, at: float) -> bytes:
     """A file with one digit, or in a binary file one bit, changed near a part of its length."""
     changed, place = bytearray(content), int(at * len(content))
     if content.isascii():
-        while not chr(changed[place]).isdigit():
-            place += 1
+        digits = [i for i, code in enumerate(content) if chr(code).isdigit()]
+        place = next((i for i in digits if i >= place), digits[-1])
     changed[place] ^= 1
     return bytes(changed)
 

@@ -1,43 +1,17 @@
 """The PlatformIO library: its manifest by PlatformIO's own check, packed by it, and played from the package."""
 
 import json
-import os
 import subprocess
 import sys
-import tarfile
 from pathlib import Path
 
 import pytest
 from building import NAME, run_clean
 from formatted import Formatted, check_finds_a_flip, formatted
-from limits import PATIENCE_S
-from short_scans import model_ticks, short
+from packed_library import MAIN, plays_the_model, run_offline, unpacked
+from short_scans import short
 
 from tablegen.version import __version__
-
-TICKS = 40
-MAIN = f"""
-#include <stdio.h>
-#include <{NAME}.h>
-#include <{NAME}_program.h>
-
-int main(void)
-{{
-    static dac_sequencer sequencer;
-    dac_tick now;
-    if (!dac_sequencer_init(&sequencer, &{NAME}_x_converter, &{NAME}_y_converter)
-        || dac_sequencer_load(&sequencer, &{NAME}_program) != DAC_LOADED || !dac_sequencer_commit(&sequencer))
-        return 1;
-    dac_sequencer_step(&sequencer, &now);
-    dac_sequencer_arm(&sequencer, 0);
-    dac_sequencer_trigger(&sequencer);
-    for (int i = 0; i < {TICKS}; i++) {{
-        dac_sequencer_step(&sequencer, &now);
-        printf("%ld %ld\\n", (long)now.x, (long)now.y);
-    }}
-    return 0;
-}}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -70,14 +44,10 @@ def test_a_changed_build_is_found(tmp_path: Path) -> None:
 
 
 def pack(folder: Path, own: Path) -> subprocess.CompletedProcess[str]:
-    """Pack a library, with nothing of the user and without asking anybody."""
-    nobody = {"https_proxy": "http://127.0.0.1:9", "http_proxy": "http://127.0.0.1:9"}
-    settings = {"PLATFORMIO_CORE_DIR": str(own), "PLATFORMIO_SETTING_ENABLE_TELEMETRY": "no", **nobody}
-    command = [sys.executable, "-m", "platformio", "pkg", "pack", str(folder), "--output", str(own / "packed.tar.gz")]
+    """Pack a library, with nothing of the user."""
     own.mkdir()
-    return subprocess.run(
-        command, env={**os.environ, **settings}, capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
+    command = [sys.executable, "-m", "platformio", "pkg", "pack", folder, "--output", own / "packed.tar.gz"]
+    return run_offline(command, own, PLATFORMIO_CORE_DIR=str(own), PLATFORMIO_SETTING_ENABLE_TELEMETRY="no")
 
 
 @pytest.mark.rest
@@ -86,13 +56,7 @@ def test_what_platformio_packs_plays_the_model(tmp_path: Path) -> None:
     done = pack(built.folder, tmp_path / "own")
     assert done.returncode == 0, done.stdout + done.stderr
     packed = tmp_path / "packed"
-    packed.mkdir()
-    with tarfile.open(tmp_path / "own" / "packed.tar.gz") as archive:
-        names = set(archive.getnames())
-        for name in names:
-            content = archive.extractfile(name)
-            assert content is not None
-            (packed / name).write_bytes(content.read())
+    names = unpacked(tmp_path / "own" / "packed.tar.gz", packed)
     named = json.loads(built.files["library.json"])["export"]["include"]
     assert {name for name in names if name.endswith((".c", ".h"))} == set(named)
     assert any(name.endswith(".v") for name in built.files)
@@ -100,12 +64,7 @@ def test_what_platformio_packs_plays_the_model(tmp_path: Path) -> None:
     (packed / "main.c").write_text(MAIN, "ascii")
     sources = [packed / name for name in sorted(named) if name.endswith(".c")]
     run_clean(["gcc", "-std=c99", "-O1", f"-I{packed}", packed / "main.c", *sources, "-o", packed / "play"])
-    program = built.plan.program
-    expected = [
-        f"{program.x.output.word(tick.x)} {program.y.output.word(tick.y)}" for tick in model_ticks(program, TICKS)[1:]
-    ]
-    played = subprocess.run([packed / "play"], capture_output=True, text=True, timeout=PATIENCE_S, check=True)
-    assert played.stdout.splitlines() == expected
+    assert plays_the_model(packed / "play", built.plan.program)
 
 
 @pytest.mark.rest
