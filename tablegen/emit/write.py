@@ -15,6 +15,7 @@ from tablegen.config.names import of_the_runtime
 from tablegen.manifest.format import MANIFEST
 
 _STAGED = ".tablegen-"
+_OF_PACKAGES = {"CMakeLists.txt", "idf_component.yml", "library.json", "library.properties"}  # as their tools want them
 _MOST_THREADS = 64
 _LITTER = re.compile(rf"{re.escape(_STAGED)}[a-z0-9_]{{8}}")  # as ``mkstemp`` names files
 
@@ -158,8 +159,9 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def names_of_build(build: str, names: Iterable[str]) -> list[str]:
-    """Return those names that a build of this name can have: its own begin with it, others are the runtime's."""
-    return [name for name in names if name.startswith((f"{build}.", f"{build}_")) or of_the_runtime(name)]
+    """Return those names that a build of this name can have: its own, the runtime's, and those of packages."""
+    own = (f"{build}.", f"{build}_")
+    return [name for name in names if name.startswith(own) or of_the_runtime(name) or name in _OF_PACKAGES]
 
 
 def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:

@@ -69,6 +69,22 @@ def test_a_module_of_an_older_runtime_is_removed(built: Path) -> None:
     assert not (built / "dac_old.v").exists()
 
 
+def test_files_of_packages_are_removed_unless_somebody_edited_them(built: Path) -> None:
+    names = {"arduino": "library.properties", "platformio": "library.json", "esp-idf": "idf_component.yml"}
+    formats = [word for each in names for word in ("-f", each)]
+    scan = built.parent / "scan.toml"
+    assert run("build", scan, "-o", built, *formats).status == 0
+    assert all((built / name).exists() for name in names.values())
+    (built / "CMakeLists.txt").write_text("# mine\n", "ascii")
+    outcome = run("build", scan, "-o", built, "-f", "c")
+    assert outcome.status == 0
+    assert not any((built / name).exists() for name in names.values())
+    assert outcome.messages == [
+        f"note: {built}/CMakeLists.txt: left over from an earlier build, and edited since; remove it"
+    ]
+    assert (built / "CMakeLists.txt").read_text("ascii") == "# mine\n"
+
+
 def test_a_module_that_no_manifest_lists_is_reported(built: Path) -> None:
     (built / "dac_old.v").write_bytes(b"module dac_old; endmodule\n")
     told = f"{built / 'dac_old.v'}: is not a file of this build but matches dac_*.v; remove it"
