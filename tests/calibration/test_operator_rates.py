@@ -174,8 +174,16 @@ def test_plays_that_grow_with_the_rate_are_found_from_one_fast_trace(monkeypatch
     assert size < 0.1
     assert operator.family.plays.growth == pytest.approx(np.log10(1.1), abs=0.005)
     del plant.dynamics  # type: ignore[misc]
-    monkeypatch.setattr(plays_fit, "_GROWTH_STEP", 0.0)
+    monkeypatch.setattr(plays_fit, "_WORTH_GROWTH", 0.0)
     assert left_of(plant, fitted(plant, ONE_FAST))[0] > 0.1
+
+
+@pytest.mark.rest
+def test_plays_that_do_not_grow_have_no_growth() -> None:
+    """It would take a part of the creep: the drift after a step would be 4 % wrong by 0.5 % of growth."""
+    operator = fitted(ForeignPlant(ManyPlays()), ONE_FAST)
+    assert operator.family.plays.growth == 0.0
+    assert operator.creep.loss_per_decade == pytest.approx(0.026, abs=0.001)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tablegen.calibration.operator.family import DEGREE, STRIDE, CreepOf, FamilyProblem
+from tablegen.calibration.operator.family import DEGREE, STRIDE, CreepOf, FamilyFit, FamilyProblem
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import SEVERAL_RATES
 from tablegen.compensation.operator.family import Family
@@ -23,7 +23,8 @@ _TREND, _SCATTER = 1.25, 0.35
 _LEAST_NOISE, _MOST_NOISE, _UNKNOWN_NOISE = 8e-5, 1.2e-2, 4e-4  # unknown where no line has two periods
 _RIDGE = 1e-5
 _MOST_GROWTH = 0.3  # of thresholds, per decade of the rate: a factor of 2
-_GROWTH_STEP = 0.01
+_BENDS_ALONE, _WITH_GROWTH = (0.02, 0.02, 0.02, 0.02, 0.0), (0.02, 0.02, 0.02, 0.02, 0.01)
+_WORTH_GROWTH = 0.5  # of the cost without it
 _MOST_BEND = 0.6  # an envelope still rises everywhere
 
 
@@ -41,11 +42,32 @@ class PlaysProblem(FamilyProblem):
         super().__init__(lines, main, creep)
         reference_hz = creep(0.0).reference_hz
         self._decades = [float(np.log10(line.rate_hz / reference_hz)) for line in lines]
-        several = max(self._decades) - min(self._decades) >= np.log10(SEVERAL_RATES)
-        self.shape_steps = (0.02,) * 4 + (_GROWTH_STEP if several else 0.0,)
+        self._several = max(self._decades) - min(self._decades) >= np.log10(SEVERAL_RATES)
+        self.shape_steps = _BENDS_ALONE
         self._thresholds = _HIGHEST * (np.arange(1, THRESHOLDS + 1) / THRESHOLDS) ** _SPACING
         self._spread = _spread(self._thresholds)
         self.penalty = _penalty(_noise(lines))
+
+    def fit(self, near: FamilyFit | None, rounds: int) -> FamilyFit:
+        """Fit without growth, and with it where lines of several rates ask for it: alone it would be mixed with creep.
+
+        Parameters
+        ----------
+        near
+            A fit of these lines and others, which has growth or none; the starts by default.
+        rounds
+            Largest number of steps.
+        """
+        if near is not None:
+            self.shape_steps = _WITH_GROWTH if self._several and near.numbers[BENDS] else _BENDS_ALONE
+            return super().fit(near, rounds)
+        without = super().fit(None, rounds)
+        if not self._several:
+            return without
+        self.shape_steps = _WITH_GROWTH
+        growing = super().fit(without, rounds)
+        costs = [self.best_weights(np.append(one.numbers, one.gains)).cost for one in (without, growing)]
+        return growing if costs[1] < _WORTH_GROWTH * costs[0] else without
 
     def unit_displacements(self, shape: Floats) -> list[Floats]:
         """Return the displacement for plays of a density of 1 at one node.
