@@ -91,6 +91,11 @@ def public_headers(content: Content) -> list[str]:
     return [f"{content.name}.h", "dac_sequencer.h" if content.header_only else f"{content.name}_program.h"]
 
 
+def packaged_files(content: Content) -> list[str]:
+    """List all C files of a build with their headers, the runtime's too, for a package that names them."""
+    return sorted([*FORMAT.files(content), *(path.name for path in FORMAT.runtime())])
+
+
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """Return the number of constants of the C header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.h", _constants(content)

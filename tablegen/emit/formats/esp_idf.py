@@ -2,7 +2,7 @@
 
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats.c import FORMAT as C
+from tablegen.emit.formats.c import packaged_files
 
 
 class EspIdf(Format):
@@ -17,7 +17,7 @@ class EspIdf(Format):
     def files(self, content: Content) -> dict[str, bytes]:
         """Render both files; they name the C files, so that those of other formats are neither built nor packed."""
         head = f"# {content.name}, tablegen {content.version}, build {content.hash}"
-        written = sorted([*C.files(content), *(path.name for path in C.runtime())])
+        written = packaged_files(content)
         component = [
             head,
             "idf_component_register(",

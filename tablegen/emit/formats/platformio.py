@@ -4,8 +4,7 @@ import json
 
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats.c import FORMAT as C
-from tablegen.emit.formats.c import public_headers
+from tablegen.emit.formats.c import packaged_files, public_headers
 
 
 class PlatformIO(Format):
@@ -18,7 +17,7 @@ class PlatformIO(Format):
 
     def files(self, content: Content) -> dict[str, bytes]:
         """Render the manifest; it names the C files, so that those of other formats are neither built nor packed."""
-        written = sorted([*C.files(content), *(path.name for path in C.runtime())])
+        written = packaged_files(content)
         manifest = {
             "name": content.name,
             "version": content.version,
