@@ -119,6 +119,7 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
     case DAC_LINK_READ:
         return 5;
     case DAC_LINK_COMMIT:
+        return dac_link_commit_bytes(length);
     case DAC_LINK_ARM:
         return 4;
     case DAC_LINK_LIMITS:
@@ -142,6 +143,10 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
         good = payload[4] >= 1 && payload[4] <= MOST_READ;
     else if (good && request == DAC_LINK_ARM)
         good = dac_link_get(payload) <= MOST_FRAMES;
+#if DAC_COMMIT_MODES
+    else if (good && request == DAC_LINK_COMMIT && plain == 5)
+        good = payload[4] <= DAC_COMMIT_FRAME;
+#endif
     return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
 }
 

@@ -147,6 +147,10 @@ typedef struct {
     /* a COMMIT in progress, and ABORTs that wait with it */
     bool committing, commit_is_last, commit_due, abort_is_last, aborts_due;
     uint8_t commit_seq, commit_type, commit_length, commit_payload[8];
+#if DAC_COMMIT_MODES
+    uint8_t commit_mode;
+    bool commit_has_mode;
+#endif
     uint8_t aborts, aborts_said, abort_seq[DAC_LINK_ABORTS];
     uint32_t commit_session, abort_session[DAC_LINK_ABORTS], abort_generation;
     uint32_t swaps, line; /* before the committed program */

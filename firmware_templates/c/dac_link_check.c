@@ -442,7 +442,7 @@ static dac_link_finding check_crc(dac_link *l, bool *done)
 
 static bool good_tag(dac_link *l)
 {
-    uint8_t request[10], digest[32];
+    uint8_t request[11], digest[32], bytes = 10;
 
     if (l->config->key_bytes == 0)
         return true;
@@ -450,9 +450,14 @@ static bool good_tag(dac_link *l)
     request[1] = l->commit_seq;
     dac_link_put(request + 2, l->commit_session);
     dac_link_put(request + 6, dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC));
+#if DAC_COMMIT_MODES
+    request[10] = l->commit_mode;
+    if (l->commit_has_mode)
+        bytes = 11;
+#endif
     dac_link_mac_end(&l->digest, digest);
     return l->commit_challenged && l->commit_tagged
-        && dac_link_tagged(l, l->commit_nonce, request, sizeof request, digest, l->commit_tag);
+        && dac_link_tagged(l, l->commit_nonce, request, bytes, digest, l->commit_tag);
 }
 
 /* One slice of the check of a stage. */

@@ -40,7 +40,8 @@ enum {
     DAC_LINK_READBACK,
     DAC_LINK_TICKS,
     DAC_LINK_REFUSED,
-    DAC_LINK_SHAPING
+    DAC_LINK_SHAPING,
+    DAC_LINK_KEEP
 };
 
 typedef struct {
@@ -180,6 +181,12 @@ dac_link_finding dac_link_check_work(dac_link *l, bool *passed);
 /* Requests, by what they do: a finding, or an answer's payload in *a. */
 dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *a);
 dac_link_finding dac_link_status(const dac_link *l, dac_link_answer *a);
+/* Bytes of the payload of a COMMIT without its tag: the CRC, and the mode behind it, which may be absent. */
+static inline uint8_t dac_link_commit_bytes(uint8_t length)
+{
+    return DAC_COMMIT_MODES && (length == 5 || length == 5 + DAC_LINK_TAG) ? 5 : 4;
+}
+
 dac_link_finding dac_link_begin(dac_link *l, const uint8_t *info, dac_link_answer *a);
 dac_link_finding dac_link_data(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
 dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);

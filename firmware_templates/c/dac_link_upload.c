@@ -97,9 +97,14 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
     l->commit_challenged = l->challenged;
     l->challenged = false;
     dac_link_copy(l->commit_nonce, l->nonce, sizeof l->nonce);
-    l->commit_tagged = length == 4 + DAC_LINK_TAG;
+    const uint8_t plain = dac_link_commit_bytes(length);
+#if DAC_COMMIT_MODES
+    l->commit_has_mode = plain == 5;
+    l->commit_mode = plain == 5 ? payload[4] : (uint8_t)DAC_COMMIT_LINE;
+#endif
+    l->commit_tagged = length == plain + DAC_LINK_TAG;
     if (l->commit_tagged)
-        dac_link_copy(l->commit_tag, payload + 4, DAC_LINK_TAG);
+        dac_link_copy(l->commit_tag, payload + plain, DAC_LINK_TAG);
     start_check(&l->check);
     a->type = DAC_LINK_SILENT;
     return dac_link_fine();
@@ -121,7 +126,8 @@ static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *p
 
 static void conclude_refused(dac_link *l, dac_link_finding why)
 {
-    const bool stays = why.reason == DAC_LINK_INTERLOCK || why.reason == DAC_LINK_KEY || why.reason == DAC_LINK_TICKS;
+    const bool stays = why.reason == DAC_LINK_INTERLOCK || why.reason == DAC_LINK_KEY || why.reason == DAC_LINK_TICKS
+                       || why.reason == DAC_LINK_KEEP;
     uint8_t payload[6];
     dac_link_answer a = {0, 0, 0, 0, payload};
 
@@ -131,6 +137,20 @@ static void conclude_refused(dac_link *l, dac_link_finding why)
     }
     dac_link_refuse(&a, DAC_LINK_COMMIT, why);
     conclude(l, stays ? DAC_LINK_RECEIVING : DAC_LINK_NONE, a.type, payload, a.length);
+}
+
+/* Commits the loaded program with the mode that was asked for. A frame that cannot go on is not restarted. */
+static dac_link_finding commit_loaded(const dac_link *l)
+{
+#if DAC_COMMIT_MODES
+    if (l->commit_mode == DAC_COMMIT_KEEP && (dac_sequencer_status(l->sequencer).markers & DAC_PLAYING) != 0
+        && !dac_sequencer_can_keep(l->sequencer))
+        return dac_link_because(DAC_LINK_KEEP, 0);
+    const bool passed = dac_sequencer_commit_at(l->sequencer, (dac_commit_mode)l->commit_mode);
+#else
+    const bool passed = dac_sequencer_commit(l->sequencer);
+#endif
+    return passed ? dac_link_fine() : dac_link_because(DAC_LINK_TICKS, 0);
 }
 
 /* A slice of the checks; behind the last the program is loaded and committed. */
@@ -150,9 +170,9 @@ void dac_link_check_on(dac_link *l)
             found = dac_link_because(DAC_LINK_INTERLOCK, 0);
         else if (loaded != DAC_LOADED)
             found = dac_link_because(DAC_LINK_REFUSED, (uint32_t)loaded);
-        else if (!dac_sequencer_commit(l->sequencer))
-            found = dac_link_because(DAC_LINK_TICKS, 0);
         else
+            found = commit_loaded(l);
+        if (found.reason == DAC_LINK_NO_REASON)
             l->upload = DAC_LINK_WAITING;
     }
     if (found.reason != DAC_LINK_NO_REASON)

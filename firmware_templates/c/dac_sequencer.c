@@ -95,6 +95,18 @@ bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode)
     s->commits = (uint8_t)(s->commits + 1u);
     return true;
 }
+
+/* Returns whether y has the same place in both programs at the start of each line. */
+DAC_CODE_ATTR static bool same_frame(const dac_bank *now, const dac_bank *next)
+{
+    return now->schedule.line_ticks == next->schedule.line_ticks
+        && now->schedule.frame_lines == next->schedule.frame_lines && now->y.holds == next->y.holds;
+}
+
+bool dac_sequencer_can_keep(const dac_sequencer *s)
+{
+    return s->playing > 1 || same_frame(&s->bank[s->playing], &s->bank[dac_sequencer_idle(s)]);
+}
 #endif
 
 bool dac_sequencer_withdraw(dac_sequencer *s) { return request(s, WITHDRAW, 0); }
@@ -260,13 +272,8 @@ DAC_CODE_ATTR static bool in_frame(const dac_sequencer *s)
 /* Returns whether the committed program continues the frame of the active one. */
 DAC_CODE_ATTR static bool keeps_frame(const dac_sequencer *s)
 {
-    const dac_bank *const now = s->now;
-
-    if (s->commit != COMMIT_KEEP || !s->running || now == NULL)
-        return false;
-    const dac_bank *const next = &s->bank[s->playing == 0 ? 1 : 0];
-    return now->schedule.line_ticks == next->schedule.line_ticks
-        && now->schedule.frame_lines == next->schedule.frame_lines && now->y.holds == next->y.holds;
+    return s->commit == COMMIT_KEEP && s->running && s->now != NULL
+        && same_frame(s->now, &s->bank[s->playing == 0 ? 1 : 0]);
 }
 
 /* Continues the frame with the next line of the active program. The position of y is the number of its advances times

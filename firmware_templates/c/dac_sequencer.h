@@ -337,6 +337,9 @@ typedef enum {
 /* Commits the program in the idle bank with a mode; while no scan runs it is taken on the next tick. A later commit of
  * the same program, before it is taken, replaces the mode. Returns false for another mode too. */
 bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode);
+
+/* Returns whether the loaded program could continue the frame of the active one, or no program is active. */
+bool dac_sequencer_can_keep(const dac_sequencer *s);
 #endif
 
 /* Withdraws a committed program, if it was not taken yet. Once dac_sequencer_writable() returns true, status.swaps

@@ -5,10 +5,11 @@ What happens on which tick is stated in ``docs/sequencer.md``; the arithmetic st
 """
 
 from dataclasses import dataclass, field
-from enum import Enum, IntEnum, IntFlag
+from enum import Enum, IntFlag
 
 import numpy as np
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.played_lines import LineTicks, PlayedLines
 from tablegen.device.schedule import Schedule
@@ -32,14 +33,6 @@ class Fault(IntFlag):
     NONE = 0
     SLEW = 1  # the slew guard limited a step after the output had reached the waveform
     CLAMP = 2  # a code was clamped to [code_min, code_max]
-
-
-class CommitMode(IntEnum):
-    """Where in a running scan a committed program is swapped in, and on which line it starts."""
-
-    LINE = 0  # at the next line start, from line 0 of a frame
-    KEEP = 1  # at the next line start, and the frame goes on
-    FRAME = 2  # at the next frame start
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +149,7 @@ class Sequencer:
         """Play one tick and return the outputs."""
         swapped = False
         if self.idle is not None and (not self.running or self._at_swap()):
-            continues = self.mode == CommitMode.KEEP and self.playing is not None and can_keep(self.playing, self.idle)
+            continues = self.keeps_frame()
             self.playing, self.idle = self.idle, None
             swapped = True
             if self.running:
@@ -228,6 +221,13 @@ class Sequencer:
             self._ticks, self._at = self._lines.ticks(self.line, unclamped), 0
             self._clamped = (self._ticks.x != unclamped[0]) | (self._ticks.y != unclamped[1])
         return self._ticks
+
+    def keeps_frame(self) -> bool:
+        """Return True if the committed program continues the frame of the active one."""
+        next_program, playing = self.idle, self.playing
+        if self.mode != CommitMode.KEEP or next_program is None or playing is None:
+            return False
+        return can_keep(playing, next_program)
 
     def _at_swap(self) -> bool:
         """Return True if the next tick of a running scan is one on which the mode of the commit swaps."""

@@ -2,6 +2,7 @@
 
 import math
 import random as random_module
+import struct
 import time
 from collections.abc import Callable
 from functools import partial
@@ -9,6 +10,7 @@ from random import Random
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.link.claims import check_length, check_limits, has_restarted, most_bytes
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
 from tablegen.link.messages import (
@@ -161,6 +163,7 @@ class Device:
         force: bool = False,
         timeout_s: float | None = None,
         limits: Limits | None = None,
+        swap: CommitMode = CommitMode.LINE,
     ) -> UploadResult:
         """Put a new scan into the instrument, which goes on with the old one until a line of the new one starts.
 
@@ -176,9 +179,14 @@ class Device:
             Bound of the whole upload in s; by default ``upload_time_s``.
         limits
             Limits of the device, to explain refusals in more detail.
+        swap
+            Where in a running scan the new one is swapped in, and on which line it starts: at the next line start from
+            line 0; there, and the frame goes on; or at the next frame start.
 
         Raises
         ------
+        Unsuitable
+            If the device does not have this mode; nothing was sent.
         Refused, LinkLost, OutOfTime
             If the device refuses, is gone, or takes too long: the old scan plays on, and the device keeps what it has
             received, so that the same upload again goes on from there.
@@ -188,7 +196,7 @@ class Device:
             If its answers contradict each other.
         """
         session = self._session
-        deadline = Deadline(session.now(), lambda: self.upload_time_s(image) if timeout_s is None else timeout_s)
+        deadline = Deadline(session.now(), lambda: self.upload_time_s(image, swap) if timeout_s is None else timeout_s)
         if session.now() - session.status_at > _HELLO_FRESH_S:
             session.greet(deadline.at)
         status = session.status
@@ -198,7 +206,7 @@ class Device:
             return UploadResult(True, status.generation, None, len(image.data), 0, 0, 0, 0.0)
         before = status
         session.status_at = -math.inf  # the status changes, whatever becomes of the upload
-        self._uploader = Uploader(session, image, deadline, progress, limits)
+        self._uploader = Uploader(session, image, deadline, progress, limits, swap)
         result = self._uploader.run()
         hello, playing = session.status, self.status()
         restarted = has_restarted(hello, playing)  # back to the program that it starts with
@@ -215,15 +223,19 @@ class Device:
             )
         return result
 
-    def upload_time_s(self, image: "ProgramImage") -> float:
+    def upload_time_s(self, image: "ProgramImage", swap: CommitMode = CommitMode.LINE) -> float:
         """Return the default time for an upload, in seconds: many times what it takes, and two long lines.
+
+        An upload that waits for a frame start has two frames of the new scan, as the old one's are not known.
 
         Answers that come late, through a long way or a slow line, add to it, each by at most 5 s and all of them by at
         most an hour. A line counts as 10 minutes at most, whatever rate the device announces.
         """
         rate = self.info.update_rate_hz
-        line_s = int.from_bytes(image.data[:4], "little") / rate if rate else 0.0  # line_ticks is the first word
-        return self._transfer_time_s(len(image.data)) + 2.0 * min(line_s, _MAX_LINE_S)
+        line_ticks, lines = struct.unpack_from("<2I", image.data)
+        ticks = line_ticks * lines if swap is CommitMode.FRAME else line_ticks
+        wait_s = ticks / rate if rate else 0.0
+        return self._transfer_time_s(len(image.data)) + 2.0 * min(wait_s, _MAX_LINE_S)
 
     def _transfer_time_s(self, size: int) -> float:
         exchange, info = self._session.exchange, self.info

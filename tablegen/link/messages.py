@@ -66,6 +66,7 @@ class Reason(IntEnum):
     TICKS = 27
     REFUSED = 28
     SHAPING = 29
+    KEEP = 30
 
 
 class Feature(IntFlag):
@@ -77,6 +78,7 @@ class Feature(IntFlag):
     READBACK = 8
     INTERLOCK = 16
     NARROWS = 32
+    COMMIT_MODES = 64
 
 
 class DeviceState(IntEnum):

@@ -6,6 +6,9 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tablegen.device.commit_mode import CommitMode
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import can_keep
 from tablegen.link import messages
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
@@ -35,6 +38,7 @@ _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.ARM: 4,
     Request.LIMITS: 2 * AxisLimits.LAYOUT.size,
 }
+_COMMIT_WITH_MODE = 5  # bytes
 _MAX_FRAMES = 1 << 31
 CHALLENGE_MS = 10_000  # how long a nonce may be used
 IDENTITY_BYTES = range(4, 33)
@@ -250,6 +254,8 @@ class ModelDevice:
             good = size in self._sizes(kind)
         if good and kind == Request.ARM:
             good = int(struct.unpack_from("<I", payload)[0]) <= self._most_frames
+        elif good and kind == Request.COMMIT and _plain_bytes(frame) == _COMMIT_WITH_MODE:
+            good = payload[4] in list(CommitMode)
         if not good:
             raise RequestRefused(Reason.PAYLOAD)
 
@@ -257,6 +263,8 @@ class ModelDevice:
         """Return the sizes that the payload of a request may have."""
         plain = _PAYLOAD_BYTES.get(kind, 0)
         sizes = {plain, plain + TAG_BYTES} if self._key and kind in _TAGGED else {plain}
+        if kind == Request.COMMIT and Feature.COMMIT_MODES in self.info.features:
+            return sizes | {size + 1 for size in sizes}
         if kind == Request.LIMITS:
             return sizes | {0} if Feature.NARROWS in self.info.features else {0}
         return sizes
@@ -268,7 +276,7 @@ class ModelDevice:
     def _check_tag(self, frame: Frame, nonce: bytes | None, image: bytes | None = None) -> None:
         if not self._key:
             return
-        plain = _PAYLOAD_BYTES.get(frame.type, 0)
+        plain = _plain_bytes(frame)
         received_tag = frame.payload[plain:]
         bare = Frame(frame.type, frame.seq, frame.session, frame.payload[:plain])
         if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), received_tag):
@@ -313,11 +321,14 @@ class ModelDevice:
             program = self._bank.accept(incoming, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
-            if not self.player.commit(program):
+            mode = _mode_of(commit.request)
+            if mode is CommitMode.KEEP and not self._can_keep(program):
+                raise RequestRefused(Reason.KEEP)
+            if not self.player.commit(program, mode):
                 raise RequestRefused(Reason.TICKS)
         except RequestRefused as refused:
             self._pending = None
-            if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS):
+            if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP):
                 incoming.state = Upload.RECEIVING
             else:
                 self._bank.incoming = None
@@ -328,6 +339,11 @@ class ModelDevice:
             return
         incoming.state = Upload.WAITING
         commit.swaps = self.player.swaps
+
+    def _can_keep(self, program: DualProgram) -> bool:
+        """Return False if a scan plays whose frame this program cannot continue."""
+        playing = self.player.playing
+        return self.player.state != DeviceState.PLAYING or playing is None or can_keep(playing, program)
 
     def _settle(self) -> None:
         """Answer a COMMIT and its ABORTs once the sequencer has said what became of the program that waited."""
@@ -379,6 +395,18 @@ class ModelDevice:
         self._challenges += 1
         count = bytes([len(self._identity)]) + self._identity + struct.pack("<II", self.boot, self._challenges)
         return hashlib.blake2s(count, key=self._key, digest_size=NONCE_BYTES).digest()
+
+
+def _plain_bytes(frame: Frame) -> int:
+    """Return the bytes of a payload without its tag."""
+    if frame.type == Request.COMMIT and len(frame.payload) in (_COMMIT_WITH_MODE, _COMMIT_WITH_MODE + TAG_BYTES):
+        return _COMMIT_WITH_MODE
+    return _PAYLOAD_BYTES.get(frame.type, 0)
+
+
+def _mode_of(frame: Frame) -> CommitMode:
+    """Return the mode of a COMMIT."""
+    return CommitMode(frame.payload[4]) if _plain_bytes(frame) == _COMMIT_WITH_MODE else CommitMode.LINE
 
 
 def _acts(frame: Frame) -> bool:

@@ -5,8 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.sequencer import Fault, Sequencer, Tick
+from tablegen.device.sequencer import Fault, Sequencer, Tick, can_keep
 from tablegen.link.messages import DeviceState
 
 MAX_REQUESTS = 8  # requests that a sequencer in C queues until its next tick
@@ -47,8 +48,8 @@ class Player(Protocol):
     def writable(self) -> bool:
         """True if no program waits to be swapped in, nor will."""
 
-    def commit(self, program: DualProgram) -> bool:
-        """Commit a program, to be swapped in at the next line start, or on the next tick where no scan plays."""
+    def commit(self, program: DualProgram, mode: CommitMode = CommitMode.LINE) -> bool:
+        """Commit a program, to be swapped in as its mode says, or on the next tick where no scan plays."""
 
     def withdraw(self) -> bool:
         """Withdraw a program that was committed and is not swapped in yet."""
@@ -93,15 +94,15 @@ class _Queue:
     def _power_up(self) -> None:
         raise NotImplementedError
 
-    def _take(self, program: DualProgram) -> None:
+    def _take(self, program: DualProgram, mode: CommitMode) -> None:
         raise NotImplementedError
 
-    def commit(self, program: DualProgram) -> bool:
-        """Commit a program, to be swapped in at the next start of a line."""
+    def commit(self, program: DualProgram, mode: CommitMode = CommitMode.LINE) -> bool:
+        """Commit a program, to be swapped in at the next start of a line, or of a frame as its mode says."""
 
         def act() -> None:
             self._commits -= 1
-            self._take(program)
+            self._take(program, mode)
 
         accepted = self._ask(act)
         self._commits += accepted
@@ -135,8 +136,8 @@ class SequencerPlayer(_Queue):
         self.sequencer = Sequencer(None, codes=self._codes)
         self._last = None
 
-    def _take(self, program: DualProgram) -> None:
-        self.sequencer.commit(program)
+    def _take(self, program: DualProgram, mode: CommitMode) -> None:
+        self.sequencer.commit(program, mode)
 
     @property
     def line(self) -> int:
@@ -208,8 +209,9 @@ class SequencerPlayer(_Queue):
             self._answer()
             before = self.sequencer.line
             # A swap and a trigger begin at line 0; the line of a tick is the one before the tick is over.
-            begins = self.sequencer.idle is not None and self.sequencer.running and self.sequencer.tick == 0
+            keeps = self.sequencer.keeps_frame()
             tick = self._last = self.sequencer.step()
+            begins = tick.swapped and tick.playing and not keeps
             if tick.swapped:
                 self.swaps += 1
                 self.swapped_at = before
@@ -231,6 +233,7 @@ class LinePlayer(_Queue):
     def _power_up(self) -> None:
         self.playing: DualProgram | None = None
         self._waits: DualProgram | None = None
+        self._mode = CommitMode.LINE
         self._running = self._armed = self._endless = False
         self._armed_frames = self._frames_left = 0
         self._tick = self.line = 0
@@ -239,8 +242,8 @@ class LinePlayer(_Queue):
         self.faults = 0
         self.fault_counts = 0, 0, 0, 0
 
-    def _take(self, program: DualProgram) -> None:
-        self._waits = program
+    def _take(self, program: DualProgram, mode: CommitMode) -> None:
+        self._waits, self._mode = program, mode
 
     @property
     def state(self) -> DeviceState:
@@ -301,7 +304,7 @@ class LinePlayer(_Queue):
         """Play so many ticks, a line at a time."""
         while ticks:
             self._answer()
-            if self._waits is not None and (not self._running or self._tick == 0):
+            if self._waits is not None and (not self._running or self._at_swap()):
                 self._swap(self._waits)
             if self._running and self.playing is not None:
                 ticks -= self._play(self.playing, ticks)
@@ -311,12 +314,16 @@ class LinePlayer(_Queue):
                 self._parks_for = max(self._parks_for - rest, 0)
                 ticks -= rest
 
+    def _at_swap(self) -> bool:
+        return self._tick == 0 and (self._mode is not CommitMode.FRAME or self.line == 0)
+
     def _swap(self, program: DualProgram) -> None:
         old, self.playing, self._waits = self.playing, program, None
         self.swaps += 1
         self.swapped_at = self.line
         if self._running:
-            self._tick = self.line = 0
+            keeps = self._mode is CommitMode.KEEP and old is not None and can_keep(old, program)
+            self.line = self.line if keeps else 0
         else:
             from_codes = self._codes if old is None else (old.x.output.park_code, old.y.output.park_code)
             self._parks_for = max(self._parks_for, _ramp(program, from_codes))

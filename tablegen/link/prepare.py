@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.fixedpoint.output import Output
@@ -14,7 +15,7 @@ from tablegen.link.acceptance import first_objection
 from tablegen.link.errors import Unsuitable
 from tablegen.link.messages import SPLINE_DEGREE, AxisShape, DeviceInfo, Feature
 from tablegen.link.program_image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, shape_of, take_apart
-from tablegen.link.refusal_reasons import Limits, explain
+from tablegen.link.refusal_reasons import Limits, explain, lacks_mode
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.read import NotABuild, read_build
 from tablegen.manifest.record import plan_record
@@ -115,13 +116,22 @@ def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
     return FOURIER_BYTES * len(words) < shape_of(axis).word_bytes * len(axis.words)
 
 
-def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
+def check(
+    scan: PreparedScan,
+    image: ProgramImage,
+    info: DeviceInfo,
+    limits: Limits,
+    any_rate: bool = False,
+    swap: CommitMode = CommitMode.LINE,
+) -> None:
     """Check that a device with these active limits would accept the image, as far as can be known without it.
 
     Parameters
     ----------
     any_rate
         True to accept another update rate than the device has.
+    swap
+        Where in a running scan the new one is swapped in.
 
     Raises
     ------
@@ -129,6 +139,8 @@ def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Lim
         If it would not, with every objection.
     """
     objections = [*_device(image, info, scan), *([] if any_rate else _rate(scan, info))]
+    if why := lacks_mode(info, swap):
+        objections.append(why)
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
         objections += [f"{name}: {why}" for why in _axis(axis, shape, theirs)]
     contents = take_apart(image.data, image.info.x, image.info.y)

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.link.errors import Refused
-from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Reason, Request
+from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Feature, Reason, Request
 
 if TYPE_CHECKING:
     from tablegen.link.messages import AxisShape
@@ -33,6 +34,8 @@ _MESSAGES = {
     Reason.IMAGE: "the memory of the device does not contain what was sent; upload again. If it happens again, the "
     "memory may be faulty",
     Reason.SCHEDULE: "line_ticks, frame_lines or a window of the schedule are out of range; build it again",
+    Reason.KEEP: "the frame cannot go on: the active scan has other ticks of a line, lines or steps of y; use "
+    "--swap line or --swap frame",
     Reason.WITHDRAWN: "it was withdrawn, by an ABORT or a reset of the sequencer; upload again",
     Reason.READBACK: "there is nothing to read: the scan came with the firmware, or a later upload uses its memory",
     Reason.TICKS: "no samples are requested from the sequencer; does the timer of the device run?",
@@ -53,6 +56,16 @@ def refused(
     sentence = explain(reason, detail, info, contents, limits)
     name = Reason(reason).name.lower() if reason in list(Reason) else str(reason)
     return Refused(request, reason, detail, f"the device refused {request_name} ({name}): {sentence}")
+
+
+def lacks_mode(info: DeviceInfo, swap: CommitMode) -> str | None:
+    """Return why a device cannot swap a scan in as asked; None if it can."""
+    if swap is CommitMode.LINE or Feature.COMMIT_MODES in info.features:
+        return None
+    return (
+        f"--swap {swap.name.lower()}: the device starts a new scan at the next line, from line 0; build its firmware "
+        "with DAC_COMMIT_MODES=1 (FPGAs have no other mode), or use --swap line"
+    )
 
 
 def keyless(request: Request) -> Refused:

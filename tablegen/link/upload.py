@@ -6,15 +6,16 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.link.claims import check_length
 from tablegen.link.data_size import DataSize
-from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
+from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent, Unsuitable
 from tablegen.link.exchange import Answer
 from tablegen.link.flight import Flight, SentFrame
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time, restart_count
 from tablegen.link.pace import Deadline
-from tablegen.link.refusal_reasons import Limits, refused
+from tablegen.link.refusal_reasons import Limits, lacks_mode, refused
 from tablegen.link.session import LinkSession, SessionEnded
 
 if TYPE_CHECKING:
@@ -39,8 +40,11 @@ class Uploader:
         deadline: Deadline,
         progress: ProgressCall | None,
         limits: Limits | None,
+        swap: CommitMode = CommitMode.LINE,
     ) -> None:
-        self._session, self._image = session, image
+        if why := lacks_mode(session.info, swap):
+            raise Unsuitable([why])
+        self._session, self._image, self._swap = session, image, swap
         self._exchange = session.exchange
         self._start, self._until = session.now(), deadline
         self._progress = progress
@@ -203,6 +207,8 @@ class Uploader:
     def _send_commit(self) -> None:
         number = self._exchange.number()
         body = _CRC.pack(self._image.info.image_crc)
+        if self._swap is not CommitMode.LINE:  # which devices without modes have too
+            body += bytes([self._swap])
         if self._nonce is not None:
             body += self._session.tag_of(self._nonce, Request.COMMIT, number, body, self._digest)
         self._commit_body = body

@@ -75,6 +75,16 @@ def test_an_upload_says_what_came_of_it(bench: Bench, folder: Path, scan: Prepar
     assert bench.asked == [*[("virtual", 115200)] * 3, ("virtual", 460800)]
 
 
+def test_a_running_scan_is_swapped_as_asked(bench: Bench, folder: Path, info: DeviceInfo) -> None:
+    refused = bench.run("upload", folder, "--swap", "keep", "--dry-run")
+    assert (refused.status, refused.err.count("\n")) == (9, 1)
+    assert "--swap keep: the device starts a new scan at the next line, from line 0; build its firmware" in refused.err
+    modes = Bench(model(replace(info, features=info.features | Feature.COMMIT_MODES), boot=BOOT))
+    assert modes.run("upload", folder, "--swap", "frame").status == 0
+    wrong = modes.run("upload", folder, "--swap", "now")
+    assert (wrong.status, "'line', 'keep', 'frame'" in wrong.err) == (2, True)
+
+
 def test_a_scan_is_built_and_uploaded(folder: Path, bench: Bench) -> None:
     shown = bench.run("upload", folder.parent / "annexin_200nm.toml")
     assert shown.status == 0

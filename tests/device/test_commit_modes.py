@@ -11,9 +11,10 @@ from programs import random_dual
 from replacing import replace
 
 from tablegen.device import sequencer as sequencer_module
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.played_lines import PlayedLines, play_line
-from tablegen.device.sequencer import CommitMode, Fault, Sequencer, Tick, can_keep
+from tablegen.device.sequencer import Fault, Sequencer, Tick, can_keep
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.verification.play.sequencer_shape import SequencerShape

@@ -11,6 +11,7 @@ from link_images import damaged, random_image, random_limits, resealed
 from link_talk import IDENTITY, Talk
 from programs import random_dual
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
@@ -69,6 +70,8 @@ class Dialogue:
         if notes:
             self.device.take_notes()
         features = Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.NARROWS
+        self._modes = bool(how.get("modes"))
+        features |= Feature.COMMIT_MODES if self._modes else Feature(0)
         shapes = [AxisShape(index[0], like.x.bits, shape.dac_bits, shape.dac_bits)]
         shapes += [AxisShape(index[1], like.y.bits, shape.dac_bits, shape.dac_bits)]
         most = 192 + sum(max(each.word_bytes << each.index_bits, 4 * (2 * HARMONICS + 1)) for each in shapes)
@@ -216,7 +219,10 @@ class Dialogue:
         if not sure and self._received < len(self._image.data) and self.rng.random() < 0.7:
             return
         crc = self._image.info.image_crc ^ (0 if sure or self.rng.random() < 0.95 else 1)
-        self._send(self._tagged(Request.COMMIT, struct.pack("<I", crc), self._image.data))
+        payload = struct.pack("<I", crc)
+        if self._modes and self.rng.random() < 0.8:
+            payload += bytes([int(self.rng.choice([*CommitMode, *CommitMode, 3]))])
+        self._send(self._tagged(Request.COMMIT, payload, self._image.data))
 
     def _ticks(self) -> None:
         self._tick(int(self.rng.choice([0, 1, 2, 20, 60])))

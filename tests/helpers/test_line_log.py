@@ -10,6 +10,7 @@ from line_log import LineCheck, PlayedLine, WrongLine
 from link_programs import make_scan
 from replacing import replace
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Tick
 from tablegen.link.messages import DeviceState
@@ -47,9 +48,9 @@ _REQUESTS = ("trigger", "trigger", "commit", "commit", "park", "withdraw", "fram
 _STEPS = st.lists(st.tuples(st.sampled_from(_REQUESTS), st.integers(0, 130)), min_size=1, max_size=14)
 
 
-def _ask(player: SequencerPlayer | LinePlayer, request: str, number: int) -> None:
+def _ask(player: SequencerPlayer | LinePlayer, request: str, number: int, mode: CommitMode = CommitMode.LINE) -> None:
     if request == "commit" and player.writable:
-        player.commit(list(_PROGRAMS.values())[number % len(_PROGRAMS)])
+        player.commit(list(_PROGRAMS.values())[number % len(_PROGRAMS)], mode)
     elif request == "trigger":
         player.arm(0)
         player.trigger()
@@ -149,15 +150,15 @@ def test_a_program_that_was_not_uploaded_is_found() -> None:
         check.follow(_played(_SOME))
 
 
-@given(_STEPS)
+@given(_STEPS, st.lists(st.sampled_from(CommitMode), min_size=15, max_size=15))
 @settings(max_examples=60)
-def test_the_player_of_lines_does_what_the_player_of_ticks_does(steps: list[Step]) -> None:
+def test_the_player_of_lines_does_what_the_player_of_ticks_does(steps: list[Step], modes: list[CommitMode]) -> None:
     """But for how long it takes to park while a swap is caught up with."""
     players: list[SequencerPlayer | LinePlayer] = [SequencerPlayer(_BOOT), LinePlayer(_BOOT)]
     for number, (request, ticks) in enumerate([("wait", 60), *steps]):
         seen = []
         for player in players:
-            _ask(player, request, number)
+            _ask(player, request, number, modes[number])
             player.advance(ticks)
             state = DeviceState.PARKED if player.state is DeviceState.PARKING else player.state
             seen.append((player.swaps, player.line, player.swapped_at, state, player.writable, _name(player.playing)))

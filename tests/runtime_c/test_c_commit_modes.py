@@ -17,8 +17,9 @@ from replacing import replace
 from sets import common
 
 from tablegen.base.resources import c_runtime
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.sequencer import CommitMode, can_keep
+from tablegen.device.sequencer import can_keep
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 MODES = "-DDAC_COMMIT_MODES=1"

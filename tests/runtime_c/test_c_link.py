@@ -129,6 +129,7 @@ def test_random_dialogues_are_about_everything() -> None:
         Reason.TICKS,
         Reason.REFUSED,
         Reason.SHAPING,
+        Reason.KEEP,
         *range(Reason.SCHEDULE, Reason.WITHDRAWN),
     }  # by others
     assert set(Reason) - reasons <= rare, sorted(set(Reason) - reasons)

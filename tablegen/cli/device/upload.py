@@ -47,6 +47,14 @@ _BITS_PER_BYTE = 10
     is_flag=True,
     help="Send nothing. Print sizes and transfer times; with --port, also whether the device would accept the scan.",
 )
+@click.option(
+    "--swap",
+    type=click.Choice(("line", "keep", "frame")),
+    default="line",
+    show_default=True,
+    help="When a running device starts the new scan. line: at the next line start, from the first line of a frame. "
+    "keep: at the next line start, and the frame goes on with its next line. frame: at the next frame start.",
+)
 @key_option
 @click.option("--force", is_flag=True, help="Send the scan even if it is active already.")
 @click.option(
@@ -59,6 +67,7 @@ def upload(
     baud: int,
     form: "Form",
     dry_run: bool,
+    swap: str,
     key_file: Path | None,
     force: bool,
     any_rate: bool,
@@ -75,6 +84,7 @@ def upload(
     Examples:
       tablegen upload annexin_200nm.toml --port /dev/ttyUSB0
       tablegen upload build --port socket://192.168.0.7:5000
+      tablegen upload build --port COM4 --swap keep            the frame goes on
       tablegen upload build --dry-run                          print sizes and transfer times
 
     \b
@@ -90,18 +100,21 @@ def upload(
     if port is None:
         return ExitStatus.OK
     bar = Bar()
+    from tablegen.device.commit_mode import CommitMode
     from tablegen.link.messages import DeviceState
     from tablegen.link.prepare import check
+
+    mode = CommitMode[swap.upper()]
 
     with connected(port, baud, key_file, goes_on="with its old scan") as device:
         limits = device.limits()
         image = scan.image(form, device.info)
-        check(scan, image, device.info, limits, any_rate)
+        check(scan, image, device.info, limits, any_rate, mode)
         if dry_run:
             click.echo(_verdict(device, image, force))
             return ExitStatus.OK
         try:
-            result = device.upload(image, bar, force=force, timeout_s=timeout, limits=limits)
+            result = device.upload(image, bar, force=force, timeout_s=timeout, limits=limits, swap=mode)
         finally:
             bar.close()
         click.echo(_summary(scan, image, result))
