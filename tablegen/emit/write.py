@@ -18,7 +18,10 @@ _STAGED = ".tablegen-"
 # As the tools of packages want them.
 _OF_PACKAGES = {
     "CMakeLists.txt",
+    "Cargo.toml",
+    "build.rs",
     "idf_component.yml",
+    "lib.rs",
     "library.json",
     "library.properties",
     "zephyr/CMakeLists.txt",
