@@ -24,7 +24,8 @@ from tablegen.version import __version__
 
 # Names of plain files that manifests can list; only a file in a sub-folder has a name without a suffix.
 _PART = "[A-Za-z0-9_][A-Za-z0-9_-]*"
-_FILE_NAME = re.compile(rf"({_PART}/)+{_PART}(\.[A-Za-z0-9]+)*|{_PART}(\.[A-Za-z0-9]+)+")
+_SUFFIX = r"(\.[A-Za-z0-9][A-Za-z0-9_]*)"
+_FILE_NAME = re.compile(rf"({_PART}/)+{_PART}{_SUFFIX}*|{_PART}{_SUFFIX}+")
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:

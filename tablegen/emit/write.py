@@ -210,11 +210,9 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 def names_of_build(build: str, names: Iterable[str]) -> list[str]:
     """Return those names that a build of this name can have: its own, the runtime's, and those of packages."""
-    own = (f"{build}.", f"{build}_")
+    own, packages = (f"{build}.", f"{build}_"), {*_OF_PACKAGES, f"tablegen.{build}.pdsc"}
     return [
-        name
-        for name in names
-        if name.startswith(own) or (of_the_runtime(name) and "/" not in name) or name in _OF_PACKAGES
+        name for name in names if name.startswith(own) or (of_the_runtime(name) and "/" not in name) or name in packages
     ]
 
 
