@@ -37,7 +37,7 @@ COMMON_TOOLS := $(CHECK_TOOLS) make g++ ccache clang libclang-rt-dev cmake ninja
 HDL_TOOLS := make g++ ccache iverilog libpython yosys nextpnr-ice40 fpga-icestorm z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
-    arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm
+    arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm cargo
 TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # A process that has nothing more to do takes tests from the end of the other's: neighbours stay together, so that what
 # they share is made once. OpenBLAS threads only spin beside the other processes. Half of what is compiled of each model

@@ -54,6 +54,25 @@ def other_than_file(path: str | os.PathLike[str]) -> str | None:
     return _other(mode)
 
 
+def other_than_folder(folder: Path, name: str) -> tuple[Path, str] | None:
+    """Return the first sub-folder of a name such as ``zephyr/module.yml`` that is no directory, and what stands there.
+
+    A symbolic link is none: what it leads to stands elsewhere. None for directories, and where nothing stands.
+    """
+    place = folder
+    for part in name.split("/")[:-1]:
+        place = place / part
+        try:
+            mode = os.lstat(place).st_mode
+        except (OSError, ValueError):
+            return None
+        if stat.S_ISLNK(mode):
+            return place, "a symbolic link"
+        if not stat.S_ISDIR(mode):
+            return place, _other(mode) or "a file"
+    return None
+
+
 def read_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
     """Read a whole file.
 

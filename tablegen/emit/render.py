@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from functools import cache
+from pathlib import PurePosixPath
 
 from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.resources import own_runtime_folders, resource_folder
@@ -21,7 +22,10 @@ from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifes
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.version import __version__
 
-_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # names of plain files that manifests can list
+# Names of plain files that manifests can list; only a file in a sub-folder has a name without a suffix.
+_PART = "[A-Za-z0-9_][A-Za-z0-9_-]*"
+_SUFFIX = r"(\.[A-Za-z0-9][A-Za-z0-9_]*)"
+_FILE_NAME = re.compile(rf"({_PART}/)+{_PART}{_SUFFIX}*|{_PART}{_SUFFIX}+")
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:
@@ -59,12 +63,15 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
         for name, text in own_files.items():
             if not _FILE_NAME.fullmatch(name) or len(name) > MAXIMUM_FILE_NAME or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
-            if of_the_runtime(name) and name not in own_runtime(each):
+            if any(map(of_the_runtime, name.split("/"))) and name not in own_runtime(each):
                 raise UnknownFormat(
                     f"{each.name!r} writes {name!r}, a name of the sequencer's files: dac_*, program_loader*"
                 )
-            if (other := spelt.setdefault(name.lower(), name)) != name:
-                raise UnknownFormat(f"{each.name!r} writes {name!r} beside {other!r}, which some disks take for one")
+            for place in (name, *(f"{parent}/" for parent in PurePosixPath(name).parents[:-1])):
+                if (other := spelt.setdefault(place.rstrip("/").lower(), place)) != place:
+                    raise UnknownFormat(
+                        f"{each.name!r} writes {place!r} beside {other!r}, which some disks take for one"
+                    )
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     names = [each.name for each in chosen_formats]

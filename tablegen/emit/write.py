@@ -9,13 +9,25 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tablegen.base.directory_lock import locked
-from tablegen.base.reading import BUILD_FILE, file_sha256, holds, other_than_file, read_bytes
+from tablegen.base.reading import BUILD_FILE, file_sha256, holds, other_than_file, other_than_folder, read_bytes
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.config.names import of_the_runtime
 from tablegen.manifest.format import MANIFEST
 
 _STAGED = ".tablegen-"
-_OF_PACKAGES = {"CMakeLists.txt", "idf_component.yml", "library.json", "library.properties"}  # as their tools want them
+# As the tools of packages want them.
+_OF_PACKAGES = {
+    "CMakeLists.txt",
+    "Cargo.toml",
+    "build.rs",
+    "idf_component.yml",
+    "lib.rs",
+    "library.json",
+    "library.properties",
+    "zephyr/CMakeLists.txt",
+    "zephyr/Kconfig",
+    "zephyr/module.yml",
+}
 _MOST_THREADS = 64
 _LITTER = re.compile(rf"{re.escape(_STAGED)}[a-z0-9_]{{8}}")  # as ``mkstemp`` names files
 
@@ -25,7 +37,7 @@ class CannotWrite(Exception):
 
 
 class NoPlace(CannotWrite):
-    """A pipe or a device where a file or a directory has to go: the request is wrong, and no disk is."""
+    """A place where the file or the directory cannot go, such as a pipe: the request is wrong, and no disk is."""
 
 
 def write_files(
@@ -33,25 +45,30 @@ def write_files(
 ) -> list[str]:
     """Write what changed, remove what is outdated, and return the names of what was written, in order.
 
-    Everything is first written beside its place and only then renamed into it, the manifest last: a full disk or
-    an interruption leaves the directory as it was, or with a manifest that ``build --check`` finds stale. So does a cut
-    of power: what was renamed has reached the disk before the manifest is. Two writers of one directory take turns, and
-    what one that was killed has left behind is removed.
+    Everything is first written into the directory itself and only then renamed into its place, the manifest last: a
+    full disk or an interruption leaves the directory as it was, or with a manifest that ``build --check`` finds stale.
+    So does a cut of power: what was renamed has reached the disk before the manifest is. Two writers of one directory
+    take turns, and what one that was killed has left behind is removed.
 
     Parameters
     ----------
+    files
+        Content by name. A name may begin with sub-folders, with ``/`` between, as ``zephyr/module.yml``.
     outdated
         Names of files to remove, or a function that returns them while the directory is locked.
 
     Raises
     ------
     NoPlace
-        If something else than a directory is at ``folder``.
+        If something else than a directory is at ``folder``, or in place of a sub-folder; if a name leads elsewhere.
     CannotWrite
         If the system refuses to write.
     """
     if (other := other_than_file(folder)) not in (None, "a directory"):
         raise NoPlace(f"{folder}: is {other}, where a directory has to go")
+    for name in files:
+        if not _is_inside(name):
+            raise NoPlace(f"{name!r}: is no name of a file in {folder}")
     new_folders = [path for path in (folder, *folder.parents) if not os.path.exists(path)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -62,7 +79,18 @@ def write_files(
         raise CannotWrite(f"{folder}: {error.strerror or error}") from error
 
 
+def _is_inside(name: str) -> bool:
+    """Return True for a plain name, and for one with plain sub-folders before it, on any system."""
+    return all(
+        part not in ("", ".", "..") and os.path.basename(part) == part and not os.path.splitdrive(part)[0]
+        for part in name.split("/")
+    )
+
+
 def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) -> list[str]:
+    for name in files:
+        if misplaced := other_than_folder(folder, name):
+            raise NoPlace(f"{misplaced[0]}: is {misplaced[1]}, where a directory has to go")
     changed = [name for name in files if not holds(folder / name, files[name])]
     if not changed and not outdated:
         return []
@@ -70,29 +98,52 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
         if other := other_than_file(folder / name):
             why = f"{folder / name}: is {other}, where a file has to go"
             raise CannotWrite(why) if other == "a directory" else NoPlace(why)
+    with _removed_if_empty(_new_sub_folders(folder, changed)):
+        _rename_staged(folder, {name: files[name] for name in changed}, outdated)
+    return changed
+
+
+def _rename_staged(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) -> None:
     import tempfile  # here: most builds change nothing
 
     staged: dict[str, Path] = {}
     try:
-        for name in changed:
+        for name in files:
             handle, temporary = tempfile.mkstemp(prefix=_STAGED, dir=folder)
             staged[name] = Path(temporary)
             with os.fdopen(handle, "wb") as file:
                 file.write(files[name])
             os.chmod(temporary, 0o666 & ~_umask())
+        for parent in {(folder / name).parent for name in files}:
+            parent.mkdir(parents=True, exist_ok=True)
         _settle_files(list(staged.values()))
-        for name in sorted(changed, key=lambda name: name == MANIFEST):
+        for name in sorted(files, key=lambda name: name == MANIFEST):
             if name == MANIFEST:  # which no longer lists them
-                _remove(folder, outdated)
-                settle(folder)
+                remove_files(folder, outdated)
+                _settle_folders(folder, [*files, *outdated])
             os.replace(staged[name], folder / name)
             del staged[name]
-        _remove(folder, outdated)
-        settle(folder)
+        remove_files(folder, outdated)
+        _settle_folders(folder, [*files, *outdated])
     finally:
         for temporary_path in staged.values():
             temporary_path.unlink(missing_ok=True)
-    return changed
+
+
+def _sub_folders(folder: Path, names: Iterable[str]) -> list[Path]:
+    """List the sub-folders that names have before them, the innermost first."""
+    places = {place for name in names for place in (folder / name).parents if place.is_relative_to(folder)} - {folder}
+    return sorted(places, key=lambda place: len(place.parts), reverse=True)
+
+
+def _new_sub_folders(folder: Path, names: Iterable[str]) -> list[Path]:
+    return [place for place in _sub_folders(folder, names) if not place.exists()]
+
+
+def _settle_folders(folder: Path, names: Iterable[str]) -> None:
+    for place in [*_sub_folders(folder, names), folder]:
+        if place.is_dir():
+            settle(place)
 
 
 @contextmanager
@@ -102,9 +153,8 @@ def _removed_if_empty(new_folders: Sequence[Path]) -> Iterator[None]:
         yield
     finally:
         for path in new_folders:
-            if not os.path.isdir(path) or any(path.iterdir()):
-                break
-            path.rmdir()
+            if os.path.isdir(path) and not any(path.iterdir()):
+                path.rmdir()
 
 
 def _settle_files(paths: Sequence[Path]) -> None:
@@ -155,13 +205,15 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
             return []
     except OSError:
         return []
-    return sorted(name for name, digest in _listed(folder, files).items() if _digest(folder / name) == digest)
+    return sorted(name for name, digest in _listed(folder, files).items() if _digest(folder, name) == digest)
 
 
 def names_of_build(build: str, names: Iterable[str]) -> list[str]:
     """Return those names that a build of this name can have: its own, the runtime's, and those of packages."""
-    own = (f"{build}.", f"{build}_")
-    return [name for name in names if name.startswith(own) or of_the_runtime(name) or name in _OF_PACKAGES]
+    own, packages = (f"{build}.", f"{build}_"), {*_OF_PACKAGES, f"tablegen.{build}.pdsc"}
+    return [
+        name for name in names if name.startswith(own) or (of_the_runtime(name) and "/" not in name) or name in packages
+    ]
 
 
 def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
@@ -172,14 +224,20 @@ def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
     files = set(files)
     try:
         present = {name for name in os.listdir(folder) if name not in files and os.path.isfile(folder / name)}
+        sub_folders = any(place.is_dir(follow_symlinks=False) for place in os.scandir(folder))
     except OSError:
         return []
-    if not present:
+    if not present and not sub_folders:
         return []
     suffixes = {Path(name).suffix for name in files if name.startswith("dac_")}
     listed = _listed(folder, files)
+    present |= {
+        name
+        for name in listed
+        if "/" in name and other_than_folder(folder, name) is None and os.path.isfile(folder / name)
+    }
     alike = {name for name in present if name.startswith("dac_") and Path(name).suffix in suffixes}
-    outdated = {name for name, digest in listed.items() if name in present and _digest(folder / name) == digest}
+    outdated = {name for name, digest in listed.items() if name in present and _digest(folder, name) == digest}
     return sorted((alike | (listed.keys() & present)) - outdated)
 
 
@@ -200,9 +258,20 @@ def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
     return {name: listed[name] for name in names_of_build(stored.manifest.name, listed) if name not in mine}
 
 
-def _remove(folder: Path, names: Iterable[str]) -> None:
-    for name in names:
+def remove_files(folder: Path, names: Iterable[str]) -> None:
+    """Remove files of a directory, and the sub-folders that are empty then; nothing that a linked sub-folder leads to.
+
+    Raises
+    ------
+    OSError
+        If the system refuses to remove a file.
+    """
+    plain = [name for name in names if other_than_folder(folder, name) is None]
+    for name in plain:
         (folder / name).unlink(missing_ok=True)
+    for place in _sub_folders(folder, plain):
+        if place.is_dir() and not any(place.iterdir()):
+            place.rmdir()
 
 
 def _remove_litter(folder: Path) -> None:
@@ -212,9 +281,11 @@ def _remove_litter(folder: Path) -> None:
             (folder / name).unlink(missing_ok=True)
 
 
-def _digest(path: Path) -> str | None:
+def _digest(folder: Path, name: str) -> str | None:
+    if other_than_folder(folder, name):
+        return None
     try:
-        return file_sha256(path, BUILD_FILE)
+        return file_sha256(folder / name, BUILD_FILE)
     except OSError:
         return None
 

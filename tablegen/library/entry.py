@@ -9,11 +9,11 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
+from tablegen.base.reading import BUILD_FILE, file_sha256, other_than_folder, read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
-from tablegen.manifest.fields import Digest, FileName
+from tablegen.manifest.fields import BuildFileName, Digest
 from tablegen.manifest.format import RECORD, read_json
 
 
@@ -52,7 +52,7 @@ class Entry(Struct, frozen=True, kw_only=True):
     y: AxisEntry
     warnings: list[str]
     inputs: Digest
-    files: dict[FileName, Digest]
+    files: dict[BuildFileName, Digest]
 
     @property
     def axes(self) -> tuple[AxisEntry, AxisEntry]:
@@ -151,7 +151,7 @@ def changed_files(folder: Path, entry: Entry) -> list[str]:
     changed = []
     for name, digest in entry.files.items():
         try:
-            same = file_sha256(folder / name, BUILD_FILE) == digest
+            same = other_than_folder(folder, name) is None and file_sha256(folder / name, BUILD_FILE) == digest
         except OSError:
             same = False
         if not same:

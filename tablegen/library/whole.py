@@ -26,6 +26,9 @@ def whole_build(folder: Path) -> Iterator[Path]:
             if path.is_file() and path.name != RECORD:
                 (Path(name) / path.name).write_bytes(read_bytes(path, BUILD_FILE))
         for file in files:
+            if "/" in file and (folder / file).is_file():
+                (Path(name) / file).parent.mkdir(parents=True, exist_ok=True)
+                (Path(name) / file).write_bytes(read_bytes(folder / file, BUILD_FILE))
             beside = folder.parent / file
             if not (folder / file).exists() and beside.is_file():
                 (Path(name) / file).write_bytes(read_bytes(beside, BUILD_FILE))

@@ -27,6 +27,10 @@ Digest = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
 # A name of a file never leads outside the directory.
 MAXIMUM_FILE_NAME = 200
 FileName = Annotated[str, Meta(max_length=MAXIMUM_FILE_NAME, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
+# Name of a file of a build; one in a sub-folder has that before it, as ``zephyr/module.yml``.
+BuildFileName = Annotated[
+    str, Meta(max_length=MAXIMUM_FILE_NAME, pattern=r"^([A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")
+]
 # Name of a file beside the scanner file; it may have any characters, since no path is made from it.
 SourceName = Annotated[str, Meta(min_length=1, max_length=255)]
 Version = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9.+!-]*\Z")]
@@ -422,7 +426,7 @@ class Manifest(Struct):
     tablegen: Version
     hash: Digest
     name: FileName
-    files: dict[FileName, Digest]
+    files: dict[BuildFileName, Digest]
     sequence: ManifestSequence
     axes: ManifestAxes
     formats: list[Annotated[str, Meta(min_length=1, max_length=64)]] = []

@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from tablegen.base.input_errors import shortened
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
-from tablegen.base.reading import other_than_file, read_bytes
+from tablegen.base.reading import other_than_file, other_than_folder, read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.device.dual_program import DualProgram
@@ -117,6 +117,8 @@ def read_build(folder: str | Path) -> StoredBuild:
     except DamagedManifest as damage:
         raise NotABuild("\n".join(f"{path}: is damaged: {why}; build it again" for why in damage.reasons)) from None
     for name in stored.manifest.files:  # simulators and compilers open them too, and would wait for a pipe
+        if misplaced := other_than_folder(path.parent, name):
+            raise NotABuild(f"{misplaced[0]}: is {misplaced[1]}, where a directory of the build has to be")
         if other := other_than_file(path.parent / name):
             raise NotABuild(f"{path.parent / name}: is {other}, where a file of the build has to be")
     return stored

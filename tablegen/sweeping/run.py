@@ -19,7 +19,7 @@ from tablegen.config.names import of_the_runtime
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.config.variants import Variant
 from tablegen.emit.formats import UnknownFormat
-from tablegen.emit.write import CannotWrite, names_of_build, write_files
+from tablegen.emit.write import CannotWrite, names_of_build, remove_files, write_files
 from tablegen.library.entry import Entry, changed_files, is_whole, parse_entry, read_record
 from tablegen.library.index import is_indexed, listed_files, make_index
 from tablegen.manifest.format import INDEX, MANIFEST, RECORD
@@ -346,8 +346,7 @@ def _remove_program(sweep: ScanLibrary, entry: Entry) -> None:
     folder = sweep.folder / entry.name
     edited = changed_files(folder, entry)
     own = {MANIFEST, *names_of_build(entry.name, entry.files)}
-    for name in [*(name for name in entry.files if name in own and name not in edited), RECORD]:
-        (folder / name).unlink(missing_ok=True)
+    remove_files(folder, [*(name for name in entry.files if name in own and name not in edited), RECORD])
     try:
         folder.rmdir()
     except OSError:

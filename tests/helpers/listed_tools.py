@@ -10,6 +10,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 _GCC = ("gcc", "cc", "gcov", "nm", "ar", "ld", "as", "objdump", "size")
 PROGRAMS: Mapping[str, tuple[str, ...]] = {
     "arduino-builder": ("arduino-builder",),
+    "cargo": ("cargo", "rustc"),
     "ccache": ("ccache",),
     "chromium": ("chromium",),
     "clang": ("clang", "clang++", "nm", "ar", "ld", "as"),

@@ -142,6 +142,31 @@ def test_programs_that_are_not_asked_for_go_unless_they_were_edited(library: Pat
 
 
 @pytest.mark.common
+def test_files_in_sub_folders_are_compared_and_go_with_their_program(library: Path) -> None:
+    formats, out = ("-f", "c", "-f", "zephyr"), library / "out"
+    file = out / "broad" / "zephyr" / "module.yml"
+    assert sweep(library, *formats)[0] == 0
+    right = file.read_bytes()
+    assert sweep(library, *formats, "--check")[0] == 0
+    assert run("verify", "--target", "files", out / "broad").status == 0
+    file.write_bytes(b"mine")
+    assert sweep(library, *formats, "--check")[0] == 1
+    assert run("verify", "--target", "files", out / "broad").status == 5
+    assert sweep(library, *formats)[0] == 0
+    assert file.read_bytes() == right
+    (out / "even" / "zephyr" / "mine.c").write_bytes(b"mine")
+    text = (library / "scan.toml").read_text("utf-8")
+    first = text[: text.index("[[scans]]")]
+    (library / "scan.toml").write_text(first + '[[scans]]\nname = "narrow"\nx.size_nm = 150.0\n', "utf-8")
+    assert sweep(library, *formats)[0] == 0
+    assert not (out / "broad").exists()
+    assert [path.relative_to(out).as_posix() for path in (out / "even").rglob("*")] == [
+        "even/zephyr",
+        "even/zephyr/mine.c",
+    ]
+
+
+@pytest.mark.common
 def test_formats_that_go_take_their_index_and_runtime_along(library: Path) -> None:
     assert sweep(library, "-f", "c")[0] == 0
     out = library / "out"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from difflib import unified_diff
 from pathlib import Path
 
-from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.base.reading import BUILD_FILE, other_than_folder, read_bytes
 
 _MAX_LINES = 12  # lines of each file: enough to see what changed, without whole tables
 _WIDTH = 120
@@ -15,6 +15,9 @@ def differences(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     out: list[str] = []
     for name, content in files.items():
         path = folder / name
+        if misplaced := other_than_folder(folder, name):
+            out.append(f"{misplaced[0]}: is {misplaced[1]}, where a directory has to go")
+            continue
         try:
             old = read_bytes(path, BUILD_FILE)
         except FileNotFoundError:

@@ -96,6 +96,11 @@ def packaged_files(content: Content) -> list[str]:
     return sorted([*FORMAT.files(content), *(path.name for path in FORMAT.runtime())])
 
 
+def runtime_options(content: Content) -> dict[str, int]:
+    """Return the macros that the runtime and an application are compiled with, at the least values that will do."""
+    return {f"DAC_{key}": value for key, value in (_storage(content) | shaping_constants(content)).items()}
+
+
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """Return the number of constants of the C header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.h", _constants(content)

@@ -256,7 +256,21 @@ def test_nobody_replaces_a_format_of_tablegen(tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize(
-    "file", ["../scan.count", "/tmp/count", "a/b.c", "manifest.json", ".hidden.h", "", "no_suffix"]
+    "file",
+    [
+        "../scan.count",
+        "/tmp/count",
+        "a/../../b.c",
+        "a/./b.c",
+        "a//b.c",
+        "a/",
+        ".a/b.c",
+        "a\\b.c",
+        "manifest.json",
+        ".hidden.h",
+        "",
+        "no_suffix",
+    ],
 )
 def test_one_that_writes_elsewhere_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str) -> None:
     package = "elsewhere_" + "".join(c if c.isalnum() else "_" for c in file)

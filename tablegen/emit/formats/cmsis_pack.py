@@ -1,0 +1,61 @@
+"""The description of a CMSIS-Pack, whose component has the files of the format c."""
+
+from tablegen.emit.content import Content
+from tablegen.emit.format import Format
+from tablegen.emit.formats.c import packaged_files, runtime_options
+
+_CATEGORIES = {"c": "sourceC", "h": "header"}
+
+
+class CmsisPack(Format):
+    """The format cmsis-pack: ``tablegen.NAME.pdsc``, which makes the folder of a build a pack with one component.
+
+    Packs of all scans have the component ``Scan:Sequencer``: names of components have 32 characters, those of scans 48,
+    and a project takes one of them, since every build has a sequencer.
+    """
+
+    name = "cmsis-pack"
+    purpose = "CMSIS-Pack of the format c: the folder of the build, with the component tablegen::Scan:Sequencer"
+    file_names = "tablegen.NAME.pdsc"
+    needs = ("c",)
+
+    def files(self, content: Content) -> dict[str, bytes]:
+        """Render the description; nothing in it needs to be escaped in XML."""
+        files = packaged_files(content)
+        lines = [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            '<package schemaVersion="1.6.0" xmlns:xs="http://www.w3.org/2001/XMLSchema-instance" '
+            'xs:noNamespaceSchemaLocation="PACK.xsd">',
+            "  <vendor>tablegen</vendor>",
+            f"  <name>{content.name}</name>",
+            f"  <description>Scan {content.name}, played by its sequencer. Build {content.hash}</description>",
+            "  <url></url>",
+            "  <releases>",
+            f'    <release version="{content.version}">Build {content.hash}</release>',
+            "  </releases>",
+            "  <taxonomy>",
+            '    <description Cclass="Scan">Scan of a piezo scanner</description>',
+            "  </taxonomy>",
+            "  <components>",
+            f'    <component Cclass="Scan" Cgroup="Sequencer" Cversion="{content.version}">',
+            f"      <description>Tables of {content.name}, and the sequencer that plays them</description>",
+            "      <Pre_Include_Global_h>",
+            *_options(content),
+            "      </Pre_Include_Global_h>",
+            "      <files>",
+            *(f'        <file category="{_CATEGORIES[name[-1]]}" name="{name}"/>' for name in files),
+            "      </files>",
+            "    </component>",
+            "  </components>",
+            "</package>",
+        ]
+        return {f"tablegen.{content.name}.pdsc": ("\n".join(lines) + "\n").encode("ascii")}
+
+
+FORMAT = CmsisPack()
+
+
+def _options(content: Content) -> list[str]:
+    """Return the options of the runtime for every file of a project, unless the project sets them itself."""
+    options = runtime_options(content).items()
+    return [line for name, value in options for line in (f"#ifndef {name}", f"#define {name} {value}", "#endif")]
