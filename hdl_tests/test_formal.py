@@ -17,7 +17,7 @@ import pytest
 from building import REPOSITORY, tool
 from limits import PATIENCE_S
 from sets import long
-from test_lint import BUS, MODULES, path_of
+from test_lint import BUS, CROSSINGS, MODULES, path_of
 
 pytestmark = pytest.mark.rest
 
@@ -69,6 +69,8 @@ PROOFS = {
     "scanner": Proof("scanner_properties", 7, 26, {"SHAPING": 3, "BITS": 3}),
     "axi_lite": Proof("axi_properties", 1, 12),
     "wishbone": Proof("wishbone_properties", 1, 12),
+    "synchronise": Proof("synchronise_properties", 5, 12, covers=12),
+    "synchronise_by_four": Proof("synchronise_properties", 7, 16, {"STAGES": 4}, covers=16),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
 }
@@ -88,7 +90,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     """
     for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
         shutil.copy(path, folder)
-    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v")]
+    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v"), *CROSSINGS.glob("*.v")]
     texts = {path.stem: path.read_text("utf-8") for path in sources} | dict(modules)
     for name, text in texts.items():
         if name not in proof.stubs:
@@ -333,6 +335,15 @@ MUTANTS = {
     "word_while_not_writable": ("axi_lite", "dac_bus", "exists && !waits", "exists"),
     "answer_of_another_cycle": ("wishbone", "dac_wishbone", "ack_o = done && waits && cycle", "ack_o = done && cycle"),
     "answer_without_a_cycle": ("wishbone", "dac_wishbone", "err_o = done && waits && cycle", "err_o = done && waits"),
+    # l. one pulse for each edge of another clock domain
+    "a_stage_less": ("synchronise_by_four", "dac_synchronise", "level = chain[LATER]", "level = chain[LATER-1]"),
+    "a_fall_is_a_rise": ("synchronise", "dac_synchronise", "(level || PULSE == 2)", "(level || PULSE != 2)"),
+    "rises_alone": ("synchronise", "dac_synchronise", "(level || PULSE == 2)", "level"),
+    "a_pulse_as_long_as_the_level": ("synchronise", "dac_synchronise", "level != level_before && (level", "(level"),
+    "a_high_level_at_power_up_is_a_rise": (
+        "synchronise", "dac_synchronise", "initial level_before = LEVEL", "initial level_before = 0"
+    ),
+    "a_chain_that_powers_up_low": ("synchronise", "dac_synchronise", "{LATER{LEVEL}}", "{LATER{1'b0}}"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
 }  # fmt: skip
 

@@ -17,6 +17,7 @@ MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
 PUBLIC = (
     "dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_coding", "dac_spi", "dac_axi_stream", "dac_bus",
+    "dac_synchronise",
 )  # fmt: skip
 Values = Mapping[str, int | str]
 
@@ -156,6 +157,13 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"HARMONICS": 513}, "HARMONICS_is_not_1_to_512"),
         ({"SHAPING": 4}, "SHAPING_is_not_0_to_3"),
     ],
+    "dac_synchronise": [
+        ({"STAGES": 1}, "STAGES_is_not_2_to_8"),
+        ({"STAGES": 0}, "STAGES_is_not_2_to_8"),
+        ({"STAGES": 9}, "STAGES_is_not_2_to_8"),
+        ({"PULSE": 3}, "PULSE_is_not_0_to_2"),
+        ({"POWER_UP": 2}, "POWER_UP_is_not_0_to_1"),
+    ],
     "dac_axi_lite": [({"ADDRESS_BITS": 19}, "ADDRESS_BITS_is_not_20_to_64")],
     "dac_wishbone": [({"ADDRESS_BITS": 65}, "ADDRESS_BITS_is_not_20_to_64")],
 }
@@ -202,6 +210,7 @@ LEGAL: dict[str, list[Values]] = {
         {"WORD_BITS": 32, "FRAME_BITS": 32, "X_PREFIX": "32'hffffffff", "TOPOLOGY": 3, "GAP": 65536},
     ],
     "dac_axi_stream": [{"WORD_BITS": 1, "MARKER_BITS": 1}, {"WORD_BITS": 64, "MARKER_BITS": 64}],
+    "dac_synchronise": [{"PULSE": 1}, {"STAGES": 8, "PULSE": 2, "POWER_UP": 1}],
     "dac_axi_lite": [
         {**SMALL, "ADDRESS_BITS": 64, "COUNT_BITS": 2, "HARMONICS": 1, "FOURIER": 1},
         {**LARGE, "COUNT_BITS": 32, "HARMONICS": 512, "FOURIER": 1, "SHAPING": 3},

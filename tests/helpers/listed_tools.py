@@ -36,6 +36,7 @@ PROGRAMS: Mapping[str, tuple[str, ...]] = {
     "qemu-user": ("qemu-mips",),
     "simavr": ("simavr",),
     "srecord": ("srec_cat",),
+    "tcl": ("tclsh",),
     "yosys": ("yosys",),
     "z3": ("z3",),
 }
