@@ -23,7 +23,7 @@ OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(pat
 COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
     -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
-    $($(BUILD)/scan_CPPFLAGS) -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
+    $($(BUILD)/scan_CPPFLAGS) -DDAC_COMMIT_MODES=1 -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
 
 $(BUILD)/firmware.elf: $(OBJECTS) $(LINK_FILES)
 	$(PRIVATELY) $(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@

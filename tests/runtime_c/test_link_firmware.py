@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from random import Random
 
@@ -134,6 +135,31 @@ def test_the_command_line_and_firmware_in_qemu(build_for: Callable[[Board], Buil
         _works("park", *port, "--wait", *_PATIENT)
         check.follow(machine.lines())
     assert sorted(check.taken.values()) == sorted([LineCheck.BOOT, *(scan.digest for scan in built.scans)])
+
+
+def test_a_swap_in_qemu_keeps_the_frame_or_waits_for_the_next(build_for: Callable[[Board], Built]) -> None:
+    """No line is left out or played twice, and the new scan is that of the model from its settled lines on."""
+    built = build_for(CmsdkBoard)
+    lines = built.boot.program.schedule.lines
+    played: list[PlayedLine] = []
+    with LinkMachine(CmsdkBoard.machine, built.executable) as machine:
+        port = ("--port", machine.url)
+        _works("trigger", *port)
+        for number, (swap, file) in enumerate(zip(("keep", "frame"), built.files, strict=True), start=2):
+            _works("upload", file, *port, "--swap", swap, *_PATIENT)
+            machine.wait_for(_line_of(number, lines - 1), played.extend)
+    for before, after in pairwise(played):
+        assert after.line == (before.line + 1) % lines
+    first = {line.generation: line.line for line in reversed(played)}
+    assert (set(first), first[3]) == ({1, 2, 3}, 0)
+    for number, scan in enumerate(built.scans, start=2):
+        last = [line for line in played if (line.generation, line.line) == (number, lines - 1)][-1]
+        ways = [built.check().steady(scan.program, lines - 1, settled) for settled in (True, False)]
+        assert (last.crc, last.markers) in [ticks.sum(last.ticks) for ticks in ways]
+
+
+def _line_of(generation: int, number: int) -> Callable[[PlayedLine], bool]:
+    return lambda line: (line.generation, line.line) == (generation, number)
 
 
 @pytest.mark.parametrize("board", [Pl011Board, pytest.param(CmsdkBoard, marks=pytest.mark.rest)])
