@@ -34,9 +34,9 @@ def replay_of(device: HostDevice, heard: bytes) -> Replay:
     return Replay(8 * device.library.word_bytes, "\n".join(device.notes) + "\n", heard.hex(), tuple(lines))
 
 
-def random_replay(shape: SequencerShape, seed: int, keyed: bool = False) -> Replay:
-    """Of a random dialogue, which the model has told to be right."""
-    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True)
+def random_replay(shape: SequencerShape, seed: int, keyed: bool = False, modes: bool = False) -> Replay:
+    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT."""
+    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, modes=modes)
     dialogue.play(STEPS)
     return replay_of(dialogue.device, bytes(dialogue.heard))
 

@@ -10,6 +10,7 @@ from tablegen.verification.play.sequencer_shape import SequencerShape
 pytestmark = pytest.mark.rest
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+MODES = "-DDAC_COMMIT_MODES=1"
 WAYS = {
     "gcc": (("gcc",), SANITIZED),
     "clang": (("clang",), SANITIZED),
@@ -32,6 +33,13 @@ def replays() -> list[Replay]:
     return [random_replay(shape, seed, keyed) for shape in kinds for seed, keyed in ((1, False), (2, True), (3, False))]
 
 
+@pytest.fixture(scope="module")
+def replays_with_modes() -> list[Replay]:
+    """Of devices whose COMMIT may have a mode."""
+    kinds = [SequencerShape(16, 1, 5, 16, 1, 4, 16), SequencerShape(24, 1, 4, 18, 1, 3, 24)]
+    return [random_replay(shape, seed, keyed, modes=True) for shape in kinds for seed, keyed in ((4, False), (5, True))]
+
+
 def hold(replays: list[Replay], folder: Path, emulator: str | None = None, **how: tuple[str, ...]) -> None:
     programs = {bits: compile_replay(folder / f"replay_{bits}", bits, **how) for bits in (16, 32)}
     for replay in replays:
@@ -46,8 +54,14 @@ def test_compilers_and_sanitizers(way: str, replays: list[Replay], tmp_path: Pat
     hold(replays, tmp_path, compiler=compiler, options=options)
 
 
-def test_the_other_byte_order(replays: list[Replay], tmp_path: Path) -> None:
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_sanitizers_with_modes_of_a_commit(compiler: str, replays_with_modes: list[Replay], tmp_path: Path) -> None:
+    hold(replays_with_modes, tmp_path, compiler=(compiler,), options=(*SANITIZED, MODES))
+
+
+def test_the_other_byte_order(replays: list[Replay], replays_with_modes: list[Replay], tmp_path: Path) -> None:
     """And a processor of 32 bits."""
     options = ("-std=c99", "-O2", "-static")
     hold(replays, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=options)
     assert (tmp_path / "replay_16").read_bytes()[4:6] == b"\1\2"
+    hold(replays_with_modes, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=(*options, MODES))
