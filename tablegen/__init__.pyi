@@ -33,6 +33,11 @@ from tablegen.api.report import report as report
 from tablegen.sweeping.sweep import sweep as sweep
 from tablegen.api.laboratory import Laboratory as Laboratory
 from tablegen.link.device import Device as Device
+from tablegen.api.live import (
+    Live as Live,
+    LiveAxis as LiveAxis,
+    LiveScan as LiveScan,
+)
 from tablegen.config.load import Setup as Setup
 from tablegen.planning.line_plan import Plan as Plan
 from tablegen.certificate.certificate import Certificate as Certificate

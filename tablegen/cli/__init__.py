@@ -40,6 +40,7 @@ _COMMANDS = {
     "correct": ("images.correct", "correct"),
     "verify": ("verify", "verify"),
     "upload": ("device.upload", "upload"),
+    "live": ("device.live", "live"),
     "status": ("device.status", "device_status"),
     "readback": ("device.readback", "readback"),
     "park": ("device.control", "park"),

@@ -171,6 +171,12 @@ def _alternatives() -> dict[str, list[str]]:
 _ALTERNATIVES = _alternatives()
 
 
+def other_settings(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings with others in place of their own and of their alternatives, such as ``x.offset_v``."""
+    replaced = {other for key in more for other in _ALTERNATIVES.get(key, ())}
+    return {key: value for key, value in settings.items() if key not in replaced} | dict(more)
+
+
 def _over(values: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
     """Return values with others over them, without the alternatives of these."""
     set_keys = {key for key, _ in _flat(more)}

@@ -22,7 +22,7 @@ from pseudo_terminal import on_pseudo_terminal
 from tablegen import __version__
 
 COMMANDS = ("build", "sweep", "check", "show", "report", "compare", "verify", "init", "paths", "schema")
-COMMANDS += ("upload", "status", "readback", "park", "trigger", "clear", "ports")
+COMMANDS += ("upload", "live", "status", "readback", "park", "trigger", "clear", "ports")
 OWN_FILES = [
     "annexin_200nm.c",
     "annexin_200nm.h",

@@ -18,7 +18,7 @@ from tablegen.link.frames import FrameReader
 from tablegen.link.messages import DeviceInfo, Feature, Reason, Request
 from tablegen.link.prepare import PreparedScan
 
-COMMANDS = ("upload", "status", "readback", "park", "trigger", "clear", "ports")
+COMMANDS = ("upload", "live", "status", "readback", "park", "trigger", "clear", "ports")
 
 
 @pytest.fixture(scope="module")

@@ -30,6 +30,7 @@ ELSEWHERE = {
     "image_files.md": "tests/docs/test_image_files_page.py",
     "images.md": "tests/docs/test_images_page.py",
     "lattice.md": "not run",
+    "live.md": "tests/cli/test_live_cli.py",
     "operator.md": "tests/docs/test_operator_page.py",
     "python.md": "tests/api/test_python_page.py",
     "report.md": "not run",

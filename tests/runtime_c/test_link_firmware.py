@@ -3,6 +3,7 @@
 The firmware logs the CRC of every line that it played; each of them has to be one of the model.
 """
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from link_qemu import LinkMachine
 from replacing import replace
 
 from tablegen.config.load import load
+from tablegen.config.variants import variants
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, NotPlaying, Refused
 from tablegen.link.prepare import PreparedScan
@@ -156,6 +158,37 @@ def test_a_swap_in_qemu_keeps_the_frame_or_waits_for_the_next(build_for: Callabl
         last = [line for line in played if (line.generation, line.line) == (number, lines - 1)][-1]
         ways = [built.check().steady(scan.program, lines - 1, settled) for settled in (True, False)]
         assert (last.crc, last.markers) in [ticks.sum(last.ticks) for ticks in ways]
+
+
+def test_a_program_moves_the_scan_in_qemu_by_lines_of_json(build_for: Callable[[Board], Built]) -> None:
+    """The frame goes on at each move, and what plays then is the scan of the file at that place."""
+    built = build_for(CmsdkBoard)
+    lines = built.boot.program.schedule.lines
+    played: list[PlayedLine] = []
+    with LinkMachine(CmsdkBoard.machine, built.executable) as machine:
+        command = [sys.executable, "-m", "tablegen", "live", built.files[0], "--port", machine.url]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as session:
+            assert session.stdin is not None
+            assert session.stdout is not None
+            answers = [json.loads(session.stdout.readline())]
+            for distance_nm in (3.0, 3.0, -4.0):
+                session.stdin.write(json.dumps({"do": "move", "x_nm": distance_nm}) + "\n")
+                session.stdin.flush()
+                answers.append(json.loads(session.stdout.readline()))
+                assert answers[-1]["ok"], answers[-1]
+                machine.wait_for(_line_of(answers[-1]["scan"]["generation"], lines - 1), played.extend)
+            session.stdin.close()
+            assert session.wait(PATIENCE_S) == 0
+    assert [one["scan"]["swap"] for one in answers] == ["frame", "keep", "keep", "keep"]
+    first, last = answers[0]["scan"], answers[-1]["scan"]
+    assert last["x"]["position_nm"] - first["x"]["position_nm"] == pytest.approx(2.0, abs=1e-6)
+    for before, after in pairwise(played):
+        assert after.line == (before.line + 1) % lines
+    _, (scan,) = variants(built.files[0], {"x.offset_nm": [last["x"]["position_nm"]]})
+    plan = make_plan(scan.setup)
+    end = [line for line in played if (line.generation, line.line) == (last["generation"], lines - 1)][-1]
+    ways = [built.check().steady(plan.program, lines - 1, settled) for settled in (True, False)]
+    assert (end.crc, end.markers) in [ticks.sum(end.ticks) for ticks in ways]
 
 
 def _line_of(generation: int, number: int) -> Callable[[PlayedLine], bool]:

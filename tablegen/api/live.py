@@ -1,0 +1,195 @@
+"""A scan that is changed while a device plays it: each change is a whole plan, checked before anything is sent."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.config.image_keys import IMAGES, SIZES
+from tablegen.config.variants import Variant, other_settings, variants
+from tablegen.device.commit_mode import CommitMode
+from tablegen.device.sequencer import can_keep
+from tablegen.link.device import Device
+from tablegen.link.messages import DeviceState, Feature
+from tablegen.link.prepare import PreparedScan, check
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+
+_AXES = "xy"
+_START_WAIT_S = 5.0
+
+
+@dataclass(frozen=True)
+class LiveAxis:
+    """Where an axis scans: position of the offset above that at 0 V, size of the whole line, voltages at the piezo."""
+
+    position_nm: float
+    size_nm: float
+    window_nm: float
+    offset_v: float
+    amplitude_v: float
+
+    @classmethod
+    def of_plan(cls, line: LinePlan) -> "LiveAxis":
+        """Return the place of a planned axis."""
+        drive = line.drive
+        return cls(
+            drive.position_nm,
+            drive.size_nm,
+            drive.window_nm,
+            drive.v_offset,
+            0.0 if drive.resting else drive.v_amplitude,
+        )
+
+
+@dataclass(frozen=True)
+class LiveScan:
+    """The scan that a device plays, and how it came to play it.
+
+    ``swap`` is the mode in which it took the place of the scan before: ``keep`` where the frame went on; None where
+    the device played it already. ``generation`` counts the programs of the device.
+    """
+
+    name: str
+    digest: str
+    generation: int
+    swap: str | None
+    line_rate_hz: float
+    lines: int
+    x: LiveAxis
+    y: LiveAxis
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields, and those of the axes, as plain data."""
+        return asdict(self)
+
+
+class Live:
+    """A scan on a device that is moved, zoomed and changed while it plays.
+
+    Every change is planned as a scan of its own, with all corrections for its place and size, and checked against the
+    limits of scanner, scan file and device before anything is sent. What one of them refuses raises its error, and the
+    scan that plays goes on. A change takes the time of a plan and of an upload; ``upload`` has the sizes.
+
+    A change continues the frame if the device can (firmware with ``DAC_COMMIT_MODES``), and ticks and lines stay the
+    same. Otherwise it waits for the next frame; a device without modes begins a frame at the next line.
+    """
+
+    def __init__(self, device: Device, scan: str | Path, settings: Mapping[str, Any] | None = None) -> None:
+        """Read a scan file; nothing is sent before ``start`` or a change.
+
+        Parameters
+        ----------
+        device
+            Device at the end of a serial line.
+        scan
+            Scan file of one scan.
+        settings
+            Values by key of the scan file, such as ``{"x.size_nm": 500}``, in place of those of the file.
+
+        Raises
+        ------
+        Rejected
+            If the file cannot be read, has several scans, or the scan cannot be played.
+        """
+        self._device, self._path = device, Path(scan)
+        self._limits = device.limits()
+        self._settings: dict[str, Any] = dict(settings or {})
+        self._variant, self._plan = self._planned(self._settings)
+        self._on_device: Plan | None = None
+
+    @property
+    def plan(self) -> Plan:
+        """The plan of the last change that a device took, or of the scan file before the first."""
+        return self._plan
+
+    def start(self) -> LiveScan:
+        """Put the scan of the file into the device, and start it if the device is parked."""
+        scan = self._send(self._variant, self._plan, self._settings)
+        if self._device.status().state != DeviceState.PLAYING:
+            self._device.arm()
+            self._device.trigger()
+            self._device.wait_for(DeviceState.PLAYING, _START_WAIT_S)
+        return scan
+
+    def move(self, x_nm: float = 0.0, y_nm: float = 0.0) -> LiveScan:
+        """Move the scan by distances in nm from where it is."""
+        distances = {"x": x_nm, "y": y_nm}
+        settings = {
+            f"{line.axis}.offset_nm": line.drive.position_nm + distances[line.axis]
+            for line in self._plan.lines
+            if distances[line.axis] != 0.0
+        }
+        return self.set(settings)
+
+    def zoom(self, factor: float) -> LiveScan:
+        """Make the scan larger by a factor, or smaller by one below 1, about its middle."""
+        return self.set(_zoomed(self._variant, factor))
+
+    def set(self, settings: Mapping[str, Any]) -> LiveScan:
+        """Play the scan with other values of keys of the scan file; those of earlier changes stay.
+
+        Parameters
+        ----------
+        settings
+            Values by key, such as ``{"timing.line_rate_hz": 2.0}``.
+        """
+        merged = other_settings(self._settings, settings)
+        return self._send(*self._planned(merged), merged)
+
+    def _planned(self, settings: Mapping[str, Any]) -> tuple[Variant, Plan]:
+        _, scans = variants(self._path, {key: [value] for key, value in settings.items()})
+        if len(scans) != 1:
+            why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
+            raise Rejected([Problem(str(self._path), 0, "scans", why)])
+        return scans[0], make_plan(scans[0].setup)
+
+    def _send(self, variant: Variant, plan: Plan, settings: dict[str, Any]) -> LiveScan:
+        device = self._device
+        scan = PreparedScan.of_plan(plan)
+        image = scan.image("auto", device.info)
+        swap = self._swap(plan)
+        check(scan, image, device.info, self._limits, swap=swap)
+        result = device.upload(image, limits=self._limits, swap=swap)
+        self._variant, self._plan, self._settings, self._on_device = variant, plan, settings, plan
+        return LiveScan(
+            name=scan.name,
+            digest=scan.digest,
+            generation=result.generation,
+            swap=None if result.already_running else swap.name.lower(),
+            line_rate_hz=float(plan.schedule.line_rate),
+            lines=plan.schedule.lines,
+            x=LiveAxis.of_plan(plan.x),
+            y=LiveAxis.of_plan(plan.y),
+        )
+
+    def _swap(self, plan: Plan) -> CommitMode:
+        """Return the mode that restarts no frame, if the device has one."""
+        if Feature.COMMIT_MODES not in self._device.info.features:
+            return CommitMode.LINE
+        keeps = self._on_device is not None and can_keep(self._on_device.program, plan.program)
+        return CommitMode.KEEP if keeps else CommitMode.FRAME
+
+
+def _zoomed(variant: Variant, factor: float) -> dict[str, Any]:
+    """Return the sizes of a scan times a factor, under the keys that it has.
+
+    Raises
+    ------
+    Rejected
+        If the factor is not positive, or the file has no key of a size.
+    """
+    settings: dict[str, Any] = {}
+    for image in IMAGES:
+        size = variant.values.get(image)
+        if size is not None:
+            settings[image] = [factor * one for one in size] if isinstance(size, list) else factor * size
+    for axis in _AXES:
+        for key in SIZES:
+            size = variant.values.get(axis, {}).get(key)
+            if size is not None:
+                settings[f"{axis}.{key}"] = factor * size
+    if not settings or not factor > 0.0:
+        why = "has no key of a size that could be zoomed" if factor > 0.0 else f"cannot be zoomed by {factor:g}"
+        raise Rejected([Problem(variant.file.name, 0, "", why)])
+    return settings

@@ -1,0 +1,220 @@
+"""``tablegen live``: requests as lines of JSON, against the model of a device in virtual time."""
+
+import io
+import json
+import re
+import sys
+from contextlib import redirect_stdout
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from building import REPOSITORY, Variant, write_variant
+from client_line import VirtualLine
+from client_rig import BOOT, Bench, client, info_for, model
+from replacing import replace
+
+import tablegen
+from tablegen.api.live import Live
+from tablegen.base.input_errors import Rejected
+from tablegen.config.load import load
+from tablegen.config.variants import variants
+from tablegen.device.sequencer import Tick
+from tablegen.link.messages import DeviceInfo, DeviceState, Feature
+from tablegen.link.model_device import ModelDevice
+from tablegen.link.players import SequencerPlayer
+from tablegen.link.prepare import PreparedScan
+from tablegen.planning.line_plan import Plan, make_plan
+
+SCAN = {"timing.lines": 40}
+MOST_JUMP = 12_000  # codes; the first scan begins by less from the park code
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_variant(tmp_path_factory.mktemp("live"), Variant(SCAN))
+
+
+@pytest.fixture(scope="module")
+def info(file: Path) -> DeviceInfo:
+    """Of a device that takes every scan of this converter, and has modes of a COMMIT."""
+    info = info_for(PreparedScan.of_plan(make_plan(load(file))))
+    return replace(info, features=info.features | Feature.COMMIT_MODES)
+
+
+def said(bench: Bench, file: Path, *requests: dict[str, Any] | str) -> list[dict[str, Any]]:
+    """What a session answers, whose command ends well; the first answer is that of the start."""
+    lines = [one if isinstance(one, str) else json.dumps(one) for one in requests]
+    with patch.object(sys, "stdin", io.StringIO("".join(f"{line}\n" for line in lines))):
+        outcome = bench.run("live", file)
+    assert (outcome.status, outcome.err) == (0, "")
+    answers = [json.loads(line) for line in outcome.out.splitlines()]
+    assert len(answers) == 1 + len([line for line in lines if line.strip()])
+    return answers
+
+
+def planned(file: Path, **settings: float) -> Plan:
+    """The plan of the file with other values of its keys, without the class under test."""
+    _, (scan,) = variants(file, {key.replace("__", "."): [value] for key, value in settings.items()})
+    return make_plan(scan.setup)
+
+
+def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> None:
+    start, moved, zoomed, slower, status = said(
+        Bench(model(info, boot=BOOT)),
+        file,
+        {"do": "move", "x_nm": 30, "y_nm": -20.5},
+        {"do": "zoom", "factor": 0.5},
+        {"do": "set", "values": {"timing.line_rate_hz": 200.0}},
+        {"do": "status"},
+    )
+    assert start["scan"]["swap"] == "frame"
+    for axis, by in (("x", 30.0), ("y", -20.5)):
+        before, after = start["scan"][axis], moved["scan"][axis]
+        assert after["position_nm"] - before["position_nm"] == pytest.approx(by, abs=1e-6)
+        assert after["size_nm"] == pytest.approx(before["size_nm"])
+        assert after["amplitude_v"] != before["amplitude_v"]  # the sensitivity is another one there
+        assert zoomed["scan"][axis]["size_nm"] == pytest.approx(0.5 * after["size_nm"])
+        assert zoomed["scan"][axis]["position_nm"] == pytest.approx(after["position_nm"])
+    assert [one["scan"]["swap"] for one in (moved, zoomed)] == ["keep", "keep"]
+    assert (slower["scan"]["swap"], slower["scan"]["line_rate_hz"]) == ("frame", 200.0)
+    x, y = (start["scan"][axis]["position_nm"] for axis in "xy")
+    same = planned(file, x__offset_nm=x + 30.0, y__offset_nm=y - 20.5, x__size_nm=100.0, y__size_nm=100.0,
+                   timing__line_rate_hz=200.0)  # fmt: skip
+    assert status["status"] == {
+        "state": "playing",
+        "line": status["status"]["line"],
+        "generation": 5,
+        "faults": 0,
+        "digest": slower["scan"]["digest"],
+    }
+    words = [(line.program.output, line.program.words.tolist()) for line in same.lines]
+    device_words = Bench(model(info, boot=BOOT))
+    said(device_words, file, *[{"do": "set", "values": {"x.offset_nm": x + 30.0, "y.offset_nm": y - 20.5,
+         "x.size_nm": 100.0, "y.size_nm": 100.0, "timing.line_rate_hz": 200.0}}])  # fmt: skip
+    playing = device_words.device.player.playing
+    assert playing is not None
+    assert [(axis.output, axis.words.tolist()) for axis in (playing.x, playing.y)] == words
+
+
+def test_what_is_refused_leaves_the_scan_that_plays(info: DeviceInfo, file: Path) -> None:
+    """By the driver's range, by a key that does not exist, and by the device; nothing of it was sent."""
+    narrow = replace(info, x_limits=replace(info.x_limits, max_jump=MOST_JUMP))
+    start, far, unknown, wide, status = said(
+        Bench(model(narrow, boot=BOOT)),
+        file,
+        {"do": "move", "x_nm": 1e6},
+        {"do": "set", "values": {"x.sise_nm": 3}},
+        {"do": "move", "x_nm": 250.0},
+        {"do": "status"},
+    )
+    assert [one["ok"] for one in (start, far, unknown, wide, status)] == [True, False, False, False, True]
+    assert "x.offset_nm" in far["error"]
+    assert "sise_nm" in unknown["error"]
+    assert "(jump)" in wide["error"]
+    assert status["status"]["generation"] == start["scan"]["generation"]
+    assert status["status"]["digest"] == start["scan"]["digest"]
+
+
+def test_a_refused_change_is_forgotten(info: DeviceInfo, file: Path) -> None:
+    """The next move begins where the scan is, and not where it could not go."""
+    start, _, moved = said(
+        Bench(model(info, boot=BOOT)), file, {"do": "move", "x_nm": 1e6}, {"do": "move", "x_nm": 10.0}
+    )
+    assert moved["scan"]["x"]["position_nm"] - start["scan"]["x"]["position_nm"] == pytest.approx(10.0, abs=1e-6)
+
+
+def test_a_device_without_modes_begins_a_frame(info: DeviceInfo, file: Path) -> None:
+    plain = replace(info, features=info.features & ~Feature.COMMIT_MODES)
+    start, moved = said(Bench(model(plain, boot=BOOT)), file, {"do": "move", "x_nm": 30})
+    assert [one["scan"]["swap"] for one in (start, moved)] == ["line", "line"]
+
+
+@pytest.mark.parametrize(
+    ("request_", "why"),
+    [
+        ("{", "the line is not JSON: "),
+        ("[1]", 'a request is an object with "do": move, zoom, set, park, trigger, status'),
+        ({"do": "jump"}, 'a request is an object with "do": move, '),
+        ({"do": "move", "z_nm": 1}, "move: unknown z_nm; possible: x_nm, y_nm"),
+        ({"do": "move", "x_nm": "far"}, 'x_nm is "far"; give a number'),
+        ('{"do": "move", "x_nm": NaN}', "x_nm is NaN; give a number"),
+        ({"do": "zoom"}, "factor is null; give a number"),
+        ({"do": "zoom", "factor": 0}, "cannot be zoomed by 0"),
+        ({"do": "set", "values": 3}, "values is missing, or no object"),
+        ({"do": "park", "now": 1}, "park: unknown now; possible: nothing"),
+    ],
+)
+def test_a_wrong_request_is_answered(request_: dict[str, Any] | str, why: str, info: DeviceInfo, file: Path) -> None:
+    _, answer, blank_is_none = said(Bench(model(info, boot=BOOT)), file, request_, "", {"do": "status"})
+    assert not answer["ok"]
+    assert why in answer["error"]
+    assert blank_is_none["ok"]
+
+
+def test_it_parks_and_starts_again(info: DeviceInfo, file: Path) -> None:
+    bench = Bench(model(info, boot=BOOT))
+    said(bench, file, {"do": "park"})
+    bench.device.player.advance(1_000_000)
+    assert bench.device.player.state == DeviceState.PARKED
+    again, _ = said(bench, file, {"do": "trigger"})
+    assert again["scan"]["swap"] is None  # it was there
+    bench.device.player.advance(1)
+    assert bench.device.player.state == DeviceState.PLAYING
+
+
+def test_a_library_of_scans_is_none(info: DeviceInfo, tmp_path: Path) -> None:
+    file = write_variant(tmp_path, Variant(SCAN))
+    file.write_text(file.read_text("utf-8") + '\n[[scans]]\nname = "a"\n\n[[scans]]\nname = "b"\n', "utf-8")
+    outcome = Bench(model(info, boot=BOOT)).run("live", file)
+    assert outcome.status == 2
+    assert "has 2 scans in [[scans]]" in outcome.err
+
+
+def test_a_zoom_that_is_none_changes_nothing(info: DeviceInfo, file: Path) -> None:
+    with client(VirtualLine(model(info, boot=BOOT), baud=115200, tick_hz=500_000)) as device:
+        live = Live(device, file)
+        with pytest.raises(Rejected, match="cannot be zoomed by -1"):
+            live.zoom(-1.0)
+        assert live.plan.x.drive.size_nm == pytest.approx(200.0)
+
+
+def test_the_page_s_python_runs(info: DeviceInfo, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (REPOSITORY / "docs" / "live.md").read_text("utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(file.parent)
+    bench, out = Bench(model(info, boot=BOOT)), io.StringIO()
+    with patch("tablegen.link.device.open_port", bench.open), redirect_stdout(out):
+        exec(block, {"tablegen": tablegen})
+    assert re.fullmatch(r"frame \d+\.\d+\n", out.getvalue())
+    assert bench.device.player.swaps == 5
+
+
+@pytest.mark.rest
+def test_no_code_jumps_and_no_frame_restarts_while_it_is_moved(info: DeviceInfo, file: Path) -> None:
+    """Random moves and zooms on the model tick by tick: slew, range and the order of the lines."""
+    rng = np.random.default_rng(7)
+    ticks: list[tuple[int, int, Tick]] = []
+    boot = make_plan(load(file)).program
+    player = SequencerPlayer(boot, on_tick=lambda generation, line, tick: ticks.append((generation, line, tick)))
+    machine = ModelDevice(info, player)
+    machine.tick(1)
+    with client(VirtualLine(machine, baud=3_000_000, tick_hz=500_000)) as device:
+        live = Live(device, file)
+        live.start()
+        for _ in range(8):
+            live.move(float(rng.uniform(-40.0, 40.0)), float(rng.uniform(-40.0, 40.0)))
+            live.zoom(float(rng.uniform(0.8, 1.2)))
+        device.status()
+    codes = np.array([(tick.x, tick.y) for _, _, tick in ticks])
+    steps = np.abs(np.diff(codes, axis=0)).max(axis=0)
+    assert np.all(steps <= [info.x_limits.max_step, info.y_limits.max_step])
+    assert np.all(codes >= [info.x_limits.code_min, info.y_limits.code_min])
+    assert np.all(codes <= [info.x_limits.code_max, info.y_limits.code_max])
+    played = [(generation, line) for generation, line, tick in ticks if tick.playing and tick.line]
+    lines = boot.schedule.lines
+    assert all((after - before) % lines == 1 for (_, before), (_, after) in pairwise(played))
+    assert played[-1][0] == 2 + 2 * 8
