@@ -20,6 +20,8 @@ from replacing import replace
 import tablegen
 from tablegen.api.live import Live
 from tablegen.base.input_errors import Rejected
+from tablegen.cli.device.live import live as live_command
+from tablegen.cli.device.live_keys import KEYS
 from tablegen.config.load import load
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
@@ -180,6 +182,59 @@ def test_a_zoom_that_is_none_changes_nothing(info: DeviceInfo, file: Path) -> No
         with pytest.raises(Rejected, match="cannot be zoomed by -1"):
             live.zoom(-1.0)
         assert live.plan.x.drive.size_nm == pytest.approx(200.0)
+
+
+# Keys
+
+
+def pressed(bench: Bench, file: Path, *keys: str) -> list[str]:
+    """What a terminal shows of keys, a text for each change; the first two are the help and the start."""
+    terminal = patch.multiple("sys", stdin=_Terminal(), stdout=_Terminal())
+    with (
+        patch("tablegen.link.device.open_port", bench.open),
+        patch("click.getchar", side_effect=[*keys, EOFError()]),
+        patch("click.echo") as echo,
+        terminal,
+    ):
+        status = live_command.main([str(file), "--port", "virtual"], standalone_mode=False)
+    assert status == 0
+    return [call.args[0] for call in echo.call_args_list]
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_keys_move_zoom_and_change_the_rate(info: DeviceInfo, file: Path) -> None:
+    bench = Bench(model(info, boot=BOOT))
+    keys, start, right, up, smaller, faster = pressed(bench, file, "\x1b[C", "\x1b[A", "+", ">", "?", "q", "+")
+    assert keys == KEYS
+    x, y, rate = start.splitlines()
+    assert (x[0], y[0], rate) == ("x", "y", "400 Hz, 40 lines; from a new frame")
+    assert x.count("=") == pytest.approx(40 * 0.01 * planned(file).x.drive.v_amplitude, abs=2.0)
+    at = float(x.split()[-2])
+    assert float(right.splitlines()[0].split()[-2]) == pytest.approx(at + 20.0, abs=0.01)
+    assert right.splitlines()[2].endswith("the frame goes on")
+    assert float(up.splitlines()[1].split()[-2]) == pytest.approx(float(y.split()[-2]) + 20.0, abs=0.01)
+    assert " 160 nm at " in smaller.splitlines()[0]
+    assert faster.splitlines()[2] == "500 Hz, 40 lines; from a new frame"
+    assert bench.device.player.swaps == 6
+
+
+def test_a_key_that_leaves_the_range_says_so(info: DeviceInfo, file: Path) -> None:
+    bench = Bench(model(info, boot=BOOT))
+    texts = pressed(bench, file, *["\x1b[C"] * 20)[2:]
+    assert len(texts) == 20
+    assert texts[0].startswith("x 0 V [")
+    assert texts[-1].startswith("not possible: ")
+    moves = sum(not text.startswith("not possible") for text in texts)
+    assert bench.device.player.swaps == 2 + moves
+
+
+def test_keys_park_and_start(info: DeviceInfo, file: Path) -> None:
+    bench = Bench(model(info, boot=BOOT))
+    assert pressed(bench, file, "p", "t", "q")[2:] == ["parks", "starts a frame"]
 
 
 def test_the_page_s_python_runs(info: DeviceInfo, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

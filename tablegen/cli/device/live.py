@@ -1,4 +1,4 @@
-"""``tablegen live``: change the scan of a running device, by lines of JSON from another program."""
+"""``tablegen live``: change the scan of a running device, by keys, or by lines of JSON from another program."""
 
 import json
 import sys
@@ -25,10 +25,12 @@ _LONGEST_LINE = 65_536  # characters of a request
 @baud_option
 @key_option
 def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
-    """Put a scan into a running device and start it; then carry out requests from standard input while it plays.
+    """Put a scan into a running device and start it; then change it while it plays: by keys, or by another program.
 
-    A request is a line of JSON, and each has one line of JSON as its answer. "ok" is true with the scan that plays now,
-    or false with the "error"; after an error the scan before plays on. At the end of the input the device plays on.
+    In a terminal, keys move, zoom, change the line rate and park; the command shows where the scan is in the range of
+    the driver. Otherwise a request is a line of JSON on standard input, and has one line of JSON as its answer: "ok" is
+    true with the scan that plays now, or false with the "error". After an error the scan before plays on. At the end of
+    the input the device plays on.
 
     \b
     {"do": "move", "x_nm": 50, "y_nm": 0}                move the scan by nm
@@ -44,8 +46,9 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
       echo '{"do": "move", "x_nm": 50}' | tablegen live annexin_200nm.toml --port /dev/ttyUSB0
 
     \b
-    Exit status: 0 the input ended, 2 wrong input, 6 pyserial is missing, 7 no port, 8 no answer,
-    9 the device refuses the scan of the file, 10 link lost or timeout, 12 invalid answers.
+    Exit status: 0 the input ended, or q in a terminal, 2 wrong input, 6 pyserial is missing, 7 no
+    port, 8 no answer, 9 the device refuses the scan of the file, 10 link lost or timeout, 12 invalid
+    answers.
     """
     from tablegen.api.live import Live
     from tablegen.base.input_errors import Rejected
@@ -57,6 +60,11 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
             first = live_scan.start()
         except Rejected as rejected:
             fail(rejected.problems, ExitStatus.WRONG_INPUT)
+        if sys.stdin.isatty() and sys.stdout.isatty():
+            from tablegen.cli.device.live_keys import follow_keys
+
+            follow_keys(live_scan, device, first)
+            return ExitStatus.OK
         _say({"ok": True, "scan": first.as_dict()})
         while line := sys.stdin.readline(_LONGEST_LINE):
             if line.strip():
