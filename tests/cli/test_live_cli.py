@@ -5,17 +5,20 @@ import json
 import re
 import sys
 from contextlib import redirect_stdout
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from random import Random
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 from building import REPOSITORY, Variant, write_variant
-from client_line import VirtualLine
+from client_line import Noise, VirtualLine, intact
 from client_rig import BOOT, Bench, client, info_for, model
 from replacing import replace
+from sets import LONG_TEST
 
 import tablegen
 from tablegen.api.live import Live
@@ -25,7 +28,9 @@ from tablegen.cli.device.live_keys import KEYS
 from tablegen.config.load import load
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
-from tablegen.link.messages import DeviceInfo, DeviceState, Feature
+from tablegen.link.errors import LinkLost
+from tablegen.link.frames import FrameReader
+from tablegen.link.messages import DeviceInfo, DeviceState, Feature, Request
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
 from tablegen.link.prepare import PreparedScan
@@ -184,6 +189,45 @@ def test_a_zoom_that_is_none_changes_nothing(info: DeviceInfo, file: Path) -> No
         assert live.plan.x.drive.size_nm == pytest.approx(200.0)
 
 
+# The link
+
+
+def test_a_lost_link_leaves_the_scan_that_plays(info: DeviceInfo, file: Path) -> None:
+    """The port vanishes with the last bytes of a move, and is there again for the next."""
+    line = VirtualLine(model(info, boot=BOOT), baud=115200, tick_hz=500_000)
+    with client(line) as device:
+        live = Live(device, file)
+        before = live.start()
+
+        def cut(piece: bytes) -> list[bytes]:
+            line.there = all(frame.type != Request.COMMIT for frame in FrameReader().feed(piece))
+            return [piece] if line.there else []
+
+        line.spoil_out = cut
+        with pytest.raises(LinkLost):
+            live.move(20.0)
+        line.device.tick(100_000)
+        assert line.device.player.swaps == before.generation
+        assert live.plan.x.drive.position_nm == before.x.position_nm
+        line.spoil_out, line.there = intact, True
+        after = live.move(20.0)
+    assert (after.generation, line.device.player.swaps) == (before.generation + 1, before.generation + 1)
+    assert after.x.position_nm == pytest.approx(before.x.position_nm + 20.0, abs=1e-6)
+
+
+def test_a_line_with_faults_plays_what_was_asked_for(info: DeviceInfo, file: Path) -> None:
+    noise = Noise(Random(5), lose=0.05, damage=0.05, repeat=0.05, swap=0.05)
+    line = VirtualLine(model(info, boot=BOOT), baud=115200, tick_hz=500_000, spoil_out=noise, spoil_back=noise)
+    with client(line) as device:
+        live = Live(device, file)
+        live.start()
+        for number in range(6):
+            scan = live.move(5.0, -5.0)
+            assert (scan.swap, device.status().hash.hex()) == ("keep", scan.digest), number
+    assert noise.spoilt > 20
+    assert line.device.player.swaps == 2 + 6
+
+
 # Keys
 
 
@@ -249,27 +293,53 @@ def test_the_page_s_python_runs(info: DeviceInfo, file: Path, monkeypatch: pytes
 
 
 @pytest.mark.rest
-def test_no_code_jumps_and_no_frame_restarts_while_it_is_moved(info: DeviceInfo, file: Path) -> None:
-    """Random moves and zooms on the model tick by tick: slew, range and the order of the lines."""
+@pytest.mark.parametrize("pairs", [8, pytest.param(200, marks=LONG_TEST)])
+def test_no_code_jumps_and_no_frame_restarts_while_it_is_moved(pairs: int, info: DeviceInfo, file: Path) -> None:
+    """Random moves and zooms, on the model tick by tick; what leaves the range of the piezo is refused."""
     rng = np.random.default_rng(7)
-    ticks: list[tuple[int, int, Tick]] = []
     boot = make_plan(load(file)).program
-    player = SequencerPlayer(boot, on_tick=lambda generation, line, tick: ticks.append((generation, line, tick)))
-    machine = ModelDevice(info, player)
+    watch = _Watch()
+    machine = ModelDevice(info, SequencerPlayer(boot, on_tick=watch))
     machine.tick(1)
+    refused = 0
     with client(VirtualLine(machine, baud=3_000_000, tick_hz=500_000)) as device:
         live = Live(device, file)
         live.start()
-        for _ in range(8):
-            live.move(float(rng.uniform(-40.0, 40.0)), float(rng.uniform(-40.0, 40.0)))
-            live.zoom(float(rng.uniform(0.8, 1.2)))
-        device.status()
-    codes = np.array([(tick.x, tick.y) for _, _, tick in ticks])
-    steps = np.abs(np.diff(codes, axis=0)).max(axis=0)
-    assert np.all(steps <= [info.x_limits.max_step, info.y_limits.max_step])
-    assert np.all(codes >= [info.x_limits.code_min, info.y_limits.code_min])
-    assert np.all(codes <= [info.x_limits.code_max, info.y_limits.code_max])
-    played = [(generation, line) for generation, line, tick in ticks if tick.playing and tick.line]
+        for _ in range(pairs):
+            for change in (
+                partial(live.move, float(rng.uniform(-60.0, 60.0)), float(rng.uniform(-60.0, 60.0))),
+                partial(live.zoom, float(rng.uniform(0.7, 1.4))),
+            ):
+                try:
+                    assert change().swap == "keep"
+                except Rejected:
+                    refused += 1
+    assert all(
+        step <= limits.max_step for step, limits in zip(watch.steps, (info.x_limits, info.y_limits), strict=True)
+    )
+    assert watch.low >= min(info.x_limits.code_min, info.y_limits.code_min)
+    assert watch.high <= max(info.x_limits.code_max, info.y_limits.code_max)
     lines = boot.schedule.lines
-    assert all((after - before) % lines == 1 for (_, before), (_, after) in pairwise(played))
-    assert played[-1][0] == 2 + 2 * 8
+    assert all((after - before) % lines == 1 for before, after in pairwise(watch.lines))
+    assert machine.player.swaps == 2 + 2 * pairs - refused
+    assert len(watch.lines) > 4 * pairs
+    assert refused < pairs
+
+
+class _Watch:
+    """The largest step of each axis, the codes at the ends, and the number of each line, of all ticks so far."""
+
+    def __init__(self) -> None:
+        self.steps = [0, 0]
+        self.low, self.high = 1 << 30, 0
+        self.lines: list[int] = []
+        self._before: tuple[int, int] | None = None
+
+    def __call__(self, generation: int, line: int, tick: Tick) -> None:
+        codes = tick.x, tick.y
+        if self._before is not None:
+            self.steps = [max(most, abs(a - b)) for most, a, b in zip(self.steps, codes, self._before, strict=True)]
+        self._before = codes
+        self.low, self.high = min(self.low, *codes), max(self.high, *codes)
+        if tick.playing and tick.line:
+            self.lines.append(line)
