@@ -46,6 +46,7 @@ ALLOWED = {
 PARSERS = {"json.loads", "tomllib.loads", "tomlkit.parse", "msgspec.json.decode"}
 PARSED = {
     ("manifest/format.py", "json.loads"): "the one reader of manifests",
+    ("cli/device/live.py", "json.loads"): "a request, a line of bounded length",
     ("base/toml.py", "tomllib.loads"): "the one reader of TOML, which has bounded the keys",
     ("calibration/scanner_file.py", "tomllib.loads"): "text that parse_toml has read",
     ("calibration/scanner_file.py", "tomlkit.parse"): "text that parse_toml has read",

@@ -67,7 +67,13 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
             return ExitStatus.OK
         _say({"ok": True, "scan": first.as_dict()})
         while line := sys.stdin.readline(_LONGEST_LINE):
-            if line.strip():
+            whole = len(line) < _LONGEST_LINE or line.endswith("\n")
+            while not whole:  # what is left of a line is no request of its own
+                whole = not (rest := sys.stdin.readline(_LONGEST_LINE)) or rest.endswith("\n")
+                line = ""
+            if not line:
+                _say({"ok": False, "error": f"the line has more than {_LONGEST_LINE} characters"})
+            elif line.strip():
                 _say(_answer(live_scan, device, line))
     return ExitStatus.OK
 
@@ -98,9 +104,11 @@ def _done(live_scan: "Live", device: "Device", line: str) -> dict[str, Any]:
         request = json.loads(line)
     except ValueError as error:
         raise _WrongRequest(f"the line is not JSON: {error}") from None
-    if not isinstance(request, dict) or request.get("do") not in _REQUESTS:
+    except RecursionError:
+        raise _WrongRequest("the line is nested too deeply for a request") from None
+    name = request.pop("do", None) if isinstance(request, dict) else None
+    if not isinstance(name, str) or name not in _REQUESTS:
         raise _WrongRequest(f'a request is an object with "do": {", ".join(_REQUESTS)}')
-    name = request.pop("do")
     allowed, act = _REQUESTS[name]
     if unknown := [key for key in request if key not in allowed]:
         raise _WrongRequest(f"{name}: unknown {', '.join(unknown)}; possible: {', '.join(allowed) or 'nothing'}")

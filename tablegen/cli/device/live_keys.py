@@ -4,13 +4,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tablegen.cli.shared.terminal import ARROWS
+
 if TYPE_CHECKING:
     from tablegen.api.live import Live, LiveScan
     from tablegen.link.device import Device
     from tablegen.planning.line_plan import LinePlan
 
 KEYS = "arrows move by a tenth, + - zoom, < > line rate, p park, t start, q quit (the scan plays on)"
-_MOVES = {"\x1b[A": (0, 1), "\x1b[B": (0, -1), "\x1b[C": (1, 0), "\x1b[D": (-1, 0)}  # up, down, right, left
+_MOVES = {"up": (0, 1), "down": (0, -1), "right": (1, 0), "left": (-1, 0)}
 _SHARE = 0.1  # of the size, by which a key moves
 _ZOOMS = {"+": 0.8, "-": 1.25}
 _RATES = {"<": 0.8, ">": 1.25}
@@ -41,8 +43,8 @@ def _done(live: "Live", device: "Device", key: str) -> str:
 
     x, y = live.plan.lines
     try:
-        if key in _MOVES:
-            right, up = _MOVES[key]
+        if key in ARROWS:
+            right, up = _MOVES[ARROWS[key]]
             return _place(live, live.move(right * _SHARE * x.drive.size_nm, up * _SHARE * y.drive.size_nm))
         if key in _ZOOMS:
             return _place(live, live.zoom(_ZOOMS[key]))

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from io import TextIOWrapper
 from typing import IO, Any
 
+WAYS = ("up", "down", "right", "left")
 # All control characters but tab and line end; marks that reorder or hide text; separators that some take for line ends.
 _STEERING = {
     code: f"\\u{code:04x}"
@@ -19,6 +20,10 @@ _STEERING = {
         *((0x200B, 0x200F), (0x2028, 0x202E), (0x2060, 0x2069), (0xFEFF, 0xFEFF)),
     )
     for code in range(first, last + 1)
+}
+ARROWS = {  # what a key sends: a terminal, one in its mode for applications, and Windows
+    **{f"\x1b{mode}{last}": way for mode in "[O" for last, way in zip("ABCD", WAYS, strict=True)},
+    **{f"\xe0{last}": way for last, way in zip("HPMK", WAYS, strict=True)},
 }
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _STYLES = {  # colours of the table of 256 that are readable on black and on white, and for the colour-blind
