@@ -3,7 +3,11 @@
 
 enum { VERSION = 1, MOST_DATA = 240, PROGRAM_HASH = 32, LIMITS = 32, DEVICE = 56, STATUS = 76 };
 enum { TAKES_TABLES = 1, TAKES_FOURIER = 2, HAS_KEY = 4, READS_BACK = 8, HAS_INTERLOCK = 16, NARROWS = 32 };
-enum { HAS_MODES = 64 };
+#if DAC_COMMIT_MODES
+enum { HAS_MODES = 64, ALWAYS = TAKES_TABLES | READS_BACK | NARROWS | HAS_MODES };
+#else
+enum { ALWAYS = TAKES_TABLES | READS_BACK | NARROWS };
+#endif
 enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
 enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
 
@@ -32,9 +36,8 @@ static void put_device(const dac_link *l, uint8_t *at)
     const dac_link_config *const c = l->config;
 
     at[0] = VERSION;
-    at[1] = (uint8_t)(TAKES_TABLES | READS_BACK | NARROWS | (c->harmonics ? TAKES_FOURIER : 0)
-                      | (c->key_bytes ? HAS_KEY : 0) | (c->permits != NULL ? HAS_INTERLOCK : 0)
-                      | (DAC_COMMIT_MODES ? HAS_MODES : 0));
+    at[1] = (uint8_t)(ALWAYS | (c->harmonics ? TAKES_FOURIER : 0)
+                      | (c->key_bytes ? HAS_KEY : 0) | (c->permits != NULL ? HAS_INTERLOCK : 0));
     at[2] = c->window != 0 ? c->window : DAC_LINK_RING / 256;
     at[3] = MOST_DATA;
     at[4] = (uint8_t)c->harmonics;

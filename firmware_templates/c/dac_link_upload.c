@@ -146,7 +146,9 @@ static dac_link_finding commit_loaded(const dac_link *l)
     if (l->commit_mode == DAC_COMMIT_KEEP && (dac_sequencer_status(l->sequencer).markers & DAC_PLAYING) != 0
         && !dac_sequencer_can_keep(l->sequencer))
         return dac_link_because(DAC_LINK_KEEP, 0);
-    const bool passed = dac_sequencer_commit_at(l->sequencer, (dac_commit_mode)l->commit_mode);
+    const bool passed = l->commit_mode == (uint8_t)DAC_COMMIT_LINE
+                      ? dac_sequencer_commit(l->sequencer)
+                      : dac_sequencer_commit_at(l->sequencer, (dac_commit_mode)l->commit_mode);
 #else
     const bool passed = dac_sequencer_commit(l->sequencer);
 #endif

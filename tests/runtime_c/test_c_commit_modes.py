@@ -135,7 +135,7 @@ MUTANTS = {
     "keep waits for a frame": ("s->commit == COMMIT_FRAME && s->running", "s->commit != COMMIT && s->running"),
     "a frame is waited for to its second line": ("s->running && s->line != 0", "s->running && s->line != 1"),
     "nothing is kept": ("    if (keeps) {\n", "    if (false) {\n"),
-    "every mode keeps": ("s->commit != COMMIT_KEEP || !s->running", "!s->running"),
+    "every mode keeps": ("s->commit == COMMIT_KEEP && s->running", "s->running"),
     "lines of other ticks are kept": (KEEPS, ""),
     "frames of other lines are kept": ("now->schedule.frame_lines == next->schedule.frame_lines && ", ""),
     "other holds of y are kept": (" && now->y.holds == next->y.holds", ""),

@@ -33,7 +33,7 @@ MUTANTS = {
         "                       || why.reason == DAC_LINK_KEEP;",
         "                       || false;",
     ),
-    "modes are not announced": ("dac_link_requests.c", "(DAC_COMMIT_MODES ? HAS_MODES : 0)", "0"),
+    "modes are not announced": ("dac_link_requests.c", "NARROWS | HAS_MODES };", "NARROWS };"),
 }
 
 
