@@ -33,6 +33,7 @@ from tablegen.api.report import report as report
 from tablegen.sweeping.sweep import sweep as sweep
 from tablegen.api.laboratory import Laboratory as Laboratory
 from tablegen.link.device import Device as Device
+from tablegen.device.commit_mode import CommitMode as CommitMode
 from tablegen.api.live import (
     Live as Live,
     LiveAxis as LiveAxis,

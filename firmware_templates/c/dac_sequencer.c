@@ -105,7 +105,7 @@ DAC_CODE_ATTR static bool same_frame(const dac_bank *now, const dac_bank *next)
 
 bool dac_sequencer_can_keep(const dac_sequencer *s)
 {
-    return s->playing > 1 || same_frame(&s->bank[s->playing], &s->bank[dac_sequencer_idle(s)]);
+    return s->playing == NOTHING || same_frame(&s->bank[s->playing], &s->bank[dac_sequencer_idle(s)]);
 }
 #endif
 

@@ -5,15 +5,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from tablegen.api.build import Build, build
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.variants import Variant, other_settings, variants
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.sequencer import can_keep
 from tablegen.link.device import Device
+from tablegen.link.errors import LinkError, Refused, Unsuitable
 from tablegen.link.messages import DeviceState, Feature
-from tablegen.link.prepare import PreparedScan, check
-from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.link.prepare import check
+from tablegen.planning.line_plan import LinePlan, Plan
 
 _AXES = "xy"
 _START_WAIT_S = 5.0
@@ -64,12 +66,21 @@ class LiveScan:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class _Scan:
+    """A scan with the values by key that make it of the file."""
+
+    settings: dict[str, Any]
+    variant: Variant
+    build: Build
+
+
 class Live:
     """A scan on a device that is moved, zoomed and changed while it plays.
 
-    Every change is planned as a scan of its own, with all corrections for its place and size, and checked against the
-    limits of scanner, scan file and device before anything is sent. What one of them refuses raises its error, and the
-    scan that plays goes on. A change takes the time of a plan and of an upload; ``upload`` has the sizes.
+    Every change is planned and certified as a scan of its own, with all corrections for its place and size, and checked
+    against the limits of scanner, scan file and device before anything is sent. What one of them refuses raises its
+    error, and the scan that plays goes on. A change takes the time of a build without files, and of an upload.
 
     A change continues the frame if the device can (firmware with ``DAC_COMMIT_MODES``), and ticks and lines stay the
     same. Otherwise it waits for the next frame; a device without modes begins a frame at the next line.
@@ -90,22 +101,22 @@ class Live:
         Raises
         ------
         Rejected
-            If the file cannot be read, has several scans, or the scan cannot be played.
+            If the file cannot be read, has several scans, or the scan cannot be played or breaks one of its limits.
         """
         self._device, self._path = device, Path(scan)
         self._limits = device.limits()
-        self._settings: dict[str, Any] = dict(settings or {})
-        self._variant, self._plan = self._planned(self._settings)
-        self._on_device: Plan | None = None
+        self._scan = self._planned(dict(settings or {}))
+        self._sent: _Scan | None = None  # by an upload whose end is not known
+        self._is_sent = False  # the device has taken ``_scan``
 
     @property
     def plan(self) -> Plan:
-        """The plan of the last change that a device took, or of the scan file before the first."""
-        return self._plan
+        """The plan of the last change that the device took, or of the scan file before the first."""
+        return self._scan.build.plan
 
     def start(self) -> LiveScan:
         """Put the scan of the file into the device, and start it if the device is parked."""
-        scan = self._send(self._variant, self._plan, self._settings)
+        scan = self._send(self._scan)
         if self._device.status().state != DeviceState.PLAYING:
             self._device.arm()
             self._device.trigger()
@@ -114,17 +125,19 @@ class Live:
 
     def move(self, x_nm: float = 0.0, y_nm: float = 0.0) -> LiveScan:
         """Move the scan by distances in nm from where it is."""
+        self._settle()
         distances = {"x": x_nm, "y": y_nm}
         settings = {
             f"{line.axis}.offset_nm": line.drive.position_nm + distances[line.axis]
-            for line in self._plan.lines
+            for line in self.plan.lines
             if distances[line.axis] != 0.0
         }
         return self.set(settings)
 
     def zoom(self, factor: float) -> LiveScan:
         """Make the scan larger by a factor, or smaller by one below 1, about its middle."""
-        return self.set(_zoomed(self._variant, factor))
+        self._settle()
+        return self.set(_zoomed(self._scan.variant, factor))
 
     def set(self, settings: Mapping[str, Any]) -> LiveScan:
         """Play the scan with other values of keys of the scan file; those of earlier changes stay.
@@ -134,24 +147,37 @@ class Live:
         settings
             Values by key, such as ``{"timing.line_rate_hz": 2.0}``.
         """
-        merged = other_settings(self._settings, settings)
-        return self._send(*self._planned(merged), merged)
+        self._settle()
+        return self._send(self._planned(other_settings(self._scan.settings, settings)))
 
-    def _planned(self, settings: Mapping[str, Any]) -> tuple[Variant, Plan]:
+    def _planned(self, settings: dict[str, Any]) -> "_Scan":
         _, scans = variants(self._path, {key: [value] for key, value in settings.items()})
         if len(scans) != 1:
             why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
             raise Rejected([Problem(str(self._path), 0, "scans", why)])
-        return scans[0], make_plan(scans[0].setup)
+        return _Scan(settings, scans[0], build(scans[0].setup))
 
-    def _send(self, variant: Variant, plan: Plan, settings: dict[str, Any]) -> LiveScan:
-        device = self._device
-        scan = PreparedScan.of_plan(plan)
+    def _settle(self) -> None:
+        """Find out whether the device took the scan of an upload that ended without an answer."""
+        if self._sent is None:
+            return
+        if self._device.status().hash.hex() == self._sent.build.prepared.digest:
+            self._scan, self._is_sent = self._sent, True
+        self._sent = None
+
+    def _send(self, live: "_Scan") -> LiveScan:
+        device, plan, scan = self._device, live.build.plan, live.build.prepared
         image = scan.image("auto", device.info)
         swap = self._swap(plan)
         check(scan, image, device.info, self._limits, swap=swap)
-        result = device.upload(image, limits=self._limits, swap=swap)
-        self._variant, self._plan, self._settings, self._on_device = variant, plan, settings, plan
+        try:
+            result = device.upload(image, limits=self._limits, swap=swap)
+        except (Refused, Unsuitable):
+            raise
+        except LinkError:
+            self._sent = live
+            raise
+        self._scan, self._is_sent = live, True
         return LiveScan(
             name=scan.name,
             digest=scan.digest,
@@ -167,7 +193,7 @@ class Live:
         """Return the mode that restarts no frame, if the device has one."""
         if Feature.COMMIT_MODES not in self._device.info.features:
             return CommitMode.LINE
-        keeps = self._on_device is not None and can_keep(self._on_device.program, plan.program)
+        keeps = self._is_sent and can_keep(self.plan.program, plan.program)
         return CommitMode.KEEP if keeps else CommitMode.FRAME
 
 

@@ -74,7 +74,7 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
         Bench(model(info, boot=BOOT)),
         file,
         {"do": "move", "x_nm": 30, "y_nm": -20.5},
-        {"do": "zoom", "factor": 0.5},
+        {"do": "zoom", "factor": 0.8},
         {"do": "set", "values": {"timing.line_rate_hz": 200.0}},
         {"do": "status"},
     )
@@ -84,12 +84,12 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
         assert after["position_nm"] - before["position_nm"] == pytest.approx(by, abs=1e-6)
         assert after["size_nm"] == pytest.approx(before["size_nm"])
         assert after["amplitude_v"] != before["amplitude_v"]  # the sensitivity is another one there
-        assert zoomed["scan"][axis]["size_nm"] == pytest.approx(0.5 * after["size_nm"])
+        assert zoomed["scan"][axis]["size_nm"] == pytest.approx(0.8 * after["size_nm"])
         assert zoomed["scan"][axis]["position_nm"] == pytest.approx(after["position_nm"])
     assert [one["scan"]["swap"] for one in (moved, zoomed)] == ["keep", "keep"]
     assert (slower["scan"]["swap"], slower["scan"]["line_rate_hz"]) == ("frame", 200.0)
     x, y = (start["scan"][axis]["position_nm"] for axis in "xy")
-    same = planned(file, x__offset_nm=x + 30.0, y__offset_nm=y - 20.5, x__size_nm=100.0, y__size_nm=100.0,
+    same = planned(file, x__offset_nm=x + 30.0, y__offset_nm=y - 20.5, x__size_nm=160.0, y__size_nm=160.0,
                    timing__line_rate_hz=200.0)  # fmt: skip
     assert status["status"] == {
         "state": "playing",
@@ -101,7 +101,7 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
     words = [(line.program.output, line.program.words.tolist()) for line in same.lines]
     device_words = Bench(model(info, boot=BOOT))
     said(device_words, file, *[{"do": "set", "values": {"x.offset_nm": x + 30.0, "y.offset_nm": y - 20.5,
-         "x.size_nm": 100.0, "y.size_nm": 100.0, "timing.line_rate_hz": 200.0}}])  # fmt: skip
+         "x.size_nm": 160.0, "y.size_nm": 160.0, "timing.line_rate_hz": 200.0}}])  # fmt: skip
     playing = device_words.device.player.playing
     assert playing is not None
     assert [(axis.output, axis.words.tolist()) for axis in (playing.x, playing.y)] == words
@@ -156,7 +156,7 @@ def test_a_device_without_modes_begins_a_frame(info: DeviceInfo, file: Path) -> 
         ({"do": "set", "values": {"x": 1}}, "x: "),
         ({"do": "set", "values": {"x.size_nm": [1e999]}}, "x.size_nm"),
         ({"do": "set", "values": {"name": "other"}}, "name is not set"),
-        ({"do": "set", "values": {"x.size_nm": 100.0, "x": {}}}, "x.size_nm lies in x"),
+        ({"do": "set", "values": {"x.size_nm": 160.0, "x": {}}}, "x.size_nm lies in x"),
         ({"do": "zoom", "factor": 1e300}, "x.size_nm"),
         ({"do": ["move"]}, "a request is an object"),
         ({"do": "zoom"}, "factor is null; give a number"),
@@ -188,7 +188,23 @@ def test_a_library_of_scans_is_none(info: DeviceInfo, tmp_path: Path) -> None:
     file.write_text(file.read_text("utf-8") + '\n[[scans]]\nname = "a"\n\n[[scans]]\nname = "b"\n', "utf-8")
     outcome = Bench(model(info, boot=BOOT)).run("live", file)
     assert outcome.status == 2
-    assert "has 2 scans in [[scans]]" in outcome.err
+    assert "this file is a library of scans" in outcome.err
+    with client(VirtualLine(model(info, boot=BOOT))) as device, pytest.raises(Rejected, match="has 2 scans"):
+        Live(device, file)
+
+
+def test_a_change_that_breaks_a_limit_of_the_scan_file_is_refused(info: DeviceInfo, file: Path) -> None:
+    """By the certificate, as a build is: half the size has more scaling error than the file allows."""
+    start, smaller, status = said(Bench(model(info, boot=BOOT)), file, {"do": "zoom", "factor": 0.5}, {"do": "status"})
+    assert "limits.max_scaling_error_percent: the x axis has a scaling error of" in smaller["error"]
+    assert status["status"]["digest"] == start["scan"]["digest"]
+
+
+def test_what_is_wrong_with_the_file_needs_no_device(info: DeviceInfo, file: Path, tmp_path: Path) -> None:
+    bench = Bench(model(info, boot=BOOT))
+    assert (bench.run("live", tmp_path / "none.toml").status, bench.asked) == (2, [])
+    broken = write_variant(tmp_path, Variant({**SCAN, "x.size_nm": 60.0}))
+    assert (bench.run("live", broken).status, bench.asked) == (3, [])
 
 
 def test_a_zoom_that_is_none_changes_nothing(info: DeviceInfo, file: Path) -> None:
@@ -223,6 +239,27 @@ def test_a_lost_link_leaves_the_scan_that_plays(info: DeviceInfo, file: Path) ->
         after = live.move(20.0)
     assert (after.generation, line.device.player.swaps) == (before.generation + 1, before.generation + 1)
     assert after.x.position_nm == pytest.approx(before.x.position_nm + 20.0, abs=1e-6)
+
+
+def test_a_change_whose_answer_was_lost_counts(info: DeviceInfo, file: Path) -> None:
+    """The device took it: the next move begins where the scan is."""
+    line = VirtualLine(model(info, boot=BOOT), baud=115200, tick_hz=500_000)
+    with client(line) as device:
+        live = Live(device, file)
+        before = live.start()
+
+        def cut(piece: bytes) -> list[bytes]:
+            line.there = all(frame.type != Request.COMMIT | 0x80 for frame in FrameReader().feed(piece))
+            return [piece] if line.there else []
+
+        line.spoil_back = cut
+        with pytest.raises(LinkLost):
+            live.move(20.0)
+        assert line.device.player.swaps == before.generation + 1
+        line.spoil_back, line.there = intact, True
+        after = live.move(20.0)
+    assert after.x.position_nm == pytest.approx(before.x.position_nm + 40.0, abs=1e-6)
+    assert after.swap == "keep"
 
 
 def test_a_line_with_faults_plays_what_was_asked_for(info: DeviceInfo, file: Path) -> None:
@@ -288,7 +325,12 @@ def test_a_key_that_leaves_the_range_says_so(info: DeviceInfo, file: Path) -> No
 
 def test_keys_park_and_start(info: DeviceInfo, file: Path) -> None:
     bench = Bench(model(info, boot=BOOT))
-    assert pressed(bench, file, "p", "t", "q")[2:] == ["parks", "starts a frame"]
+    assert pressed(bench, file, "p", "q")[2:] == ["parks"]
+    bench.device.player.advance(1_000_000)
+    assert bench.device.player.state == DeviceState.PARKED
+    assert pressed(bench, file, "p", "t")[2:] == ["parks", "starts a frame"]
+    bench.device.player.advance(1)
+    assert bench.device.player.state == DeviceState.PLAYING
 
 
 def test_the_page_s_python_runs(info: DeviceInfo, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

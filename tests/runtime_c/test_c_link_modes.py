@@ -87,6 +87,23 @@ def test_a_frame_that_cannot_go_on_is_not_restarted() -> None:
     assert (2, 0) in [(line.generation, line.line) for line in device.lines()]
 
 
+def test_a_device_without_modes_refuses_one() -> None:
+    device, talk = HostDevice(OLD.program, OLD.program), Talk()
+    device.receive(talk.hello())
+    device.tick(1)
+    for wire in talk.upload(NEW.image(False)):
+        device.receive(wire)
+    device.transmit()
+    crc = NEW.image(False).info.image_crc.to_bytes(4, "little")
+    for mode in CommitMode:
+        device.receive(talk.acting(Request.COMMIT, crc + bytes([mode])))
+        (refusal,) = talk.answers(device.transmit())
+        assert (refusal.type, Refusal.unpack(refusal.payload).reason) == (REFUSED, Reason.PAYLOAD)
+    device.receive(talk.acting(Request.COMMIT, crc))
+    device.tick(1000)
+    assert talk.answers(device.transmit())[-1].type == Request.COMMIT | 0x80
+
+
 def _random(library: DeviceLibrary | None, keys: tuple[bytes, ...], seeds: range) -> Counter[Any]:
     seen: Counter[Any] = Counter()
     for key in keys:

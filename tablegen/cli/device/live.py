@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tablegen.cli.device.connection import baud_option, connected, key_option, port_option
-from tablegen.cli.shared.common import scan_argument
+from tablegen.cli.shared.common import fail, planned, scan_argument
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
 
     \b
     {"do": "move", "x_nm": 50, "y_nm": 0}                move the scan by nm
-    {"do": "zoom", "factor": 0.5}                        make it smaller or larger about its middle
+    {"do": "zoom", "factor": 0.8}                        make it smaller or larger about its middle
     {"do": "set", "values": {"timing.line_rate_hz": 2}}  give keys of the scan file other values
     {"do": "park"}   {"do": "trigger"}   {"do": "status"}
 
@@ -46,14 +46,14 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
       echo '{"do": "move", "x_nm": 50}' | tablegen live annexin_200nm.toml --port /dev/ttyUSB0
 
     \b
-    Exit status: 0 the input ended, or q in a terminal, 2 wrong input, 6 pyserial is missing, 7 no
-    port, 8 no answer, 9 the device refuses the scan of the file, 10 link lost or timeout, 12 invalid
-    answers.
+    Exit status: 0 the input ended, or q in a terminal, 2 wrong input, 3 a limit of the scan is
+    exceeded, 6 pyserial is missing, 7 no port, 8 no answer, 9 the device refuses the scan of the
+    file, 10 link lost or timeout, 12 invalid answers.
     """
     from tablegen.api.live import Live
     from tablegen.base.input_errors import Rejected
-    from tablegen.cli.shared.common import fail
 
+    planned(scan)  # what is wrong with it needs no device
     with connected(port, baud, key_file, goes_on="with the scan that plays") as device:
         try:
             live_scan = Live(device, scan)
