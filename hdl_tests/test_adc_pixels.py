@@ -69,7 +69,7 @@ MUTANTS: dict[str, tuple[str, str, str]] = {
     "sum goes on": ("adc_pixels", "else if (!counted) sum", "else sum"),
     "no sign": ("adc_pixels", "SIGNED != 0 && value[SAMPLE_BITS-1]", "1'b0"),
     "sign of the lane": ("adc_pixels", "SIGNED != 0 && stored[SUM_BITS*i+SUM_BITS-1]", "1'b0"),
-    "sample without its strobe": ("adc_pixels", "sample ? {{COUNT_BITS{sign}}, value}", "1'b1 ? {{COUNT_BITS{sign}}, value}"),
+    "sample without its strobe": ("adc_pixels", "term = sample ? {", "term = 1'b1 ? {"),
     "first channel twice": ("adc_pixels", "samples[i*SAMPLE_BITS +: SAMPLE_BITS]", "samples[SAMPLE_BITS-1:0]"),
     "full count wraps": ("adc_pixels", "if (counted) overfull <= 1'b1;\n            else count", "count"),
     "overfull stays": ("adc_pixels", "            overfull <= 1'b0;\n", ""),
@@ -81,7 +81,7 @@ MUTANTS: dict[str, tuple[str, str, str]] = {
     "window ends no pixel": ("adc_pixels", "(begins || sweep_ends || window_ends)", "(begins || sweep_ends)"),
     "fault ends the pixel": ("adc_pixels", "complete && !valid && !fault;", "complete && !valid;"),
     "valid of its end alone": ("adc_pixels", "(begins || complete) && valid", "valid"),
-    "valid of its begin alone": ("adc_pixels", "(begins || complete) && valid && !fault", "begins ? valid && !fault : complete"),
+    "valid of its begin alone": ("adc_pixels", "complete <= (begins ||", "if (begins) complete <= (begins ||"),
     "valid in a fault": ("adc_pixels", "&& valid && !fault;", "&& valid;"),
     "valid though parked": ("adc_pixels", "complete && playing && count", "complete && count"),
     "valid without a sample": ("adc_pixels", "playing && count != 0", "playing"),
@@ -111,7 +111,7 @@ MUTANTS: dict[str, tuple[str, str, str]] = {
     "word comes twice": ("adc_fifo", "else if (out_ready) out_valid", "else if (0) out_valid"),
     "word is dropped": ("adc_fifo", "else if (out_ready) out_valid", "else out_valid"),
     "pause after each word": ("adc_fifo", "(!out_valid || out_ready)", "!out_valid"),
-    "reset leaves a word": ("adc_fifo", "            stored <= 0;\n            out_valid <= 1'b0;", "            stored <= 0;"),
+    "reset leaves a word": ("adc_fifo", "stored <= 0;\n            out_valid <= 1'b0;", "stored <= 0;"),
 }  # fmt: skip
 
 

@@ -119,8 +119,9 @@ def noise_clocks(shape: Shape, seed: int, clocks: int) -> list[PixelInputs]:
     return made[:clocks]
 
 
-def _line(inputs: PixelInputs, sample_bits: int) -> str:
-    value = 0
+def _line(inputs: PixelInputs, sample_bits: int, clock: int) -> str:
+    """Without a sample the lines of the ADC have any values."""
+    value = random.Random(clock).getrandbits(SAMPLES_BITS) if inputs.samples is None else 0
     for channel, sample in enumerate(inputs.samples or ()):
         value |= (sample & (1 << sample_bits) - 1) << sample_bits * channel
     flags = {**inputs._asdict(), "sample": inputs.samples is not None}
@@ -154,7 +155,7 @@ def play(
     given = list(sources) if sources is not None else [PIXELS, ADC / "adc_fifo.v"]
     design = Design([BENCHES / "adc_pixels_bench.v", *given], "adc_pixels_bench", parameters)
     compiled = compile_design(simulator, design, folder)
-    text = "".join(_line(inputs, shape.sample_bits) for inputs in clocks)
+    text = "".join(_line(inputs, shape.sample_bits, clock) for clock, inputs in enumerate(clocks))
     (folder / "stimulus.hex").write_text(text, "ascii")
     if sink is None:
         assert compiled.run("cocotb_outputs") == (1, 0)

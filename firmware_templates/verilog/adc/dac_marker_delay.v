@@ -39,23 +39,22 @@ module dac_marker_delay #(
             wire [DELAY_BITS-1:0] delay = delays[i*DELAY_BITS +: DELAY_BITS];
             wire [DELAY_BITS-1:0] address = now + 1'b1 - delay;
             reg past [0:(1<<DELAY_BITS)-1];
-            reg read, before, is_0, is_1;
+            reg recalled, latest, is_0, is_1;
             integer k;
             initial begin
                 for (k = 0; k < 1 << DELAY_BITS; k = k + 1) past[k] = 1'b0;
-                read = 1'b0;
-                before = 1'b0;
+                latest = 1'b0;
                 is_0 = 1'b0;
-                is_1 = 1'b0;
+                is_1 = 1'b1;  // the output on the first clock: `recalled` has no power-up value, as in block RAM
             end
             always @(posedge clock) begin
                 past[now] <= in[i];
-                read <= past[address];  // for a delay of 2 or more: it was written before this clock
-                before <= in[i];
+                recalled <= past[address];  // for a delay of 2 or more: it was written before this clock
+                latest <= in[i];
                 is_0 <= delay == 0;
                 is_1 <= delay == 1;
             end
-            assign out[i] = is_0 ? in[i] : is_1 ? before : read;
+            assign out[i] = is_0 ? in[i] : is_1 ? latest : recalled;
         end
     endgenerate
 endmodule
