@@ -17,7 +17,7 @@ import pytest
 from building import REPOSITORY, tool
 from limits import PATIENCE_S
 from sets import long
-from test_lint import BUS, CROSSINGS, MODULES, path_of
+from test_lint import ADC, BUS, CROSSINGS, MODULES, path_of
 
 pytestmark = pytest.mark.rest
 
@@ -38,6 +38,7 @@ class Proof:
     stubs: tuple[str, ...] = ()
     covers: int = 0
     asserts_in_stubs: bool = True
+    maps_memory: bool = False  # its memories are registers, and words of them signals of the harness
 
 
 ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit", "dac_whole")
@@ -71,6 +72,9 @@ PROOFS = {
     "wishbone": Proof("wishbone_properties", 1, 12),
     "synchronise": Proof("synchronise_properties", 5, 12, covers=12),
     "synchronise_by_four": Proof("synchronise_properties", 7, 16, {"STAGES": 4}, covers=16),
+    "pixels": Proof("pixels_properties", 1, 12, covers=12),
+    "fifo": Proof("fifo_properties", 1, 14, covers=14, maps_memory=True),
+    "marker_delay": Proof("marker_delay_properties", 2, 10, covers=10, maps_memory=True),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
 }
@@ -90,7 +94,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     """
     for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
         shutil.copy(path, folder)
-    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v"), *CROSSINGS.glob("*.v")]
+    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v"), *CROSSINGS.glob("*.v"), *ADC.glob("*.v")]
     texts = {path.stem: path.read_text("utf-8") for path in sources} | dict(modules)
     for name, text in texts.items():
         if name not in proof.stubs:
@@ -112,11 +116,16 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     lines += [
         f"read_verilog -formal -defer {harness}",
         f"hierarchy -check -top {proof.top} " + " ".join(f"-chparam {k} {v}" for k, v in proof.parameters.items()),
-        "proc; flatten",
-        *(f"connect -nounset -set {name} {name.replace('__', '.')}" for name in seen),
+        "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten",
+        *(f"connect -nounset -set {name} {_inner(name)}" for name in seen),
         f"check -assert; opt_clean; prep -top {proof.top}; memory_nordff; dffunmap; opt_clean",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _inner(name: str) -> str:
+    """The signal ``b`` of the instance ``a`` for ``a__b``; a number at the end or on the way is an index."""
+    return re.sub(r"__(\d+)", r"[\1]", name).replace("__", ".")
 
 
 def _proven(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None) -> bool:
@@ -344,6 +353,27 @@ MUTANTS = {
         "synchronise", "dac_synchronise", "initial level_before = LEVEL", "initial level_before = 0"
     ),
     "a_chain_that_powers_up_low": ("synchronise", "dac_synchronise", "{LATER{LEVEL}}", "{LATER{1'b0}}"),
+    # m. pixels of an ADC, their FIFO and the delay of their markers
+    "sample_of_the_pulse_lost": ("pixels", "adc_pixels", "if (begins) sum <= term;", "if (begins) sum <= 0;"),
+    "sum_goes_on": ("pixels", "adc_pixels", "else if (!counted) sum", "else sum"),
+    "pixel_without_an_end": ("pixels", "adc_pixels", "(begins || sweep_ends || window_ends)", "(begins || sweep_ends)"),
+    "pixel_ends_twice": ("pixels", "adc_pixels", "(open && !ends)", "open"),
+    "valid_in_a_part": ("pixels", "adc_pixels", "(begins || complete) && valid", "valid"),
+    "valid_though_parked": ("pixels", "adc_pixels", "complete && playing && count", "complete && count"),
+    "last_though_it_goes_on": ("pixels", "adc_pixels", "sweep_ends || !begins,", "sweep_ends || begins,"),
+    "column_skipped": ("pixels", "adc_pixels", "begins ? column_now + 16'd1", "pixel ? column_now + 16'd1"),
+    "loss_is_silent": ("pixels", "adc_pixels", "lost <= full;", "lost <= 1'b0;"),
+    "loss_is_not_counted": ("pixels", "adc_pixels", "lost_words + 16'd1", "lost_words"),
+    "start_of_a_frame_lost": ("pixels", "adc_pixels", "first_lost <= full && (is", "first_lost <= full && !full && (is"),
+    "word_overwritten": ("fifo", "adc_fifo", "writes = write && !full", "writes = write"),
+    "word_replaced": ("fifo", "adc_fifo", "stored != 0 && (!out_valid || out_ready)", "stored != 0"),
+    "word_twice": ("fifo", "adc_fifo", "else if (out_ready) out_valid", "else if (0) out_valid"),
+    "word_dropped": ("fifo", "adc_fifo", "else if (out_ready) out_valid", "else out_valid"),
+    "word_never_sent": ("fifo", "adc_fifo", "reads = stored != 0", "reads = stored > 1"),
+    "full_too_early": ("fifo", "adc_fifo", "full = stored[DEPTH_BITS]", "full = &stored[DEPTH_BITS-1:0]"),
+    "marker_a_clock_late": ("marker_delay", "dac_marker_delay", "now + 1'b1 - delay", "now - delay"),
+    "marker_of_its_neighbour": ("marker_delay", "dac_marker_delay", "past[now] <= in[i]", "past[now] <= in[0]"),
+    "marker_without_its_bypass": ("marker_delay", "dac_marker_delay", "is_1 <= delay == 1", "is_1 <= 1'b0"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
 }  # fmt: skip
 
