@@ -1,9 +1,12 @@
 """``adc_pixels`` on every clock equal to its integer model, with mutants; received by the sink of cocotbext-axi."""
 
+import re
+import subprocess
 from pathlib import Path
 
 import pytest
 from adc_bench import PIXELS, Shape, beat_of, compare, noise_clocks, play, scan_clocks
+from building import tool
 from spi_bench import Difference
 from test_lint import ADC
 
@@ -60,6 +63,35 @@ def test_a_sink_of_axi_gets_every_word(tmp_path: Path) -> None:
     assert len(frames) > 50
     assert frames == packets[: len(frames)]
     assert len(packets) - len(frames) <= 2
+
+
+def netlist(folder: Path, shape: Shape) -> list[Path]:
+    """Return the cells of an iCE40 for a module of these parameters, behind its ports."""
+    values = " ".join(f"-chparam {name} {value}" for name, value in shape.parameters.items())
+    cells, library, front = folder / "cells.v", folder / "library.v", folder / "adc_pixels.v"
+    script = (
+        f"read_verilog -defer {ADC}/adc_*.v; hierarchy -check -top adc_pixels {values}; synth_ice40; "
+        f"rename -top adc_pixels_cells; write_verilog -noattr {cells}"
+    )
+    subprocess.run([tool("yosys"), "-q", "-p", script], check=True)
+    share = Path(tool("yosys")).resolve().parents[1] / "share" / "yosys"
+    library.write_text((share / "ice40" / "cells_sim.v").read_text("utf-8"), "utf-8")
+    head = PIXELS.read_text("utf-8").partition("\n);\n")[0].replace("output reg ", "output wire")
+    ports = re.findall(r"^ +(?:in|out)put +wire +(?:\[\S+\] +)?(\w+)", head, re.MULTILINE)
+    assert len(ports) == 17
+    connected = ", ".join(f".{port}({port})" for port in ports)
+    front.write_text(f"{head}\n);\n    adc_pixels_cells cells ({connected});\nendmodule\n", "utf-8")
+    return [front, cells, library]
+
+
+@pytest.mark.rest
+def test_the_cells_of_an_ice40_have_the_same_clocks(tmp_path: Path) -> None:
+    """With the FIFO in block RAM."""
+    shape = SHAPES["unsigned"]
+    clocks = scan_clocks(shape, 7, CLOCKS // 2) + noise_clocks(shape, 8, CLOCKS // 2)
+    sources = netlist(tmp_path, shape)
+    assert "SB_RAM40_4K" in sources[1].read_text("utf-8")
+    compare(shape, clocks, play(tmp_path / "bench", "verilator", shape, clocks, sources=sources)[0])
 
 
 # A piece of the text and what takes its place, of each module.

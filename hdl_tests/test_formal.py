@@ -364,7 +364,7 @@ MUTANTS = {
     "column_skipped": ("pixels", "adc_pixels", "begins ? column_now + 16'd1", "pixel ? column_now + 16'd1"),
     "loss_is_silent": ("pixels", "adc_pixels", "lost <= full;", "lost <= 1'b0;"),
     "loss_is_not_counted": ("pixels", "adc_pixels", "lost_words + 16'd1", "lost_words"),
-    "start_of_a_frame_lost": ("pixels", "adc_pixels", "first_lost <= full && (is", "first_lost <= full && !full && (is"),
+    "start_of_a_frame_lost": ("pixels", "adc_pixels", "full && (is_first", "1'b0 && (is_first"),
     "word_overwritten": ("fifo", "adc_fifo", "writes = write && !full", "writes = write"),
     "word_replaced": ("fifo", "adc_fifo", "stored != 0 && (!out_valid || out_ready)", "stored != 0"),
     "word_twice": ("fifo", "adc_fifo", "else if (out_ready) out_valid", "else if (0) out_valid"),

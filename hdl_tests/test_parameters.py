@@ -17,7 +17,7 @@ MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
 PUBLIC = (
     "dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_coding", "dac_spi", "dac_axi_stream", "dac_bus",
-    "dac_synchronise",
+    "dac_synchronise", "adc_pixels", "dac_marker_delay",
 )  # fmt: skip
 Values = Mapping[str, int | str]
 
@@ -164,6 +164,25 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"PULSE": 3}, "PULSE_is_not_0_to_2"),
         ({"POWER_UP": 2}, "POWER_UP_is_not_0_to_1"),
     ],
+    "adc_pixels": [
+        ({"CHANNELS": 0}, "CHANNELS_is_not_1_to_2"),
+        ({"CHANNELS": 3}, "CHANNELS_is_not_1_to_2"),
+        ({"SAMPLE_BITS": 1}, "SAMPLE_BITS_is_not_2_to_30"),
+        ({"SAMPLE_BITS": 31, "COUNT_BITS": 2}, "SAMPLE_BITS_is_not_2_to_30"),
+        ({"SIGNED": 2}, "SIGNED_is_not_0_to_1"),
+        ({"COUNT_BITS": 1}, "COUNT_BITS_is_not_2_to_16"),
+        ({"COUNT_BITS": 17, "SAMPLE_BITS": 8}, "COUNT_BITS_is_not_2_to_16"),
+        ({"SAMPLE_BITS": 17}, "SAMPLE_BITS_and_COUNT_BITS_are_more_than_32"),
+        ({"DEPTH_BITS": 0}, "DEPTH_BITS_is_not_1_to_16"),
+        ({"DEPTH_BITS": 17}, "DEPTH_BITS_is_not_1_to_16"),
+        ({"DATA_BITS": 128}, "DATA_BITS_follows_from_CHANNELS"),
+    ],
+    "dac_marker_delay": [
+        ({"SIGNALS": 0}, "SIGNALS_is_not_1_to_64"),
+        ({"SIGNALS": 65}, "SIGNALS_is_not_1_to_64"),
+        ({"DELAY_BITS": 1}, "DELAY_BITS_is_not_2_to_16"),
+        ({"DELAY_BITS": 17}, "DELAY_BITS_is_not_2_to_16"),
+    ],
     "dac_axi_lite": [({"ADDRESS_BITS": 19}, "ADDRESS_BITS_is_not_20_to_64")],
     "dac_wishbone": [({"ADDRESS_BITS": 65}, "ADDRESS_BITS_is_not_20_to_64")],
 }
@@ -211,6 +230,12 @@ LEGAL: dict[str, list[Values]] = {
     ],
     "dac_axi_stream": [{"WORD_BITS": 1, "MARKER_BITS": 1}, {"WORD_BITS": 64, "MARKER_BITS": 64}],
     "dac_synchronise": [{"PULSE": 1}, {"STAGES": 8, "PULSE": 2, "POWER_UP": 1}],
+    "adc_pixels": [
+        {"CHANNELS": 2, "SAMPLE_BITS": 2, "COUNT_BITS": 2, "DEPTH_BITS": 1, "SIGNED": 0},
+        {"CHANNELS": 2, "SAMPLE_BITS": 30, "COUNT_BITS": 2, "DEPTH_BITS": 16},
+        {"SAMPLE_BITS": 2, "COUNT_BITS": 16},
+    ],
+    "dac_marker_delay": [{"SIGNALS": 1, "DELAY_BITS": 2}, {"SIGNALS": 64, "DELAY_BITS": 2}, {"DELAY_BITS": 16}],
     "dac_axi_lite": [
         {**SMALL, "ADDRESS_BITS": 64, "COUNT_BITS": 2, "HARMONICS": 1, "FOURIER": 1},
         {**LARGE, "COUNT_BITS": 32, "HARMONICS": 512, "FOURIER": 1, "SHAPING": 3},
@@ -231,6 +256,7 @@ def icarus(top: str, values: Values, folder: Path) -> str:
 # Yosys takes minutes to fill the largest memories word by word, in loops that no parameter's range depends on.
 FILLS = {
     "dac_fourier.v": "for (i = 0; i < 1 << QUARTER_BITS; i = i + 1) quarter_sine[i] = {1'b1, 30'd0};",
+    "dac_marker_delay.v": "for (k = 0; k < 1 << DELAY_BITS; k = k + 1) past[k] = 1'b0;",
     "dac_loader_memory.v": "for (i = 0; i < 1 << ADDRESS_BITS; i = i + 1) bytes[i] = 8'd0;",
 }
 

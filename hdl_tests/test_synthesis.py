@@ -19,7 +19,7 @@ sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
 
 MODULES = resources.MODULES
-BUS = MODULES / "bus"
+BUS, ADC = MODULES / "bus", MODULES / "adc"
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "as_it_comes": ("dac_sequencer", {}),
     "multiplier_blocks": ("dac_sequencer", {"PLAIN_MULTIPLIER": 1}),
@@ -46,6 +46,9 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "axi_lite": ("dac_axi_lite", {"ADDRESS_BITS": 32}),
     "axi_lite_fourier": ("dac_axi_lite", {"FOURIER": 1, "COUNT_BITS": 32, "X_INDEX_BITS": 16}),
     "wishbone": ("dac_wishbone", {"FOURIER": 1}),
+    "adc_pixels": ("adc_pixels", {}),
+    "adc_two_channels": ("adc_pixels", {"CHANNELS": 2, "SAMPLE_BITS": 18, "COUNT_BITS": 14, "DEPTH_BITS": 9}),
+    "marker_delay": ("dac_marker_delay", {"SIGNALS": 5, "DELAY_BITS": 10}),
     "fourier_renderer": ("dac_fourier", {"MULTIPLIER": 1}),
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
@@ -60,7 +63,8 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
 def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> subprocess.CompletedProcess[str]:
     values = " ".join(f"-chparam {name} {value}" for name, value in parameters.items())
     script = (
-        f"read_verilog -defer {folder}/*.v {BUS}/*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
+        f"read_verilog -defer {folder}/*.v {BUS}/*.v {ADC}/*.v; "
+        f"hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )
     return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
