@@ -114,7 +114,8 @@ class PixelSums:
     def step(self, inputs: PixelInputs) -> PixelWord | None:
         """Take the inputs of a clock; return the word of the pixel that ends on it, if one does.
 
-        What begins on a clock takes the sample of this clock, what ends on it does not.
+        What begins on a clock takes the sample of this clock, what ends on it does not. A reset ends a pixel without a
+        word.
         """
         sweep_ends = inputs.line or inputs.frame or inputs.backward != self._was_backward or not inputs.playing
         begins = inputs.pixel and inputs.playing
@@ -124,7 +125,7 @@ class PixelSums:
         if inputs.reset:
             self._pixel, self._line, self._next_column = None, 0, 0
             self._line_is_0, self._frame_waits = True, False
-            return word
+            return None
         self._number(inputs, sweep_ends)
         if begins:
             first = inputs.frame or self._frame_waits
