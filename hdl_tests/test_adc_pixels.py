@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 from adc_bench import PIXELS, Shape, beat_of, compare, noise_clocks, play, scan_clocks
-from building import tool
+from building import REPOSITORY, run_clean, tool
 from spi_bench import Difference
-from test_lint import ADC
+from test_lint import ADC, CROSSINGS
+from test_marker_delay import MUTANTS as DELAY_MUTANTS
 
+from tablegen.device.adc_pixels import PixelInputs
+
+PAGE = REPOSITORY / "docs" / "pixels.md"
 CLOCKS = 6_000
 SHAPES = {
     "as it comes": Shape(),
@@ -63,6 +67,54 @@ def test_a_sink_of_axi_gets_every_word(tmp_path: Path) -> None:
     assert len(frames) > 50
     assert frames == packets[: len(frames)]
     assert len(packets) - len(frames) <= 2
+
+
+def test_the_page_shows_what_is_simulated(tmp_path: Path) -> None:
+    """The diagram of docs/pixels.md: its inputs are played, its outputs are those of the module."""
+    shown = PAGE.read_text("utf-8").partition("<!-- simulated -->")[2].partition("<!-- /simulated -->")[0]
+    rows = dict(line.split() for line in shown.splitlines() if line)
+    high = {name: [level == "#" for level in row] for name, row in rows.items()}
+    clocks = [
+        PixelInputs(
+            samples=None if rows["sample"][k] == "_" else (int(rows["sample"][k]),),
+            **{name: high[name][k] for name in ("pixel", "line", "frame", "valid")},
+        )
+        for k in range(len(rows["sample"]))
+    ]
+    shape = Shape()
+    seen, _ = play(tmp_path, "icarus", shape, clocks)
+    compare(shape, clocks, seen)
+    beats = [one.beat for one in seen[1:]]
+    drawn = {
+        "tvalid": ["_" if beat is None else "#" for beat in beats],
+        "tlast": ["#" if beat is not None and beat[0] else "_" for beat in beats],
+        "first": ["#" if beat is not None and beat[1] & 4 else "_" for beat in beats],
+        "sum": ["_" if beat is None else f"{beat[2] & 0xFFFFFFFF:x}" for beat in beats],
+        "count": ["_" if beat is None else f"{beat[2] >> 32 & 0xFFFF:x}" for beat in beats],
+    }
+    assert {name: "".join(levels) for name, levels in drawn.items()} == {name: rows[name] for name in drawn}
+
+
+def test_the_instances_of_the_page_elaborate(tmp_path: Path) -> None:
+    blocks = re.findall(r"```verilog\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    inputs = (
+        "clock, reset, strobe, playing, valid_marker, backward_marker, frame_marker, line_marker, pixel_marker, "
+        "adc_strobe, tready, frame_pin, line_pin, pixel_pin, input [3:0] faults, input [9:0] latency, "
+        "input signed [15:0] adc_a, adc_b"
+    )
+    outputs = (
+        "[127:0] tdata, output [5:0] tuser, output tlast, tvalid, output [15:0] lost_words, output frame, line, pixel"
+    )
+    top = tmp_path / "top.v"
+    top.write_text(f"module top (input {inputs}, output {outputs});\n{''.join(blocks)}endmodule\n", "ascii")
+    sources = [top, *ADC.glob("*.v"), *CROSSINGS.glob("*.v")]
+    run_clean(["iverilog", "-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s", "top", *sources])
+
+
+def test_the_page_counts_the_mutants() -> None:
+    page = PAGE.read_text("utf-8")
+    assert f"with {len(MUTANTS)} mutants" in page
+    assert f"with {len(DELAY_MUTANTS)} mutants" in page
 
 
 def netlist(folder: Path, shape: Shape) -> list[Path]:

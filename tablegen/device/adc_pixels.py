@@ -248,8 +248,8 @@ def pixel_picture(
     """
     picture = np.full((len(lines), columns), np.nan)
     flags = words["flags"]
-    shown = (flags & 1 == 1) & (flags >> 1 & 1 == int(backward)) & (words["column"] < columns)
-    shown &= (words["line"] >= lines.start) & (words["line"] < lines.stop)
-    kept = words[shown]
-    picture[kept["line"].astype(int) - lines.start, kept["column"]] = kept["sums"][:, channel] / kept["count"]
+    mask = (flags & 1 == 1) & (flags >> 1 & 1 == int(backward)) & (words["column"] < columns)
+    mask &= (words["line"] >= lines.start) & (words["line"] < lines.stop)
+    subset = words[mask]
+    picture[subset["line"].astype(int) - lines.start, subset["column"]] = subset["sums"][:, channel] / subset["count"]
     return picture
