@@ -177,7 +177,7 @@ def test_the_sequencer_plays_the_codes_of_the_plan(setup: Setup, delayed: Run) -
 
 
 def test_the_picture_is_that_of_the_plan(setup: Setup, delayed: Run) -> None:
-    """Trace and retrace, to a hundredth of the contrast: what the mean of nine samples differs from that of the time."""
+    """Trace and retrace, to a hundredth of the contrast: what nine samples differ from the mean over their time."""
     schedule = setup.built.plan.schedule
     for window, picture in zip((schedule.forward, schedule.backward), pictures(setup, delayed), strict=True):
         wanted = planned(setup, window, 0.5)
