@@ -1,5 +1,6 @@
-/* MCP4922: 12 bits, two outputs. The upper four bits of a frame are the output, no input buffer, gain 1, output on;
- * LDAC changes both. It needs no set-up. Data sheet DS22250.
+/* MCP4922: 12 bits, two outputs. The upper four bits of a frame are the output, no input buffer (BUF), gain 1 (GA set),
+ * output on (SHDN set); LDAC changes both. It needs no set-up. Data sheet DS21897A, p. 18, section 5.2: 16 bits, four
+ * of configuration, rising edge, LDAC. Order of the four: register 5-1, as in DS22250.
  *
  *     [dac]
  *     bits = 12

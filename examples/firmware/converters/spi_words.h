@@ -8,16 +8,17 @@
  *     dac_spi_words(&ad5791, 0, y, 64, frames[1]);
  *
  * A frame is the prefix of an output (command and address) with the word of the axis above bit data_lsb. Its bytes go
- * out highest first. They are the same on every processor: a SPI unit that sends bytes needs no byte order. For a unit
- * that sends 16 or 32 bits at once, take dac_spi_frame(). The word is that of the scan: give its [dac] table the bits,
- * coding, word_bits and align that the converter's file states. */
+ * out highest first. They are the same on every processor: a SPI unit that sends bytes needs no byte order. A unit that
+ * takes a frame at once takes numbers in the processor's byte order: dac_spi_frames16() and dac_spi_frames32().
+ * The word is that of the scan: fill has made it straight binary or two's complement, left- or right-aligned. Give the
+ * scan's [dac] table the bits, coding, word_bits and align that the converter's file states. */
 #ifndef SPI_WORDS_H
 #define SPI_WORDS_H
 
 #include "dac_sequencer.h"
 
 typedef struct dac_spi_converter {
-    uint8_t frame_bits;     /* 16 or 24 */
+    uint8_t frame_bits;     /* 16, 24 or 32 */
     uint8_t word_bits;      /* as in the scan: word_bits, or bits without it */
     uint8_t data_lsb;       /* the bit of the frame that takes the lowest bit of the word */
     uint8_t mode;           /* of SPI: 0 samples on the rising edge, 1 on the falling one; the clock rests low */
@@ -67,6 +68,29 @@ static inline uint8_t *dac_spi_pairs(
         to = dac_spi_bytes(converter, dac_spi_frame(converter, 1, *b), to);
         a += DAC_STRIDE;
         b += DAC_STRIDE;
+    }
+    return to;
+}
+
+/* Writes the frames of `count` words as numbers, each into the lowest bits of 32: for a unit with frames of up to 32
+ * bits that DMA feeds by words, such as that of an STM32H7. Returns the place after them. */
+static inline uint32_t *dac_spi_frames32(
+    const dac_spi_converter *converter, unsigned output, const dac_output *words, unsigned count, uint32_t *to)
+{
+    while (count-- != 0) {
+        *to++ = dac_spi_frame(converter, output, *words);
+        words += DAC_STRIDE;
+    }
+    return to;
+}
+
+/* The same for frames of 16 bits and DMA by half words. */
+static inline uint16_t *dac_spi_frames16(
+    const dac_spi_converter *converter, unsigned output, const dac_output *words, unsigned count, uint16_t *to)
+{
+    while (count-- != 0) {
+        *to++ = (uint16_t)dac_spi_frame(converter, output, *words);
+        words += DAC_STRIDE;
     }
     return to;
 }
