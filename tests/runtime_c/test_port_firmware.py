@@ -25,9 +25,11 @@ from link_line import FarEnd, Line
 from pipe_board import PipeBoard
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
+from stm32h7_board import OFF, Stm32h7Board
 
 from tablegen.config.load import load
 from tablegen.link.device import Device
+from tablegen.link.errors import LinkError
 from tablegen.link.prepare import PreparedScan
 from tablegen.planning.line_plan import make_plan
 from tablegen.verification.c.elf import read_executable
@@ -52,10 +54,10 @@ def _scan(folder: Path, name: str, changes: dict[str, object]) -> tuple[Path, Pr
     return file, PreparedScan.of_plan(make_plan(load(file)))
 
 
-def _firmware(port: str, folder: Path, scan: Path, *more: str) -> Path:
+def _firmware(port: str, folder: Path, scan: Path, *more: str, ports: Path = FIRMWARE) -> Path:
     target = folder / port
     run_warned(
-        ["make", "-C", FIRMWARE / port, f"SCAN={scan}", f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen",
+        ["make", "-C", ports / port, f"SCAN={scan}", f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen",
          *more]
     )  # fmt: skip
     return target / "firmware.elf"
@@ -151,6 +153,121 @@ def test_stm32(tmp_path: Path) -> None:
     board.tick(1)
     _play(board, rate, baud, scan, "table")
     _follow(board.words, boot, scan)
+
+
+H7_RATE = 500_000
+H7_CHANGES: dict[str, object] = {
+    **SMALL,
+    "dac.bits": 20,
+    "dac.v_min": -10.0,
+    "dac.v_max": 10.0,
+    "dac.update_rate_hz": float(H7_RATE),
+    "timing": {**TIMING, "line_rate_hz": H7_RATE / 331},
+}
+H7_POWER_UP = 1 << 19  # 0 V
+
+
+def _h7_play(firmware: Path, scan: PreparedScan) -> list[tuple[int, int, int]]:
+    """Return codes and pixels: an edge of the pin starts the boot scan, another one is uploaded, plays, and parks."""
+    board = Stm32h7Board(firmware, "ad5791")
+    board.tick(1)
+    line = Line(board, baud=460800, tick_hz=H7_RATE)
+    frame = scan.program.schedule.frame_ticks / H7_RATE
+    line.sleep(0.002)
+    with Device(line.open, random=Random(8), sleep=line.sleep) as client:
+        board.raise_trigger()  # ignored: not armed
+        line.sleep(0.1 * frame)
+        client.arm()
+        board.raise_trigger()
+        line.sleep(frame / 3)
+        client.upload(scan.image("table"), timeout_s=20.0)
+        line.sleep(1.3 * frame)
+        status = client.status()
+        client.park()
+        line.sleep(0.1 * frame)
+    assert status.faults == 0
+    assert status.bad_frames == 0
+    # The first tick twice: off, switched on, and then as the model has it.
+    assert board.words[0] == (OFF, OFF)
+    assert board.words[1] == board.words[2]
+    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][2:]
+
+
+def _h7_play_boot(firmware: Path) -> list[tuple[int, int, int]]:
+    """Return codes and pixels of the first lines of the boot scan."""
+    board = Stm32h7Board(firmware, "ad5791")
+    board.tick(1)
+    line = Line(board, baud=460800, tick_hz=H7_RATE)
+    line.sleep(0.002)
+    with Device(line.open, random=Random(8), sleep=line.sleep, timeout_s=0.02) as client:
+        client.arm()
+        board.raise_trigger()
+        line.sleep(2 * 331 / H7_RATE)
+    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][2:]
+
+
+def _h7_follow(played: list[tuple[int, int, int]], boot: PreparedScan, scan: PreparedScan) -> list[int]:
+    requests = [commit(boot.program), start(), commit(scan.program), park]
+    return follow_words(played, requests, H7_POWER_UP, pixels=True)
+
+
+def test_stm32h7(tmp_path: Path) -> None:
+    """Two AD5791 by DMA behind a data cache; codes and pixel clock are those at the converters and at the pin."""
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    _, scan = _scan(tmp_path, "scan", {**H7_CHANGES, "x.size_nm": 40.0})
+    played = _h7_play(_firmware("stm32h7", tmp_path, file, "BAUD=460800"), scan)
+    heard = _h7_follow(played, boot, scan)
+    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    assert sum(pixel for _, _, pixel in played) > 2 * 50 * 4
+    wrong = heard[2] + scan.program.schedule.ticks * 3
+    x, y, pixel = played[wrong]
+    for other in ((x ^ 1, y, pixel), (x, y, 1 - pixel)):  # negative controls
+        with pytest.raises(Differs, match=f"tick {wrong}"):
+            _h7_follow([*played[:wrong], other, *played[wrong + 1 :]], boot, scan)
+
+
+H7_FAULTS = {
+    "no half is cleaned": ("        SCB_DCCMVAC = at;", "        (void)at;"),
+    "received bytes are not invalidated": ("        SCB_DCIMVAC = at;", "        (void)at;"),
+    "the other half is cleaned": ("fill(0, HALF);\n        clean_half(0);", "fill(0, HALF);\n        clean_half(1);"),
+    "the half that plays is filled": (
+        "fill(0, HALF);\n        clean_half(0);",
+        "fill(HALF, HALF);\n        clean_half(1);",
+    ),
+    "half of y is cleaned": ("clean(play.y + half * HALF, HALF * 4)", "clean(play.y + half * HALF, HALF * 2)"),
+    "the pixel clock is not cleaned": ("    clean(play.pixels + half * HALF, HALF * 4);\n", ""),
+    "the pixel clock is that of lines": ("& DAC_PIXEL", "& DAC_LINE"),
+    "y comes a tick early": ("TIM1_CNT = PERIOD - 1;", "TIM1_CNT = 0;"),
+    "SYNC rises early": ("SETTLE = 88", "SETTLE = 0"),
+    "the cache is on before it is invalidated": (
+        "            SCB_DCISW = way << 30 | set << 5;",
+        "            (void)way;",
+    ),
+    "the pin starts nothing": ("    edge = true;", "    edge = false;"),
+    "a line that rests does not wake the link": ("USART3_CR1 = 1u << 4 |", "USART3_CR1 ="),
+    "the outputs stay off": ("play.x[at] = play.y[at] = SPI_CONVERTER.setup[i];", "play.x[at] = play.y[at] = 0;"),
+}
+
+
+@pytest.mark.parametrize("fault", H7_FAULTS)
+def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
+    old, new = H7_FAULTS[fault]
+    ports = tmp_path / "firmware"
+    shutil.copytree(FIRMWARE, ports, ignore=shutil.ignore_patterns("build"))
+    main = ports / "stm32h7" / "main.c"
+    text = main.read_text("ascii")
+    assert text.count(old) == 1
+    main.write_text(text.replace(old, new), "ascii")
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", ports=ports)
+    with pytest.raises((Differs, LinkError, AssertionError)):
+        follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, pixels=True)
+
+
+def test_the_stm32h7_port_without_a_fault_is_right(tmp_path: Path) -> None:
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800")
+    follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, pixels=True)
 
 
 # Arduino: the recipe of the README, with Arduino's builder, core and libraries.
