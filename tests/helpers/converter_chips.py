@@ -5,7 +5,7 @@ should send, and has a code at each output, straight binary, or None while the o
 headers.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 Codes = tuple[int | None, ...]
 
@@ -205,6 +205,19 @@ class Board:
         """Take LDAC of all chips to low."""
         for chip in self.chips:
             chip.load()
+
+    def play(self, frames: Sequence[int], setups: int) -> Iterator[Codes]:
+        """Yield the codes of x and y after ``dac_spi_start`` of both outputs, and after each pair of frames."""
+        begin = 2 + setups
+        for index, frame in enumerate(frames[: 2 * begin]):
+            self.take(index // begin, frame)
+            self.load()
+        yield self.codes()
+        for at in range(2 * begin, len(frames) - 1, 2):
+            self.take(0, frames[at])
+            self.take(1, frames[at + 1])
+            self.load()
+            yield self.codes()
 
     def codes(self) -> Codes:
         """Return the codes of x and y."""

@@ -18,10 +18,12 @@ from random import Random
 
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, run_warned, tool, write_variant
+from converter_chips import Board as Converters
 from converter_words import commit, follow_words, park, start
 from following import Differs
 from limits import PATIENCE_S
 from link_line import FarEnd, Line
+from link_qemu import LinkMachine
 from pipe_board import PipeBoard
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
@@ -208,7 +210,7 @@ def _h7_play_boot(firmware: Path) -> list[tuple[int, int, int]]:
 
 def _h7_follow(played: list[tuple[int, int, int]], boot: PreparedScan, scan: PreparedScan) -> list[int]:
     requests = [commit(boot.program), start(), commit(scan.program), park]
-    return follow_words(played, requests, H7_POWER_UP, pixels=True)
+    return follow_words(played, requests, H7_POWER_UP, codes=True, pixels=True)
 
 
 def test_stm32h7(tmp_path: Path) -> None:
@@ -261,13 +263,76 @@ def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> Non
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
     firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", ports=ports)
     with pytest.raises((Differs, LinkError, AssertionError)):
-        follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, pixels=True)
+        follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True, pixels=True)
 
 
 def test_the_stm32h7_port_without_a_fault_is_right(tmp_path: Path) -> None:
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
     firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800")
-    follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, pixels=True)
+    follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True, pixels=True)
+
+
+# The reference firmware in QEMU, whose log is what SPI of a converter is sent.
+
+QEMU_CONVERTERS = {
+    "ad5764": ("lm3s6965evb", {"dac.coding": "twos-complement"}, 1),
+    "ad5781": ("mps2_an386", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 2),
+}
+
+
+@pytest.mark.parametrize("converter", QEMU_CONVERTERS)
+def test_frames_of_a_converter_in_qemu(converter: str, tmp_path: Path) -> None:
+    """From an upload to the codes at the converter, which its model reads from the bytes of the frames."""
+    board, table, chips = QEMU_CONVERTERS[converter]
+    rate = 20_000
+    changes = {
+        **SMALL,
+        "dac.v_min": -10.0,
+        "dac.v_max": 10.0,
+        **table,
+        "dac.update_rate_hz": float(rate),
+        "timing": {**TIMING, "line_rate_hz": rate / 331},
+    }
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    executable = _firmware(
+        "cortex_m", tmp_path, file, f"BOARD={board}", "CONTROL=link", "DAC=frames", f"CONVERTER={converter}"
+    )
+    log = bytearray()
+    frame_bytes = 6 * scan.program.schedule.frame_ticks
+
+    with LinkMachine(board.replace("_", "-"), executable) as machine:
+
+        def wait(octets: int) -> None:
+            until = time.monotonic() + PATIENCE_S
+            log.extend(machine.octets())
+            end = len(log) + octets
+            while len(log) < end:
+                assert time.monotonic() < until, "QEMU does not get there"
+                time.sleep(0.01)
+                log.extend(machine.octets())
+
+        with Device(machine.url, timeout_s=PATIENCE_S) as client:
+            client.arm()
+            client.trigger()
+            wait(frame_bytes // 2)
+            client.upload(scan.image("fourier"), timeout_s=PATIENCE_S)
+            wait(frame_bytes * 3)  # part of it was in buffers before
+            status = client.status()
+            client.park()
+            wait(frame_bytes // 4)
+    assert status.faults == 0
+    frames = [int.from_bytes(log[at : at + 3], "big") for at in range(0, len(log) - 2, 3)]
+    seen = Converters(converter).play(frames, 1 if chips == 2 else 0)
+    codes = [(x, y) for x, y in seen if x is not None and y is not None][1:]  # the first is that of the start
+    assert len(codes) == len(frames) // 2 - (3 if chips == 2 else 2)
+    requests = [commit(boot.program), start(), commit(scan.program), park]
+    heard = follow_words(codes, requests, codes=True)
+    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    wrong = heard[2] + scan.program.schedule.ticks * 3
+    changed = [*codes[:wrong], (codes[wrong][0] ^ 1, codes[wrong][1]), *codes[wrong + 1 :]]
+    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
+        follow_words(changed, requests, codes=True)
 
 
 # Arduino: the recipe of the README, with Arduino's builder, core and libraries.

@@ -7,7 +7,6 @@ this machine and on MIPS, whose byte order is the other one, as bytes and as num
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from subprocess import run as start
 
@@ -108,19 +107,9 @@ def sent(
     return frames
 
 
-def outputs(name: str, frames: list[int], ticks: int) -> Iterator[Codes]:
-    """Yield the codes at the outputs after the start, and after each tick of two frames and LDAC."""
-    board = Board(name)
-    begun, played = frames[: -2 * ticks], frames[-2 * ticks :]
-    for index, frame in enumerate(begun):
-        board.take(index // (len(begun) // 2), frame)
-        board.load()
-    yield board.codes()
-    for tick in range(ticks):
-        for output in (0, 1):
-            board.take(output, played[2 * tick + output])
-        board.load()
-        yield board.codes()
+def outputs(name: str, frames: list[int], ticks: int) -> list[Codes]:
+    """Return the codes at the outputs after the start, and after each tick of two frames and LDAC."""
+    return list(Board(name).play(frames, len(frames) // 2 - ticks - 2))
 
 
 @pytest.fixture(scope="module", params=CONVERTERS)
@@ -146,7 +135,7 @@ def test_a_converter_has_the_codes_of_the_model(
 ) -> None:
     name, codes, words = played
     frames = sent(compiled(tmp_path, name), name, words)
-    assert list(outputs(name, frames, len(codes))) == [codes[0], *codes]
+    assert outputs(name, frames, len(codes)) == [codes[0], *codes]
 
 
 @pytest.mark.rest
@@ -157,7 +146,7 @@ def test_a_converter_has_the_codes_of_the_model_from_mips(
     name, codes, words = played
     program = compiled(tmp_path, name, compiler="mips-linux-gnu-gcc")
     frames = sent(program, name, words, "qemu-mips", "big")
-    assert list(outputs(name, frames, len(codes))) == [codes[0], *codes]
+    assert outputs(name, frames, len(codes)) == [codes[0], *codes]
 
 
 def output_of(name: str) -> Output:
@@ -184,7 +173,7 @@ def test_any_codes_arrive(program_of: tuple[str, Path], shares: list[tuple[float
     output = output_of(name)
     codes = [(int(x * output.code_max), int(y * output.code_max)) for x, y in shares]
     words = [(int(output.word(x)), int(output.word(y))) for x, y in codes]
-    assert list(outputs(name, sent(program, name, words), len(codes))) == [codes[0], *codes]
+    assert outputs(name, sent(program, name, words), len(codes)) == [codes[0], *codes]
 
 
 @pytest.mark.common
@@ -195,7 +184,7 @@ def test_frames_of_32_bits(tmp_path: Path) -> None:
     program = compiled(tmp_path, "ltc2668", text.replace("    24, 16,", "    32, 16,"))
     words = [(0, 0xFFFF), (0x8000, 0x7FFF), (0x1234, 0xEDCB)]
     frames = sent(program, "ltc2668", words)
-    assert list(outputs("ltc2668", frames, 3)) == [words[0], *words]
+    assert outputs("ltc2668", frames, 3) == [words[0], *words]
 
 
 @pytest.mark.common
@@ -256,7 +245,7 @@ def right(name: str, program: Path) -> bool:
         sign = 1 << output.word_bits - 1
         words = [(x | -(x & sign) & 0xFFFFFFFF, y | -(y & sign) & 0xFFFFFFFF) for x, y in words]
     try:
-        return list(outputs(name, sent(program, name, words), len(codes))) == [codes[0], *codes]
+        return outputs(name, sent(program, name, words), len(codes)) == [codes[0], *codes]
     except AssertionError:
         return False  # the converter takes no such frame
 
