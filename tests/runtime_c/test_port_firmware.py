@@ -195,9 +195,9 @@ def _h7_play(firmware: Path, scan: PreparedScan) -> list[tuple[int, int, int]]:
     return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][2:]
 
 
-def _h7_play_boot(firmware: Path) -> list[tuple[int, int, int]]:
-    """Return codes and pixels of the first lines of the boot scan."""
-    board = Stm32h7Board(firmware, "ad5791")
+def _h7_play_boot(firmware: Path, converter: str = "ad5791", setups: int = 1) -> list[tuple[int, int, int]]:
+    """Return codes and pixels of the first lines of the boot scan, without those before the end of the set-up."""
+    board = Stm32h7Board(firmware, converter)
     board.tick(1)
     line = Line(board, baud=460800, tick_hz=H7_RATE)
     line.sleep(0.002)
@@ -205,7 +205,8 @@ def _h7_play_boot(firmware: Path) -> list[tuple[int, int, int]]:
         client.arm()
         board.raise_trigger()
         line.sleep(2 * 331 / H7_RATE)
-    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][2:]
+    assert board.words[0] == (OFF, OFF)
+    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][1 + setups :]
 
 
 def _h7_follow(played: list[tuple[int, int, int]], boot: PreparedScan, scan: PreparedScan) -> list[int]:
@@ -266,10 +267,22 @@ def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> Non
         follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True, pixels=True)
 
 
-def test_the_stm32h7_port_without_a_fault_is_right(tmp_path: Path) -> None:
-    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
-    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800")
-    follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True, pixels=True)
+@pytest.mark.parametrize(
+    ("converter", "table", "setups"),
+    [
+        ("ad5791", {}, 1),
+        ("ad5781", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 1),
+        ("ad5761", {"dac.bits": 16}, 2),
+    ],
+)
+def test_a_converter_of_the_stm32h7_port(converter: str, table: dict[str, object], setups: int, tmp_path: Path) -> None:
+    changes = {**H7_CHANGES, **table}
+    file, boot = _scan(tmp_path, "boot", changes)
+    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", f"CONVERTER={converter}")
+    played = _h7_play_boot(firmware, converter, setups)
+    power_up = 1 << int(str(changes["dac.bits"])) - 1
+    heard = follow_words(played, [commit(boot.program), start()], power_up, codes=True, pixels=True)
+    assert len(played) - heard[1] > 331
 
 
 # The reference firmware in QEMU, whose log is what SPI of a converter is sent.

@@ -288,6 +288,41 @@ def test_the_verilog_takes_the_same_frames() -> None:
         assert int(second[1] if second else "0", 16) == b, name
 
 
+@pytest.mark.parametrize("name", CONVERTERS)
+def test_constants_of_a_converter_are_those_of_its_table(name: str) -> None:
+    text = described(name)[0]
+    constants = dict(re.findall(rf"{name}_(\w+) = (\d+)", text))
+    output = output_of(name)
+    frame_bits, word_bits = values(text)[:2]
+    assert constants == {
+        "frame_bits": str(frame_bits),
+        "bits": str(output.dac_bits),
+        "word_bits": str(word_bits),
+        "twos_complement": str(int(output.coding == "twos-complement")),
+    }
+    assert word_bits == output.word_bits
+
+
+@pytest.mark.common
+def test_a_scan_for_another_converter_is_known(tmp_path: Path) -> None:
+    """The words fit or not: bits, bits of the word, two's complement, left-aligned."""
+    cases = {
+        "ad5781": [(18, 20, 0, 1, 1), (18, 20, 0, 0, 0), (20, 20, 0, 0, 0), (16, 20, 0, 1, 1), (18, 20, 1, 1, 0)],
+        "ad5764": [(16, 16, 1, 0, 1), (16, 16, 0, 0, 0), (12, 12, 1, 0, 0), (12, 16, 1, 1, 1), (12, 16, 1, 0, 0)],
+        "mcp4922": [(12, 12, 0, 0, 1), (16, 16, 0, 0, 0)],
+    }
+    names = ("DAC_BITS", "DAC_WORD_BITS", "DAC_TWOS_COMPLEMENT", "DAC_LEFT_ALIGNED")
+    lines = [f'#include "{name}.h"' for name in cases]
+    for name, rows in cases.items():
+        for at, (*scan, fits) in enumerate(rows):
+            axis = f"{name.upper()}_{at}"
+            lines += [f"#define {axis}_{key} {value}" for key, value in zip(names, scan, strict=True)]
+            lines.append(f"typedef char {name}_{at}[DAC_SPI_FITS({name}, {axis}) == {fits} ? 1 : -1];")
+    (tmp_path / "fits.c").write_text("\n".join([*lines, "int main(void) { return 0; }", ""]), "ascii")
+    includes = [f"-I{FOLDER}", *(f"-I{path}" for path in RUNTIME)]
+    run_clean(["gcc", "-std=c99", *includes, "-fsyntax-only", tmp_path / "fits.c"])
+
+
 def test_every_converter_is_modelled_and_listed() -> None:
     assert set(CHIPS) == set(CONVERTERS)
     table = (REPOSITORY / "docs" / "c.md").read_text("utf-8")

@@ -22,5 +22,6 @@ static const dac_spi_converter ad5761 = {
     {UINT32_C(0x010000), UINT32_C(0x010000)},
     2, {UINT32_C(0x0F0000), UINT32_C(0x040208)}
 };
+enum { ad5761_frame_bits = 24, ad5761_bits = 16, ad5761_word_bits = 16, ad5761_twos_complement = 0 };
 
 #endif

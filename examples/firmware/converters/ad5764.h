@@ -19,5 +19,6 @@ static const dac_spi_converter ad5764 = {
     {UINT32_C(0x100000), UINT32_C(0x110000)},
     0, {0, 0}
 };
+enum { ad5764_frame_bits = 24, ad5764_bits = 16, ad5764_word_bits = 16, ad5764_twos_complement = 1 };
 
 #endif

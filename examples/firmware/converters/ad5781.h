@@ -19,5 +19,6 @@ static const dac_spi_converter ad5781 = {
     {UINT32_C(0x100000), UINT32_C(0x100000)},
     1, {UINT32_C(0x200312), 0}
 };
+enum { ad5781_frame_bits = 24, ad5781_bits = 18, ad5781_word_bits = 20, ad5781_twos_complement = 0 };
 
 #endif

@@ -21,5 +21,6 @@ static const dac_spi_converter ad5791 = {
     {UINT32_C(0x100000), UINT32_C(0x100000)},
     1, {UINT32_C(0x200312), 0}
 };
+enum { ad5791_frame_bits = 24, ad5791_bits = 20, ad5791_word_bits = 20, ad5791_twos_complement = 0 };
 
 #endif

@@ -21,5 +21,6 @@ static const dac_spi_converter dac8562 = {
     {UINT32_C(0x000000), UINT32_C(0x010000)},
     1, {UINT32_C(0x380001), 0}
 };
+enum { dac8562_frame_bits = 24, dac8562_bits = 16, dac8562_word_bits = 16, dac8562_twos_complement = 0 };
 
 #endif

@@ -20,5 +20,6 @@ static const dac_spi_converter ltc2668 = {
     {UINT32_C(0x000000), UINT32_C(0x010000)},
     1, {UINT32_C(0xE00003), 0}
 };
+enum { ltc2668_frame_bits = 24, ltc2668_bits = 16, ltc2668_word_bits = 16, ltc2668_twos_complement = 0 };
 
 #endif

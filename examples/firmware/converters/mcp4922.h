@@ -16,5 +16,6 @@ static const dac_spi_converter mcp4922 = {
     {UINT32_C(0x3000), UINT32_C(0xB000)},
     0, {0, 0}
 };
+enum { mcp4922_frame_bits = 16, mcp4922_bits = 12, mcp4922_word_bits = 12, mcp4922_twos_complement = 0 };
 
 #endif

@@ -27,6 +27,13 @@ typedef struct dac_spi_converter {
     uint32_t setup[2];      /* after power-up, between two frames of the first word: dac_spi_start() */
 } dac_spi_converter;
 
+/* Whether the words of an axis of a scan are those of a converter, a constant: DAC_SPI_FITS(ad5791, ANNEXIN_200NM_X). A
+ * scan with fewer bits than the converter is left-aligned. */
+#define DAC_SPI_FITS(converter, AXIS) DAC_SPI_FITS_OF(converter, AXIS)
+#define DAC_SPI_FITS_OF(converter, AXIS)                                                                              \
+    (AXIS##_DAC_WORD_BITS == converter##_word_bits && AXIS##_DAC_TWOS_COMPLEMENT == converter##_twos_complement       \
+     && AXIS##_DAC_BITS <= converter##_bits && (AXIS##_DAC_LEFT_ALIGNED || AXIS##_DAC_BITS == AXIS##_DAC_WORD_BITS))
+
 /* The frame of a word. output: 0 for A, 1 for B. A word in two's complement may have its sign above word_bits. */
 static inline uint32_t dac_spi_frame(const dac_spi_converter *converter, unsigned output, uint32_t word)
 {

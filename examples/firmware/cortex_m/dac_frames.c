@@ -3,9 +3,14 @@
  * after each frame, and LDAC falls after each pair. */
 #include "board.h"
 #include "dac.h"
+#include "names.h"
 #include CONVERTER_HEADER
+#include SCAN_HEADER
 
 enum { RING = 4096, MOST = 12 * 4 }; /* bytes: a power of two; of the first sample, at most */
+
+typedef char the_scan_has_words_of_the_converter[DAC_SPI_FITS(SPI_CONVERTER, CONSTANT(_X))
+                                                 && DAC_SPI_FITS(SPI_CONVERTER, CONSTANT(_Y)) ? 1 : -1];
 
 static uint8_t ring[RING];
 static volatile uint32_t head, tail; /* written by the interrupt, and by the main loop */

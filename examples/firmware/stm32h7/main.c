@@ -17,13 +17,16 @@
 
 enum { HALF = 128, TIMER_HZ = 200000000, UART_HZ = 100000000, SPI_COUNTS = 8 }; /* of the timer, for a bit */
 enum { PERIOD = TIMER_HZ / UPDATE_RATE_HZ };
-enum { FRAME_BITS = 24 };
+enum { FRAME_BITS = JOIN(SPI_CONVERTER, _frame_bits) };
 enum { Y_COUNT = 4, SETTLE = 88, LDAC_WAIT = 20, LDAC_WIDTH = 40 }; /* counts: see start_timer() */
 enum { RECEIVED = 256 }; /* bytes: at half of them, and when the line rests, they go to the link */
 enum { X_STREAM, Y_STREAM, PIXEL_STREAM, RECEIVE_STREAM };
 enum { LOWER = 0x80 };   /* priority of interrupts that must not interrupt each other */
 
 typedef char a_tick_has_room[PERIOD >= FRAME_BITS * SPI_COUNTS + SETTLE + LDAC_WAIT + LDAC_WIDTH ? 1 : -1];
+typedef char a_frame_is_no_half_word[FRAME_BITS > 16 ? 1 : -1];
+typedef char the_scan_has_words_of_the_converter[DAC_SPI_FITS(SPI_CONVERTER, CONSTANT(_X))
+                                                 && DAC_SPI_FITS(SPI_CONVERTER, CONSTANT(_Y)) ? 1 : -1];
 typedef char the_counter_has_room[PERIOD < 65536 ? 1 : -1];
 typedef char halves_are_whole_lines[HALF * 4 % CACHE_LINE == 0 && RECEIVED % CACHE_LINE == 0 ? 1 : -1];
 
@@ -319,8 +322,7 @@ int main(void)
 {
     start_clocks();
     start_caches();
-    const bool good = SPI_CONVERTER.frame_bits == FRAME_BITS
-                   && dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && control_start();
+    const bool good = dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && control_start();
     fill_first();
     start_converters();
     start_uart();
