@@ -1,7 +1,7 @@
 """An STM32H743 with the firmware of ``examples/firmware/stm32h7``, two converters at its pins, and its data cache.
 
 unicorn has the processor; the model has RCC, PWR, TIM1, SPI 1 and 2, USART 3, four streams of DMA 1 with their
-multiplexer, a line of EXTI, and interrupts, written from ST's RM0433. What the firmware does not use is not there: a
+multiplexer, a line of EXTI, and interrupts, as ST's RM0433 names them. What the firmware does not use is not there: a
 register without a meaning here keeps what is written.
 
 **Cache.** No emulator has one. Here the processor and DMA see memories of their own from the moment that the cache is

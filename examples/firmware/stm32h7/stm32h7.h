@@ -1,5 +1,6 @@
-/* The registers that this firmware uses, from ST's reference manual RM0433 (STM32H742, 743, 750, 753): addresses from
- * the memory map (table 8), bits from the register chapters named below. */
+/* The registers that this firmware uses, under the names of ST's reference manual RM0433 (STM32H742, 743, 750, 753).
+ * Compared with ST's stm32h743xx.h: the places of RCC, EXTI, SYSCFG and GPIO, and the bits of TIM1_BDTR; with public
+ * drivers: the numbers of DMA requests, and the bits of SPI. The manual itself was not at hand: compare the rest. */
 #ifndef STM32H7_H
 #define STM32H7_H
 
@@ -56,7 +57,7 @@ enum { SPI1 = 0x40013000, SPI2 = 0x40003800 };
 #define SPI_CFG1(unit) REGISTER((unit) + 0x08)
 #define SPI_CFG2(unit) REGISTER((unit) + 0x0C)
 #define SPI_TXDR_ADDRESS(unit) ((uint32_t)(unit) + 0x20)
-/* DMA controller 1 and its request multiplexer: stream n has channel n, numbers of requests in table 121 */
+/* DMA controller 1 and its request multiplexer: stream n has channel n */
 #define DMA1_LISR REGISTER(0x40020000)
 #define DMA1_LIFCR REGISTER(0x40020008)
 #define DMA1_CR(stream) REGISTER(0x40020010 + 0x18 * (stream))
