@@ -2,6 +2,8 @@
 #
 #     make SCAN=scan.toml BAUD=460800 CFLAGS=-O3
 #
+# CONVERTER is a file of converters/, for ports that send its frames: SPI_CONVERTER in C.
+#
 # A port sets OWN, CPU, LINK (where everything goes) and BOARD_FLAGS before it includes this, and PRIVATELY, which stands
 # in front of commands whose output others must not read.
 CROSS ?= arm-none-eabi-gcc
@@ -23,6 +25,7 @@ OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(pat
 COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
     -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
+    $(if $(CONVERTER),-I../converters -DSPI_CONVERTER=$(CONVERTER) -DCONVERTER_HEADER='"$(CONVERTER).h"') \
     $($(BUILD)/scan_CPPFLAGS) -DDAC_COMMIT_MODES=1 -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
 
 $(BUILD)/firmware.elf: $(OBJECTS) $(LINK_FILES)

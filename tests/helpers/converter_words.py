@@ -41,13 +41,21 @@ def _state(model: Sequencer, heard: int) -> tuple[object, ...]:
     return heard, model.codes, *programs, *place
 
 
-def follow_words(words: Iterable[tuple[int, int]], requests: Sequence[Request]) -> list[int]:
-    """Hold words of x and y against a device that powers up at codes 0, and hears the requests in this order.
+def follow_words(
+    words: Iterable[tuple[int, ...]],
+    requests: Sequence[Request],
+    power_up: int = 0,
+    *,
+    codes: bool = False,
+    pixels: bool = False,
+) -> list[int]:
+    """Hold words of x and y against a device that powers up at these codes, and hears the requests in this order.
 
-    Returns the tick on which each was heard, the first one where several fit. Raises ``Differs`` at the first word that
-    the model cannot have, and if not all requests were heard.
+    With ``codes`` they are the codes at the outputs, not the words. With ``pixels`` the third of each tick is whether
+    it began a pixel. Returns the tick on which each was heard, the first one where several fit. Raises ``Differs`` at
+    the first word that the model cannot have, and if not all requests were heard.
     """
-    tries: list[tuple[Sequencer, list[int]]] = [(Sequencer(None, codes=(0, 0)), [])]
+    tries: list[tuple[Sequencer, list[int]]] = [(Sequencer(None, codes=(power_up, power_up)), [])]
     at = 0
     for at, word in enumerate(words):
         goes_on: dict[tuple[object, ...], tuple[Sequencer, list[int]]] = {}
@@ -55,7 +63,7 @@ def follow_words(words: Iterable[tuple[int, int]], requests: Sequence[Request]) 
             model = before
             for number in range(len(heard), len(requests) + 1):
                 trial = copy(model)
-                if _word(trial) == word:
+                if _tick(trial, codes)[: 3 if pixels else 2] == word:
                     ticks = [*heard, *[at] * (number - len(heard))]
                     goes_on.setdefault(_state(trial, number), (trial, ticks))
                 if number < len(requests):
@@ -71,9 +79,9 @@ def follow_words(words: Iterable[tuple[int, int]], requests: Sequence[Request]) 
     raise Differs(f"not all of {len(requests)} requests were heard in {at + 1} ticks")
 
 
-def _word(model: Sequencer) -> tuple[int, int]:
-    """What its next tick puts out."""
+def _tick(model: Sequencer, codes: bool) -> tuple[int, int, int]:
+    """What its next tick puts out, and whether it begins a pixel."""
     tick = model.step()
-    if model.playing is None:
-        return tick.x, tick.y
-    return int(model.playing.x.output.word(tick.x)), int(model.playing.y.output.word(tick.y))
+    if codes or model.playing is None:
+        return tick.x, tick.y, tick.pixel
+    return int(model.playing.x.output.word(tick.x)), int(model.playing.y.output.word(tick.y)), tick.pixel

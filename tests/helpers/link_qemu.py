@@ -108,6 +108,12 @@ class LinkMachine:
             whole, _, self._text = self._text.rpartition(b"\n")
         return [PlayedLine.parse(line[-_RECORD:]) for line in whole.decode("ascii").splitlines()]
 
+    def octets(self) -> bytes:
+        """Those that were logged since the last call, of a log that is not text."""
+        with self._lock:
+            octets, self._text = self._text, b""
+        return octets
+
     def wait_for(self, good: Callable[[PlayedLine], bool], followed: Callable[[list[PlayedLine]], None]) -> None:
         """Until a line is good; all lines are followed."""
         until = time.monotonic() + PATIENCE_S

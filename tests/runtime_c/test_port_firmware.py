@@ -18,16 +18,20 @@ from random import Random
 
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, run_warned, tool, write_variant
+from converter_chips import Board as Converters
 from converter_words import commit, follow_words, park, start
 from following import Differs
 from limits import PATIENCE_S
 from link_line import FarEnd, Line
+from link_qemu import LinkMachine
 from pipe_board import PipeBoard
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
+from stm32h7_board import OFF, Stm32h7Board
 
 from tablegen.config.load import load
 from tablegen.link.device import Device
+from tablegen.link.errors import LinkError
 from tablegen.link.prepare import PreparedScan
 from tablegen.planning.line_plan import make_plan
 from tablegen.verification.c.elf import read_executable
@@ -52,10 +56,10 @@ def _scan(folder: Path, name: str, changes: dict[str, object]) -> tuple[Path, Pr
     return file, PreparedScan.of_plan(make_plan(load(file)))
 
 
-def _firmware(port: str, folder: Path, scan: Path, *more: str) -> Path:
+def _firmware(port: str, folder: Path, scan: Path, *more: str, ports: Path = FIRMWARE) -> Path:
     target = folder / port
     run_warned(
-        ["make", "-C", FIRMWARE / port, f"SCAN={scan}", f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen",
+        ["make", "-C", ports / port, f"SCAN={scan}", f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen",
          *more]
     )  # fmt: skip
     return target / "firmware.elf"
@@ -151,6 +155,197 @@ def test_stm32(tmp_path: Path) -> None:
     board.tick(1)
     _play(board, rate, baud, scan, "table")
     _follow(board.words, boot, scan)
+
+
+H7_RATE = 500_000
+H7_CHANGES: dict[str, object] = {
+    **SMALL,
+    "dac.bits": 20,
+    "dac.v_min": -10.0,
+    "dac.v_max": 10.0,
+    "dac.update_rate_hz": float(H7_RATE),
+    "timing": {**TIMING, "line_rate_hz": H7_RATE / 331},
+}
+H7_POWER_UP = 1 << 19  # 0 V
+
+
+def _h7_play(firmware: Path, scan: PreparedScan) -> list[tuple[int, int, int]]:
+    """Return codes and pixels: an edge of the pin starts the boot scan, another one is uploaded, plays, and parks."""
+    board = Stm32h7Board(firmware, "ad5791")
+    board.tick(1)
+    line = Line(board, baud=460800, tick_hz=H7_RATE)
+    frame = scan.program.schedule.frame_ticks / H7_RATE
+    line.sleep(0.002)
+    with Device(line.open, random=Random(8), sleep=line.sleep) as client:
+        board.raise_trigger()  # ignored: not armed
+        line.sleep(0.1 * frame)
+        client.arm()
+        board.raise_trigger()
+        line.sleep(frame / 3)
+        client.upload(scan.image("table"), timeout_s=20.0)
+        line.sleep(1.3 * frame)
+        status = client.status()
+        client.park()
+        line.sleep(0.1 * frame)
+    assert status.faults == 0
+    assert status.bad_frames == 0
+    # The first tick twice: off, switched on, and then as the model has it.
+    assert board.words[0] == (OFF, OFF)
+    assert board.words[1] == board.words[2]
+    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][2:]
+
+
+def _h7_play_boot(firmware: Path, converter: str = "ad5791", setups: int = 1) -> list[tuple[int, int, int]]:
+    """Return codes and pixels of the first lines of the boot scan, without those before the end of the set-up."""
+    board = Stm32h7Board(firmware, converter)
+    board.tick(1)
+    line = Line(board, baud=460800, tick_hz=H7_RATE)
+    line.sleep(0.002)
+    with Device(line.open, random=Random(8), sleep=line.sleep, timeout_s=0.02) as client:
+        client.arm()
+        board.raise_trigger()
+        line.sleep(2 * 331 / H7_RATE)
+    assert board.words[0] == (OFF, OFF)
+    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][1 + setups :]
+
+
+def _h7_follow(played: list[tuple[int, int, int]], boot: PreparedScan, scan: PreparedScan) -> list[int]:
+    requests = [commit(boot.program), start(), commit(scan.program), park]
+    return follow_words(played, requests, H7_POWER_UP, codes=True, pixels=True)
+
+
+def test_stm32h7(tmp_path: Path) -> None:
+    """Two AD5791 by DMA behind a data cache; codes and pixel clock are those at the converters and at the pin."""
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    _, scan = _scan(tmp_path, "scan", {**H7_CHANGES, "x.size_nm": 40.0})
+    played = _h7_play(_firmware("stm32h7", tmp_path, file, "BAUD=460800"), scan)
+    heard = _h7_follow(played, boot, scan)
+    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    assert sum(pixel for _, _, pixel in played) > 2 * 50 * 4
+    wrong = heard[2] + scan.program.schedule.ticks * 3
+    x, y, pixel = played[wrong]
+    for other in ((x ^ 1, y, pixel), (x, y, 1 - pixel)):  # negative controls
+        with pytest.raises(Differs, match=f"tick {wrong}"):
+            _h7_follow([*played[:wrong], other, *played[wrong + 1 :]], boot, scan)
+
+
+H7_FAULTS = {
+    "no half is cleaned": ("        SCB_DCCMVAC = at;", "        (void)at;"),
+    "received bytes are not invalidated": ("        SCB_DCIMVAC = at;", "        (void)at;"),
+    "the other half is cleaned": ("fill(0, HALF);\n        clean_half(0);", "fill(0, HALF);\n        clean_half(1);"),
+    "the half that plays is filled": (
+        "fill(0, HALF);\n        clean_half(0);",
+        "fill(HALF, HALF);\n        clean_half(1);",
+    ),
+    "half of y is cleaned": ("clean(play.y + half * HALF, HALF * 4)", "clean(play.y + half * HALF, HALF * 2)"),
+    "the pixel clock is not cleaned": ("    clean(play.pixels + half * HALF, HALF * 4);\n", ""),
+    "the pixel clock is that of lines": ("& DAC_PIXEL", "& DAC_LINE"),
+    "y comes a tick early": ("TIM1_CNT = PERIOD - 1;", "TIM1_CNT = 0;"),
+    "SYNC rises early": ("SETTLE = 88", "SETTLE = 0"),
+    "the cache is on before it is invalidated": (
+        "            SCB_DCISW = way << 30 | set << 5;",
+        "            (void)way;",
+    ),
+    "the pin starts nothing": ("    edge = true;", "    edge = false;"),
+    "a line that rests does not wake the link": ("USART3_CR1 = 1u << 4 |", "USART3_CR1 ="),
+    "the outputs stay off": ("play.x[at] = play.y[at] = SPI_CONVERTER.setup[i];", "play.x[at] = play.y[at] = 0;"),
+}
+
+
+@pytest.mark.parametrize("fault", H7_FAULTS)
+def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
+    old, new = H7_FAULTS[fault]
+    ports = tmp_path / "firmware"
+    shutil.copytree(FIRMWARE, ports, ignore=shutil.ignore_patterns("build"))
+    main = ports / "stm32h7" / "main.c"
+    text = main.read_text("ascii")
+    assert text.count(old) == 1
+    main.write_text(text.replace(old, new), "ascii")
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", ports=ports)
+    with pytest.raises((Differs, LinkError, AssertionError)):
+        follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True, pixels=True)
+
+
+@pytest.mark.parametrize(
+    ("converter", "table", "setups"),
+    [
+        ("ad5791", {}, 1),
+        ("ad5781", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 1),
+        ("ad5761", {"dac.bits": 16}, 2),
+    ],
+)
+def test_a_converter_of_the_stm32h7_port(converter: str, table: dict[str, object], setups: int, tmp_path: Path) -> None:
+    changes = {**H7_CHANGES, **table}
+    file, boot = _scan(tmp_path, "boot", changes)
+    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", f"CONVERTER={converter}")
+    played = _h7_play_boot(firmware, converter, setups)
+    power_up = 1 << int(str(changes["dac.bits"])) - 1
+    heard = follow_words(played, [commit(boot.program), start()], power_up, codes=True, pixels=True)
+    assert len(played) - heard[1] > 331
+
+
+# The reference firmware in QEMU, whose log is what SPI of a converter is sent.
+
+QEMU_CONVERTERS = {
+    "ad5764": ("lm3s6965evb", {"dac.coding": "twos-complement"}, 1),
+    "ad5781": ("mps2_an386", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 2),
+}
+
+
+@pytest.mark.parametrize("converter", QEMU_CONVERTERS)
+def test_frames_of_a_converter_in_qemu(converter: str, tmp_path: Path) -> None:
+    """From an upload to the codes at the converter, which its model reads from the bytes of the frames."""
+    board, table, chips = QEMU_CONVERTERS[converter]
+    rate = 20_000
+    changes = {
+        **SMALL,
+        "dac.v_min": -10.0,
+        "dac.v_max": 10.0,
+        **table,
+        "dac.update_rate_hz": float(rate),
+        "timing": {**TIMING, "line_rate_hz": rate / 331},
+    }
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    executable = _firmware(
+        "cortex_m", tmp_path, file, f"BOARD={board}", "CONTROL=link", "DAC=frames", f"CONVERTER={converter}"
+    )
+    log = bytearray()
+    frame_bytes = 6 * scan.program.schedule.frame_ticks
+
+    with LinkMachine(board.replace("_", "-"), executable) as machine:
+
+        def wait(octets: int) -> None:
+            until = time.monotonic() + PATIENCE_S
+            log.extend(machine.octets())
+            end = len(log) + octets
+            while len(log) < end:
+                assert time.monotonic() < until, "QEMU does not get there"
+                time.sleep(0.01)
+                log.extend(machine.octets())
+
+        with Device(machine.url, timeout_s=PATIENCE_S) as client:
+            client.arm()
+            client.trigger()
+            wait(frame_bytes // 2)
+            client.upload(scan.image("fourier"), timeout_s=PATIENCE_S)
+            wait(frame_bytes * 3)  # part of it was in buffers before
+            status = client.status()
+            client.park()
+            wait(frame_bytes // 4)
+    assert status.faults == 0
+    frames = [int.from_bytes(log[at : at + 3], "big") for at in range(0, len(log) - 2, 3)]
+    seen = Converters(converter).play(frames, 1 if chips == 2 else 0)
+    codes = [(x, y) for x, y in seen if x is not None and y is not None][1:]  # the first is that of the start
+    assert len(codes) == len(frames) // 2 - (3 if chips == 2 else 2)
+    requests = [commit(boot.program), start(), commit(scan.program), park]
+    heard = follow_words(codes, requests, codes=True)
+    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    wrong = heard[2] + scan.program.schedule.ticks * 3
+    changed = [*codes[:wrong], (codes[wrong][0] ^ 1, codes[wrong][1]), *codes[wrong + 1 :]]
+    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
+        follow_words(changed, requests, codes=True)
 
 
 # Arduino: the recipe of the README, with Arduino's builder, core and libraries.

@@ -1,21 +1,30 @@
-"""Frames of examples/firmware/converters, as models of the converters, written from their data sheets, read them."""
+"""Frames of examples/firmware/converters, read by models of the converters (``converter_chips``).
+
+The models have the codes of the integer model: of a scan, and of any codes that hypothesis finds. Frames are made on
+this machine and on MIPS, whose byte order is the other one, as bytes and as numbers of 16 or 32 bits.
+"""
 
 import re
+import sys
 import tomllib
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from subprocess import run as start
 
 import pytest
-from building import REPOSITORY, Variant, build, run_clean
+from building import REPOSITORY, Variant, build, run_clean, tool
+from converter_chips import CHIPS, Board, Codes
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.played_lines import play_line
+from tablegen.fixedpoint.output import Output
 
 FOLDER = REPOSITORY / "examples" / "firmware" / "converters"
 CONVERTERS = sorted(path.stem for path in FOLDER.glob("*.h") if path.stem != "spi_words")
 RUNTIME = sorted({str(path.parent) for path in c_runtime()})
-# Reads words of x and y, writes the frames of the start of each output and then those of all words.
+# Reads words of x and y, writes the frames of the start of each output and then those of all words: as bytes, and those
+# of all words as numbers, x first.
 PROGRAM = """
 #include <stdio.h>
 #include "NAME.h"
@@ -23,7 +32,9 @@ PROGRAM = """
 int main(void)
 {
     static dac_output words[2 * 4096];
-    static unsigned char frames[8192 * 3 + 24];
+    static unsigned char frames[8192 * 4 + 32];
+    static uint32_t wide[8192];
+    static uint16_t narrow[8192];
     unsigned char *end = frames;
     unsigned count = 0;
     unsigned long x, y;
@@ -36,133 +47,18 @@ int main(void)
     end = dac_spi_start(&NAME, 1, words[1], end);
     end = dac_spi_pairs(&NAME, words, words + 1, count, end);
     fwrite(frames, 1, (size_t)(end - frames), stdout);
+    if (NAME.frame_bits == 16) {
+        uint16_t *after = dac_spi_frames16(&NAME, 0, words, count, narrow);
+        after = dac_spi_frames16(&NAME, 1, words + 1, count, after);
+        fwrite(narrow, sizeof *narrow, (size_t)(after - narrow), stdout);
+    } else {
+        uint32_t *after = dac_spi_frames32(&NAME, 0, words, count, wide);
+        after = dac_spi_frames32(&NAME, 1, words + 1, count, after);
+        fwrite(wide, sizeof *wide, (size_t)(after - wide), stdout);
+    }
     return 0;
 }
 """
-Codes = tuple[int | None, int | None]
-
-
-class Chip:
-    """A converter, or two with one output each: takes frames, and has a code at each output; None where it is off."""
-
-    def __init__(self, bits: int) -> None:
-        self.bits = bits
-        self.input, self.dac = [0] * 16, [0] * 16
-        self.control: int | None = None
-
-    def load(self) -> None:
-        """Take the pin LDAC to low."""
-        self.dac = list(self.input)
-
-    def codes(self) -> Codes:
-        return self.dac[0], self.dac[1]
-
-
-class Bare(Chip):
-    def take(self, output: int, frame: int) -> None:
-        self.input[output] = frame & 0xFFFF
-
-
-class Ad57x1(Chip):
-    """AD5791, AD5781: R/W, three bits of register, 20 of data."""
-
-    def take(self, output: int, frame: int) -> None:
-        register, data = frame >> 20, frame & 0xFFFFF
-        assert register in (1, 2)  # no read, no other register
-        if register == 1:
-            self.input[output] = data
-        else:
-            assert data == data & 0b11_1111_1110
-            self.control = data
-
-    def codes(self) -> Codes:
-        if self.control is None or self.control & 0b1100:  # OPGND, DACTRI
-            return None, None
-        coded = [data if self.control & 0b1_0000 else data ^ 1 << 19 for data in self.dac[:2]]
-        return coded[0] >> 20 - self.bits, coded[1] >> 20 - self.bits
-
-
-class Ad5761(Chip):
-    """Three bits that are ignored, a zero, four of command, 16 of data."""
-
-    def take(self, output: int, frame: int) -> None:
-        command, data = frame >> 16 & 15, frame & 0xFFFF
-        assert not frame >> 20 & 1
-        assert command in (1, 4)
-        if command == 1:
-            self.input[output] = data
-        else:
-            assert data & 7 == 0  # -10..+10 V
-            self.control = data
-
-    def codes(self) -> Codes:
-        if self.control is None:
-            return None, None
-        turned = 1 << 15 if self.control & 0x80 else 0  # B2C
-        return self.dac[0] ^ turned, self.dac[1] ^ turned
-
-
-class Ad5764(Chip):
-    """R/W, a zero, three bits of register, three of channel, 16 of data; BIN/2sCOMP is low."""
-
-    def take(self, output: int, frame: int) -> None:
-        assert frame >> 19 == 2
-        assert frame >> 16 & 7 == output
-        self.input[frame >> 16 & 7] = frame & 0xFFFF
-
-    def codes(self) -> Codes:
-        return self.dac[0] ^ 1 << 15, self.dac[1] ^ 1 << 15
-
-
-class Dac8562(Chip):
-    """Two bits that are ignored, three of command, three of address, 16 of data."""
-
-    def take(self, output: int, frame: int) -> None:
-        command, channel, data = frame >> 19 & 7, frame >> 16 & 7, frame & 0xFFFF
-        if command == 7:
-            assert (command, channel, data) == (7, 0, 1)  # the inner reference is on
-            self.control = data
-            return
-        assert (command, channel) == (0, output)
-        self.input[channel] = data
-
-    def codes(self) -> Codes:
-        return (None, None) if self.control is None else (self.dac[0], self.dac[1])
-
-
-class Ltc2668(Chip):
-    """Four bits of command, four of address, 16 of data."""
-
-    def take(self, output: int, frame: int) -> None:
-        command, channel, data = frame >> 20, frame >> 16 & 15, frame & 0xFFFF
-        if command == 14:
-            self.control = data
-            return
-        assert (command, channel) == (0, output)
-        self.input[channel] = data
-
-    def codes(self) -> Codes:
-        return (None, None) if self.control != 3 else (self.dac[0], self.dac[1])  # -10..+10 V
-
-
-class Mcp4922(Chip):
-    """Output, input buffer, gain of one, output on, 12 of data."""
-
-    def take(self, output: int, frame: int) -> None:
-        assert frame >> 12 == 0b0011 | output << 3
-        self.input[output] = frame & 0xFFF
-
-
-CHIPS: dict[str, Callable[[], Chip]] = {
-    "ad5541a": lambda: Bare(16),
-    "ad5761": lambda: Ad5761(16),
-    "ad5764": lambda: Ad5764(16),
-    "ad5781": lambda: Ad57x1(18),
-    "ad5791": lambda: Ad57x1(20),
-    "dac8562": lambda: Dac8562(16),
-    "ltc2668": lambda: Ltc2668(16),
-    "mcp4922": lambda: Mcp4922(12),
-}
 
 
 def described(name: str) -> tuple[str, dict[str, object]]:
@@ -179,37 +75,41 @@ def values(text: str) -> list[int]:
     return [int(number, 0) for number in re.findall(r"0x[0-9A-F]+|\b\d+\b", body)]
 
 
-def sent(folder: Path, name: str, words: list[tuple[int, int]], text: str | None = None) -> tuple[int, list[int]]:
-    """Return how many bytes a frame has, and the frames that the C makes of words; ``text`` replaces its file."""
-    folder.mkdir()
+def compiled(folder: Path, name: str, text: str | None = None, compiler: str = "gcc") -> Path:
+    """Compile the program for a converter; ``text`` replaces its file."""
+    folder.mkdir(exist_ok=True)
     (folder / f"{name}.h").write_text(text or described(name)[0], "ascii")
     (folder / "main.c").write_text(PROGRAM.replace("NAME", name), "ascii")
-    options = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"]
-    widths = ["-DDAC_OUTPUT_STORAGE_BITS=32"]
+    options = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror", "-static"]
     includes = [f"-I{folder}", f"-I{FOLDER}", *(f"-I{path}" for path in RUNTIME)]
-    run_clean(["gcc", *options, *widths, *includes, folder / "main.c", "-o", folder / "frames"])
+    run_clean(
+        [compiler, *options, "-DDAC_OUTPUT_STORAGE_BITS=32", *includes, folder / "main.c", "-o", folder / "frames"]
+    )
+    return folder / "frames"
+
+
+def sent(
+    program: Path, name: str, words: list[tuple[int, int]], emulator: str = "", order: str = sys.byteorder
+) -> list[int]:
+    """Return the frames that the C makes of words; those that it makes as numbers are the same."""
     typed = "".join(f"{x} {y}\n" for x, y in words).encode()
-    octets = start([folder / "frames"], input=typed, capture_output=True, check=True, timeout=600).stdout
-    size = values(described(name)[0])[0] // 8
-    assert len(octets) % size == 0
-    return size, [int.from_bytes(octets[i : i + size], "big") for i in range(0, len(octets), size)]
+    command = [tool(emulator), program] if emulator else [program]
+    octets = start(command, input=typed, capture_output=True, check=True, timeout=600).stdout
+    bits, setups = values((program.parent / f"{name}.h").read_text("ascii"))[:7:6]
+    size, each = bits // 8, 2 if bits == 16 else 4
+    count = 2 * (2 + setups) + 2 * len(words)
+    numbers = octets[count * size :]
+    assert len(numbers) == 2 * len(words) * each
+    frames = [int.from_bytes(octets[i : i + size], "big") for i in range(0, count * size, size)]
+    whole = [int.from_bytes(numbers[i : i + each], order) for i in range(0, len(numbers), each)]  # type: ignore[arg-type]
+    pairs = frames[-2 * len(words) :]
+    assert whole == [*pairs[::2], *pairs[1::2]]
+    return frames
 
 
-def outputs(name: str, frames: list[int], ticks: int) -> Iterator[Codes]:
-    """Yield the codes at the outputs after the start, and after each tick of two frames and LDAC."""
-    chip = CHIPS[name]()
-    setups = values(described(name)[0])[6]
-    begun, begin = frames[: -2 * ticks], 2 + setups
-    assert len(begun) == 2 * begin
-    for index, frame in enumerate(begun):
-        chip.take(index // begin, frame)
-        chip.load()
-    yield chip.codes()
-    for tick in range(ticks):
-        for output in (0, 1):
-            chip.take(output, frames[2 * begin + 2 * tick + output])
-        chip.load()
-        yield chip.codes()
+def outputs(name: str, frames: list[int], ticks: int) -> list[Codes]:
+    """Return the codes at the outputs after the start, and after each tick of two frames and LDAC."""
+    return list(Board(name).play(frames, len(frames) // 2 - ticks - 2))
 
 
 @pytest.fixture(scope="module", params=CONVERTERS)
@@ -234,48 +134,137 @@ def test_a_converter_has_the_codes_of_the_model(
     played: tuple[str, list[Codes], list[tuple[int, int]]], tmp_path: Path
 ) -> None:
     name, codes, words = played
-    size, frames = sent(tmp_path / "own", name, words)
-    assert size == (2 if name in ("ad5541a", "mcp4922") else 3)
-    assert list(outputs(name, frames, len(codes))) == [codes[0], *codes]
+    frames = sent(compiled(tmp_path, name), name, words)
+    assert outputs(name, frames, len(codes)) == [codes[0], *codes]
+
+
+@pytest.mark.rest
+def test_a_converter_has_the_codes_of_the_model_from_mips(
+    played: tuple[str, list[Codes], list[tuple[int, int]]], tmp_path: Path
+) -> None:
+    """The other byte order: the same bytes, and numbers whose highest byte is in front."""
+    name, codes, words = played
+    program = compiled(tmp_path, name, compiler="mips-linux-gnu-gcc")
+    frames = sent(program, name, words, "qemu-mips", "big")
+    assert outputs(name, frames, len(codes)) == [codes[0], *codes]
+
+
+def output_of(name: str) -> Output:
+    """Return the output stage of the integer model with the [dac] table of a converter."""
+    table = described(name)[1]
+    bits = int(str(table["bits"]))
+    word_bits, align = int(str(table.get("word_bits", bits))), str(table.get("align", "right"))
+    return Output(0, 0, 0, 0, (1 << bits) - 1, 1, 0, bits, str(table["coding"]), align, word_bits)
+
+
+@pytest.fixture(scope="module", params=CONVERTERS)
+def program_of(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """A converter and its compiled program."""
+    return request.param, compiled(tmp_path_factory.mktemp(request.param), request.param)
+
+
+@pytest.mark.common
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(shares=st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=40))
+@example(shares=[(0.0, 1.0), (1.0, 0.0), (0.5, 0.5), (0.499999, 0.500001), (0.0, 0.0), (1.0, 1.0)])
+def test_any_codes_arrive(program_of: tuple[str, Path], shares: list[tuple[float, float]]) -> None:
+    """Codes are given as shares of the range, so that the same example serves all widths."""
+    name, program = program_of
+    output = output_of(name)
+    codes = [(int(x * output.code_max), int(y * output.code_max)) for x, y in shares]
+    words = [(int(output.word(x)), int(output.word(y))) for x, y in codes]
+    assert outputs(name, sent(program, name, words), len(codes)) == [codes[0], *codes]
+
+
+@pytest.mark.common
+def test_frames_of_32_bits(tmp_path: Path) -> None:
+    """An LTC2668 takes them too: eight zeros in front."""
+    text = described("ltc2668")[0]
+    assert text.count("    24, 16,") == 1
+    program = compiled(tmp_path, "ltc2668", text.replace("    24, 16,", "    32, 16,"))
+    words = [(0, 0xFFFF), (0x8000, 0x7FFF), (0x1234, 0xEDCB)]
+    frames = sent(program, "ltc2668", words)
+    assert outputs("ltc2668", frames, 3) == [words[0], *words]
 
 
 @pytest.mark.common
 @pytest.mark.parametrize("name", ["ad5781", "ad5791"])
 def test_an_output_is_switched_on_at_the_first_word(name: str, tmp_path: Path) -> None:
     words = [(0x81234, 0x7EDCC)]
-    frames = sent(tmp_path / "own", name, words)[1]
+    frames = sent(compiled(tmp_path, name), name, words)
     chip = CHIPS[name]()
-    first = words[0][0] >> 20 - chip.bits
+    first = words[0][0] >> (2 if name == "ad5781" else 0)
     seen = []
     for frame in frames[:3]:
-        chip.take(0, frame)
+        chip.take(frame)
         chip.load()
         seen.append(chip.codes()[0])
     assert seen == [None, first, first]
 
 
-@pytest.mark.common
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
-        ("ad5791", "UINT32_C(0x200012)", "UINT32_C(0x200002)"),  # two's complement
-        ("ad5781", "24, 20, 0,", "24, 18, 0,"),
-        ("dac8562", "UINT32_C(0x010000)", "UINT32_C(0x180000)"),  # write and update A
-        ("mcp4922", "16, 12, 0,", "16, 12, 1,"),
-    ],
-)
-def test_a_wrong_frame_is_seen(name: str, old: str, new: str, tmp_path: Path) -> None:
-    text, table = described(name)
-    assert text.count(old) == 1
-    bits = int(str(table.get("word_bits", table["bits"])))
-    words = [(3 << bits - 3, 5 << bits - 3)] * 2
-    right = list(outputs(name, sent(tmp_path / "own", name, words)[1], 2))
-    frames = sent(tmp_path / "wrong", name, words, text.replace(old, new))[1]
+# What may be wrong in a converter's file, and in what makes the frames.
+FAULTS = [
+    ("ad5541a", "16, 16, 0, 0,", "16, 15, 0, 0,"),
+    ("ad5791", "UINT32_C(0x200312)", "UINT32_C(0x200302)"),  # two's complement
+    ("ad5791", "UINT32_C(0x200312)", "UINT32_C(0x200316)"),  # clamped to ground
+    ("ad5791", "UINT32_C(0x200312)", "UINT32_C(0x20031A)"),  # three-state
+    ("ad5791", "UINT32_C(0x200312)", "UINT32_C(0x200012)"),  # for references 10 V apart
+    ("ad5791", "1, {UINT32_C", "0, {UINT32_C"),
+    ("ad5791", "{UINT32_C(0x100000),", "{UINT32_C(0x900000),"),  # a read
+    ("ad5781", "24, 20, 0,", "24, 18, 0,"),
+    ("ad5761", "UINT32_C(0x040208)", "UINT32_C(0x040288)"),  # two's complement
+    ("ad5761", "UINT32_C(0x040208)", "UINT32_C(0x04020A)"),  # -5..+5 V
+    ("ad5761", "UINT32_C(0x0F0000), UINT32_C(0x040208)", "UINT32_C(0x040208), UINT32_C(0x0F0000)"),
+    ("ad5764", "UINT32_C(0x110000)", "UINT32_C(0x120000)"),  # output C
+    ("ad5764", "24, 16, 0,", "24, 16, 4,"),
+    ("dac8562", "UINT32_C(0x010000)", "UINT32_C(0x180000)"),  # write and update A
+    ("dac8562", "UINT32_C(0x380001)", "UINT32_C(0x380000)"),  # the reference off
+    ("ltc2668", "UINT32_C(0xE00003)", "UINT32_C(0xE00002)"),  # -5..+5 V
+    ("ltc2668", "UINT32_C(0x000000), UINT32_C(0x010000)", "UINT32_C(0x010000), UINT32_C(0x000000)"),
+    ("mcp4922", "16, 12, 0,", "16, 12, 1,"),
+    ("mcp4922", "UINT32_C(0x3000)", "UINT32_C(0x1000)"),  # a gain of two
+    ("mcp4922", "UINT32_C(0xB000)", "UINT32_C(0xA000)"),  # shut down
+    ("spi_words", "(UINT32_C(1) << converter->word_bits) - 1", "UINT32_C(0xFFFFFFFF)"),
+    ("spi_words", "(uint8_t)(frame >> bits)", "(uint8_t)(frame >> (converter->frame_bits - 8 - bits))"),
+    ("spi_words", "dac_spi_frame(converter, 1, *b)", "dac_spi_frame(converter, 0, *b)"),
+    ("spi_words", "*to++ = dac_spi_frame(converter, output, *words);",
+     "*to++ = dac_spi_frame(converter, 0 & output, *words);"),
+    ("spi_words", "done < converter->setups", "done < 1u"),
+    ("spi_words", "        b += DAC_STRIDE;", "        b += 1;"),
+    ("spi_words", "(uint16_t)dac_spi_frame(converter, output, *words)",
+     "(uint16_t)dac_spi_frame(converter, output, *words << 8)"),
+]  # fmt: skip
+
+
+def right(name: str, program: Path) -> bool:
+    """Whether the codes of some words arrive, of which those of two's complement have their sign above the word."""
+    output = output_of(name)
+    codes = [(output.code_max * 3 // 8, output.code_max * 5 // 8), (0, output.code_max), (output.code_max, 1)]
+    words = [(int(output.word(x)), int(output.word(y))) for x, y in codes]
+    if output.coding == "twos-complement":
+        sign = 1 << output.word_bits - 1
+        words = [(x | -(x & sign) & 0xFFFFFFFF, y | -(y & sign) & 0xFFFFFFFF) for x, y in words]
     try:
-        wrong = list(outputs(name, frames, 2))
+        return outputs(name, sent(program, name, words), len(codes)) == [codes[0], *codes]
     except AssertionError:
-        wrong = []  # the converter takes no such frame
-    assert wrong != right
+        return False  # the converter takes no such frame
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(("place", "old", "new"), FAULTS)
+def test_a_wrong_frame_is_seen(place: str, old: str, new: str, tmp_path: Path) -> None:
+    text = (FOLDER / f"{place}.h").read_text("ascii")
+    assert text.count(old) == 1
+    (tmp_path / f"{place}.h").write_text(text.replace(old, new), "ascii")
+    if place == "spi_words":
+        assert any(not right(name, compiled(tmp_path, name)) for name in ("ad5764", "ad5761", "mcp4922"))
+    else:
+        assert not right(place, compiled(tmp_path, place, text.replace(old, new)))
+
+
+@pytest.mark.common
+def test_frames_without_a_fault_are_right(program_of: tuple[str, Path]) -> None:
+    assert right(*program_of)
 
 
 def test_the_verilog_takes_the_same_frames() -> None:
@@ -297,6 +286,41 @@ def test_the_verilog_takes_the_same_frames() -> None:
         second = re.search(r"Y_PREFIX = \d+'h([0-9A-F]+)", text)
         assert int(first[1] if first else "0", 16) == a, name
         assert int(second[1] if second else "0", 16) == b, name
+
+
+@pytest.mark.parametrize("name", CONVERTERS)
+def test_constants_of_a_converter_are_those_of_its_table(name: str) -> None:
+    text = described(name)[0]
+    constants = dict(re.findall(rf"{name}_(\w+) = (\d+)", text))
+    output = output_of(name)
+    frame_bits, word_bits = values(text)[:2]
+    assert constants == {
+        "frame_bits": str(frame_bits),
+        "bits": str(output.dac_bits),
+        "word_bits": str(word_bits),
+        "twos_complement": str(int(output.coding == "twos-complement")),
+    }
+    assert word_bits == output.word_bits
+
+
+@pytest.mark.common
+def test_a_scan_for_another_converter_is_known(tmp_path: Path) -> None:
+    """The words fit or not: bits, bits of the word, two's complement, left-aligned."""
+    cases = {
+        "ad5781": [(18, 20, 0, 1, 1), (18, 20, 0, 0, 0), (20, 20, 0, 0, 0), (16, 20, 0, 1, 1), (18, 20, 1, 1, 0)],
+        "ad5764": [(16, 16, 1, 0, 1), (16, 16, 0, 0, 0), (12, 12, 1, 0, 0), (12, 16, 1, 1, 1), (12, 16, 1, 0, 0)],
+        "mcp4922": [(12, 12, 0, 0, 1), (16, 16, 0, 0, 0)],
+    }
+    names = ("DAC_BITS", "DAC_WORD_BITS", "DAC_TWOS_COMPLEMENT", "DAC_LEFT_ALIGNED")
+    lines = [f'#include "{name}.h"' for name in cases]
+    for name, rows in cases.items():
+        for at, (*scan, fits) in enumerate(rows):
+            axis = f"{name.upper()}_{at}"
+            lines += [f"#define {axis}_{key} {value}" for key, value in zip(names, scan, strict=True)]
+            lines.append(f"typedef char {name}_{at}[DAC_SPI_FITS({name}, {axis}) == {fits} ? 1 : -1];")
+    (tmp_path / "fits.c").write_text("\n".join([*lines, "int main(void) { return 0; }", ""]), "ascii")
+    includes = [f"-I{FOLDER}", *(f"-I{path}" for path in RUNTIME)]
+    run_clean(["gcc", "-std=c99", *includes, "-fsyntax-only", tmp_path / "fits.c"])
 
 
 def test_every_converter_is_modelled_and_listed() -> None:

@@ -13,6 +13,10 @@
 #define NAMED(suffix) JOIN(SCAN, suffix)
 #define CONSTANT(suffix) JOIN(SCAN_UPPER, suffix)
 #define PROGRAM(NAME, name) DAC_PROGRAM(NAME, name)
-#define CONVERTER(AXIS) DAC_CONVERTER(AXIS, 0)
+/* The code at which the outputs are before the first write. */
+#ifndef POWER_UP_CODE
+#define POWER_UP_CODE 0
+#endif
+#define CONVERTER(AXIS) DAC_CONVERTER(AXIS, POWER_UP_CODE)
 
 #endif

@@ -15,5 +15,6 @@ static const dac_spi_converter ad5541a = {
     {0, 0},
     0, {0, 0}
 };
+enum { ad5541a_frame_bits = 16, ad5541a_bits = 16, ad5541a_word_bits = 16, ad5541a_twos_complement = 0 };
 
 #endif

@@ -1,5 +1,6 @@
-/* MCP4922: 12 bits, two outputs. The upper four bits of a frame are the output, no input buffer, gain 1, output on;
- * LDAC changes both. It needs no set-up. Data sheet DS22250.
+/* MCP4922: 12 bits, two outputs. The upper four bits of a frame are the output, no input buffer (BUF), gain 1 (GA set),
+ * output on (SHDN set); LDAC changes both. It needs no set-up. Data sheet DS21897A, p. 18, section 5.2: 16 bits, four
+ * of configuration, rising edge, LDAC. Order of the four: register 5-1, as in DS22250.
  *
  *     [dac]
  *     bits = 12
@@ -15,5 +16,6 @@ static const dac_spi_converter mcp4922 = {
     {UINT32_C(0x3000), UINT32_C(0xB000)},
     0, {0, 0}
 };
+enum { mcp4922_frame_bits = 16, mcp4922_bits = 12, mcp4922_word_bits = 12, mcp4922_twos_complement = 0 };
 
 #endif
