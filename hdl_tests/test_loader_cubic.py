@@ -11,7 +11,7 @@ from link_talk import Talk
 from loader_bridge import Simulation, compile_loader
 from loader_device import Loader
 from programs import random_dual
-from sets import LONG_TEST
+from sets import LONG_TEST, long
 from test_loader import checked_uploads, random_dialogue
 
 from tablegen.base.resources import verilog_runtime
@@ -110,7 +110,7 @@ def loader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", long((0, 1), range(4)))
 def test_random_dialogues(seed: int, loader: Loader) -> None:
     assert len(random_dialogue(loader, seed, 120, []).seen) > 10
 

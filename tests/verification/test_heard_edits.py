@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from building import Build
 from heard_edits import OUTPUT, SEQUENCER, Edit, PreparedPlay, judge_output
+from sets import long
 
 from tablegen.base.resources import resource_folder
 
@@ -21,7 +22,7 @@ def test_the_build_as_it_is_passes(prepared: PreparedPlay, tmp_path: Path) -> No
     assert prepared.judge(None, tmp_path) is None
 
 
-@pytest.mark.parametrize("edit", SEQUENCER, ids=[edit.breaks for edit in SEQUENCER])
+@pytest.mark.parametrize("edit", long(SEQUENCER[::2], SEQUENCER), ids=[edit.breaks for edit in SEQUENCER])
 def test_an_edit_of_the_sequencer_is_heard(edit: Edit, prepared: PreparedPlay, tmp_path: Path) -> None:
     assert prepared.judge(edit, tmp_path) is not None
 

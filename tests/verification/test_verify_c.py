@@ -17,7 +17,7 @@ from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from replacing import replace
-from sets import common
+from sets import common, long
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -136,7 +136,7 @@ def test_words_that_are_wider_than_their_codes(variant: Variant, tmp_path: Path)
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("seed", range(2, 6))
+@pytest.mark.parametrize("seed", long((2, 3), range(2, 6)))
 def test_every_seed_verifies(short: Build, seed: int) -> None:
     outcome = verify(short.folder, "--seed", seed)
     assert outcome.status == 0, outcome.err
