@@ -28,15 +28,22 @@ from tablegen.link.messages import (
     Upload,
 )
 from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused
+from tablegen.link.model_store import ModelStore
 from tablegen.link.players import Player
+from tablegen.link.store import Flash, Layout, Store
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
+_TAGGED |= {Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE}
 _ACTING = _TAGGED | {Request.ABORT}
 _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.BEGIN: ImageInfo.LAYOUT.size,
     Request.COMMIT: 4,
     Request.ARM: 4,
     Request.LIMITS: 2 * AxisLimits.LAYOUT.size,
+    Request.SLOT: 1,
+    Request.SAVE: 5,
+    Request.SELECT: 2,
+    Request.DELETE: 1,
 }
 _COMMIT_WITH_MODE = 5  # bytes
 _MAX_FRAMES = 1 << 31
@@ -80,6 +87,7 @@ class ModelDevice:
     counter, or from ``nonces``, and may be used for ``CHALLENGE_MS`` of the clock ``milliseconds``. ``reboot`` counts
     ``boot`` on, as a device does that keeps its count without power. ``staged``: the image is kept, as in Verilog, and
     not its tables. ``checking``: ticks that the checks take.
+    ``flash`` with its layout, for the feature STORE, keeps programs, ``stores_while_playing`` even while a scan plays.
     ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
     """
 
@@ -97,9 +105,13 @@ class ModelDevice:
         staged: bool = False,
         checking: int = 0,
         most_frames: int = _MAX_FRAMES,
+        flash: tuple[Flash, Layout] | None = None,
+        stores_while_playing: bool = False,
     ) -> None:
         if bool(key) != (Feature.KEY in info.features):
             raise ValueError("a key and the feature go together")
+        if (flash is not None) != (Feature.STORE in info.features):
+            raise ValueError("a flash and the feature go together")
         self.info, self.player, self.boot = info, player, boot
         self.permits = True
         if key and len(identity) not in IDENTITY_BYTES:
@@ -128,7 +140,19 @@ class ModelDevice:
             del self._requests[Request.CHALLENGE]
         if Feature.READBACK not in info.features:
             del self._requests[Request.READBACK]
+        if flash is not None:
+            self._requests |= {
+                Request.SLOT: lambda frame: self._store.slot(frame.payload),
+                Request.SAVE: lambda frame: self._store.save(frame.payload),
+                Request.SELECT: lambda frame: self._store.select(frame.payload),
+                Request.CONFIRM: lambda frame: self._store.confirm(),
+                Request.DELETE: lambda frame: self._store.delete(frame.payload),
+            }
+        self._flash, self._stores_while_playing = flash, stores_while_playing
+        self._store: ModelStore
         self._power_up()
+        if flash is not None:
+            self.player.restart(self._kept_program())
 
     def _power_up(self) -> None:
         self._reader = FrameReader()
@@ -145,9 +169,16 @@ class ModelDevice:
     def reboot(self) -> None:
         """Start again, with nothing but what is in the firmware, and the next boot count."""
         self.boot = (self.boot + 1) & 0xFFFFFFFF
-        self.player.restart()
         self._bank.power_up()
         self._power_up()
+        self.player.restart(self._kept_program())
+
+    def _kept_program(self) -> DualProgram | None:
+        """Return the kept program that a start begins with; None for that of the firmware."""
+        if self._flash is None:
+            return None
+        self._store = ModelStore(Store(*self._flash), self._bank, self.player, self._stores_while_playing)
+        return self._store.load()
 
     @property
     def memory(self) -> bytearray:
@@ -182,7 +213,7 @@ class ModelDevice:
     def status(self) -> DeviceStatus:
         """Return the answer to STATUS."""
         player, incoming, active = self.player, self._bank.incoming, self._bank.active
-        known = bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else self._boot_hash
+        known = self._boot_hash if active is None else active.info.hash
         return DeviceStatus(
             state=player.state,
             upload=Upload.NONE if incoming is None else incoming.state,
@@ -195,7 +226,7 @@ class ModelDevice:
             image_crc=0 if incoming is None else incoming.info.image_crc,
             fault_counts=player.fault_counts,
             bad_frames=self._reader.bad_frames,
-            hash=known if active is None else active.info.hash,
+            hash=bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else known,
         )
 
     # Checks that every request passes
@@ -256,6 +287,8 @@ class ModelDevice:
             good = int(struct.unpack_from("<I", payload)[0]) <= self._most_frames
         elif good and kind == Request.COMMIT and _plain_bytes(frame) == _COMMIT_WITH_MODE:
             good = payload[4] in list(CommitMode)
+        elif good and kind == Request.SELECT:
+            good = payload[1] <= 1
         if not good:
             raise RequestRefused(Reason.PAYLOAD)
 
