@@ -39,10 +39,11 @@ class ModelStore:
         return self._load(store.state.selected) if program is None and slot != store.state.selected else program
 
     def _load(self, slot: int) -> DualProgram | None:
-        if self._store.info(slot) is None:
+        image = self._store.image(slot)
+        if image is None:
             return None
         try:
-            program = self._bank.load(self._store.image(slot))
+            program = self._bank.load(image)
         except RequestRefused as refused:
             self._reason = self._reason or refused.reason
             return None

@@ -224,9 +224,12 @@ class Store:
         place = self._place(slot)
         return None if place == NONE else self._good_place(place, slot)
 
-    def image(self, slot: int) -> ProgramImage:
-        """Return the image of a slot of which ``info`` is not None."""
-        info = ImageInfo.unpack(self.info(slot) or b"")
+    def image(self, slot: int) -> ProgramImage | None:
+        """Return the image of a slot, or None without an image of the right CRC."""
+        announcement = self.info(slot)
+        if announcement is None:
+            return None
+        info = ImageInfo.unpack(announcement)
         address = self.layout.place(self._place(slot)) + HEADER
         return ProgramImage(info, b"".join(self._lines(address, info.image_bytes)))
 
