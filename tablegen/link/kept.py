@@ -5,7 +5,16 @@ from typing import TYPE_CHECKING
 
 from tablegen.link.claims import check_length, check_store
 from tablegen.link.errors import LinkLost, Refused, Unsuitable
-from tablegen.link.messages import NO_SLOT, Content, DeviceStatus, Feature, ImageInfo, Request, StoreStatus
+from tablegen.link.messages import (
+    NO_SLOT,
+    STORES_WHILE_PLAYING,
+    Content,
+    DeviceStatus,
+    Feature,
+    ImageInfo,
+    Request,
+    StoreStatus,
+)
 
 if TYPE_CHECKING:
     from tablegen.link.session import LinkSession
@@ -43,6 +52,8 @@ class KeptPrograms:
         Why it did not start with the program that was due: a ``Reason``, or 0.
     room
         Bytes of the longest program image that a slot can have.
+    while_playing
+        True if slots can be changed while a scan plays.
     """
 
     slots: tuple[Slot, ...]
@@ -52,6 +63,25 @@ class KeptPrograms:
     start: int | None
     reason: int
     room: int
+    while_playing: bool
+
+    def check(self, slot: int, image_bytes: int, playing: bool) -> None:
+        """Check before an upload that its scan can be saved.
+
+        Raises
+        ------
+        Unsuitable
+            If there is no such slot, it is too small, or a scan plays and flash cannot be written meanwhile.
+        """
+        objections = []
+        if slot >= len(self.slots):
+            objections.append(f"there is no slot {slot}; the device has slots 0 to {len(self.slots) - 1}")
+        if image_bytes > self.room:
+            objections.append(f"the tables need {image_bytes} bytes; a slot has room for {self.room}")
+        if playing and not self.while_playing:
+            objections.append("the device cannot write its flash while a scan plays; `tablegen park --wait` first")
+        if objections:
+            raise Unsuitable(objections)
 
 
 def read_kept(session: "LinkSession", deadline: float) -> KeptPrograms:
@@ -71,7 +101,9 @@ def read_kept(session: "LinkSession", deadline: float) -> KeptPrograms:
     selected, trial, start = (
         None if each == NO_SLOT else each for each in (status.selected, status.trial, status.start)
     )
-    return KeptPrograms(tuple(slots), selected, trial, bool(status.started), start, status.reason, status.room)
+    while_playing = bool(status.flags & STORES_WHILE_PLAYING)
+    reason, room = status.reason, status.room
+    return KeptPrograms(tuple(slots), selected, trial, bool(status.started), start, reason, room, while_playing)
 
 
 def change_kept(session: "LinkSession", kind: Request, payload: bytes, deadline: float) -> None:
