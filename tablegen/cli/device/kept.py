@@ -39,7 +39,7 @@ def save(slot: int, port: str, baud: int, key_file: Path | None) -> int:
     SLOT is a number from 0; `tablegen slots` lists them. What plays after a start does not change: `tablegen select`
     chooses that. If power fails meanwhile, the slot has its old content or the new one, never a mixture.
 
-    Most devices cannot write their flash while a scan plays: run `tablegen park --wait` first.
+    Most devices cannot write their flash while a scan plays; `tablegen park` ends it.
 
     \b
     Examples:
