@@ -201,7 +201,8 @@ bool dac_link_load_kept(dac_link *l);
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */
 bool dac_link_receive(dac_link *l, uint8_t byte);
 
-/* Does a bounded piece of work; the main loop calls it repeatedly. Returns true if there may be more to do. */
+/* Does a bounded piece of work, but for requests about kept programs, which take as long as their flash; the main loop
+ * calls it repeatedly. Returns true if there may be more to do. */
 bool dac_link_work(dac_link *l);
 
 /* Returns the next byte to send, or -1. Called by the main loop, or by the interrupt of a UART that is ready to

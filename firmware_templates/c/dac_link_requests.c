@@ -42,7 +42,7 @@ static void put_device(const dac_link *l, uint8_t *at)
     at[1] = (uint8_t)(ALWAYS | (c->harmonics ? TAKES_FOURIER : 0)
                       | (c->key_bytes ? HAS_KEY : 0) | (c->permits != NULL ? HAS_INTERLOCK : 0));
 #if DAC_STORE
-    at[1] |= c->store != NULL ? KEEPS_PROGRAMS : 0;
+    at[1] = (uint8_t)(at[1] | (c->store != NULL ? KEEPS_PROGRAMS : 0));
 #endif
     at[2] = c->window != 0 ? c->window : DAC_LINK_RING / 256;
     at[3] = MOST_DATA;

@@ -20,7 +20,7 @@ static uint32_t crc_of(const uint8_t *bytes, uint32_t count)
     return ~crc;
 }
 
-static uint32_t record_address(const dac_store *s, unsigned sector)
+static uint32_t record_address(const dac_store *s, uint32_t sector)
 {
     return s->flash->base + sector * s->flash->sector_bytes;
 }

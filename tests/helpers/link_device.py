@@ -240,6 +240,7 @@ class HostDevice:
             self._random = setup.random = _Random(lambda to: ctypes.memmove(to, random(), 16))
         self._setup = setup
         self._device = c_void_p(self._dll.device_new(ctypes.byref(setup), c_uint32(boot_count)))
+        self._layout, self._while_playing = None if flash is None else flash[1], stores_while_playing
         if flash is not None:
             self._flash = c_flash(*flash)
             self._dll.device_keep(self._device, ctypes.byref(self._flash), c_bool(stores_while_playing))
@@ -298,6 +299,10 @@ class HostDevice:
             talk = Talk()
             upload = b"".join([talk.hello(), *talk.upload(make_image(self._boot, bytes(32).hex()))])
             self.notes.append(f"B {upload.hex()}")
+        if self._layout is not None:
+            layout = self._layout
+            numbers = [layout.base, layout.sector_bytes, layout.place_sectors, layout.slots, self._while_playing]
+            self.notes.append(" ".join(map(str, ["F", *map(int, numbers)])))
 
     def transmit(self) -> bytes:
         """What has left since the last call."""

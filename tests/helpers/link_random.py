@@ -200,6 +200,8 @@ class Dialogue:
         ]  # fmt: skip
         if self.flashes:
             doings += [(12, self._keep), (2, self._cut), (1, self._reboot), (4, self._whole), (3, self._trial)]
+        if self.device.notes is not None:  # a replay has no cuts
+            doings = [doing for doing in doings if doing[1] != self._cut]
         weights = np.array([weight for weight, _ in doings])
         for _ in range(steps):
             doings[int(self.rng.choice(len(doings), p=weights / weights.sum()))][1]()

@@ -311,6 +311,24 @@ def test_a_restart_during_a_save_is_no_success() -> None:
             device.save(1, generation)
 
 
+def test_a_flash_may_take_its_time() -> None:
+    """No answer comes for 40 s; the request is repeated, and carried out once."""
+    line = Watched(storing())
+    with client(line) as device:
+        device.upload(FIRST.image(False))
+        silent_until = line.now() + 40.0
+
+        def late(piece: bytes) -> list[bytes]:
+            return [piece] if line.now() >= silent_until or not line.count(Request.SAVE) else []
+
+        line.spoil_back = late
+        device.save(1)
+        assert line.now() >= silent_until
+        assert line.count(Request.SAVE) < 50
+        assert len({frame.seq for frame in line.frames if frame.type == Request.SAVE}) == 1
+        assert line.device._store._store.state.counter == 3  # the copy of an empty record, and one change
+
+
 @pytest.mark.parametrize(
     ("field", "value"), [("slots", 0), ("slots", 16), ("selected", 16), ("started", 2), ("content", 3)]
 )

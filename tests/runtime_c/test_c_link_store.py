@@ -51,7 +51,7 @@ MUTANTS = {
     "SELECT has any trial": (LINK, "good = payload[1] <= 1;", "good = true;"),
     "SAVE needs no tag": (LINK, "UINT32_C(1) << DAC_LINK_SAVE | ", ""),
     "DELETE needs no tag": (LINK, " | UINT32_C(1) << DAC_LINK_DELETE)", ")"),
-    "the feature is not announced": (REQUESTS, "c->store != NULL ? KEEPS_PROGRAMS : 0", "0"),
+    "the feature is not announced": (REQUESTS, "c->store != NULL ? KEEPS_PROGRAMS : 0", "false ? KEEPS_PROGRAMS : 0"),
 }  # fmt: skip
 CUT_MUTANTS = {  # these need a cut
     "the record comes before the image": (
