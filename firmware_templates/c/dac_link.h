@@ -71,7 +71,7 @@ typedef struct {
     uint32_t (*milliseconds)(void);    /* a clock that wraps at 2^32: a challenge expires after DAC_LINK_CHALLENGE_MS */
 
 #if DAC_STORE
-    dac_store *store;         /* the kept programs, which dac_store_open() has opened as DAC_STORE_DONE, or NULL: none */
+    dac_store *store;         /* opened by dac_store_open() as DAC_STORE_DONE; NULL: no programs are kept */
     bool store_while_playing; /* flash can be written while a scan plays; otherwise the scan is to be parked first */
 #endif
 } dac_link_config;
@@ -171,7 +171,7 @@ typedef struct {
     dac_link_mac digest;
 
 #if DAC_STORE
-    bool loading;               /* a kept program is checked, which has no tag */
+    bool loading;               /* a kept program is checked or waits: it has no tag, and no COMMIT to be answered */
     uint8_t kept, kept_refused; /* slot of this start, or DAC_STORE_NONE; why it is not the one that was due */
 #endif
 
@@ -196,6 +196,11 @@ dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_s
 /* Loads and commits the kept program that is due, if it passes the checks of an upload. Call it after dac_link_init(),
  * in place of loading the program of the firmware; if it returns false, load that one. */
 bool dac_link_load_kept(dac_link *l);
+
+/* Plays a kept program as if a host uploaded it: it is checked, and takes the place of the one that plays at a line.
+ * False: the slot has no program that suits the device, the interlock is open, or an upload or another program is on
+ * its way. Called where dac_link_work() is, which does the rest; STATUS has the hash of what plays. */
+bool dac_link_play_kept(dac_link *l, uint8_t slot);
 #endif
 
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */

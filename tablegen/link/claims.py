@@ -13,9 +13,9 @@ from tablegen.link.messages import (
     VERSION,
     AxisLimits,
     AxisShape,
-    Content,
     DeviceInfo,
     DeviceStatus,
+    SlotContent,
     StoreStatus,
 )
 
@@ -136,7 +136,7 @@ def check_store(status: StoreStatus) -> None:
         if value != NO_SLOT:
             _check("SLOT", field, value, 0, MAXIMUM_SLOTS)
     _check("SLOT", "started", status.started, 0, 1)
-    _check("SLOT", "content", status.content, 0, max(Content))
+    _check("SLOT", "content", status.content, 0, max(SlotContent))
 
 
 def check_length(source: str, payload: bytes, size: int) -> None:

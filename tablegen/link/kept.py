@@ -8,11 +8,11 @@ from tablegen.link.errors import LinkLost, Refused, Unsuitable
 from tablegen.link.messages import (
     NO_SLOT,
     STORES_WHILE_PLAYING,
-    Content,
     DeviceStatus,
     Feature,
     ImageInfo,
     Request,
+    SlotContent,
     StoreStatus,
 )
 
@@ -28,7 +28,7 @@ class Slot:
     """A slot of a device: its number, what it has, and the announcement of its program, if it has one."""
 
     number: int
-    content: Content
+    content: SlotContent
     image: ImageInfo | None
 
 
@@ -97,7 +97,7 @@ def read_kept(session: "LinkSession", deadline: float) -> KeptPrograms:
     slots = []
     for number in range(status.slots):
         status, image = _ask(session, number, deadline)
-        slots.append(Slot(number, Content(status.content), image))
+        slots.append(Slot(number, SlotContent(status.content), image))
     selected, trial, start = (
         None if each == NO_SLOT else each for each in (status.selected, status.trial, status.start)
     )
@@ -146,7 +146,7 @@ def _ask(session: "LinkSession", slot: int, deadline: float) -> tuple[StoreStatu
     check_length("SLOT", payload, size)
     status = StoreStatus.unpack(payload)
     check_store(status)
-    if status.content != Content.PROGRAM:
+    if status.content != SlotContent.PROGRAM:
         return status, None
     check_length("SLOT", payload, size + ImageInfo.LAYOUT.size)
     return status, ImageInfo.unpack(payload[size:])

@@ -102,7 +102,7 @@ class DeviceState(IntEnum):
     PLAYING = 3
 
 
-class Content(IntEnum):
+class SlotContent(IntEnum):
     """The content of a slot of a device."""
 
     EMPTY = 0
@@ -378,7 +378,7 @@ class StoreStatus(_Struct):
     reason
         A ``Reason`` why that was not the program that was due, or 0.
     content
-        Of the slot that was asked for, a ``Content``.
+        Of the slot that was asked for, a ``SlotContent``.
     flags
         ``STORES_WHILE_PLAYING``, or 0.
     room

@@ -227,6 +227,18 @@ class Bank:
         self.active = ActiveUpload(info, image.data, 1, 0)
         return program_of(contents, self._info.update_rate_hz)
 
+    def put(self, image: ProgramImage) -> IncomingUpload | None:
+        """Make a kept image the upload that is checked; None if it does not suit the device, or not now."""
+        if self.incoming is not None or not self._player.writable:
+            return None
+        try:
+            self._check_announcement(image.info)
+            self._check_words(image.info, image.data)
+        except RequestRefused:
+            return None
+        self.incoming = IncomingUpload(image.info, image.info.pack(), bytearray(image.data), Upload.CHECKING)
+        return self.incoming
+
     def image(self) -> ProgramImage:
         """Return the image of the tables that play, with the announcement of what was uploaded.
 

@@ -62,10 +62,10 @@ class _LastRequest:
 
 @dataclass
 class _PendingRequest:
-    """A COMMIT or an ABORT that has not been answered yet."""
+    """A COMMIT or an ABORT that has not been answered yet; without a request a kept program, which has no answer."""
 
-    request: Frame
-    memory: _LastRequest
+    request: Frame | None
+    memory: _LastRequest | None
     before: _LastRequest | None = None
     nonce: bytes | None = None
     ticks: int = 0
@@ -179,6 +179,21 @@ class ModelDevice:
             return None
         self._store = ModelStore(Store(*self._flash), self._bank, self.player, self._stores_while_playing)
         return self._store.load()
+
+    def keeps(self, slot: int) -> bool:
+        """Return True if a slot has a program."""
+        return self._store.image(slot) is not None
+
+    def play_kept(self, slot: int) -> bool:
+        """Play a kept program as if a host uploaded it; return False if it does not suit the device, or not now."""
+        image = self._store.image(slot) if self.permits else None
+        incoming = None if image is None else self._bank.put(image)
+        if incoming is None:
+            return False
+        self._pending = _PendingRequest(None, None, ticks=self._checking)
+        if self._checking == 0:
+            self._check(self._pending, incoming)
+        return True
 
     @property
     def memory(self) -> bytearray:
@@ -306,8 +321,8 @@ class ModelDevice:
         nonce, self._nonce = self._nonce, None
         return nonce if self._milliseconds() - self._challenged_at < CHALLENGE_MS else None
 
-    def _check_tag(self, frame: Frame, nonce: bytes | None, image: bytes | None = None) -> None:
-        if not self._key:
+    def _check_tag(self, frame: Frame | None, nonce: bytes | None, image: bytes | None = None) -> None:
+        if not self._key or frame is None:
             return
         plain = _plain_bytes(frame)
         received_tag = frame.payload[plain:]
@@ -315,10 +330,14 @@ class ModelDevice:
         if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), received_tag):
             raise RequestRefused(Reason.KEY)
 
-    def _answer(self, frame: Frame, payload: bytes, memory: _LastRequest | None) -> None:
+    def _answer(self, frame: Frame | None, payload: bytes, memory: _LastRequest | None) -> None:
+        if frame is None:
+            return
         self._send(Frame(frame.type | ANSWER, frame.seq, frame.session, payload), memory)
 
-    def _refuse(self, frame: Frame, refused: RequestRefused, memory: _LastRequest | None) -> None:
+    def _refuse(self, frame: Frame | None, refused: RequestRefused, memory: _LastRequest | None) -> None:
+        if frame is None:
+            return
         payload = Refusal(frame.type, refused.reason, refused.detail).pack()
         self._send(Frame(messages.REFUSAL, frame.seq, frame.session, payload), memory)
 
@@ -354,14 +373,15 @@ class ModelDevice:
             program = self._bank.accept(incoming, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
-            mode = _mode_of(commit.request)
+            mode = CommitMode.LINE if commit.request is None else _mode_of(commit.request)
             if mode is CommitMode.KEEP and not self._can_keep(program):
                 raise RequestRefused(Reason.KEEP)
             if not self.player.commit(program, mode):
                 raise RequestRefused(Reason.TICKS)
         except RequestRefused as refused:
             self._pending = None
-            if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP):
+            stays = refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP)
+            if stays and commit.request is not None:
                 incoming.state = Upload.RECEIVING
             else:
                 self._bank.incoming = None

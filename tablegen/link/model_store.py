@@ -4,9 +4,10 @@ import struct
 from collections.abc import Callable
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.link.messages import NO_SLOT, STORES_WHILE_PLAYING, Content, DeviceState, Reason, StoreStatus
+from tablegen.link.messages import NO_SLOT, STORES_WHILE_PLAYING, DeviceState, Reason, SlotContent, StoreStatus
 from tablegen.link.model_bank import Bank, RequestRefused
 from tablegen.link.players import Player
+from tablegen.link.program_image import ProgramImage
 from tablegen.link.store import Store, StoreError, StoreFault
 
 
@@ -50,6 +51,10 @@ class ModelStore:
         self._start = slot
         return program
 
+    def image(self, slot: int) -> ProgramImage | None:
+        """Return the image of a slot, if it has one."""
+        return self._store.image(slot)
+
     def slot(self, payload: bytes) -> bytes:
         """Return the answer to SLOT.
 
@@ -63,7 +68,9 @@ class ModelStore:
         if slot != NO_SLOT and slot >= store.layout.slots:
             raise self._no_slot()
         info = store.info(slot)
-        content = Content.EMPTY if not store.holds(slot) else Content.DAMAGED if info is None else Content.PROGRAM
+        content = (
+            SlotContent.EMPTY if not store.holds(slot) else SlotContent.DAMAGED if info is None else SlotContent.PROGRAM
+        )
         flags = STORES_WHILE_PLAYING if self._while_playing else 0
         head = (store.layout.slots, state.selected, state.trial, state.started, self._start, self._reason)
         return StoreStatus(*head, content, flags, store.layout.room).pack() + (info or b"")

@@ -119,6 +119,14 @@ void device_keep(device *d, const dac_store_flash *flash, bool while_playing)
 }
 #endif
 
+#if DAC_STORE
+bool device_play(device *d, uint8_t slot)
+{
+    permits_now = d->permits;
+    return dac_link_play_kept(&d->link, slot);
+}
+#endif
+
 void device_permit(device *d, bool permitted)
 {
     d->permits = permitted;

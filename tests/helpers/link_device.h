@@ -45,6 +45,7 @@ typedef struct {
 device *device_new(const device_setup *setup, uint32_t boot);
 #if DAC_STORE
 void device_keep(device *d, const dac_store_flash *flash, bool while_playing);
+bool device_play(device *d, uint8_t slot);
 #endif
 void device_delete(device *d);
 void device_start(device *d, uint32_t boot);

@@ -353,6 +353,13 @@ class HostDevice:
         self._note(f"p {int(permits)}")
         self._dll.device_permit(self._device, c_bool(permits))
 
+    def play_kept(self, slot: int) -> bool:
+        """The application plays a kept program; whether it is on its way."""
+        begun = bool(self._dll.device_play(self._device, c_uint8(slot)))
+        self._work()
+        self._note(f"P {slot}")
+        return begun
+
     def report(self, fault: int) -> None:
         """A fault that the driver of the converters saw."""
         self._dll.device_report(self._device, c_uint8(fault))

@@ -200,6 +200,7 @@ class Dialogue:
         ]  # fmt: skip
         if self.flashes:
             doings += [(12, self._keep), (2, self._cut), (1, self._reboot), (4, self._whole), (3, self._trial)]
+            doings += [(3, self._play)]
         if self.device.notes is not None:  # a replay has no cuts
             doings = [doing for doing in doings if doing[1] != self._cut]
         weights = np.array([weight for weight, _ in doings])
@@ -313,9 +314,28 @@ class Dialogue:
             payload = b""
         self._send(self.talk.request(kind, payload) if kind == Request.SLOT else self._tagged(kind, payload))
 
+    def _play(self) -> None:
+        """The application plays a kept program, and goes on at once or after some ticks."""
+        if self.rng.random() < 0.7:
+            self._send(self.talk.acting(Request.ABORT))
+            self._tick(1)
+        held = [slot for slot in range(SLOTS) if self.model.keeps(slot)]
+        slot = int(self.rng.choice([*held, *held, *held, *range(SLOTS + 1), 255]))
+        begun = self.device.play_kept(slot)
+        if begun != self.model.play_kept(slot):
+            raise Differs(f"a kept program {'begins' if begun else 'does not begin'}")
+        self.seen["played" if begun else "not played"] += 1
+        self._hear()
+        self._tick(int(self.rng.choice([0, 0, 1, 20])))
+
     def _trial(self) -> None:
         """Keep what plays, try it after a start, and confirm it."""
         slot = int(self.rng.integers(0, SLOTS))
+        if self.rng.random() < 0.7:
+            self._send(self.talk.acting(Request.ABORT))
+            self._image, _ = random_image(self.rng, self.shape, HARMONICS, "smooth", self.order)
+            self._whole()
+            self._tick(60)
         if self.rng.random() < 0.7:
             generation = struct.pack("<I", self.model.status().generation)
             self._send(self._tagged(Request.SAVE, bytes([slot]) + generation))

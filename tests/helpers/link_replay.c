@@ -6,6 +6,7 @@
  *     r hex        bytes from the line; f hex  the same, and the main loop does not go round
  *     w n, t n k   the main loop n times; n ticks, after each the main loop at most k times
  *     F numbers    it has a flash from now on, which is empty: the layout, and whether it is written while a scan plays
+ *     P slot       the application plays a kept program
  *     p, s, b, k, c   interlock, line stalled, reset with a boot count, a damaged word, the clock
  */
 #include <inttypes.h>
@@ -157,6 +158,9 @@ int main(void)
 #if DAC_STORE
         } else if (what == 'F') {
             give_flash(d);
+        } else if (what == 'P') {
+            (void)device_play(d, (uint8_t)number());
+            device_run(d, UINT32_MAX);
 #endif
         } else if (what == 'B') {
             keep_boot(d, hexadecimal());

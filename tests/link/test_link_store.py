@@ -14,12 +14,12 @@ from tablegen.link.errors import LinkLost, NotUnderstood, Refused, Unsuitable
 from tablegen.link.kept import KeptPrograms
 from tablegen.link.messages import (
     NO_SLOT,
-    Content,
     DeviceInfo,
     DeviceState,
     Feature,
     Reason,
     Request,
+    SlotContent,
     StoreStatus,
 )
 from tablegen.link.model_device import ModelDevice
@@ -56,7 +56,7 @@ def plays(line: Watched) -> str:
 def test_a_kept_scan_plays_after_a_start_once_it_is_selected(key: bytes) -> None:
     line = Watched(storing(key))
     with client(line, key=key or None) as device:
-        assert [slot.content for slot in device.slots().slots] == [Content.EMPTY] * 3
+        assert [slot.content for slot in device.slots().slots] == [SlotContent.EMPTY] * 3
         result = device.upload(FIRST.image(True))
         device.save(1, result.generation)
         restart(line)
@@ -67,7 +67,7 @@ def test_a_kept_scan_plays_after_a_start_once_it_is_selected(key: bytes) -> None
         kept = device.slots()
         assert device.readback() == FIRST.image(False).data
     assert (kept.selected, kept.trial, kept.start, kept.reason, kept.room) == (1, None, 1, 0, LAYOUT.room)
-    assert [slot.content for slot in kept.slots] == [Content.EMPTY, Content.PROGRAM, Content.EMPTY]
+    assert [slot.content for slot in kept.slots] == [SlotContent.EMPTY, SlotContent.PROGRAM, SlotContent.EMPTY]
     image = kept.slots[1].image
     assert image is not None
     assert (image.hash.hex(), image.image_bytes) == (FIRST.digest, len(FIRST.image(False).data))
@@ -260,9 +260,9 @@ def test_a_damaged_slot_is_reported_and_can_be_deleted() -> None:
     with client(line) as device:
         kept = device.slots()
         assert (plays(line), kept.start, kept.reason) == (BOOT.digest, None, Reason.IMAGE)
-        assert kept.slots[0].content is Content.DAMAGED
+        assert kept.slots[0].content is SlotContent.DAMAGED
         device.delete(0)
-        assert device.slots().slots[0].content is Content.EMPTY
+        assert device.slots().slots[0].content is SlotContent.EMPTY
 
 
 def test_a_trial_whose_slot_was_saved_to_again_cannot_be_confirmed() -> None:

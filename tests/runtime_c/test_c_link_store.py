@@ -18,17 +18,18 @@ from tablegen.base.resources import c_link, c_runtime, c_store
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.messages import (
     NO_SLOT,
-    Content,
     DeviceInfo,
     Feature,
     Reason,
     Request,
+    SlotContent,
     StoreStatus,
+    Upload,
 )
 from tablegen.link.store import Store
 
-KEPT, LINK, CHECK, REQUESTS, STORE = (
-    "dac_link_kept.c", "dac_link.c", "dac_link_check.c", "dac_link_requests.c", "dac_store.c"
+KEPT, LINK, UPLOAD, REQUESTS, STORE = (
+    "dac_link_kept.c", "dac_link.c", "dac_link_upload.c", "dac_link_requests.c", "dac_store.c"
 )  # fmt: skip
 MUTANTS = {
     "another generation is saved": (KEPT, "dac_link_get(payload + 1) != generation", "false"),
@@ -40,7 +41,8 @@ MUTANTS = {
     "no upload needs a tag any more": (KEPT, "    l->loading = false;\n", ""),
     "a kept program cannot be read back": (KEPT, "    l->uploaded = true;\n", ""),
     "a kept program has no generation": (KEPT, "    l->taken_generation = 1;\n", ""),
-    "an upload seems to go on after a start": (KEPT, "    l->upload = DAC_LINK_NONE;\n", ""),
+    "an upload seems to go on after a start": (
+        KEPT, "found = commit(l);\n    l->upload = DAC_LINK_NONE;\n", "found = commit(l);\n"),
     "a refused trial leaves nothing to play": (KEPT, "(slot != store->state.selected &&", "(false &&"),
     "a refused start says nothing": (KEPT, "            l->kept_refused = found.reason;", "            (void)found;"),
     "a damaged slot says nothing": (KEPT, "    if (slot != due)\n", "    if (false)\n"),
@@ -51,6 +53,12 @@ MUTANTS = {
     "SELECT has any trial": (LINK, "good = payload[1] <= 1;", "good = true;"),
     "SAVE needs no tag": (LINK, "UINT32_C(1) << DAC_LINK_SAVE | ", ""),
     "DELETE needs no tag": (LINK, " | UINT32_C(1) << DAC_LINK_DELETE)", ")"),
+    "a kept program ends an upload": (KEPT, "|| l->upload != DAC_LINK_NONE || !dac", "|| !dac"),
+    "a kept program ignores the interlock": (KEPT, " || !dac_link_permits(l)\n", "\n"),
+    "a host hears of a kept program": (UPLOAD, "if (l->loading) {", "if (false) {"),
+    "a kept program is not checked against what plays": (
+        KEPT, "    dac_link_start_check(&l->check);\n    return true;",
+        "    dac_link_start_check(&l->check);\n    l->check.stage = 7;\n    return true;"),
     "the feature is not announced": (REQUESTS, "c->store != NULL ? KEEPS_PROGRAMS : 0", "false ? KEEPS_PROGRAMS : 0"),
 }  # fmt: skip
 CUT_MUTANTS = {  # these need a cut
@@ -157,9 +165,9 @@ def check_damage(library: DeviceLibrary | None = None) -> None:
     flash.cells[LAYOUT.place(0) + 200] ^= 1
     device.restart()
     store = device.store(0)
-    assert (device.plays(), store.start, store.reason, store.content) == (0, NO_SLOT, Reason.IMAGE, Content.DAMAGED)
+    assert (device.plays(), store.start, store.reason, store.content) == (0, NO_SLOT, Reason.IMAGE, SlotContent.DAMAGED)
     assert device.act(Request.DELETE, bytes([0])) == 0
-    assert device.store(0).content == Content.EMPTY
+    assert device.store(0).content == SlotContent.EMPTY
 
 
 def check_playing(library: DeviceLibrary | None = None) -> None:
@@ -190,7 +198,36 @@ def check_changed_slot(library: DeviceLibrary | None = None) -> None:
     assert device.act(Request.CONFIRM) == Reason.TRIAL
 
 
+def check_play(library: DeviceLibrary | None = None) -> None:
+    """The application plays kept programs: at a line, without a word on the line, after the checks of an upload."""
+    for key in (b"", KEY):
+        flash = new_flash()
+        device = StoreDevice(flash, library, key=key, while_playing=True)
+        for slot in (0, 1):
+            device.upload(SCANS[slot + 1])
+            assert device.save(slot) == 0
+        assert (device.act(Request.ARM, bytes(4)), device.act(Request.TRIGGER)) == (0, 0)
+        device.device.tick(200)
+        device.device.lines()
+        assert device.device.play_kept(0)
+        assert not device.device.play_kept(1), "one is on its way"
+        device.device.tick(200)
+        assert device.device.transmit() == b""
+        assert (device.plays(), device.status().generation) == (1, 4)
+        assert next(line.line for line in device.device.lines() if line.generation == 4) == 0
+        assert not device.device.play_kept(2), "an empty slot"
+        flash.power_up()
+        narrow = StoreDevice(flash, library, NARROW, key)
+        assert narrow.device.play_kept(1)
+        narrow.device.tick(200)
+        assert (narrow.plays(), narrow.status().upload) == (0, Upload.NONE)
+        assert narrow.device.play_kept(0)
+        narrow.device.tick(200)
+        assert narrow.plays() == 1
+
+
 CHECKS = (
+    check_play,
     check_start,
     check_refused_start,
     check_two_refused_programs,
@@ -207,7 +244,7 @@ def test_starts(check: Any) -> None:
 
 def test_the_slots_of_an_empty_flash() -> None:
     device = StoreDevice(new_flash())
-    expected = StoreStatus(3, NO_SLOT, NO_SLOT, 0, NO_SLOT, 0, Content.EMPTY, 0, LAYOUT.room)
+    expected = StoreStatus(3, NO_SLOT, NO_SLOT, 0, NO_SLOT, 0, SlotContent.EMPTY, 0, LAYOUT.room)
     assert device.store() == device.store(2) == expected
 
 

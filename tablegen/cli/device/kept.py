@@ -58,9 +58,9 @@ def save(slot: int, port: str, baud: int, key_file: Path | None) -> int:
 
 def saved(device: "Device", slot: int) -> str:
     """Describe a slot that was saved to, and what comes next."""
-    kept = device.slots()
-    text = f"slot {slot} keeps {_scan(kept.slots[slot])}"
-    if kept.selected == slot:
+    programs = device.slots()
+    text = f"slot {slot} keeps {_scan(programs.slots[slot])}"
+    if programs.selected == slot:
         return f"{text}; it plays after a start"
     return f"{text}; `tablegen select {slot}` lets it play after a start"
 
@@ -83,16 +83,16 @@ def slots(port: str, baud: int, key_file: Path | None, as_json: bool) -> int:
     no scans), 10 link lost, 12 invalid answers.
     """
     with connected(port, baud, key_file) as device:
-        kept = device.slots()
+        programs = device.slots()
     if as_json:
         import json
 
-        click.echo(json.dumps(_record(kept), indent=2))
+        click.echo(json.dumps(_record(programs), indent=2))
         return ExitStatus.OK
     click.echo("slot  content")
-    for slot in kept.slots:
+    for slot in programs.slots:
         click.echo(f"{slot.number:>4}  {_scan(slot)}")
-    click.echo("\n".join(["", *_sentences(kept)]))
+    click.echo("\n".join(["", *_sentences(programs)]))
     return ExitStatus.OK
 
 
@@ -106,17 +106,19 @@ def _name(slot: int | None) -> str:
     return "the scan of the firmware" if slot is None else f"slot {slot}"
 
 
-def _sentences(kept: "KeptPrograms") -> list[str]:
-    lines = [f"selected     {_name(kept.selected)}, which plays after a start"]
-    if kept.trial is not None:
-        if not kept.started:
-            lines.append(f"trial        {_name(kept.trial)}, which plays after the next start, to be confirmed then")
+def _sentences(programs: "KeptPrograms") -> list[str]:
+    lines = [f"selected     {_name(programs.selected)}, which plays after a start"]
+    if programs.trial is not None:
+        if not programs.started:
+            lines.append(
+                f"trial        {_name(programs.trial)}, which plays after the next start, to be confirmed then"
+            )
         else:
-            lines.append(f"trial        {_name(kept.trial)}, over at the next start; `tablegen confirm` selects it")
-    lines.append(f"this start   began with {_name(kept.start)}")
-    if kept.reason:
-        lines.append(f"             another scan was due, but refused ({_reason(kept.reason)})")
-    lines.append(f"room         {kept.room} bytes a slot")
+            lines.append(f"trial        {_name(programs.trial)}, over at the next start; `tablegen confirm` selects it")
+    lines.append(f"this start   began with {_name(programs.start)}")
+    if programs.reason:
+        lines.append(f"             another scan was due, but refused ({_reason(programs.reason)})")
+    lines.append(f"room         {programs.room} bytes a slot")
     return lines
 
 
@@ -126,7 +128,7 @@ def _reason(reason: int) -> str:
     return Reason(reason).name.lower() if reason in list(Reason) else str(reason)
 
 
-def _record(kept: "KeptPrograms") -> dict[str, Any]:
+def _record(programs: "KeptPrograms") -> dict[str, Any]:
     """Return all values, by the names of docs/protocol.md; null is no slot, or the firmware."""
     return {
         "slots": [
@@ -137,15 +139,15 @@ def _record(kept: "KeptPrograms") -> dict[str, Any]:
                 "image_bytes": None if slot.image is None else slot.image.image_bytes,
                 "image_crc": None if slot.image is None else slot.image.image_crc,
             }
-            for slot in kept.slots
+            for slot in programs.slots
         ],
-        "selected": kept.selected,
-        "trial": kept.trial,
-        "started": kept.started,
-        "start": kept.start,
-        "reason": _reason(kept.reason) if kept.reason else None,
-        "room": kept.room,
-        "while_playing": kept.while_playing,
+        "selected": programs.selected,
+        "trial": programs.trial,
+        "started": programs.started,
+        "start": programs.start,
+        "reason": _reason(programs.reason) if programs.reason else None,
+        "room": programs.room,
+        "while_playing": programs.while_playing,
     }
 
 
