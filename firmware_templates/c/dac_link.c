@@ -57,6 +57,9 @@ dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_s
     l->boot = boot;
     l->x_limits = config->x.limits;
     l->y_limits = config->y.limits;
+#if DAC_STORE
+    l->kept = DAC_STORE_NONE;
+#endif
     return started;
 }
 
@@ -100,13 +103,23 @@ static uint8_t next_byte(dac_link *l)
 
 /* Requests. */
 
-static bool in(unsigned set, uint8_t request)
+#if DAC_STORE
+typedef uint32_t request_set;
+#define KNOWN DAC_LINK_DELETE /* the last request */
+#define TAGGED (TAGGED_ALWAYS | UINT32_C(1) << DAC_LINK_SAVE | UINT32_C(1) << DAC_LINK_SELECT \
+                | UINT32_C(1) << DAC_LINK_CONFIRM | UINT32_C(1) << DAC_LINK_DELETE)
+#else
+typedef unsigned request_set;
+#define KNOWN DAC_LINK_LIMITS
+#define TAGGED TAGGED_ALWAYS
+#endif
+#define TAGGED_ALWAYS (1u << DAC_LINK_COMMIT | 1u << DAC_LINK_PARK | 1u << DAC_LINK_ARM | 1u << DAC_LINK_TRIGGER \
+                       | 1u << DAC_LINK_CLEAR | 1u << DAC_LINK_LIMITS)
+
+static bool in(request_set set, uint8_t request)
 {
     return (set >> request & 1u) != 0;
 }
-
-#define TAGGED (1u << DAC_LINK_COMMIT | 1u << DAC_LINK_PARK | 1u << DAC_LINK_ARM | 1u << DAC_LINK_TRIGGER \
-                | 1u << DAC_LINK_CLEAR | 1u << DAC_LINK_LIMITS)
 
 /* Bytes of a payload without tag, but for those whose length varies. */
 static uint8_t plain_bytes(uint8_t request, uint8_t length)
@@ -124,6 +137,15 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
         return 4;
     case DAC_LINK_LIMITS:
         return length == 0 ? 0 : LIMITS;
+#if DAC_STORE
+    case DAC_LINK_SLOT:
+    case DAC_LINK_DELETE:
+        return 1;
+    case DAC_LINK_SELECT:
+        return 2;
+    case DAC_LINK_SAVE:
+        return 5;
+#endif
     default:
         return 0;
     }
@@ -146,6 +168,10 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
 #if DAC_COMMIT_MODES
     else if (good && request == DAC_LINK_COMMIT && plain == 5)
         good = payload[4] <= DAC_COMMIT_FRAME;
+#endif
+#if DAC_STORE
+    else if (good && request == DAC_LINK_SELECT)
+        good = payload[1] <= 1;
 #endif
     return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
 }
@@ -195,6 +221,18 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
         return passed_on(dac_sequencer_clear_faults(l->sequencer));
     case DAC_LINK_CHALLENGE:
         return dac_link_challenge(l, a);
+#if DAC_STORE
+    case DAC_LINK_SLOT:
+        return dac_link_slot(l, payload, a);
+    case DAC_LINK_SAVE:
+        return dac_link_save(l, payload);
+    case DAC_LINK_SELECT:
+        return dac_link_select(l, payload);
+    case DAC_LINK_CONFIRM:
+        return dac_link_confirm(l);
+    case DAC_LINK_DELETE:
+        return dac_link_delete(l, payload);
+#endif
     default:
         return dac_link_set_limits(l, payload, length, a);
     }
@@ -207,9 +245,13 @@ static dac_link_finding admit(dac_link *l, const uint8_t *frame, uint8_t length,
 
     if (request != DAC_LINK_HELLO && (!l->opened || dac_link_get(frame + 2) != l->session))
         return dac_link_because(DAC_LINK_SESSION, 0);
-    if (request < DAC_LINK_HELLO || request > DAC_LINK_LIMITS
+    if (request < DAC_LINK_HELLO || request > KNOWN
         || (request == DAC_LINK_CHALLENGE && l->config->key_bytes == 0))
         return dac_link_because(DAC_LINK_TYPE, 0);
+#if DAC_STORE
+    if (request > DAC_LINK_LIMITS && l->config->store == NULL)
+        return dac_link_because(DAC_LINK_TYPE, 0);
+#endif
     const dac_link_finding found = check_payload(l, request, frame + DAC_LINK_HEADER, length);
     if (found.reason != DAC_LINK_NO_REASON || !acts)
         return found;
@@ -231,7 +273,7 @@ static void judge(dac_link *l)
 {
     const uint8_t *const frame = l->reader.bytes;
     const uint8_t request = frame[0], length = (uint8_t)(l->reader.length - DAC_LINK_HEADER);
-    const bool acts = request == DAC_LINK_ABORT || (request <= DAC_LINK_LIMITS && in(TAGGED, request)
+    const bool acts = request == DAC_LINK_ABORT || (request <= KNOWN && in(TAGGED, request)
                                                     && (request != DAC_LINK_LIMITS || length != 0));
     dac_link_answer a = {(uint8_t)(request | DAC_LINK_ANSWER), frame[1], 0, 0, l->out + 1 + DAC_LINK_HEADER};
     bool again = false;

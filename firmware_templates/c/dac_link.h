@@ -24,6 +24,9 @@
 #include "dac_link_frame.h"
 #include "dac_link_mac.h"
 #include "dac_sequencer.h"
+#if DAC_STORE
+#include "dac_store.h"
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -66,6 +69,11 @@ typedef struct {
     bool boot_persists;       /* the boot count is kept without power, and never comes twice */
     void (*random)(uint8_t bytes[16]); /* numbers that nobody can foresee; NULL only if boot_persists */
     uint32_t (*milliseconds)(void);    /* a clock that wraps at 2^32: a challenge expires after DAC_LINK_CHALLENGE_MS */
+
+#if DAC_STORE
+    dac_store *store;         /* opened by dac_store_open() as DAC_STORE_DONE; NULL: no programs are kept */
+    bool store_while_playing; /* flash can be written while a scan plays; otherwise the scan is to be parked first */
+#endif
 } dac_link_config;
 
 /* Why a link was not started. */
@@ -162,6 +170,11 @@ typedef struct {
     uint8_t nonce[16], commit_nonce[16], commit_tag[16];
     dac_link_mac digest;
 
+#if DAC_STORE
+    bool loading;               /* a kept program is checked or waits: it has no tag, and no COMMIT to be answered */
+    uint8_t kept, kept_refused; /* slot of this start, or DAC_STORE_NONE; why it is not the one that was due */
+#endif
+
     dac_link_reader reader;
     /* output: dac_link_work() fills it, dac_link_transmit() empties it */
     volatile uint8_t sending;
@@ -179,10 +192,22 @@ typedef struct {
  * to start. The application loads and commits the program of the firmware. A link that was not started is silent. */
 dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot);
 
+#if DAC_STORE
+/* Loads and commits the kept program that is due, if it passes the checks of an upload. Call it after dac_link_init(),
+ * in place of loading the program of the firmware; if it returns false, load that one. */
+bool dac_link_load_kept(dac_link *l);
+
+/* Plays a kept program as if a host uploaded it: it is checked, and takes the place of the one that plays at a line.
+ * False: the slot has no program that suits the device, the interlock is open, or an upload or another program is on
+ * its way. Called where dac_link_work() is, which does the rest; STATUS has the hash of what plays. */
+bool dac_link_play_kept(dac_link *l, uint8_t slot);
+#endif
+
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */
 bool dac_link_receive(dac_link *l, uint8_t byte);
 
-/* Does a bounded piece of work; the main loop calls it repeatedly. Returns true if there may be more to do. */
+/* Does a bounded piece of work, but for requests about kept programs, which take as long as their flash; the main loop
+ * calls it repeatedly. Returns true if there may be more to do. */
 bool dac_link_work(dac_link *l);
 
 /* Returns the next byte to send, or -1. Called by the main loop, or by the interrupt of a UART that is ready to

@@ -446,6 +446,10 @@ static bool good_tag(dac_link *l)
 
     if (l->config->key_bytes == 0)
         return true;
+#if DAC_STORE
+    if (l->loading)
+        return true;
+#endif
     request[0] = DAC_LINK_COMMIT;
     request[1] = l->commit_seq;
     dac_link_put(request + 2, l->commit_session);

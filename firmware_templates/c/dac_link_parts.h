@@ -6,7 +6,7 @@
 
 enum { DAC_LINK_HELLO = 1, DAC_LINK_BEGIN, DAC_LINK_DATA, DAC_LINK_COMMIT, DAC_LINK_ABORT, DAC_LINK_STATUS,
        DAC_LINK_READ, DAC_LINK_PARK, DAC_LINK_ARM, DAC_LINK_TRIGGER, DAC_LINK_CLEAR, DAC_LINK_CHALLENGE,
-       DAC_LINK_LIMITS };
+       DAC_LINK_LIMITS, DAC_LINK_SLOT, DAC_LINK_SAVE, DAC_LINK_SELECT, DAC_LINK_CONFIRM, DAC_LINK_DELETE };
 enum { DAC_LINK_ANSWER = 0x80, DAC_LINK_REFUSAL = 0xFF };
 
 /* Why a request is refused; docs/protocol.md, "Reasons". */
@@ -41,7 +41,13 @@ enum {
     DAC_LINK_TICKS,
     DAC_LINK_REFUSED,
     DAC_LINK_SHAPING,
-    DAC_LINK_KEEP
+    DAC_LINK_KEEP,
+    DAC_LINK_NO_SLOT,
+    DAC_LINK_ROOM,
+    DAC_LINK_NOT_PARKED,
+    DAC_LINK_GENERATION,
+    DAC_LINK_NO_TRIAL,
+    DAC_LINK_FLASH
 };
 
 typedef struct {
@@ -175,6 +181,14 @@ void dac_link_program_of(const dac_link *l, dac_program *program);
 
 /* dac_link_check.c */
 
+static inline void dac_link_start_check(dac_link_check *c)
+{
+    unsigned char *const bytes = (unsigned char *)c;
+
+    for (size_t i = 0; i < sizeof *c; i++)
+        bytes[i] = 0;
+}
+
 /* The checks of a commit, a slice a call, from a check of all zeros on: a reason, or whether all have *passed. */
 dac_link_finding dac_link_check_work(dac_link *l, bool *passed);
 
@@ -194,6 +208,15 @@ dac_link_finding dac_link_abort(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_readback(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
 dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+
+#if DAC_STORE
+/* dac_link_kept.c */
+dac_link_finding dac_link_slot(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
+dac_link_finding dac_link_save(dac_link *l, const uint8_t *payload);
+dac_link_finding dac_link_select(dac_link *l, const uint8_t *payload);
+dac_link_finding dac_link_confirm(dac_link *l);
+dac_link_finding dac_link_delete(dac_link *l, const uint8_t *payload);
+#endif
 
 /* dac_link_upload.c */
 

@@ -8,6 +8,9 @@ enum { HAS_MODES = 64, ALWAYS = TAKES_TABLES | READS_BACK | NARROWS | HAS_MODES 
 #else
 enum { ALWAYS = TAKES_TABLES | READS_BACK | NARROWS };
 #endif
+#if DAC_STORE
+enum { KEEPS_PROGRAMS = 128 };
+#endif
 enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
 enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
 
@@ -38,6 +41,9 @@ static void put_device(const dac_link *l, uint8_t *at)
     at[0] = VERSION;
     at[1] = (uint8_t)(ALWAYS | (c->harmonics ? TAKES_FOURIER : 0)
                       | (c->key_bytes ? HAS_KEY : 0) | (c->permits != NULL ? HAS_INTERLOCK : 0));
+#if DAC_STORE
+    at[1] = (uint8_t)(at[1] | (c->store != NULL ? KEEPS_PROGRAMS : 0));
+#endif
     at[2] = c->window != 0 ? c->window : DAC_LINK_RING / 256;
     at[3] = MOST_DATA;
     at[4] = (uint8_t)c->harmonics;

@@ -63,14 +63,6 @@ static void say_taken(const dac_link *l, uint8_t *payload)
     dac_link_put(payload + 4, l->taken_line);
 }
 
-static void start_check(dac_link_check *c)
-{
-    unsigned char *const bytes = (unsigned char *)c;
-
-    for (size_t i = 0; i < sizeof *c; i++)
-        bytes[i] = 0;
-}
-
 dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a)
 {
     const uint32_t crc = dac_link_get(payload);
@@ -105,7 +97,7 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
     l->commit_tagged = length == plain + DAC_LINK_TAG;
     if (l->commit_tagged)
         dac_link_copy(l->commit_tag, payload + plain, DAC_LINK_TAG);
-    start_check(&l->check);
+    dac_link_start_check(&l->check);
     a->type = DAC_LINK_SILENT;
     return dac_link_fine();
 }
@@ -113,6 +105,13 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
 /* The COMMIT in progress has an answer; the upload is kept or discarded. */
 static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *payload, uint8_t length)
 {
+#if DAC_STORE
+    if (l->loading) { /* no host waits for this */
+        l->upload = DAC_LINK_NONE;
+        l->committing = l->loading = false;
+        return;
+    }
+#endif
     l->upload = upload;
     l->committing = false;
     l->commit_due = true;

@@ -20,7 +20,7 @@ static uint32_t crc_of(const uint8_t *bytes, uint32_t count)
     return ~crc;
 }
 
-static uint32_t record_address(const dac_store *s, unsigned sector)
+static uint32_t record_address(const dac_store *s, uint32_t sector)
 {
     return s->flash->base + sector * s->flash->sector_bytes;
 }
@@ -174,11 +174,20 @@ static uint8_t place_of(const dac_store *s, uint8_t slot)
     return slot < s->flash->slots && s->state.place[slot] <= s->flash->slots ? s->state.place[slot] : DAC_STORE_NONE;
 }
 
+bool dac_store_holds(const dac_store *s, uint8_t slot)
+{
+    return place_of(s, slot) != DAC_STORE_NONE;
+}
+
+uint32_t dac_store_room(const dac_store *s)
+{
+    return s->flash->place_sectors * s->flash->sector_bytes - HEADER;
+}
+
 /* Whether a place has an image of this slot; its announcement, if it has. */
 static bool good_place(const dac_store *s, unsigned place, uint8_t slot, uint8_t *info)
 {
     const uint32_t address = place_address(s, place);
-    const uint32_t room = s->flash->place_sectors * s->flash->sector_bytes - HEADER;
     uint8_t header[HEADER], line[DAC_STORE_LINE];
     uint32_t crc = DAC_LINK_CRC;
 
@@ -186,7 +195,7 @@ static bool good_place(const dac_store *s, unsigned place, uint8_t slot, uint8_t
         || dac_link_get(header + 4) != slot || dac_link_get(header + 60) != crc_of(header, 60))
         return false;
     const uint32_t bytes = dac_link_get(header + 8 + IMAGE_BYTES);
-    if (bytes > room)
+    if (bytes > dac_store_room(s))
         return false;
     for (uint32_t at = 0; at < bytes; at += DAC_STORE_LINE) {
         const uint32_t count = bytes - at < DAC_STORE_LINE ? bytes - at : DAC_STORE_LINE;
@@ -270,7 +279,7 @@ dac_store_result dac_store_save(dac_store *s, uint8_t slot, const uint8_t *info,
 
     if (slot >= s->flash->slots)
         return DAC_STORE_NO_SLOT;
-    if (bytes > s->flash->place_sectors * s->flash->sector_bytes - HEADER)
+    if (bytes > dac_store_room(s))
         return DAC_STORE_TOO_LONG;
     if (!make_certain(s))
         return DAC_STORE_FAILED;

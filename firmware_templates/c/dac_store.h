@@ -81,6 +81,12 @@ dac_store_result dac_store_delete(dac_store *s, uint8_t slot);
 /* Whether a slot has an image with the right CRC. Its announcement, if it has. */
 bool dac_store_info(const dac_store *s, uint8_t slot, uint8_t *info);
 
+/* Whether a slot has an image, which may be damaged. */
+bool dac_store_holds(const dac_store *s, uint8_t slot);
+
+/* Bytes of the longest image. */
+uint32_t dac_store_room(const dac_store *s);
+
 /* Bytes of the image of a slot; the caller stays within the bytes that its announcement states. */
 bool dac_store_read(const dac_store *s, uint8_t slot, uint32_t offset, uint8_t *bytes, uint32_t count);
 

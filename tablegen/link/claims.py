@@ -7,12 +7,23 @@ The ranges are those of docs/protocol.md.
 from dataclasses import fields
 
 from tablegen.link.errors import NotUnderstood
-from tablegen.link.messages import DATA_BYTES, VERSION, AxisLimits, AxisShape, DeviceInfo, DeviceStatus
+from tablegen.link.messages import (
+    DATA_BYTES,
+    NO_SLOT,
+    VERSION,
+    AxisLimits,
+    AxisShape,
+    DeviceInfo,
+    DeviceStatus,
+    SlotContent,
+    StoreStatus,
+)
 
 PROGRAM_BYTES = 192  # as in tablegen.link.program_image, which imports numpy
 MAXIMUM_INDEX_BITS = 16
 MAXIMUM_HARMONICS = 4096
 MAXIMUM_LINE = (1 << 31) - 1
+MAXIMUM_SLOTS = 15
 _WORD_BITS = range(8, 25)  # of table words and of codes
 _CONVERTER_BITS = 63  # mask of the word's bits in AxisShape.converter
 _MAXIMUM_CONVERTER_BITS = 32
@@ -109,6 +120,23 @@ def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> Non
                 raise NotUnderstood(
                     f"LIMITS: {name} {field} is {value}, wider than {getattr(build, field)}, which HELLO announced"
                 )
+
+
+def check_store(status: StoreStatus) -> None:
+    """Check what a device answers to SLOT.
+
+    Raises
+    ------
+    NotUnderstood
+        For the first field that no device can have.
+    """
+    _check("SLOT", "slots", status.slots, 1, MAXIMUM_SLOTS)
+    for field in ("selected", "trial", "start"):
+        value = getattr(status, field)
+        if value != NO_SLOT:
+            _check("SLOT", field, value, 0, MAXIMUM_SLOTS)
+    _check("SLOT", "started", status.started, 0, 1)
+    _check("SLOT", "content", status.content, 0, max(SlotContent))
 
 
 def check_length(source: str, payload: bytes, size: int) -> None:

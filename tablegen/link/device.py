@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Self
 from tablegen.device.commit_mode import CommitMode
 from tablegen.link.claims import check_length, check_limits, has_restarted, most_bytes
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
+from tablegen.link.kept import CHANGE_S, KeptPrograms, change_kept, read_kept, require_store
 from tablegen.link.messages import (
     DATA_BYTES,
+    NO_SLOT,
     AxisLimits,
     DeviceInfo,
     DeviceState,
@@ -300,6 +302,75 @@ class Device:
         payload = self._act(Request.ABORT, plain=True)
         check_length("ABORT", payload, _GENERATION_BYTES)
         return int.from_bytes(payload[:_GENERATION_BYTES], "little")
+
+    def slots(self) -> KeptPrograms:
+        """Ask for the programs that the device keeps.
+
+        Raises
+        ------
+        Unsuitable
+            If it keeps none (``Feature.STORE``).
+        """
+        return read_kept(self._session, self._until(None))
+
+    def save(self, slot: int, generation: int | None = None) -> None:
+        """Keep the active program in a slot, in place of what the slot has.
+
+        Parameters
+        ----------
+        slot
+            Number of the slot, from 0.
+        generation
+            That of the program, as ``UploadResult`` has it; by default of the one that is active now.
+
+        Raises
+        ------
+        Unsuitable
+            If the device keeps no programs.
+        Refused
+            If the scan came with the firmware, the slot is too small, or flash cannot be written now.
+        LinkLost
+            If the device restarts meanwhile.
+        """
+        require_store(self._session)
+        if generation is None:
+            generation = self.status().generation
+        self._change(Request.SAVE, struct.pack("<BI", slot, generation))
+
+    def select(self, slot: int | None, trial: bool = False) -> None:
+        """Choose the slot whose program plays after a start; None is the program of the firmware.
+
+        With ``trial`` it plays after one start only, unless it is then confirmed.
+
+        Raises
+        ------
+        Refused
+            If the slot is empty, or flash cannot be written now.
+        """
+        self._change(Request.SELECT, bytes([NO_SLOT if slot is None else slot, trial]))
+
+    def confirm(self) -> None:
+        """Select the trial that plays since the start.
+
+        Raises
+        ------
+        Refused
+            If there is none, or flash cannot be written now.
+        """
+        self._change(Request.CONFIRM, b"")
+
+    def delete(self, slot: int) -> None:
+        """Empty a slot; where it was selected, the program of the firmware is.
+
+        Raises
+        ------
+        Refused
+            If it is empty already, or flash cannot be written now.
+        """
+        self._change(Request.DELETE, bytes([slot]))
+
+    def _change(self, kind: Request, payload: bytes) -> None:
+        change_kept(self._session, kind, payload, self._until(max(self._timeout_s, CHANGE_S)))
 
     def limits(self) -> Limits:
         """Ask for the active limits of x and y.

@@ -32,6 +32,11 @@ class Request(IntEnum):
     CLEAR = 11
     CHALLENGE = 12
     LIMITS = 13
+    SLOT = 14
+    SAVE = 15
+    SELECT = 16
+    CONFIRM = 17
+    DELETE = 18
 
 
 class Reason(IntEnum):
@@ -67,6 +72,12 @@ class Reason(IntEnum):
     REFUSED = 28
     SHAPING = 29
     KEEP = 30
+    SLOT = 31
+    ROOM = 32
+    PLAYING = 33
+    GENERATION = 34
+    TRIAL = 35
+    FLASH = 36
 
 
 class Feature(IntFlag):
@@ -79,6 +90,7 @@ class Feature(IntFlag):
     INTERLOCK = 16
     NARROWS = 32
     COMMIT_MODES = 64
+    STORE = 128
 
 
 class DeviceState(IntEnum):
@@ -88,6 +100,14 @@ class DeviceState(IntEnum):
     PARKED = 1
     PARKING = 2
     PLAYING = 3
+
+
+class SlotContent(IntEnum):
+    """The content of a slot of a device."""
+
+    EMPTY = 0
+    PROGRAM = 1
+    DAMAGED = 2
 
 
 class Upload(IntEnum):
@@ -100,6 +120,8 @@ class Upload(IntEnum):
 
 
 PERMITS = 1  # bit of Status.flags
+NO_SLOT = 255  # the program of the firmware, or no trial
+STORES_WHILE_PLAYING = 1  # bit of StoreStatus.flags
 
 
 class _Struct:
@@ -337,6 +359,43 @@ class ImageInfo:
             raise ValueError(f"{len(payload)} bytes, too few for an image")
         digest, size, crc, x, y = cls.LAYOUT.unpack_from(payload)
         return cls(digest, size, crc, AxisShape.unpack(x), AxisShape.unpack(y))
+
+
+@dataclass(frozen=True, slots=True)
+class StoreStatus(_Struct):
+    """The programs that a device keeps, and one of its slots (12 bytes).
+
+    Attributes
+    ----------
+    slots
+        Number of slots, 1 to 15.
+    selected, trial
+        Slots, or ``NO_SLOT``.
+    started
+        1 if the trial has been started.
+    start
+        Slot with whose program the device started, or ``NO_SLOT``.
+    reason
+        A ``Reason`` why that was not the program that was due, or 0.
+    content
+        Of the slot that was asked for, a ``SlotContent``.
+    flags
+        ``STORES_WHILE_PLAYING``, or 0.
+    room
+        Bytes of the longest image that a slot can have.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<8BI")
+
+    slots: int
+    selected: int
+    trial: int
+    started: int
+    start: int
+    reason: int
+    content: int
+    flags: int
+    room: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 import struct
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from tablegen.config.schema import MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
@@ -13,7 +13,7 @@ from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
 from tablegen.link.players import Player
-from tablegen.link.program_image import PROGRAM_BYTES, Contents, layout, make_image, take_apart
+from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, layout, make_image, take_apart
 
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table
 
@@ -101,6 +101,14 @@ class Bank:
         incoming = self.incoming
         if (incoming is not None and incoming.state is not Upload.RECEIVING) or not self._player.writable:
             raise RequestRefused(Reason.BUSY)
+        self._check_announcement(info)
+        if incoming is None or incoming.announcement != payload:
+            self._stage_is_whole = False
+            incoming = self.incoming = IncomingUpload(info, payload, bytearray())
+        return struct.pack("<I", len(incoming.data))
+
+    def _check_announcement(self, info: ImageInfo) -> None:
+        """Check the shapes of an image and its length."""
         for axis, (ours, theirs) in enumerate(((self._info.x, info.x), (self._info.y, info.y))):
             fits = theirs.index_bits == 0 or _MIN_INDEX_BITS <= theirs.length_bits <= ours.index_bits
             if theirs.mode == "cubic":
@@ -110,10 +118,6 @@ class Bank:
                 raise RequestRefused(Reason.SHAPE, axis)
         if not PROGRAM_BYTES <= info.image_bytes <= self._info.image_bytes:
             raise RequestRefused(Reason.LENGTH, self._info.image_bytes)
-        if incoming is None or incoming.announcement != payload:
-            self._stage_is_whole = False
-            incoming = self.incoming = IncomingUpload(info, payload, bytearray())
-        return struct.pack("<I", len(incoming.data))
 
     def data(self, payload: bytes) -> bytes:
         """Return the answer to DATA.
@@ -132,16 +136,16 @@ class Bank:
             incoming.data += payload[4:]
             if before < PROGRAM_BYTES <= len(incoming.data):
                 try:
-                    self._check_words(incoming)
+                    self._check_words(incoming.info, incoming.data)
                 except RequestRefused:
                     self.incoming = None
                     raise
         return struct.pack("<I", len(incoming.data))
 
-    def _check_words(self, incoming: IncomingUpload) -> None:
+    def _check_words(self, info: ImageInfo, data: bytes | bytearray) -> None:
         """Check the program words of an upload: shapes, harmonics, and the length of its image."""
-        words = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", incoming.data)
-        shapes = ((incoming.info.x, self._info.x), (incoming.info.y, self._info.y))
+        words = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", data)
+        shapes = ((info.x, self._info.x), (info.y, self._info.y))
         for page, (shape, _) in enumerate(shapes, 1):
             harmonics = words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]
             most = self._info.harmonics if shape.index_bits else 0
@@ -151,8 +155,8 @@ class Bank:
             period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
             if not shape.index_bits and period > 1 << ours.index_bits:
                 raise RequestRefused(Reason.SHAPE, page - 1)
-        size = PROGRAM_BYTES + sum(layout(words, incoming.info.x, incoming.info.y))
-        if size != incoming.info.image_bytes:
+        size = PROGRAM_BYTES + sum(layout(words, info.x, info.y))
+        if size != info.image_bytes:
             raise RequestRefused(Reason.LENGTH, size)
 
     def find(self, image_crc: int) -> ActiveUpload | IncomingUpload:
@@ -205,6 +209,48 @@ class Bank:
         self.active = ActiveUpload(incoming.info, bytes(incoming.data), self._player.swaps, self._player.swapped_at)
         self.incoming = None
         self._stage_is_whole = True
+
+    def load(self, image: ProgramImage) -> DualProgram:
+        """Check a kept image at a start, make it the current one, and return its program.
+
+        Raises
+        ------
+        RequestRefused
+            If it is none that this device plays.
+        """
+        info = image.info
+        self._check_announcement(info)
+        self._check_words(info, image.data)
+        contents = take_apart(image.data, info.x, info.y)
+        if objection := first_objection(contents, *self.limits, None, self._info.shaping):
+            raise RequestRefused(*objection)
+        self.active = ActiveUpload(info, image.data, 1, 0)
+        return program_of(contents, self._info.update_rate_hz)
+
+    def put(self, image: ProgramImage) -> IncomingUpload | None:
+        """Make a kept image the upload that is checked; None if it does not suit the device, or not now."""
+        if self.incoming is not None or not self._player.writable:
+            return None
+        try:
+            self._check_announcement(image.info)
+            self._check_words(image.info, image.data)
+        except RequestRefused:
+            return None
+        self.incoming = IncomingUpload(image.info, image.info.pack(), bytearray(image.data), Upload.CHECKING)
+        return self.incoming
+
+    def image(self) -> ProgramImage:
+        """Return the image of the tables that play, with the announcement of what was uploaded.
+
+        Raises
+        ------
+        RequestRefused
+            If the image is not held.
+        """
+        if self.active is None:
+            raise RequestRefused(Reason.READBACK)
+        data = _of_tables(self.active)
+        return ProgramImage(replace(self.active.info, image_bytes=len(data), image_crc=zlib.crc32(data)), data)
 
     def readback(self, offset: int, count: int) -> bytes:
         """Return bytes of the image that plays.

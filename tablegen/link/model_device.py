@@ -28,15 +28,22 @@ from tablegen.link.messages import (
     Upload,
 )
 from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused
+from tablegen.link.model_store import ModelStore
 from tablegen.link.players import Player
+from tablegen.link.store import Flash, Layout, Store
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
+_TAGGED |= {Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE}
 _ACTING = _TAGGED | {Request.ABORT}
 _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.BEGIN: ImageInfo.LAYOUT.size,
     Request.COMMIT: 4,
     Request.ARM: 4,
     Request.LIMITS: 2 * AxisLimits.LAYOUT.size,
+    Request.SLOT: 1,
+    Request.SAVE: 5,
+    Request.SELECT: 2,
+    Request.DELETE: 1,
 }
 _COMMIT_WITH_MODE = 5  # bytes
 _MAX_FRAMES = 1 << 31
@@ -55,10 +62,10 @@ class _LastRequest:
 
 @dataclass
 class _PendingRequest:
-    """A COMMIT or an ABORT that has not been answered yet."""
+    """A COMMIT or an ABORT that has not been answered yet; without a request a kept program, which has no answer."""
 
-    request: Frame
-    memory: _LastRequest
+    request: Frame | None
+    memory: _LastRequest | None
     before: _LastRequest | None = None
     nonce: bytes | None = None
     ticks: int = 0
@@ -80,6 +87,7 @@ class ModelDevice:
     counter, or from ``nonces``, and may be used for ``CHALLENGE_MS`` of the clock ``milliseconds``. ``reboot`` counts
     ``boot`` on, as a device does that keeps its count without power. ``staged``: the image is kept, as in Verilog, and
     not its tables. ``checking``: ticks that the checks take.
+    ``flash`` with its layout, for the feature STORE, keeps programs, ``stores_while_playing`` even while a scan plays.
     ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
     """
 
@@ -97,9 +105,13 @@ class ModelDevice:
         staged: bool = False,
         checking: int = 0,
         most_frames: int = _MAX_FRAMES,
+        flash: tuple[Flash, Layout] | None = None,
+        stores_while_playing: bool = False,
     ) -> None:
         if bool(key) != (Feature.KEY in info.features):
             raise ValueError("a key and the feature go together")
+        if (flash is not None) != (Feature.STORE in info.features):
+            raise ValueError("a flash and the feature go together")
         self.info, self.player, self.boot = info, player, boot
         self.permits = True
         if key and len(identity) not in IDENTITY_BYTES:
@@ -128,7 +140,19 @@ class ModelDevice:
             del self._requests[Request.CHALLENGE]
         if Feature.READBACK not in info.features:
             del self._requests[Request.READBACK]
+        if flash is not None:
+            self._requests |= {
+                Request.SLOT: lambda frame: self._store.slot(frame.payload),
+                Request.SAVE: lambda frame: self._store.save(frame.payload),
+                Request.SELECT: lambda frame: self._store.select(frame.payload),
+                Request.CONFIRM: lambda frame: self._store.confirm(),
+                Request.DELETE: lambda frame: self._store.delete(frame.payload),
+            }
+        self._flash, self._stores_while_playing = flash, stores_while_playing
+        self._store: ModelStore
         self._power_up()
+        if flash is not None:
+            self.player.restart(self._kept_program())
 
     def _power_up(self) -> None:
         self._reader = FrameReader()
@@ -145,9 +169,31 @@ class ModelDevice:
     def reboot(self) -> None:
         """Start again, with nothing but what is in the firmware, and the next boot count."""
         self.boot = (self.boot + 1) & 0xFFFFFFFF
-        self.player.restart()
         self._bank.power_up()
         self._power_up()
+        self.player.restart(self._kept_program())
+
+    def _kept_program(self) -> DualProgram | None:
+        """Return the kept program that a start begins with; None for that of the firmware."""
+        if self._flash is None:
+            return None
+        self._store = ModelStore(Store(*self._flash), self._bank, self.player, self._stores_while_playing)
+        return self._store.load()
+
+    def keeps(self, slot: int) -> bool:
+        """Return True if a slot has a program."""
+        return self._store.image(slot) is not None
+
+    def play_kept(self, slot: int) -> bool:
+        """Play a kept program as if a host uploaded it; return False if it does not suit the device, or not now."""
+        image = self._store.image(slot) if self.permits else None
+        incoming = None if image is None else self._bank.put(image)
+        if incoming is None:
+            return False
+        self._pending = _PendingRequest(None, None, ticks=self._checking)
+        if self._checking == 0:
+            self._check(self._pending, incoming)
+        return True
 
     @property
     def memory(self) -> bytearray:
@@ -182,7 +228,7 @@ class ModelDevice:
     def status(self) -> DeviceStatus:
         """Return the answer to STATUS."""
         player, incoming, active = self.player, self._bank.incoming, self._bank.active
-        known = bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else self._boot_hash
+        known = self._boot_hash if active is None else active.info.hash
         return DeviceStatus(
             state=player.state,
             upload=Upload.NONE if incoming is None else incoming.state,
@@ -195,7 +241,7 @@ class ModelDevice:
             image_crc=0 if incoming is None else incoming.info.image_crc,
             fault_counts=player.fault_counts,
             bad_frames=self._reader.bad_frames,
-            hash=known if active is None else active.info.hash,
+            hash=bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else known,
         )
 
     # Checks that every request passes
@@ -256,6 +302,8 @@ class ModelDevice:
             good = int(struct.unpack_from("<I", payload)[0]) <= self._most_frames
         elif good and kind == Request.COMMIT and _plain_bytes(frame) == _COMMIT_WITH_MODE:
             good = payload[4] in list(CommitMode)
+        elif good and kind == Request.SELECT:
+            good = payload[1] <= 1
         if not good:
             raise RequestRefused(Reason.PAYLOAD)
 
@@ -273,8 +321,8 @@ class ModelDevice:
         nonce, self._nonce = self._nonce, None
         return nonce if self._milliseconds() - self._challenged_at < CHALLENGE_MS else None
 
-    def _check_tag(self, frame: Frame, nonce: bytes | None, image: bytes | None = None) -> None:
-        if not self._key:
+    def _check_tag(self, frame: Frame | None, nonce: bytes | None, image: bytes | None = None) -> None:
+        if not self._key or frame is None:
             return
         plain = _plain_bytes(frame)
         received_tag = frame.payload[plain:]
@@ -282,10 +330,14 @@ class ModelDevice:
         if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), received_tag):
             raise RequestRefused(Reason.KEY)
 
-    def _answer(self, frame: Frame, payload: bytes, memory: _LastRequest | None) -> None:
+    def _answer(self, frame: Frame | None, payload: bytes, memory: _LastRequest | None) -> None:
+        if frame is None:
+            return
         self._send(Frame(frame.type | ANSWER, frame.seq, frame.session, payload), memory)
 
-    def _refuse(self, frame: Frame, refused: RequestRefused, memory: _LastRequest | None) -> None:
+    def _refuse(self, frame: Frame | None, refused: RequestRefused, memory: _LastRequest | None) -> None:
+        if frame is None:
+            return
         payload = Refusal(frame.type, refused.reason, refused.detail).pack()
         self._send(Frame(messages.REFUSAL, frame.seq, frame.session, payload), memory)
 
@@ -321,14 +373,15 @@ class ModelDevice:
             program = self._bank.accept(incoming, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
-            mode = _mode_of(commit.request)
+            mode = CommitMode.LINE if commit.request is None else _mode_of(commit.request)
             if mode is CommitMode.KEEP and not self._can_keep(program):
                 raise RequestRefused(Reason.KEEP)
             if not self.player.commit(program, mode):
                 raise RequestRefused(Reason.TICKS)
         except RequestRefused as refused:
             self._pending = None
-            if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP):
+            stays = refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP)
+            if stays and commit.request is not None:
                 incoming.state = Upload.RECEIVING
             else:
                 self._bank.incoming = None

@@ -69,8 +69,8 @@ class Player(Protocol):
     def advance(self, ticks: int) -> None:
         """Play so many ticks."""
 
-    def restart(self) -> None:
-        """Restart as at power-up."""
+    def restart(self, program: DualProgram | None = None) -> None:
+        """Restart as at power-up, with this program in place of the one of the firmware."""
 
 
 class _Queue:
@@ -83,13 +83,14 @@ class _Queue:
         self.swaps = self.swapped_at = 0
         self.restart()
 
-    def restart(self) -> None:
-        """Restart as at power-up: the boot program, if there is one, waits for the first tick."""
+    def restart(self, program: DualProgram | None = None) -> None:
+        """Restart as at power-up: this program, or else the boot program, if there is one, waits for the first tick."""
         self._requests.clear()
         self._commits = self.swaps = self.swapped_at = 0
         self._power_up()
-        if self._boot is not None:
-            self.commit(self._boot)
+        first = program or self._boot
+        if first is not None:
+            self.commit(first)
 
     def _power_up(self) -> None:
         raise NotImplementedError

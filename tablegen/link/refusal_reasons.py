@@ -37,8 +37,14 @@ _MESSAGES = {
     Reason.KEEP: "the frame cannot go on: the active scan has other ticks of a line, lines or steps of y; use "
     "--swap line or --swap frame",
     Reason.WITHDRAWN: "it was withdrawn, by an ABORT or a reset of the sequencer; upload again",
-    Reason.READBACK: "there is nothing to read: the scan came with the firmware, or a later upload uses its memory",
+    Reason.READBACK: "there is nothing to read or keep: the scan came with the firmware, or a later upload uses its "
+    "memory",
     Reason.TICKS: "no samples are requested from the sequencer; does the timer of the device run?",
+    Reason.PLAYING: "it cannot write its flash while a scan plays; `tablegen park --wait` first",
+    Reason.TRIAL: "no trial plays since the last start: `tablegen select SLOT --trial`, restart the device, and "
+    "confirm; `tablegen slots` shows where it stands",
+    Reason.FLASH: "its flash was not written as it should be, and it goes on with what it kept before; try again. "
+    "If it happens again, the flash may be worn out",
 }
 
 
@@ -125,6 +131,18 @@ def _incomplete(detail: int, info: DeviceInfo | None) -> str:
     return f"the device has received {detail} bytes only; repeat the upload to continue"
 
 
+def _slot(detail: int, info: DeviceInfo | None) -> str:
+    return f"there is no such slot, or no program in it; the device has slots 0 to {detail - 1} (`tablegen slots`)"
+
+
+def _room(detail: int, info: DeviceInfo | None) -> str:
+    return f"a slot has room for {detail} bytes, its tables included; make the tables shorter, or its slots larger"
+
+
+def _generation(detail: int, info: DeviceInfo | None) -> str:
+    return f"another scan became active meanwhile (generation {detail}); did another program upload? Save that one?"
+
+
 def _shaping(detail: int, info: DeviceInfo | None) -> str:
     has = "" if info is None else f" It has {_ORDERS.get(info.shaping, f'order {info.shaping}')}."
     return (
@@ -145,6 +163,9 @@ _SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {
     Reason.INCOMPLETE: _incomplete,
     Reason.REFUSED: _other,
     Reason.SHAPING: _shaping,
+    Reason.SLOT: _slot,
+    Reason.ROOM: _room,
+    Reason.GENERATION: _generation,
 }
 
 

@@ -166,8 +166,18 @@ class LinkSession:
                 self.greet(deadline, new_session=True)
         raise self.contested()
 
-    def act(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float, tagged: bool = True) -> bytes:
+    def act(
+        self,
+        kind: Request,
+        payload: bytes,
+        answer_bytes: int,
+        deadline: float,
+        tagged: bool = True,
+        tries: int = _MAX_TRIES,
+    ) -> bytes:
         """Send a request that acts, with a tag where the device needs one; it is carried out once.
+
+        It is sent at most ``tries`` times without an answer.
 
         Raises
         ------
@@ -183,7 +193,7 @@ class LinkSession:
                 if body is None:
                     body = payload + (self.tag(kind, number, payload, deadline) if tagged else b"")
                 self.acts[kind] = None
-                return self._repeat(kind, number, body, answer_bytes, deadline)
+                return self._repeat(kind, number, body, answer_bytes, deadline, tries)
             except Silent:
                 raise
             except LinkLost as loss:
@@ -250,7 +260,15 @@ class LinkSession:
             why = "is it on, does its firmware include the link, are port and --baud right, are TX and RX crossed?"
         return NoAnswer(f"the port is open, but no device answers: {why}")
 
-    def _repeat(self, kind: Request, number: int | None, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
+    def _repeat(
+        self,
+        kind: Request,
+        number: int | None,
+        payload: bytes,
+        answer_bytes: int,
+        deadline: float,
+        tries: int = _MAX_TRIES,
+    ) -> bytes:
         """Send a request until it is answered.
 
         A request that acts has its ``number``; any other has a new one each time, so that answers show the delay.
@@ -263,7 +281,7 @@ class LinkSession:
             If no answer comes before the deadline.
         """
         sent = set()
-        for count in range(_MAX_TRIES):
+        for count in range(tries):
             again = count > 0 or kind == Request.HELLO
             seq = self.exchange.seq() if number is None else number
             sent.add(seq)

@@ -2,9 +2,12 @@
 
 import struct
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Protocol
 
+from tablegen.link.messages import ImageInfo
 from tablegen.link.program_image import ProgramImage
 
 RECORDS = 3  # sectors of records
@@ -30,8 +33,22 @@ class Flash(Protocol):
         """Return bytes, or None if they cannot be read."""
 
 
+class StoreFault(IntEnum):
+    """Why a store does not do what was requested: ``dac_store_result``."""
+
+    NO_SLOT = 2
+    TOO_LONG = 3
+    BAD_IMAGE = 4
+    NO_TRIAL = 5
+    FAILED = 6
+
+
 class StoreError(Exception):
     """Report that the store does not do what was requested; the message says why."""
+
+    def __init__(self, fault: StoreFault, message: str) -> None:
+        super().__init__(message)
+        self.fault = fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +158,10 @@ class Store:
             If there is no such slot or no room, the CRC is not that of the image, or flash failed.
         """
         if slot >= self.layout.slots:
-            raise StoreError(f"slot {slot}; the store has slots 0 to {self.layout.slots - 1}")
+            raise StoreError(StoreFault.NO_SLOT, f"slot {slot}; the store has slots 0 to {self.layout.slots - 1}")
         if len(image.data) > self.layout.room:
-            raise StoreError(f"an image of {len(image.data)} bytes; a place has room for {self.layout.room}")
+            message = f"an image of {len(image.data)} bytes; a place has room for {self.layout.room}"
+            raise StoreError(StoreFault.TOO_LONG, message)
         self._make_certain()
         place = next(place for place in range(SLOTS + 1) if place not in self.state.places[: self.layout.slots])
         address = self.layout.place(place)
@@ -157,7 +175,7 @@ class Store:
         for at in (0, LINE):
             self._write(address + at, header[at : at + LINE])
         if self._good_place(place, slot) is None:
-            raise StoreError("the bytes of the image do not have its CRC")
+            raise StoreError(StoreFault.BAD_IMAGE, "the bytes of the image do not have its CRC")
         self._change(self._with_place(slot, place))
 
     def select(self, slot: int, trial: bool = False) -> None:
@@ -169,7 +187,7 @@ class Store:
             If the slot is empty, or flash failed.
         """
         if (slot != NONE or trial) and self.info(slot) is None:
-            raise StoreError(f"nothing is kept in slot {slot}")
+            raise StoreError(StoreFault.NO_SLOT, f"nothing is kept in slot {slot}")
         if trial:
             self._change(replace(self.state, trial=slot, started=0))
         else:
@@ -184,7 +202,7 @@ class Store:
             If there is none, or flash failed.
         """
         if self.state.trial == NONE or not self.state.started:
-            raise StoreError("no trial has been started")
+            raise StoreError(StoreFault.NO_TRIAL, "no trial has been started")
         self._change(replace(self.state, selected=self.state.trial, trial=NONE, started=0))
 
     def delete(self, slot: int) -> None:
@@ -196,7 +214,7 @@ class Store:
             If it is empty, or flash failed.
         """
         if self._place(slot) == NONE:
-            raise StoreError(f"nothing is kept in slot {slot}")
+            raise StoreError(StoreFault.NO_SLOT, f"nothing is kept in slot {slot}")
         state = self._with_place(slot, NONE)
         selected, trial = (NONE if each == slot else each for each in (state.selected, state.trial))
         self._change(replace(state, selected=selected, trial=trial))
@@ -205,6 +223,25 @@ class Store:
         """Return the announcement of the image of a slot, 48 bytes, or None without an image of the right CRC."""
         place = self._place(slot)
         return None if place == NONE else self._good_place(place, slot)
+
+    def image(self, slot: int) -> ProgramImage | None:
+        """Return the image of a slot, or None without an image of the right CRC."""
+        announcement = self.info(slot)
+        if announcement is None:
+            return None
+        info = ImageInfo.unpack(announcement)
+        address = self.layout.place(self._place(slot)) + HEADER
+        return ProgramImage(info, b"".join(self._lines(address, info.image_bytes)))
+
+    def holds(self, slot: int) -> bool:
+        """Return True if a slot has an image, which may be damaged."""
+        return self._place(slot) != NONE
+
+    def _lines(self, address: int, size: int) -> Iterator[bytes]:
+        for at in range(0, size, LINE):
+            line = self.flash.read(address + at, min(LINE, size - at))
+            self._require(line is not None)
+            yield line or b""
 
     def _place(self, slot: int) -> int:
         place = self.state.places[slot] if slot < self.layout.slots else NONE
@@ -236,7 +273,8 @@ class Store:
 
     def _require(self, success: bool) -> None:
         if not success:
-            raise StoreError("the flash was not erased, or not written, or reads otherwise than it was written")
+            message = "the flash was not erased, or not written, or reads otherwise than it was written"
+            raise StoreError(StoreFault.FAILED, message)
 
     def _write(self, address: int, line: bytes) -> None:
         self._require(self.flash.write(address, line) and self.flash.read(address, LINE) == line)

@@ -19,6 +19,7 @@ from tablegen.link.messages import DeviceInfo, Feature, Reason, Request
 from tablegen.link.prepare import PreparedScan
 
 COMMANDS = ("upload", "live", "status", "readback", "park", "trigger", "clear", "ports")
+COMMANDS += ("save", "slots", "select", "confirm", "delete")
 
 
 @pytest.fixture(scope="module")

@@ -65,24 +65,30 @@ def compile_store(folder: Path, changes: tuple[tuple[str, str], ...] = ()) -> ct
     return library
 
 
+def c_flash(flash: CutFlash, layout: Layout) -> Structure:
+    """The ``dac_store_flash`` of a flash in Python, which has to live as long as it is used."""
+
+    def write(address: int, line: "ctypes._Pointer[c_uint8]") -> bool:
+        return flash.write(address, ctypes.string_at(line, LINE))
+
+    def read(address: int, to: "ctypes._Pointer[c_uint8]", count: int) -> bool:
+        found = flash.read(address, count)
+        if found is not None:
+            ctypes.memmove(to, found, count)
+        return found is not None
+
+    return _Flash(
+        _Erase(flash.erase), _Write(write), _Read(read),
+        layout.base, layout.sector_bytes, layout.place_sectors, layout.slots,
+    )  # fmt: skip
+
+
 class CStore:
     """A ``dac_store``, opened on a flash."""
 
     def __init__(self, library: ctypes.CDLL, flash: CutFlash, layout: Layout) -> None:
-        def write(address: int, line: "ctypes._Pointer[c_uint8]") -> bool:
-            return flash.write(address, ctypes.string_at(line, LINE))
-
-        def read(address: int, to: "ctypes._Pointer[c_uint8]", count: int) -> bool:
-            found = flash.read(address, count)
-            if found is not None:
-                ctypes.memmove(to, found, count)
-            return found is not None
-
         self.library = library
-        self.flash = _Flash(
-            _Erase(flash.erase), _Write(write), _Read(read),
-            layout.base, layout.sector_bytes, layout.place_sectors, layout.slots,
-        )  # fmt: skip
+        self.flash = c_flash(flash, layout)
         self.store = _Store()
         self.opened = library.dac_store_open(byref(self.store), byref(self.flash))
 

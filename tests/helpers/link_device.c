@@ -95,12 +95,37 @@ void device_start(device *d, uint32_t boot)
     d->boot = boot;
     if (!dac_sequencer_init(&d->sequencer, &d->config.x.converter, &d->config.y.converter))
         abort();
+#if DAC_STORE
+    d->config.store = d->flash.slots != 0 && dac_store_open(&d->store, &d->flash) == DAC_STORE_DONE ? &d->store : NULL;
+#endif
     d->started = dac_link_init(&d->link, &d->config, &d->sequencer, boot);
+#if DAC_STORE
+    if (dac_link_load_kept(&d->link))
+        return;
+#endif
     if (d->setup.boot_program == NULL)
         return;
     if (dac_sequencer_load(&d->sequencer, d->setup.boot_program) != DAC_LOADED || !dac_sequencer_commit(&d->sequencer))
         abort();
 }
+
+#if DAC_STORE
+/* From now on the device has a flash, and starts again. */
+void device_keep(device *d, const dac_store_flash *flash, bool while_playing)
+{
+    d->flash = *flash;
+    d->config.store_while_playing = while_playing;
+    device_start(d, d->boot);
+}
+#endif
+
+#if DAC_STORE
+bool device_play(device *d, uint8_t slot)
+{
+    permits_now = d->permits;
+    return dac_link_play_kept(&d->link, slot);
+}
+#endif
 
 void device_permit(device *d, bool permitted)
 {

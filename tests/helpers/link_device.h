@@ -30,6 +30,10 @@ typedef struct {
     dac_sequencer sequencer;
     dac_link link;
     line_log log;
+#if DAC_STORE
+    dac_store store;
+    dac_store_flash flash; /* of no slot: none */
+#endif
     uint32_t boot;
     dac_link_started started;
     bool permits, stalled;
@@ -39,6 +43,10 @@ typedef struct {
 } device;
 
 device *device_new(const device_setup *setup, uint32_t boot);
+#if DAC_STORE
+void device_keep(device *d, const dac_store_flash *flash, bool while_playing);
+bool device_play(device *d, uint8_t slot);
+#endif
 void device_delete(device *d);
 void device_start(device *d, uint32_t boot);
 void device_permit(device *d, bool permits);

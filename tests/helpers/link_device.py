@@ -18,14 +18,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from building import REPOSITORY
 from c_library import OPTIONS, Converter, Library, compile_library, converter_of
+from c_store import c_flash
+from cut_flash import CutFlash
 from link_talk import IDENTITY, Talk, derived_nonce
 
-from tablegen.base.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.link.messages import AxisLimits
 from tablegen.link.program_image import make_image
+from tablegen.link.store import Layout
 
 HERE = Path(__file__).parent
 LINES = REPOSITORY / "examples" / "firmware" / "cortex_m"
@@ -130,17 +133,21 @@ class DeviceLibrary(Library):
 
 
 @cache
-def device_library(bits: int = 16, shaping: int = 0, spline: bool = False, modes: bool = False) -> DeviceLibrary:
+def device_library(
+    bits: int = 16, shaping: int = 0, spline: bool = False, modes: bool = False, store: bool = False
+) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
-    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode.
+    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     more = [f"-DDAC_SHAPING={shaping}"] if shaping else []
     more += ["-DDAC_SPLINE=1"] if spline else []
     more += ["-DDAC_COMMIT_MODES=1"] if modes else []
-    return DeviceLibrary(compile_device(folder / "device.so", bits, more=more))
+    more += ["-DDAC_STORE=1"] if store else []
+    sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
+    return DeviceLibrary(compile_device(folder / "device.so", bits, sources=sources, more=more))
 
 
 def widest(output: Output) -> AxisLimits:
@@ -155,7 +162,7 @@ class HostDevice:
     can do, ``library`` to that of ``device_library`` with the order ``shaping``, and with ``modes`` of a COMMIT. Nonces
     are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``; ``started`` is why the link was
     not.
-    ``permits`` is the input of the interlock, if it has one.
+    ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout.
     """
 
     def __init__(
@@ -180,9 +187,12 @@ class HostDevice:
         boot_persists: bool = True,
         shaping: int = 0,
         modes: bool = False,
+        flash: tuple[CutFlash, Layout] | None = None,
+        stores_while_playing: bool = False,
     ) -> None:
         bits = 16 if max(like.x.bits, like.y.bits, like.x.output.word_bits, like.y.output.word_bits) <= 16 else 32
-        self.library = library or device_library(bits, shaping, "cubic" in (like.x.mode, like.y.mode), modes)
+        spline, store = "cubic" in (like.x.mode, like.y.mode), flash is not None
+        self.library = library or device_library(bits, shaping, spline, modes, store)
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True
@@ -230,6 +240,10 @@ class HostDevice:
             self._random = setup.random = _Random(lambda to: ctypes.memmove(to, random(), 16))
         self._setup = setup
         self._device = c_void_p(self._dll.device_new(ctypes.byref(setup), c_uint32(boot_count)))
+        self._layout, self._while_playing = None if flash is None else flash[1], stores_while_playing
+        if flash is not None:
+            self._flash = c_flash(*flash)
+            self._dll.device_keep(self._device, ctypes.byref(self._flash), c_bool(stores_while_playing))
         self.started = Started(self._dll.device_started(self._device))
 
     def __del__(self) -> None:
@@ -285,6 +299,10 @@ class HostDevice:
             talk = Talk()
             upload = b"".join([talk.hello(), *talk.upload(make_image(self._boot, bytes(32).hex()))])
             self.notes.append(f"B {upload.hex()}")
+        if self._layout is not None:
+            layout = self._layout
+            numbers = [layout.base, layout.sector_bytes, layout.place_sectors, layout.slots, self._while_playing]
+            self.notes.append(" ".join(map(str, ["F", *map(int, numbers)])))
 
     def transmit(self) -> bytes:
         """What has left since the last call."""
@@ -334,6 +352,13 @@ class HostDevice:
         self._permits = permits
         self._note(f"p {int(permits)}")
         self._dll.device_permit(self._device, c_bool(permits))
+
+    def play_kept(self, slot: int) -> bool:
+        """The application plays a kept program; whether it is on its way."""
+        begun = bool(self._dll.device_play(self._device, c_uint8(slot)))
+        self._work()
+        self._note(f"P {slot}")
+        return begun
 
     def report(self, fault: int) -> None:
         """A fault that the driver of the converters saw."""

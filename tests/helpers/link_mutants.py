@@ -140,7 +140,7 @@ MUTANTS = [
     ),
     Mutant("a request of another session is heard", LINK, "|| dac_link_get(frame + 2) != l->session", "|| false"),
     Mutant("a request before any session is heard", LINK, "(!l->opened || ", "("),
-    Mutant("an unknown request is heard", LINK, "|| request > DAC_LINK_LIMITS\n", "|| request > 200\n"),
+    Mutant("an unknown request is heard", LINK, "|| request > KNOWN\n", "|| request > 200\n"),
     Mutant("a challenge without a key", LINK, "l->config->key_bytes == 0))\n", "false))\n"),
     Mutant(
         "an echo is answered", LINK, "    if ((request & DAC_LINK_ANSWER) != 0)\n        return; /* an echo */\n", ""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from cut_flash import MODES, CutFlash
 from link_device import HostDevice, Started, widest
 from link_images import damaged, random_image, random_limits, resealed
 from link_talk import IDENTITY, Talk
@@ -26,11 +27,15 @@ from tablegen.link.messages import (
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
 from tablegen.link.program_image import ProgramImage
+from tablegen.link.store import Layout
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 HARMONICS = 4
 KEY = bytes(range(32))
 BOOT_HASH = bytes(range(100, 132))
+SLOTS = 3
+KEEPING = (Request.SLOT, Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE)
+CERTAIN_MODES = tuple(mode for mode in MODES if mode != "unstable")  # whatever is read, and how often
 TAGGED = (Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS)
 
 
@@ -42,7 +47,14 @@ class Dialogue:
     """One that is told by a seed. ``seen`` counts answers by type, and refusals by request and reason."""
 
     def __init__(
-        self, shape: SequencerShape, seed: int, key: bytes = b"", notes: bool = False, order: int = 0, **how: Any
+        self,
+        shape: SequencerShape,
+        seed: int,
+        key: bytes = b"",
+        notes: bool = False,
+        order: int = 0,
+        store: bool = False,
+        **how: Any,
     ) -> None:
         self.rng = np.random.default_rng(seed)
         self.shape, self.key, self.order = shape, key, order
@@ -52,6 +64,14 @@ class Dialogue:
         if self.rng.random() < 0.2:
             limits = random_limits(self.rng, like)
         index = tuple(max(bits, 3) for bits in (shape.x_index_bits, shape.y_index_bits))
+        self.flashes: list[CutFlash] = []
+        kept: dict[str, Any] = {}
+        if store:
+            layout = _some_layout(seed)
+            self.flashes = [CutFlash(layout.place(layout.slots + 1), layout.sector_bytes) for _ in range(2)]
+            kept = {"stores_while_playing": bool(self.rng.random() < 0.5)}
+            how |= {"flash": (self.flashes[0], layout), **kept}
+            kept |= {"flash": (self.flashes[1], layout)}
         self.device = HostDevice(
             like,
             boot,
@@ -72,6 +92,7 @@ class Dialogue:
         features = Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.NARROWS
         self._modes = bool(how.get("modes"))
         features |= Feature.COMMIT_MODES if self._modes else Feature(0)
+        features |= Feature.STORE if store else Feature(0)
         shapes = [AxisShape(index[0], like.x.bits, shape.dac_bits, shape.dac_bits)]
         shapes += [AxisShape(index[1], like.y.bits, shape.dac_bits, shape.dac_bits)]
         most = 192 + sum(max(each.word_bytes << each.index_bits, 4 * (2 * HARMONICS + 1)) for each in shapes)
@@ -100,6 +121,7 @@ class Dialogue:
             boot_hash=BOOT_HASH,
             identity=IDENTITY,
             milliseconds=lambda: self._clock,
+            **kept,
         )
         self.talk = Talk(int(self.rng.integers(1, 1 << 32)), key)
         self.seen: Counter[Any] = Counter()
@@ -176,6 +198,11 @@ class Dialogue:
             (3, self._ask), (1, self._hello), (3, self._again), (1, self._noise), (1, self._odd),
             (0.5, self._permit), (0.3, self._reboot), (0.7, self._whole),
         ]  # fmt: skip
+        if self.flashes:
+            doings += [(12, self._keep), (2, self._cut), (1, self._reboot), (4, self._whole), (3, self._trial)]
+            doings += [(3, self._play)]
+        if self.device.notes is not None:  # a replay has no cuts
+            doings = [doing for doing in doings if doing[1] != self._cut]
         weights = np.array([weight for weight, _ in doings])
         for _ in range(steps):
             doings[int(self.rng.choice(len(doings), p=weights / weights.sum()))][1]()
@@ -273,8 +300,70 @@ class Dialogue:
         permits = bool(self.rng.random() < 0.8)
         self.device.permits = self.model.permits = permits
 
+    def _keep(self) -> None:
+        """Something about the kept programs."""
+        kind = int(self.rng.choice([*KEEPING, Request.SAVE, Request.SAVE, Request.SELECT, Request.SELECT]))
+        slot = int(self.rng.choice([*range(SLOTS + 1), *range(SLOTS), 255]))
+        payload = bytes([slot])
+        if kind == Request.SAVE:
+            wrong = int(self.rng.random() < 0.1)
+            payload += struct.pack("<I", self.model.status().generation + wrong)
+        elif kind == Request.SELECT:
+            payload += bytes([int(self.rng.choice([0, 0, 1, 1, 1, 2]))])
+        elif kind == Request.CONFIRM:
+            payload = b""
+        self._send(self.talk.request(kind, payload) if kind == Request.SLOT else self._tagged(kind, payload))
+
+    def _play(self) -> None:
+        """The application plays a kept program, and goes on at once or after some ticks."""
+        if self.rng.random() < 0.7:
+            self._send(self.talk.acting(Request.ABORT))
+            self._tick(1)
+        held = [slot for slot in range(SLOTS) if self.model.keeps(slot)]
+        slot = int(self.rng.choice([*held, *held, *held, *range(SLOTS + 1), 255]))
+        begun = self.device.play_kept(slot)
+        if begun != self.model.play_kept(slot):
+            raise Differs(f"a kept program {'begins' if begun else 'does not begin'}")
+        self.seen["played" if begun else "not played"] += 1
+        self._hear()
+        self._tick(int(self.rng.choice([0, 0, 1, 20])))
+
+    def _trial(self) -> None:
+        """Keep what plays, try it after a start, and confirm it."""
+        slot = int(self.rng.integers(0, SLOTS))
+        if self.rng.random() < 0.7:
+            self._send(self.talk.acting(Request.ABORT))
+            self._image, _ = random_image(self.rng, self.shape, HARMONICS, "smooth", self.order)
+            self._whole()
+            self._tick(60)
+        if self.rng.random() < 0.7:
+            generation = struct.pack("<I", self.model.status().generation)
+            self._send(self._tagged(Request.SAVE, bytes([slot]) + generation))
+        self._send(self._tagged(Request.SELECT, bytes([slot, 1])))
+        self._reboot()
+        self._tick(int(self.rng.choice([0, 1, 1, 5])))
+        if self.rng.random() < 0.3:
+            self._keep()
+        self._send(self._tagged(Request.CONFIRM))
+        self._send(self.talk.request(Request.SLOT, bytes([slot])))
+
+    def _cut(self) -> None:
+        """The supply fails while something is done about the kept programs, or soon after; then a start."""
+        event, mode = int(self.rng.choice([0, 1, 3, 5, 9, 30, 60])), str(self.rng.choice(CERTAIN_MODES))
+        for flash in self.flashes:
+            flash.cut(event, mode)
+        self._keep()
+        self._reboot()
+
     def _reboot(self) -> None:
+        for flash in self.flashes:
+            flash.power_up()
         self.device.reboot()
         self.model.reboot()
         self._received = 0
         self._send(self.talk.hello())
+
+
+def _some_layout(seed: int) -> Layout:
+    """A layout of few slots; in one of five the longest images have no room."""
+    return Layout(320, 320, 1, SLOTS) if seed % 5 == 0 else Layout(0, 256, 2, SLOTS)

@@ -5,6 +5,8 @@
  *     B hex        what uploads the program that it boots with
  *     r hex        bytes from the line; f hex  the same, and the main loop does not go round
  *     w n, t n k   the main loop n times; n ticks, after each the main loop at most k times
+ *     F numbers    it has a flash from now on, which is empty: the layout, and whether it is written while a scan plays
+ *     P slot       the application plays a kept program
  *     p, s, b, k, c   interlock, line stalled, reset with a boot count, a damaged word, the clock
  */
 #include <inttypes.h>
@@ -97,6 +99,43 @@ static void keep_boot(device *d, size_t count)
     device_start(d, d->boot);
 }
 
+#if DAC_STORE
+static uint8_t cells[1 << 14];
+
+static bool erase_sector(uint32_t address);
+static bool write_line(uint32_t address, const uint8_t *from);
+static bool read_cells(uint32_t address, uint8_t *to, uint32_t count);
+static dac_store_flash flash = {erase_sector, write_line, read_cells, 0, 0, 0, 0};
+
+static bool erase_sector(uint32_t address)
+{
+    memset(cells + address, 0xFF, flash.sector_bytes);
+    return true;
+}
+
+static bool write_line(uint32_t address, const uint8_t *from)
+{
+    memcpy(cells + address, from, DAC_STORE_LINE);
+    return true;
+}
+
+static bool read_cells(uint32_t address, uint8_t *to, uint32_t count)
+{
+    memcpy(to, cells + address, count);
+    return true;
+}
+
+static void give_flash(device *d)
+{
+    memset(cells, 0xFF, sizeof cells);
+    flash.base = (uint32_t)number();
+    flash.sector_bytes = (uint32_t)number();
+    flash.place_sectors = (uint32_t)number();
+    flash.slots = (uint8_t)number();
+    device_keep(d, &flash, number() != 0);
+}
+#endif
+
 int main(void)
 {
     static device_setup setup;
@@ -116,6 +155,13 @@ int main(void)
                 (void)device_refusal(d, fault);
         } else if (d == NULL) {
             return 1;
+#if DAC_STORE
+        } else if (what == 'F') {
+            give_flash(d);
+        } else if (what == 'P') {
+            (void)device_play(d, (uint8_t)number());
+            device_run(d, UINT32_MAX);
+#endif
         } else if (what == 'B') {
             keep_boot(d, hexadecimal());
         } else if (what == 'r' || what == 'f') {

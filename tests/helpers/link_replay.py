@@ -10,7 +10,7 @@ from limits import ENDED, within
 from link_device import HERE, LINES, HostDevice
 from link_random import KEY, Dialogue
 
-from tablegen.base.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime, c_store
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 _REPLAY_S = 240  # of CPU time; in an emulator it takes ten
@@ -34,9 +34,11 @@ def replay_of(device: HostDevice, heard: bytes) -> Replay:
     return Replay(8 * device.library.word_bytes, "\n".join(device.notes) + "\n", heard.hex(), tuple(lines))
 
 
-def random_replay(shape: SequencerShape, seed: int, keyed: bool = False, modes: bool = False) -> Replay:
-    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT."""
-    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, modes=modes)
+def random_replay(
+    shape: SequencerShape, seed: int, keyed: bool = False, modes: bool = False, store: bool = False
+) -> Replay:
+    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, or kept programs."""
+    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, store=store, modes=modes)
     dialogue.play(STEPS)
     return replay_of(dialogue.device, bytes(dialogue.heard))
 
@@ -49,7 +51,7 @@ def compile_replay(
     sources: Iterable[Path] | None = None,
 ) -> Path:
     """The device that replays, for storage of so many bits; ``sources`` in place of runtime and link."""
-    runtime = list(sources) if sources is not None else [*c_runtime(), *c_link()]
+    runtime = list(sources) if sources is not None else [*c_runtime(), *c_link(), *c_store()]
     folders = sorted({str(file.parent) for file in runtime})
     run_clean(
         [

@@ -11,6 +11,7 @@ pytestmark = pytest.mark.rest
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 MODES = "-DDAC_COMMIT_MODES=1"
+STORE = "-DDAC_STORE=1"
 WAYS = {
     "gcc": (("gcc",), SANITIZED),
     "clang": (("clang",), SANITIZED),
@@ -40,6 +41,13 @@ def replays_with_modes() -> list[Replay]:
     return [random_replay(shape, seed, keyed, modes=True) for shape in kinds for seed, keyed in ((4, False), (5, True))]
 
 
+@pytest.fixture(scope="module")
+def replays_with_a_store() -> list[Replay]:
+    """Of devices that keep programs."""
+    kinds = [SequencerShape(16, 1, 5, 16, 1, 4, 16), SequencerShape(24, 1, 4, 18, 1, 3, 24)]
+    return [random_replay(shape, seed, keyed, store=True) for shape in kinds for seed, keyed in ((6, False), (7, True))]
+
+
 def hold(replays: list[Replay], folder: Path, emulator: str | None = None, **how: tuple[str, ...]) -> None:
     programs = {bits: compile_replay(folder / f"replay_{bits}", bits, **how) for bits in (16, 32)}
     for replay in replays:
@@ -59,9 +67,17 @@ def test_sanitizers_with_modes_of_a_commit(compiler: str, replays_with_modes: li
     hold(replays_with_modes, tmp_path, compiler=(compiler,), options=(*SANITIZED, MODES))
 
 
-def test_the_other_byte_order(replays: list[Replay], replays_with_modes: list[Replay], tmp_path: Path) -> None:
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_sanitizers_with_kept_programs(compiler: str, replays_with_a_store: list[Replay], tmp_path: Path) -> None:
+    hold(replays_with_a_store, tmp_path, compiler=(compiler,), options=(*SANITIZED, STORE))
+
+
+def test_the_other_byte_order(
+    replays: list[Replay], replays_with_modes: list[Replay], replays_with_a_store: list[Replay], tmp_path: Path
+) -> None:
     """And a processor of 32 bits."""
     options = ("-std=c99", "-O2", "-static")
     hold(replays, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=options)
     assert (tmp_path / "replay_16").read_bytes()[4:6] == b"\1\2"
     hold(replays_with_modes, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=(*options, MODES))
+    hold(replays_with_a_store, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=(*options, STORE))

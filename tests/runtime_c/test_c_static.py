@@ -126,11 +126,20 @@ def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     assert run([*ANALYSERS[analyser], source]).returncode != 0
 
 
-def declared(*headers: str, options: Sequence[str] = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1")) -> set[str]:
+ALL_FUNCTIONS = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", "-DDAC_STORE=1")
+
+
+def declared(
+    *headers: str, options: Sequence[str] = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", "-DDAC_STORE=1")
+) -> set[str]:
     """Functions that headers declare with these options, but for those that they define themselves."""
     text = "".join(HEADERS[name].read_text("utf-8") for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    for option, given in (("DAC_SHAPING", "-DDAC_SHAPING=3"), ("DAC_COMMIT_MODES", "-DDAC_COMMIT_MODES=1")):
+    for option, given in (
+        ("DAC_SHAPING", "-DDAC_SHAPING=3"),
+        ("DAC_COMMIT_MODES", "-DDAC_COMMIT_MODES=1"),
+        ("DAC_STORE", "-DDAC_STORE=1"),
+    ):
         if given not in options:
             text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
     return set(re.findall(r"^(?!static|#)\w[\w ]*?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
@@ -151,7 +160,7 @@ def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    own = declared(*HEADERS, options=options)
+    own = declared(*HEADERS, options=[*options, "-DDAC_STORE=1"])
     assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
     assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     # Of absolute value, for the linker to compare: they are in no memory.
@@ -165,7 +174,7 @@ def test_public_names_have_the_prefix_of_the_sequencer() -> None:
     assert {name for name in public if not name.startswith("dac_sequencer_")} == {"dac_synthesize"}
     assert all(name.startswith("dac_axis_") for name in declared("dac_axis.h"))
     link = [name for name in HEADERS if name.startswith("dac_link")]
-    assert len(declared("dac_link.h")) == 4
+    assert len(declared("dac_link.h")) == 6
     assert all(name.startswith("dac_link_") for name in declared(*link))
 
 

@@ -11,11 +11,24 @@ static dac_link link;
  * key. */
 static uint32_t boots __attribute__((section(".noinit")));
 
+static bool start_link(void)
+{
+#if DAC_STORE
+    if (dac_store_open(&scan_store, &scan_flash) != DAC_STORE_DONE)
+        return false;
+#endif
+    return dac_link_init(&link, scan_link(), &sequencer, ++boots) == DAC_LINK_STARTED;
+}
+
 bool control_start(void)
 {
-    return dac_link_init(&link, scan_link(), &sequencer, ++boots) == DAC_LINK_STARTED
-        && dac_sequencer_load(&sequencer, &scan_whole) == DAC_LOADED
-        && dac_sequencer_commit(&sequencer);
+    if (!start_link())
+        return false;
+#if DAC_STORE
+    if (dac_link_load_kept(&link))
+        return true;
+#endif
+    return dac_sequencer_load(&sequencer, &scan_whole) == DAC_LOADED && dac_sequencer_commit(&sequencer);
 }
 
 void control_ready(bool good)

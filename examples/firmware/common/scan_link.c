@@ -1,7 +1,8 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
  * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only),
  * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and
- * LINK_DEVICE, a name as a string; with a key the port has random.h.
+ * LINK_DEVICE, a name as a string; with a key the port has random.h. With DAC_STORE=1 the port has scan_flash, and
+ * LINK_STORE_WHILE_PLAYING where writing to it does not stop the processor.
  */
 #include "scan_link.h"
 
@@ -55,6 +56,10 @@ typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof
         {tables[0], tables[1]}, words                                                                                 \
     }
 
+#if DAC_STORE
+dac_store scan_store;
+#endif
+
 static const dac_link_config config = {
     .x = AXIS(_X, LINK_X_INDEX_BITS, x_tables, x_fourier),
     .y = AXIS(_Y, LINK_Y_INDEX_BITS, y_tables, y_fourier),
@@ -63,6 +68,12 @@ static const dac_link_config config = {
     .sine = SINE,
     .update_rate_hz = UPDATE_RATE_HZ,
     .hash = hash,
+#if DAC_STORE
+    .store = &scan_store,
+#ifdef LINK_STORE_WHILE_PLAYING
+    .store_while_playing = true,
+#endif
+#endif
 #ifdef LINK_KEY
     .key_bytes = sizeof key,
     .key = key,

@@ -6,4 +6,9 @@
 
 const dac_link_config *scan_link(void);
 
+#if DAC_STORE
+extern dac_store scan_store;
+extern const dac_store_flash scan_flash; /* in the port */
+#endif
+
 #endif

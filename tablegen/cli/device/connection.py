@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _KEY_BYTES = range(16, 33)
+_OF_SLOTS = ("SAVE", "SELECT", "CONFIRM", "DELETE")
 _OF_OTHERS = 0o077  # permissions of a group and of others
 
 baud_option = click.option(
@@ -104,7 +105,8 @@ def _interrupted_state(device: "Device | None", goes_on: str) -> str:
         )
     acts = [] if device is None else [act.name for act in device.acts if act != Request.COMMIT]
     if acts:
-        return f"the device may have carried out {' and '.join(dict.fromkeys(acts))}: see `tablegen status`"
+        look = "slots" if any(act in _OF_SLOTS for act in acts) else "status"
+        return f"the device may have carried out {' and '.join(dict.fromkeys(acts))}: see `tablegen {look}`"
     return f"the device continues {goes_on}"
 
 

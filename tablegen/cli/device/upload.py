@@ -14,6 +14,7 @@ from tablegen.cli.device.connection import (
     source_argument,
     timeout_option,
 )
+from tablegen.cli.device.kept import SLOT, saved
 from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.progress_bar import Bar
 
@@ -55,6 +56,12 @@ _BITS_PER_BYTE = 10
     help="When a running device starts the new scan. line: at the next line start, from the first line of a frame. "
     "keep: at the next line start, and the frame goes on with its next line. frame: at the next frame start.",
 )
+@click.option(
+    "--store",
+    type=SLOT,
+    metavar="SLOT",
+    help="Then keep the scan in this slot of the flash of the device, as `tablegen save` does.",
+)
 @key_option
 @click.option("--force", is_flag=True, help="Send the scan even if it is active already.")
 @click.option(
@@ -68,6 +75,7 @@ def upload(
     form: "Form",
     dry_run: bool,
     swap: str,
+    store: int | None,
     key_file: Path | None,
     force: bool,
     any_rate: bool,
@@ -85,6 +93,7 @@ def upload(
       tablegen upload annexin_200nm.toml --port /dev/ttyUSB0
       tablegen upload build --port socket://192.168.0.7:5000
       tablegen upload build --port COM4 --swap keep            the frame goes on
+      tablegen upload build --port COM4 --store 1              keep it without power
       tablegen upload build --dry-run                          print sizes and transfer times
 
     \b
@@ -110,6 +119,9 @@ def upload(
         limits = device.limits()
         image = scan.image(form, device.info)
         check(scan, image, device.info, limits, any_rate, mode)
+        if store is not None:
+            tables = len(scan.image("table").data)
+            device.slots().check(store, tables, device.status().state in (DeviceState.PLAYING, DeviceState.PARKING))
         if dry_run:
             click.echo(_verdict(device, image, force))
             return ExitStatus.OK
@@ -118,6 +130,9 @@ def upload(
         finally:
             bar.close()
         click.echo(_summary(scan, image, result))
+        if store is not None:
+            device.save(store, result.generation)
+            click.echo(saved(device, store))
         if device.hello.state == DeviceState.PARKED:
             click.echo("the device is parked; start the scan with `tablegen trigger`")
     return ExitStatus.OK

@@ -1,0 +1,330 @@
+"""Kept programs in the C link: dialogues against the model, starts, and cuts of the power from request to flash."""
+
+import struct
+from collections import Counter
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import pytest
+from kept_dialogues import FIRMWARE, LAYOUT, SCANS, StoreDevice, faults, new_flash
+from link_device import DeviceLibrary, HostDevice, compile_device, widest
+from link_images import resealed
+from link_random import KEY, Dialogue, Differs
+from replacing import replace
+from test_c_link import SHAPES, STEPS
+
+from tablegen.base.resources import c_link, c_runtime, c_store
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.link.messages import (
+    NO_SLOT,
+    DeviceInfo,
+    Feature,
+    Reason,
+    Request,
+    SlotContent,
+    StoreStatus,
+    Upload,
+)
+from tablegen.link.store import Store
+
+KEPT, LINK, UPLOAD, REQUESTS, STORE = (
+    "dac_link_kept.c", "dac_link.c", "dac_link_upload.c", "dac_link_requests.c", "dac_store.c"
+)  # fmt: skip
+MUTANTS = {
+    "another generation is saved": (KEPT, "dac_link_get(payload + 1) != generation", "false"),
+    "the upload is announced": (KEPT, "    dac_link_put(info + DAC_LINK_IMAGE_CRC, ~crc);\n", ""),
+    "flash is written at any time": (KEPT, "l->config->store_while_playing || s.swaps == 0", "true"),
+    "flash is written only when parked": (KEPT, "l->config->store_while_playing || s.swaps == 0", "false"),
+    "a kept program has no checks": (KEPT, "        found = check_all(l);", "        found = dac_link_fine();"),
+    "a kept program needs a tag": (KEPT, "    l->loading = true;\n", ""),
+    "no upload needs a tag any more": (KEPT, "    l->loading = false;\n", ""),
+    "a kept program cannot be read back": (KEPT, "    l->uploaded = true;\n", ""),
+    "a kept program has no generation": (KEPT, "    l->taken_generation = 1;\n", ""),
+    "an upload seems to go on after a start": (
+        KEPT, "found = commit(l);\n    l->upload = DAC_LINK_NONE;\n", "found = commit(l);\n"),
+    "a refused trial leaves nothing to play": (KEPT, "(slot != store->state.selected &&", "(false &&"),
+    "a refused start says nothing": (KEPT, "            l->kept_refused = found.reason;", "            (void)found;"),
+    "a damaged slot says nothing": (KEPT, "    if (slot != due)\n", "    if (false)\n"),
+    "a trial that did not play is confirmed": (KEPT, "if (l->kept != store->state.trial)", "if (false)"),
+    "a slot of other content is the one of this start": (
+        KEPT, "        l->kept = DAC_STORE_NONE;\n    return", "        l->kept = slot;\n    return"),
+    "damage is not told": (KEPT, "dac_store_holds(store, slot) ? DAMAGED", "false ? DAMAGED"),
+    "SELECT has any trial": (LINK, "good = payload[1] <= 1;", "good = true;"),
+    "SAVE needs no tag": (LINK, "UINT32_C(1) << DAC_LINK_SAVE | ", ""),
+    "DELETE needs no tag": (LINK, " | UINT32_C(1) << DAC_LINK_DELETE)", ")"),
+    "a kept program ends an upload": (KEPT, "|| l->upload != DAC_LINK_NONE || !dac", "|| !dac"),
+    "a kept program ignores the interlock": (KEPT, " || !dac_link_permits(l)\n", "\n"),
+    "a host hears of a kept program": (UPLOAD, "if (l->loading) {", "if (false) {"),
+    "a kept program is not checked against what plays": (
+        KEPT, "    dac_link_start_check(&l->check);\n    return true;",
+        "    dac_link_start_check(&l->check);\n    l->check.stage = 7;\n    return true;"),
+    "the feature is not announced": (REQUESTS, "c->store != NULL ? KEEPS_PROGRAMS : 0", "false ? KEEPS_PROGRAMS : 0"),
+}  # fmt: skip
+CUT_MUTANTS = {  # these need a cut
+    "the record comes before the image": (
+        STORE,
+        "    dac_link_put(header, PLACE_MAGIC);",
+        "    dac_store_state early = s->state;\n    early.place[slot] = (uint8_t)place;\n    (void)change(s, &early);\n"
+        "    dac_link_put(header, PLACE_MAGIC);",
+    ),
+    "a trial plays without a mark": (
+        STORE, "if (make_certain(s) && change(s, &state) == DAC_STORE_DONE && first)", "if (first)"),
+}  # fmt: skip
+# Too little for y of the scans 2 and 4.
+NARROW = widest(FIRMWARE.program.x.output), replace(widest(FIRMWARE.program.y.output), max_step=5000)
+
+
+def compile_with(folder: Path, change: tuple[str, str, str]) -> DeviceLibrary:
+    """Compile a device that keeps programs, with a piece of one file replaced."""
+    file, old, new = change
+    sources = []
+    for source in (*c_runtime(), *c_link(), *c_store()):
+        text = source.read_text("utf-8")
+        if source.name == file:
+            assert text.count(old) == 1, f"{file}: {old}"
+            text = text.replace(old, new)
+        (folder / source.name).write_text(text, "utf-8")
+        sources.append(folder / source.name)
+    return DeviceLibrary(compile_device(folder / "device.so", sources=sources, more=["-DDAC_STORE=1"]))
+
+
+# Starts
+
+
+def check_start(library: DeviceLibrary | None = None) -> None:
+    """A scan that was uploaded as Fourier words plays after a start, with all that STATUS and READBACK say of it."""
+    for key in (b"", KEY):
+        device = StoreDevice(new_flash(), library, key=key)
+        device.upload(SCANS[1], fourier=True)
+        assert device.save(1) == 0
+        assert device.act(Request.SELECT, bytes([1, 0])) == 0
+        device.restart()
+        assert (device.plays(), device.status().generation, device.store(1).start) == (1, 1, 1)
+        table = SCANS[1].image(False)
+        nonce = device.ask(Request.CHALLENGE) if key else b""
+        device.device.receive(device.talk.commit(table, nonce))  # it is active already
+        answers = device.talk.answers(device.device.transmit())
+        assert [answer.payload for answer in answers] == [struct.pack("<II", 1, 0)]
+        if key:
+            image = SCANS[2].image(False)
+            for wire in device.talk.upload(image):
+                device.device.receive(wire)
+            device.device.transmit()
+            wrong = device.talk.acting(Request.COMMIT, struct.pack("<I", image.info.image_crc) + bytes(16))
+            device.device.receive(wrong)
+            assert device.talk.refusals(device.device.transmit()) == [(Reason.KEY, 0)]
+        device.upload(SCANS[2])
+        assert device.plays() == 2
+
+
+def check_refused_start(library: DeviceLibrary | None = None) -> None:
+    """What the limits of a build refuse does not play; the selected scan does in place of a trial."""
+    flash = new_flash()
+    device = StoreDevice(flash, library)
+    for slot in (0, 1):
+        device.upload(SCANS[slot + 1])
+        assert device.save(slot) == 0
+    assert device.act(Request.SELECT, bytes([1, 0])) == 0
+    flash.power_up()
+    narrow = StoreDevice(flash, library, NARROW)
+    store = narrow.store()
+    assert (narrow.plays(), store.start, store.reason) == (0, NO_SLOT, Reason.STEP)
+    assert narrow.act(Request.SELECT, bytes([0, 0])) == 0
+    assert narrow.act(Request.SELECT, bytes([1, 1])) == 0
+    narrow.restart()
+    store = narrow.store()
+    assert (narrow.plays(), store.start, store.trial, store.reason) == (1, 0, 1, Reason.STEP)
+    assert narrow.act(Request.CONFIRM) == Reason.TRIAL
+
+
+def check_two_refused_programs(library: DeviceLibrary | None = None) -> None:
+    """The selected program has all checks too where a trial failed late ones."""
+    flash = new_flash()
+    store = Store(flash, LAYOUT)
+    image = SCANS[1].image(False)
+    words = bytearray(image.data)
+    park, most = (4 * (2 * PAGE_WORDS + AXIS_WORDS.index(name)) for name in ("park_code", "code_max"))
+    words[most : most + 4] = words[park : park + 4]  # of y, so that its last check fails
+    store.save(0, SCANS[2].image(False))
+    store.save(1, resealed(image, bytes(words)))
+    store.select(0)
+    store.select(1, trial=True)
+    flash.power_up()
+    device = StoreDevice(flash, library, NARROW)
+    assert (device.plays(), device.store().start, device.store().reason) == (0, NO_SLOT, Reason.RANGE)
+
+
+def check_damage(library: DeviceLibrary | None = None) -> None:
+    """A slot with a damaged bit does not play, and says so."""
+    flash = new_flash()
+    device = StoreDevice(flash, library)
+    device.upload(SCANS[1])
+    assert device.save(0) == 0
+    assert device.act(Request.SELECT, bytes([0, 0])) == 0
+    flash.cells[LAYOUT.place(0) + 200] ^= 1
+    device.restart()
+    store = device.store(0)
+    assert (device.plays(), store.start, store.reason, store.content) == (0, NO_SLOT, Reason.IMAGE, SlotContent.DAMAGED)
+    assert device.act(Request.DELETE, bytes([0])) == 0
+    assert device.store(0).content == SlotContent.EMPTY
+
+
+def check_playing(library: DeviceLibrary | None = None) -> None:
+    """Flash is written while a scan plays only where the device can do that, and without a program."""
+    for while_playing in (False, True):
+        device = StoreDevice(new_flash(), library, while_playing=while_playing)
+        device.upload(SCANS[1])
+        assert (device.act(Request.ARM, bytes(4)), device.act(Request.TRIGGER)) == (0, 0)
+        device.device.tick(200)
+        assert device.save(0) == (0 if while_playing else Reason.PLAYING)
+        assert device.act(Request.PARK) == 0
+        device.device.tick(1000)
+        assert device.save(1) == 0
+        device.device.reboot()  # before its first tick a device has no program yet
+        device.device.receive(device.talk.hello())
+        device.device.transmit()
+        assert device.act(Request.DELETE, bytes([1])) == 0
+
+
+def check_changed_slot(library: DeviceLibrary | None = None) -> None:
+    """A trial cannot be confirmed whose slot has another scan now."""
+    device = StoreDevice(new_flash(), library)
+    device.upload(SCANS[1])
+    assert (device.save(1), device.act(Request.SELECT, bytes([1, 1]))) == (0, 0)
+    device.restart()
+    device.upload(SCANS[3])
+    assert (device.store().start, device.save(1), device.store().start) == (1, 0, NO_SLOT)
+    assert device.act(Request.CONFIRM) == Reason.TRIAL
+
+
+def check_play(library: DeviceLibrary | None = None) -> None:
+    """The application plays kept programs: at a line, without a word on the line, after the checks of an upload."""
+    for key in (b"", KEY):
+        flash = new_flash()
+        device = StoreDevice(flash, library, key=key, while_playing=True)
+        for slot in (0, 1):
+            device.upload(SCANS[slot + 1])
+            assert device.save(slot) == 0
+        assert (device.act(Request.ARM, bytes(4)), device.act(Request.TRIGGER)) == (0, 0)
+        device.device.tick(200)
+        device.device.lines()
+        assert device.device.play_kept(0)
+        assert not device.device.play_kept(1), "one is on its way"
+        device.device.tick(200)
+        assert device.device.transmit() == b""
+        assert (device.plays(), device.status().generation) == (1, 4)
+        assert next(line.line for line in device.device.lines() if line.generation == 4) == 0
+        assert not device.device.play_kept(2), "an empty slot"
+        flash.power_up()
+        narrow = StoreDevice(flash, library, NARROW, key)
+        assert narrow.device.play_kept(1)
+        narrow.device.tick(200)
+        assert (narrow.plays(), narrow.status().upload) == (0, Upload.NONE)
+        assert narrow.device.play_kept(0)
+        narrow.device.tick(200)
+        assert narrow.plays() == 1
+
+
+CHECKS = (
+    check_play,
+    check_start,
+    check_refused_start,
+    check_two_refused_programs,
+    check_damage,
+    check_playing,
+    check_changed_slot,
+)
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_starts(check: Any) -> None:
+    check()
+
+
+def test_the_slots_of_an_empty_flash() -> None:
+    device = StoreDevice(new_flash())
+    expected = StoreStatus(3, NO_SLOT, NO_SLOT, 0, NO_SLOT, 0, SlotContent.EMPTY, 0, LAYOUT.room)
+    assert device.store() == device.store(2) == expected
+
+
+def test_a_device_without_flash_has_no_such_requests() -> None:
+    """Neither if its code has them nor if it was compiled without."""
+    library = StoreDevice(new_flash()).device.library
+    for how in ({"library": library}, {}):
+        device = HostDevice(FIRMWARE.program, FIRMWARE.program, **how)  # type: ignore[arg-type]
+        talk = StoreDevice(new_flash()).talk
+        device.receive(talk.hello())
+        (hello,) = talk.answers(device.transmit())
+        assert Feature.STORE not in DeviceInfo.unpack(hello.payload).features
+        for kind, size in ((Request.SLOT, 1), (Request.SAVE, 5), (Request.SELECT, 2), (Request.CONFIRM, 0)):
+            device.receive(talk.request(kind, bytes(size)))
+            assert talk.refusals(device.transmit()) == [(Reason.TYPE, 0)]
+
+
+# Dialogues
+
+
+def _random(library: DeviceLibrary | None, seeds: range, shape: str = "16 bits") -> Counter[Any]:
+    how: dict[str, Any] = {} if library is None else {"library": library}
+    seen: Counter[Any] = Counter()
+    for key in (b"", KEY):
+        for seed in seeds:
+            dialogue = Dialogue(SHAPES[shape], seed, key, store=True, **how)
+            dialogue.play(STEPS)
+            ours, theirs = dialogue.flashes
+            if ours.cells != theirs.cells:
+                raise Differs("the flash of the device is not that of its model")
+            seen += dialogue.seen
+    return seen
+
+
+@pytest.mark.common
+def test_random_dialogues_about_kept_programs_are_those_of_the_model() -> None:
+    seen = _random(None, range(300, 320))
+    for kind in (Request.SLOT, Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE):
+        assert seen[kind] > 5, kind
+    reasons = (Reason.SLOT, Reason.ROOM, Reason.PLAYING, Reason.GENERATION, Reason.TRIAL, Reason.FLASH)
+    for reason in reasons:
+        assert sum(count for each, count in seen.items() if isinstance(each, tuple) and each[1] == reason), reason
+    assert seen[Request.SAVE, Reason.READBACK]
+    assert seen[Request.SAVE, Reason.KEY]
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("shape", [shape for shape in SHAPES if shape != "16 bits"])
+def test_random_dialogues_of_other_shapes(shape: str) -> None:
+    assert _random(None, range(330, 336), shape)[Request.SLOT]
+
+
+def _check_all(library: DeviceLibrary) -> None:
+    for check in CHECKS:
+        check(library)
+    _random(library, range(300, 320))
+
+
+# Cuts
+
+
+@pytest.mark.common
+def test_no_cut_of_the_power_makes_a_mixture() -> None:
+    assert list(islice(faults(modes=("mixed",)), 3)) == []
+
+
+@pytest.mark.rest
+def test_no_cut_of_the_power_makes_a_mixture_whatever_it_reads_as() -> None:
+    assert list(islice(faults(), 3)) == []
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", CUT_MUTANTS)
+def test_a_wrong_store_is_found_by_cuts(name: str, tmp_path: Path) -> None:
+    assert list(islice(faults(compile_with(tmp_path, CUT_MUTANTS[name])), 1))
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_wrong_link_is_noticed(name: str, tmp_path: Path) -> None:
+    library = compile_with(tmp_path, MUTANTS[name])
+    with pytest.raises((Differs, AssertionError)):
+        _check_all(library)

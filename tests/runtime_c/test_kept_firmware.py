@@ -1,0 +1,93 @@
+"""Kept programs in the reference firmware, in QEMU: the command line saves, chooses and tries scans over resets."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_warned, write_variant
+from limits import PATIENCE_S
+from link_qemu import LinkMachine
+
+from tablegen.config.load import load
+from tablegen.link.prepare import PreparedScan
+from tablegen.planning.line_plan import make_plan
+
+pytestmark = pytest.mark.rest
+
+SCAN = {
+    **VARIANTS["short_frame"].scan,
+    "limits": REMOVED,
+    "dac.update_rate_hz": 20e3,  # that of the firmware's timer
+    "timing": {"pixels": 50, "lines": 8, "line_rate_hz": 60.0, "ticks_per_line": 331},
+    "x.table.length": 256,
+    "y.table.length": 128,
+}
+SIZES_NM = (40.0, 30.0)
+_PATIENT = ("--timeout", str(PATIENCE_S))
+
+
+def _tablegen(machine: LinkMachine, *arguments: str | Path) -> str:
+    """The output of a command that works."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tablegen", *map(str, arguments), "--port", machine.url],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=PATIENCE_S,
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def _status(machine: LinkMachine) -> tuple[int, str]:
+    """Boot count and hash of what plays, of a device that has a program."""
+    until = time.monotonic() + PATIENCE_S
+    while True:
+        status = json.loads(_tablegen(machine, "status", "--json"))["status"]
+        if status["hash"] is not None:
+            return status["boot"], status["hash"]
+        assert time.monotonic() < until, "the device has no program"
+
+
+def _after_reset(machine: LinkMachine) -> str:
+    """The hash of what plays after a reset."""
+    before, _ = _status(machine)
+    machine.reset()
+    until = time.monotonic() + PATIENCE_S
+    while (now := _status(machine))[0] == before:
+        assert time.monotonic() < until, "the device was not reset"
+    return now[1]
+
+
+@pytest.mark.parametrize(("board", "name"), [("lm3s6965evb", "lm3s6965evb"), ("mps2_an386", "mps2-an386")])
+def test_scans_are_kept_over_resets(board: str, name: str, tmp_path: Path) -> None:
+    files = [write_variant(tmp_path / "boot", Variant(SCAN))]
+    files += [write_variant(tmp_path / f"{size}", Variant({**SCAN, "x.size_nm": size})) for size in SIZES_NM]
+    boot, first, second = (PreparedScan.of_plan(make_plan(load(file))).digest for file in files)
+    target = tmp_path / "firmware"
+    run_warned(
+        ["make", "-C", REPOSITORY / "examples" / "firmware" / "cortex_m", f"BOARD={board}", f"SCAN={files[0]}",
+         f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen", "CONTROL=link", "DAC=lines", "STORE=1"]
+    )  # fmt: skip
+    with LinkMachine(name, target / "firmware.elf") as machine:
+        assert _after_reset(machine) == boot
+        _tablegen(machine, "trigger")
+        kept = _tablegen(machine, "upload", files[1], "--as", "fourier", "--store", "1", *_PATIENT)
+        assert f"slot 1 keeps {first[:12]}" in kept
+        _tablegen(machine, "select", "1")
+        assert _after_reset(machine) == first
+        _tablegen(machine, "readback", files[1], *_PATIENT)
+        _tablegen(machine, "trigger")
+        _tablegen(machine, "upload", files[2], "--store", "0", *_PATIENT)
+        _tablegen(machine, "select", "0", "--trial")
+        assert [_after_reset(machine) for _ in range(2)] == [second, first]
+        _tablegen(machine, "select", "0", "--trial")
+        assert _after_reset(machine) == second
+        assert _tablegen(machine, "confirm") == "slot 0 plays after a start\n"
+        assert _after_reset(machine) == second
+        _tablegen(machine, "delete", "0")
+        assert _after_reset(machine) == boot
