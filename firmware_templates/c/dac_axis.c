@@ -3,6 +3,7 @@
 #include "dac_run.h"
 #include "dac_shaping.h"
 #include "dac_short.h"
+#include "dac_slow.h"
 
 bool dac_axis_serves(const dac_converter *c)
 {
@@ -17,19 +18,9 @@ DAC_CODE_ATTR bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, 
     return axis->code == target;
 }
 
-/* A parameter, or an argument, that only a runtime with slow parts has. */
-#if DAC_SLOW_PART
-#define WITH_RAMP(value) , value
-#else
-#define WITH_RAMP(value)
-#endif
-
-DAC_CODE_ATTR static inline int32_t code_of(const dac_bank_axis *bank, int32_t sample WITH_RAMP(int64_t offset))
+DAC_CODE_ATTR static inline int32_t code_of(const dac_bank_axis *bank, int32_t sample)
 {
-#if !DAC_SLOW_PART
-    const int64_t offset = bank->offset;
-#endif
-    return (int32_t)(((int64_t)bank->gain * sample + offset) >> bank->gain_q); /* 28 bits or fewer */
+    return (int32_t)(((int64_t)bank->gain * sample + bank->offset) >> bank->gain_q); /* 28 bits or fewer */
 }
 
 /* The code of this tick, before the clamp. */
@@ -42,7 +33,11 @@ DAC_CODE_ATTR static inline int32_t unclamped(dac_axis *axis, const dac_bank_axi
 #else
     (void)axis;
 #endif
-    return code_of(bank, sample WITH_RAMP(DAC_OFFSET(axis, bank)));
+#if DAC_SLOW_PART
+    if (bank->slow != NULL)
+        return dac_slow_code(axis, bank, sample);
+#endif
+    return code_of(bank, sample);
 }
 
 DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
@@ -65,8 +60,7 @@ DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool
  * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most
  * max_step + 1 wide and inside the limits. If all codes of a run are in it, any two of them differ by max_step at most,
  * and no limit is met: clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has
- * no bit above run_bits; the bits of all codes are or-ed together, and looked at once. That of a slow part is among
- * them: its ramp is in the codes.
+ * no bit above run_bits; the bits of all codes are or-ed together, and looked at once.
  *
  * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the
  * exact one, and every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which
@@ -76,18 +70,11 @@ DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
 DAC_CODE_ATTR static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
-                                                dac_output *out, uint32_t ticks, bool cubic WITH_RAMP(bool ramps))
+                                                dac_output *out, uint32_t ticks, bool cubic)
 {
     const dac_word *const table = bank->table;
     /* Read again for every sample: a constant would take two registers, which the loop does not have. */
-#if DAC_SLOW_PART
-    /* With a ramp, the offset of the tick before. */
-    const volatile int64_t ramp = bank->run_ramp;
-    volatile int64_t offset = bank->run_offset
-                            + (ramps ? axis->rise * ((int64_t)1 << (32u - bank->gain_q)) - bank->run_ramp : 0);
-#else
     const volatile int64_t offset = bank->run_offset;
-#endif
     int32_t gain = bank->run_gain;
     const unsigned guard = DAC_GUARD(bank);
     dac_wide half = DAC_HALF(guard);
@@ -122,14 +109,7 @@ DAC_CODE_ATTR static inline uint32_t play_along(dac_axis *axis, const dac_bank_a
                 DAC_NEIGHBOURS(table, high >> 15, here, there);
                 sample = dac_lerp(here, there, high & 0x7fffu, guard, half);
             }
-#if DAC_SLOW_PART
-            if (ramps) {
-                const int64_t moved = offset + ramp;
-                offset = moved;
-                code = (int32_t)((moved + (int64_t)gain * sample) >> 32);
-            } else
-#endif
-                code = (int32_t)((offset + (int64_t)gain * sample) >> 32);
+            code = (int32_t)((offset + (int64_t)gain * sample) >> 32);
             out_of_window |= (uint32_t)(code - base);
             *out = (dac_output)code;
             if (!cubic)
@@ -150,24 +130,10 @@ DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, ui
 {
 #if DAC_SPLINE
     if (bank->cubic)
-        return play_along(axis, bank, at, step, out, ticks, true WITH_RAMP(false));
+        return play_along(axis, bank, at, step, out, ticks, true);
 #endif
-    return play_along(axis, bank, at, step, out, ticks, false WITH_RAMP(false));
+    return play_along(axis, bank, at, step, out, ticks, false);
 }
-
-#if DAC_SLOW_PART
-DAC_NOINLINE uint32_t play_ramp(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                                uint32_t ticks)
-{
-    if (ticks == 0) /* without runs, the offset may not fit */
-        return 0;
-#if DAC_SPLINE
-    if (bank->cubic)
-        return play_along(axis, bank, at, step, out, ticks, true WITH_RAMP(true));
-#endif
-    return play_along(axis, bank, at, step, out, ticks, false WITH_RAMP(true));
-}
-#endif
 
 #else
 
@@ -193,34 +159,10 @@ DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, ui
     return dac_play_short(axis, bank, stretch, kind);
 }
 
-#if DAC_SLOW_PART
-#if DAC_SPLINE
-DAC_NOINLINE uint32_t play_spline_ramp(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
-                                       dac_output *out, uint32_t ticks)
-{
-    const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL, true};
-    return dac_play_short(axis, bank, stretch, kind);
-}
-#endif
-
-DAC_NOINLINE uint32_t play_ramp(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                                uint32_t ticks)
-{
-#if DAC_SPLINE
-    if (bank->cubic)
-        return play_spline_ramp(axis, bank, at, step, out, ticks);
-#endif
-    const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL, true};
-    return dac_play_short(axis, bank, stretch, kind);
-}
-#endif
-
 #endif
 
 #if DAC_SLOW_PART
-#define PLAY_ROUNDED(bank) ((bank)->ramp != 0 ? play_ramp : play)
+#define PLAY_ROUNDED(bank) ((bank)->ramp != 0 ? dac_slow_play : play)
 #else
 #define PLAY_ROUNDED(bank) play
 #endif

@@ -73,13 +73,6 @@ DAC_CODE_ATTR static inline int32_t dac_track_next(dac_track *track)
 
 #endif
 
-/* The offset of this tick. */
-#if DAC_SLOW_PART
-#define DAC_OFFSET(axis, bank) ((bank)->offset + (axis)->rise)
-#else
-#define DAC_OFFSET(axis, bank) ((bank)->offset)
-#endif
-
 /* Returns the ticks of the next block, which one check covers. */
 DAC_CODE_ATTR static inline uint32_t dac_block_of(uint32_t ticks)
 {

@@ -116,6 +116,17 @@ DAC_ALWAYS_INLINE void dac_short_put(dac_short_block *b, const dac_short_kind *k
     DAC_HIDE_FROM_OPTIMIZER(b->out);
 }
 
+/* Returns the offset of this tick. */
+DAC_CODE_ATTR static inline int64_t dac_short_offset(const dac_axis *axis, const dac_bank_axis *bank)
+{
+#if DAC_SLOW_PART
+    return bank->offset + axis->rise;
+#else
+    (void)axis;
+    return bank->offset;
+#endif
+}
+
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
 DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, dac_stretch s,
                                           const dac_short_kind kind)
@@ -125,7 +136,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     uint64_t at = s.at;
     dac_short_block b;
 #if DAC_SHAPING
-    int64_t offset = kind.shaped ? bank->run_offset : DAC_OFFSET(axis, bank);
+    int64_t offset = kind.shaped ? bank->run_offset : dac_short_offset(axis, bank);
     const unsigned below = kind.shaped ? kind.bits + DAC_BELOW : kind.bits;
 
     b.gain = (uint32_t)(kind.shaped ? bank->run_gain : bank->gain);
@@ -133,7 +144,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.weight = DAC_WEIGHT(bank);
     b.shaper = axis->shaper;
 #else
-    int64_t offset = DAC_OFFSET(axis, bank);
+    int64_t offset = dac_short_offset(axis, bank);
     const unsigned below = kind.bits;
 
     b.gain = (uint32_t)bank->gain;
@@ -189,7 +200,8 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
                 if (!kind.shaped || fed)
                     DAC_HIGH_REGISTER(low);
                 if (!kind.shaped) {
-                    DAC_HIGH_REGISTER(b.base);
+                    if (!kind.ramps)
+                        DAC_HIGH_REGISTER(b.base);
                     DAC_HIGH_REGISTER(b.stop);
                 }
                 if (fed) {
@@ -207,7 +219,8 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
                 if (!kind.shaped || fed)
                     DAC_HIGH_REGISTER(low);
                 if (!kind.shaped) {
-                    DAC_HIGH_REGISTER(b.base);
+                    if (!kind.ramps)
+                        DAC_HIGH_REGISTER(b.base);
                     DAC_HIGH_REGISTER(b.stop);
                 }
                 const uint32_t high = (uint32_t)(at >> 32);

@@ -1,6 +1,7 @@
-/* The slow part of an axis, once a line: docs/sequencer.md has the arithmetic. */
+/* The slow part of an axis: what a line begins with, and its ticks. docs/sequencer.md has the arithmetic. */
 #include "dac_slow.h"
-#include "dac_arithmetic.h"
+#include "dac_run.h"
+#include "dac_short.h"
 
 #if DAC_SLOW_PART
 
@@ -75,12 +76,18 @@ DAC_CODE_ATTR static void mix(const dac_bank_axis *bank, int32_t ratio)
     dac_word *const mixed = bank->slow->mixed;
     const int32_t most = (INT32_C(1) << (bank->bits - 1u)) - 1, least = -most - 1;
 
-    for (uint32_t i = 0; i < bank->length; i++) {
-        const int32_t word = bank->fast[i] + ((ratio * second[i] + (1 << 11)) >> 12);
-        mixed[i] = (dac_word)(word > most ? most : word < least ? least : word);
+    const uint32_t length = bank->length;
+
+    for (uint32_t i = 0; i < length; i++) {
+        int32_t word = bank->fast[i] + ((ratio * second[i] + (1 << 11)) >> 12);
+        if (word > most)
+            word = most;
+        if (word < least)
+            word = least;
+        mixed[i] = (dac_word)word;
     }
     for (uint32_t i = 0; i < DAC_WORDS_BEHIND; i++)
-        mixed[bank->length + i] = mixed[i];
+        mixed[length + i] = mixed[i];
 }
 
 /* Returns the offset at the start of a line. */
@@ -138,5 +145,140 @@ DAC_CODE_ATTR void dac_slow_begin_line(dac_axis *axis, dac_bank_axis *bank, uint
     bank->ramp = ramp_of(there - here, bank->ramp_step);
     allow_runs(bank);
 }
+
+DAC_CODE_ATTR int32_t dac_slow_code(const dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
+{
+    return (int32_t)(((int64_t)bank->gain * sample + bank->offset + axis->rise) >> bank->gain_q); /* 28 bits or fewer */
+}
+
+#if DAC_LONG_MULTIPLY
+
+/* The fast path, as in dac_axis.c, but in two loops: samples first, then codes. One loop for both would need more
+ * registers than a Cortex-M has, of a spline by far. */
+
+enum { CHUNK = 4 * DAC_RUN };
+
+/* Writes the codes of samples, block by block; returns how many. Ends before a block with a code outside the window. */
+DAC_NOINLINE uint32_t put(dac_axis *axis, const dac_bank_axis *bank, const int32_t *sample, uint32_t ticks,
+                          int64_t rise, dac_output *out)
+{
+    const int64_t ramp = bank->run_ramp;
+    const int32_t gain = bank->run_gain;
+    int64_t offset = bank->run_offset + rise * ((int64_t)1 << (32u - bank->gain_q));
+    int32_t code = axis->code;
+    uint32_t done = 0;
+
+    while (done < ticks) {
+        const int32_t base = code - bank->run_half;
+        const uint32_t length = dac_block_of(ticks - done);
+        const int32_t *const end = sample + length;
+        uint32_t out_of_window = 0;
+
+        if (!dac_has_room(bank, base))
+            break;
+        do {
+            code = (int32_t)((offset + (int64_t)gain * *sample++) >> 32);
+            offset += ramp;
+            out_of_window |= (uint32_t)(code - base);
+            *out = (dac_output)code;
+            out += DAC_STRIDE;
+            DAC_HIDE_FROM_OPTIMIZER(out);
+            DAC_HIDE_FROM_OPTIMIZER(sample);
+        } while (sample != end);
+        if (out_of_window >> bank->run_bits != 0)
+            break;
+        axis->code = code;
+        done += length;
+    }
+    return done;
+}
+
+/* Writes samples of straight lines, up to `end`; returns the position after them. */
+DAC_NOINLINE uint64_t sample_lines(const dac_bank_axis *bank, uint64_t at, uint64_t step, int32_t *sample,
+                                   const int32_t *end)
+{
+    const dac_word *const table = bank->table;
+    const unsigned guard = DAC_GUARD(bank);
+    dac_wide half = DAC_HALF(guard);
+
+    DAC_HIDE_FROM_OPTIMIZER(half);
+    do {
+        const uint32_t high = (uint32_t)(at >> 32);
+        DAC_NEIGHBOURS(table, high >> 15, here, there);
+        *sample++ = dac_lerp(here, there, high & 0x7fffu, guard, half);
+        at += step;
+        DAC_HIDE_FROM_OPTIMIZER(sample);
+    } while (sample != end);
+    return at;
+}
+
+#if DAC_SPLINE
+DAC_NOINLINE void sample_spline(dac_track *track, int32_t *sample, const int32_t *end)
+{
+    dac_track here = *track;
+
+    do {
+        *sample++ = dac_track_next(&here);
+    } while (sample != end);
+    *track = here;
+}
+#endif
+
+DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                     dac_output *out, uint32_t ticks)
+{
+    int32_t samples[CHUNK];
+    int64_t rise = axis->rise;
+    uint32_t done = 0;
+#if DAC_SPLINE
+    dac_track track;
+
+    if (bank->cubic)
+        track = dac_track_of(bank->table, at, step);
+#endif
+    while (done < ticks) {
+        const uint32_t length = ticks - done < CHUNK ? ticks - done : CHUNK;
+        const int32_t *const end = samples + length;
+#if DAC_SPLINE
+        if (bank->cubic)
+            sample_spline(&track, samples, end);
+        else
+#endif
+            at = sample_lines(bank, at, step, samples, end);
+        const uint32_t played = put(axis, bank, samples, length, rise, out);
+        done += played;
+        if (played != length)
+            break;
+        rise += CHUNK * bank->ramp;
+        out += CHUNK * DAC_STRIDE;
+    }
+    return done;
+}
+
+#else
+
+#if DAC_SPLINE
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks)
+{
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL, true};
+    return dac_play_short(axis, bank, stretch, kind);
+}
+#endif
+
+DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                     dac_output *out, uint32_t ticks)
+{
+#if DAC_SPLINE
+    if (bank->cubic)
+        return play_spline(axis, bank, at, step, out, ticks);
+#endif
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL, true};
+    return dac_play_short(axis, bank, stretch, kind);
+}
+
+#endif
 
 #endif
