@@ -324,9 +324,6 @@ DAC_CODE_ATTR static bool swap(dac_sequencer *s)
     s->swaps = s->swaps + 1;
     DAC_RELEASE(); /* from here on the other bank may be written */
     s->waiting = 0;
-#if DAC_SLOW_PART
-    s->line_due = true;
-#endif
 #if DAC_COMMIT_MODES
     if (keeps) {
         keep_frame(s, &y_step);

@@ -116,16 +116,12 @@ DAC_ALWAYS_INLINE void dac_short_put(dac_short_block *b, const dac_short_kind *k
     DAC_HIDE_FROM_OPTIMIZER(b->out);
 }
 
-/* Returns the offset of this tick. */
-DAC_CODE_ATTR static inline int64_t dac_short_offset(const dac_axis *axis, const dac_bank_axis *bank)
-{
+/* The offset of this tick. */
 #if DAC_SLOW_PART
-    return bank->offset + axis->rise;
+#define DAC_SHORT_OFFSET(axis, bank) ((bank)->offset + (axis)->rise)
 #else
-    (void)axis;
-    return bank->offset;
+#define DAC_SHORT_OFFSET(axis, bank) ((bank)->offset)
 #endif
-}
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
 DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, dac_stretch s,
@@ -136,7 +132,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     uint64_t at = s.at;
     dac_short_block b;
 #if DAC_SHAPING
-    int64_t offset = kind.shaped ? bank->run_offset : dac_short_offset(axis, bank);
+    int64_t offset = kind.shaped ? bank->run_offset : DAC_SHORT_OFFSET(axis, bank);
     const unsigned below = kind.shaped ? kind.bits + DAC_BELOW : kind.bits;
 
     b.gain = (uint32_t)(kind.shaped ? bank->run_gain : bank->gain);
@@ -144,7 +140,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.weight = DAC_WEIGHT(bank);
     b.shaper = axis->shaper;
 #else
-    int64_t offset = dac_short_offset(axis, bank);
+    int64_t offset = DAC_SHORT_OFFSET(axis, bank);
     const unsigned below = kind.bits;
 
     b.gain = (uint32_t)bank->gain;

@@ -72,18 +72,16 @@ DAC_CODE_ATTR static int32_t ratio_of(const dac_slow_part *slow, uint32_t line)
 /* Mixes the table of a line. Behind its last word stand as many of the first ones as any table has. */
 DAC_CODE_ATTR static void mix(const dac_bank_axis *bank, int32_t ratio)
 {
+    const dac_word *const fast = bank->fast;
     const int8_t *const second = bank->slow->second;
     dac_word *const mixed = bank->slow->mixed;
-    const int32_t most = (INT32_C(1) << (bank->bits - 1u)) - 1, least = -most - 1;
-
-    const uint32_t length = bank->length;
+    const int32_t least = -(INT32_C(1) << (bank->bits - 1u));
+    const uint32_t range = (UINT32_C(1) << bank->bits) - 1, length = bank->length;
 
     for (uint32_t i = 0; i < length; i++) {
-        int32_t word = bank->fast[i] + ((ratio * second[i] + (1 << 11)) >> 12);
-        if (word > most)
-            word = most;
-        if (word < least)
-            word = least;
+        int32_t word = fast[i] + ((ratio * second[i] + (1 << 11)) >> 12);
+        if ((uint32_t)(word - least) > range)
+            word = word < 0 ? least : -least - 1;
         mixed[i] = (dac_word)word;
     }
     for (uint32_t i = 0; i < DAC_WORDS_BEHIND; i++)

@@ -18,6 +18,7 @@ OTHER_VALUES = {
     "DAC_SHAPING": 3,
     "DAC_SPLINE": 1,
     "DAC_COMMIT_MODES": 1,
+    "DAC_SLOW_PART": 1,
     "DAC_REQUESTS": 128,
     "DAC_LONG_MULTIPLY": 0,
     "DAC_LINK_RING": 512,
@@ -116,10 +117,11 @@ def test_tables_and_the_functions_of_the_consumer_go_where_the_firmware_wants_th
     sections: dict[str, str] = {}
     for source in (
         tmp_path / "out" / f"{NAME}.c",
-        *(FOLDER / f"dac_{name}.c" for name in ("axis", "shaping", "sequencer")),
+        *(FOLDER / f"dac_{name}.c" for name in ("axis", "shaping", "slow", "sequencer")),
     ):
-        for order in (0, 3):
-            run_clean([*CC, *options, f"-DDAC_SHAPING={order}", "-c", source, "-o", "unit.o"], tmp_path)
+        for order, slow in ((0, 0), (3, 0), (0, 1)):
+            chosen = [f"-DDAC_SHAPING={order}", f"-DDAC_SLOW_PART={slow}"]
+            run_clean([*CC, *options, *chosen, "-c", source, "-o", "unit.o"], tmp_path)
             symbols = run_clean(["objdump", "--syms", "unit.o"], tmp_path)
             sections |= {
                 name: where for where, name in re.findall(r" [FO] (\S+)\s+\S+ (?:\.hidden )?(\w+)$", symbols, re.M)
@@ -130,6 +132,7 @@ def test_tables_and_the_functions_of_the_consumer_go_where_the_firmware_wants_th
     elsewhere = {name for name, section in sections.items() if section.startswith(".text")}
     assert elsewhere <= PRODUCER, "functions that the consumer calls, outside the section"
     assert sections["dac_sequencer_fill"] == sections["dac_axis_run"] == sections["dac_shaping_play"] == ".fast"
+    assert sections["dac_slow_begin_line"] == sections["dac_slow_play"] == ".fast"
 
 
 def test_a_program_is_an_object_whose_names_may_come_from_the_build(tmp_path: Path) -> None:
