@@ -164,3 +164,18 @@ def test_the_object_of_another_width_does_not_compile(tmp_path: Path) -> None:
     assert "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in run([*CC, "-c", unit, "-o", tmp_path / "o"]).stderr
     wide = [f"-DDAC_{name}_STORAGE_BITS=32" for name in ("TABLE", "OUTPUT")]
     run_clean([*CC, *wide, "-c", unit, "-o", tmp_path / "o"], tmp_path)
+
+
+def test_the_slow_part_of_the_page_compiles(tmp_path: Path) -> None:
+    """As an axis of a build, which the page calls SCAN; and not without the option."""
+    page = (REPOSITORY / "docs" / "c.md").read_text("utf-8")
+    (code,) = re.findall(r"^```c\n(static const int32_t gains.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    build(tmp_path, VARIANTS["example"])
+    code = code.replace("SCAN", NAME.upper()).replace("scan_x_table", f"{NAME}_x_table")
+    includes = f'#include "dac_sequencer.h"\n#include "{NAME}.h"\n'
+    main = f"{includes}{code}int main(void)\n{{\n    return x.slow != &slow_x;\n}}\n"
+    (tmp_path / "main.c").write_text(main, "ascii")
+    command = [*CC, f"-I{tmp_path / 'out'}", "main.c", tmp_path / "out" / f"{NAME}.c", "-o", "main"]
+    run_clean([*command, "-DDAC_SLOW_PART=1"], tmp_path)
+    run_clean([tmp_path / "main"], tmp_path)
+    assert run(command, tmp_path).returncode != 0
