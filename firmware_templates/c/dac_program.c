@@ -48,12 +48,15 @@ static bool good_table(const dac_axis_program *p)
  * line. With a slow part y plays one period per line. */
 static bool good_periods(const dac_program *p)
 {
-    const uint32_t ticks = p->schedule.line_ticks, lines = p->schedule.frame_lines;
+    const uint32_t ticks = p->schedule.line_ticks;
+    uint32_t lines = p->schedule.frame_lines; /* of a period of y */
 
 #if DAC_SLOW_PART
-    if (p->y.slow != NULL)
-        return p->x.hold_ticks == 1 && p->x.phase_period == ticks && p->y.hold_ticks == 1
-            && p->y.phase_period == ticks;
+    if (p->y.slow != NULL) {
+        if (p->y.hold_ticks != 1)
+            return false;
+        lines = 1;
+    }
 #endif
     return p->x.hold_ticks == 1 && p->x.phase_period == ticks
         && (p->y.hold_ticks == 1 ? p->y.phase_period == ticks * lines

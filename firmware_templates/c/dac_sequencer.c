@@ -187,11 +187,11 @@ DAC_CODE_ATTR static void unsettle(dac_sequencer *s)
 /* Starts at line 0 of the active program. Without one, swap() does so again with the program that waits. */
 DAC_CODE_ATTR static void begin(dac_sequencer *s)
 {
-    s->tick = 0;
-    s->line = 0;
 #if DAC_SLOW_PART
     s->line_due = true;
 #endif
+    s->tick = 0;
+    s->line = 0;
     to_start(&s->x);
     to_start(&s->y);
     unsettle(s);
@@ -387,34 +387,6 @@ DAC_CODE_ATTR static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *marker
     return most;
 }
 
-DAC_CODE_ATTR static void go_on(dac_sequencer *s, uint32_t ticks)
-{
-    const dac_bank *const bank = s->now;
-
-    s->tick += ticks;
-    if (s->tick != bank->schedule.line_ticks)
-        return;
-    s->tick = 0;
-    if (s->settle_left != 0)
-        s->settle_left--;
-    to_start(&s->x);
-#if DAC_SLOW_PART
-    s->line_due = true;
-    if (bank->y.slow != NULL)
-        to_start(&s->y);
-#endif
-    if (bank->y.holds)
-        dac_advance(&s->y.at, &bank->y.step);
-    if (s->line + 1 != bank->schedule.frame_lines) {
-        s->line = s->line + 1;
-        return;
-    }
-    s->line = 0;
-    to_start(&s->y);
-    if (!s->endless && --s->frames_left == 0)
-        s->running = false;
-}
-
 #if DAC_SLOW_PART
 /* Prepares the line of the next tick, once. */
 DAC_CODE_ATTR static void begin_line(dac_sequencer *s)
@@ -428,6 +400,34 @@ DAC_CODE_ATTR static void begin_line(dac_sequencer *s)
     dac_slow_begin_line(&s->y, &bank->y, s->line);
 }
 #endif
+
+DAC_CODE_ATTR static void go_on(dac_sequencer *s, uint32_t ticks)
+{
+    const dac_bank *const bank = s->now;
+
+    s->tick += ticks;
+    if (s->tick != bank->schedule.line_ticks)
+        return;
+    s->tick = 0;
+    if (s->settle_left != 0)
+        s->settle_left--;
+#if DAC_SLOW_PART
+    s->line_due = true;
+    if (bank->y.slow != NULL)
+        to_start(&s->y);
+#endif
+    to_start(&s->x);
+    if (bank->y.holds)
+        dac_advance(&s->y.at, &bank->y.step);
+    if (s->line + 1 != bank->schedule.frame_lines) {
+        s->line = s->line + 1;
+        return;
+    }
+    s->line = 0;
+    to_start(&s->y);
+    if (!s->endless && --s->frames_left == 0)
+        s->running = false;
+}
 
 DAC_CODE_ATTR static uint8_t play(dac_sequencer *s)
 {

@@ -116,13 +116,6 @@ DAC_ALWAYS_INLINE void dac_short_put(dac_short_block *b, const dac_short_kind *k
     DAC_HIDE_FROM_OPTIMIZER(b->out);
 }
 
-/* The offset of this tick. */
-#if DAC_SLOW_PART
-#define DAC_SHORT_OFFSET(axis, bank) ((bank)->offset + (axis)->rise)
-#else
-#define DAC_SHORT_OFFSET(axis, bank) ((bank)->offset)
-#endif
-
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
 DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, dac_stretch s,
                                           const dac_short_kind kind)
@@ -132,7 +125,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     uint64_t at = s.at;
     dac_short_block b;
 #if DAC_SHAPING
-    int64_t offset = kind.shaped ? bank->run_offset : DAC_SHORT_OFFSET(axis, bank);
+    int64_t offset = kind.shaped ? bank->run_offset : bank->offset;
     const unsigned below = kind.shaped ? kind.bits + DAC_BELOW : kind.bits;
 
     b.gain = (uint32_t)(kind.shaped ? bank->run_gain : bank->gain);
@@ -140,10 +133,14 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.weight = DAC_WEIGHT(bank);
     b.shaper = axis->shaper;
 #else
-    int64_t offset = DAC_SHORT_OFFSET(axis, bank);
+    int64_t offset = bank->offset;
     const unsigned below = kind.bits;
 
     b.gain = (uint32_t)bank->gain;
+#endif
+#if DAC_SLOW_PART
+    if (kind.ramps)
+        offset += axis->rise;
 #endif
     const uint32_t spread = UINT32_C(1) << bank->run_spread;
     const int32_t begin = dac_sample_at(bank, (uint32_t)(at >> 32));

@@ -423,7 +423,7 @@ def unmixed(axis: FrameProgram) -> FrameProgram:
     return replace(axis, second=np.zeros_like(axis.second))
 
 
-DUE = "    to_start(&s->x);\n#if DAC_SLOW_PART\n    s->line_due = "
+DUE = "    s->line_due = true;\n    if (bank"
 SAME_KIND = "    if ((now->y.slow == NULL) != (next->y.slow == NULL))\n        return false;\n"
 NO_PLACE = "    if (bank->y.slow != NULL) /* it is at the start of a line in both programs */\n        return;\n"
 AFTER = "line + 1 == bank->lines ? "
@@ -439,7 +439,7 @@ WINDOW = """        if (out_of_window >> bank->run_bits != 0)
 /* Writes"""
 MUTANTS = {
     "a line is never prepared": ("    s->line_due = false;\n    dac_slow", "    return;\n    dac_slow"),
-    "only the first line is prepared": (f"{DUE}true;", f"{DUE}s->line_due;"),
+    "only the first line is prepared": (DUE, "    if (bank"),
     "a line is prepared at every tick": ("    if (!s->line_due)\n        return;\n", ""),
     "y goes on at the end of a line": ("    if (bank->y.slow != NULL)\n        to_start(&s->y);\n", ""),
     "a ramp goes on when x goes back": ("        s->x.rise = rise;\n", ""),
@@ -468,7 +468,7 @@ MUTANTS = {
 SHORT_MUTANTS = {
     "a ramp is added twice": ("        b->rest += b->ramp;", "        b->rest += 2 * b->ramp;"),
     "a block begins with the ramp of the last one": ("            offset += bank->ramp * (int64_t)length;\n", ""),
-    "runs begin without what the ramp has added": ("((bank)->offset + (axis)->rise)", "((bank)->offset)"),
+    "runs begin without what the ramp has added": ("    if (kind.ramps)\n        offset += axis->rise;\n", ""),
     "the spread is that of the axis": ("    bank->run_spread = spread > 19 ? 19 : spread;\n", ""),
 }
 _FORK = get_context("fork")
