@@ -18,6 +18,7 @@ from c_library import (
     LOADED,
     Library,
     ShapedSlowCProgram,
+    SlowPart,
     Twin,
     compile_library,
 )
@@ -32,6 +33,7 @@ from tablegen.base.resources import c_runtime
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.sequencer import can_keep
+from tablegen.emit.slow_part import slow_part_text
 from tablegen.fixedpoint.frame_program import FrameProgram, Knots
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -512,3 +514,30 @@ def test_every_mutant_is_found(option: str, breaks: str, tmp_path: Path) -> None
 @pytest.mark.parametrize("option", ["plain", "short"])
 def test_the_runtime_as_it_is_does_not_differ(option: str, tmp_path: Path) -> None:
     assert not differs(compiled(tmp_path, option), option)
+
+
+def words_of(address: int, kind: Any, count: int) -> list[int]:
+    return list((kind * count).from_address(address))
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("mixes", [True, False])
+def test_emitted_slow_parts_have_the_words_of_the_program(mixes: bool, tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    made = scan_program(rng, LINEAR[0], replace(random_schedule(rng, TICKS, 1), lines=LINES), "x", "wild").x
+    assert isinstance(made, FrameProgram)
+    axis = made if mixes else unmixed(made)
+    unit = tmp_path / "unit.c"
+    unit.write_text('#include "dac_sequencer.h"\n' + slow_part_text("scan_x", axis), "ascii")
+    library = library_of(compile_library(tmp_path / "unit.so", more=[*SLOW, "-Wall", "-Wextra", "-Werror", unit]))
+    got = SlowPart.in_dll(library.dll, "scan_x_slow_part")
+    wanted, _ = library.slow(axis, ctypes.c_int16)
+    numbers = [name for name, kind in SlowPart._fields_ if kind is not ctypes.c_void_p]
+    assert [getattr(got, name) for name in numbers] == [getattr(wanted, name) for name in numbers]
+    slow = axis.slow.words.tolist()
+    assert words_of(got.table, ctypes.c_int16, len(slow) + 3) == [*slow, *slow[:3]]
+    assert words_of(got.gains, ctypes.c_int32, got.gain_knots) == axis.gains.words.tolist()
+    assert (got.ratios is None, got.second is None, got.mixed is None) == (not mixes,) * 3
+    if mixes:
+        assert words_of(got.ratios, ctypes.c_int16, got.ratio_knots) == axis.ratios.words.tolist()
+        assert words_of(got.second, ctypes.c_int8, len(axis.second)) == axis.second.tolist()
