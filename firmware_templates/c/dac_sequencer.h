@@ -71,8 +71,8 @@ typedef struct {
     const int32_t *gains;  /* at knots, signed 18 bits: they take the place of gain_word */
     const int16_t *ratios; /* at knots, 12 fraction bits; not used without `second` */
     const int8_t *second;  /* words mixed into the table, as many as its length; NULL: none */
-    dac_word *mixed;       /* memory for the table of a line, length + DAC_WORDS_BEHIND words; not used without `second`.
-                            * x and y need memory of their own, programs of one sequencer may share it */
+    dac_word *mixed;       /* memory for the table of a line, length + DAC_WORDS_BEHIND words: x and y need memory of
+                            * their own, programs of one sequencer may share it; not used without `second` */
     const dac_word *table; /* of the offset over a frame: words of a cubic table, then its first three again */
     uint32_t gain_spacing, ratio_spacing;
     uint8_t gain_knots, ratio_knots; /* 2..65 */
