@@ -34,7 +34,7 @@ DAC_CODE_ATTR static inline int32_t dac_lerp(int32_t here, int32_t there, uint32
     return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
 }
 
-#if DAC_SPLINE
+#if DAC_SPLINE || DAC_SLOW_PART
 /* Horner's rule: lower + value * fraction / 2^19, to nearest, ties up. The fraction has 18 bits; |value| <= 2^27, of
  * words of 16 bits 2^22. The fraction is passed as a dac_factor, which is the same for all three steps. */
 #if DAC_LONG_MULTIPLY || defined(__riscv_mul)

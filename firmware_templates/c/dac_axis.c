@@ -3,6 +3,7 @@
 #include "dac_run.h"
 #include "dac_shaping.h"
 #include "dac_short.h"
+#include "dac_slow.h"
 
 bool dac_axis_serves(const dac_converter *c)
 {
@@ -32,6 +33,10 @@ DAC_CODE_ATTR static inline int32_t unclamped(dac_axis *axis, const dac_bank_axi
 #else
     (void)axis;
 #endif
+#if DAC_SLOW_PART
+    if (bank->slow != NULL)
+        return dac_slow_code(axis, bank, sample);
+#endif
     return code_of(bank, sample);
 }
 
@@ -42,6 +47,9 @@ DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool
 
     if (clamped != code)
         *outside = true;
+#if DAC_SLOW_PART
+    axis->rise += bank->ramp;
+#endif
     if (!bank->holds)
         dac_advance(&axis->at, &bank->step);
     return dac_axis_approach(axis, bank, clamped);
@@ -134,7 +142,7 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
                                   dac_output *out, uint32_t ticks)
 {
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL};
+    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL, false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
@@ -147,16 +155,21 @@ DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, ui
         return play_spline(axis, bank, at, step, out, ticks);
 #endif
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL};
+    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL, false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 
 #endif
 
-#if DAC_SHAPING
-#define PLAY(bank) ((bank)->order != 0 ? dac_shaping_play : play)
+#if DAC_SLOW_PART
+#define PLAY_ROUNDED(bank) ((bank)->ramp != 0 ? dac_slow_play : play)
 #else
-#define PLAY(bank) play
+#define PLAY_ROUNDED(bank) play
+#endif
+#if DAC_SHAPING
+#define PLAY(bank) ((bank)->order != 0 ? dac_shaping_play : PLAY_ROUNDED(bank))
+#else
+#define PLAY(bank) PLAY_ROUNDED(bank)
 #endif
 
 DAC_CODE_ATTR uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks)
@@ -186,4 +199,7 @@ DAC_CODE_ATTR void dac_axis_skip(dac_axis *axis, const dac_bank_axis *bank, uint
     const dac_position way = {bank->step.high * ticks + (uint32_t)(second >> 32),
                               second << 32 | (first & 0xffffffffu)};
     dac_advance(&axis->at, &way);
+#if DAC_SLOW_PART
+    axis->rise += bank->ramp * (int64_t)ticks;
+#endif
 }

@@ -200,5 +200,8 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
         a->shaping_order = dac_link_program_word(image, page, DAC_LINK_SHAPING_WORD) & 3;
         a->shaping_zero = (uint8_t)(dac_link_program_word(image, page, DAC_LINK_SHAPING_WORD) >> 8);
 #endif
+#if DAC_SLOW_PART
+        a->slow = NULL;
+#endif
     }
 }

@@ -45,11 +45,19 @@ static bool good_table(const dac_axis_program *p)
 }
 
 /* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a
- * line. */
+ * line. With a slow part y plays one period per line. */
 static bool good_periods(const dac_program *p)
 {
-    const uint32_t ticks = p->schedule.line_ticks, lines = p->schedule.frame_lines;
+    const uint32_t ticks = p->schedule.line_ticks;
+    uint32_t lines = p->schedule.frame_lines; /* of a period of y */
 
+#if DAC_SLOW_PART
+    if (p->y.slow != NULL) {
+        if (p->y.hold_ticks != 1)
+            return false;
+        lines = 1;
+    }
+#endif
     return p->x.hold_ticks == 1 && p->x.phase_period == ticks
         && (p->y.hold_ticks == 1 ? p->y.phase_period == ticks * lines
                                  : p->y.hold_ticks == ticks && p->y.phase_period == lines);
@@ -75,6 +83,78 @@ static bool good_shaping(const dac_axis_program *p)
 {
     return (p->shaping_zero == 0 || (p->shaping_order == 3 && p->shaping_zero <= 128))
         && p->shaping_order <= DAC_SHAPING;
+}
+#endif
+
+#if DAC_SLOW_PART
+/* Whether knots reach all lines of a frame. */
+static bool good_knots(uint8_t knots, uint32_t spacing, uint32_t lines)
+{
+    return knots >= 2 && knots <= 65 && (uint64_t)spacing * (knots - 1u) >= lines;
+}
+
+/* Whether the slow table and its words behind are in range, so that every offset is. A spline stays between the least
+ * and the greatest of its words. */
+static bool good_slow_table(const dac_slow_part *slow, int64_t most)
+{
+    const uint32_t length = UINT32_C(1) << slow->index_bits;
+
+    for (uint32_t i = 0; i < length + 3; i++) {
+        const int32_t word = slow->table[i];
+        const int64_t offset = (int64_t)slow->gain_word * word * DAC_SPLINE_UNIT + slow->offset_word;
+        if (word >= INT32_C(1) << 20 || word < -(INT32_C(1) << 20) || offset >= most || offset <= -most
+            || word != slow->table[i % length])
+            return false;
+    }
+    return true;
+}
+
+static bool good_mixture(const dac_axis_program *p, const dac_slow_part *slow, uint32_t lines)
+{
+    return slow->second == NULL
+        || ((CUBIC(p) || p->index_bits <= 8) && slow->mixed != NULL && slow->ratios != NULL
+            && good_knots(slow->ratio_knots, slow->ratio_spacing, lines));
+}
+
+static bool good_gains(const dac_slow_part *slow, uint32_t lines)
+{
+    if (slow->gains == NULL || !good_knots(slow->gain_knots, slow->gain_spacing, lines))
+        return false;
+    for (unsigned i = 0; i < slow->gain_knots; i++)
+        if (slow->gains[i] >= INT32_C(1) << 17 || slow->gains[i] < -(INT32_C(1) << 17))
+            return false;
+    return true;
+}
+
+static bool good_slow_part(const dac_axis_program *p, uint32_t lines)
+{
+    const dac_slow_part *const slow = p->slow;
+    const int64_t most = INT64_C(2) << (p->dac_bits + p->gain_q); /* of an offset, as without a slow part */
+
+    if (slow == NULL)
+        return true;
+#if DAC_SHAPING
+    if (p->shaping_order != 0)
+        return false;
+#endif
+    return p->index_bits != 0 && good_mixture(p, slow, lines) && good_gains(slow, lines) && slow->table != NULL
+        && slow->index_bits >= 3 && slow->index_bits <= 14 && slow->gain_word >= -(INT32_C(1) << 17)
+        && slow->gain_word < INT32_C(1) << 17 && slow->offset_word < most && slow->offset_word > -most
+        && good_slow_table(slow, most);
+}
+
+static bool mixes(const dac_axis_program *p)
+{
+    return p->slow != NULL && p->slow->second != NULL;
+}
+
+/* Whether both slow parts are good, and their lines are mixed in memory of their own. */
+static bool good_slow_parts(const dac_program *p)
+{
+    const uint32_t lines = p->schedule.frame_lines;
+
+    return good_slow_part(&p->x, lines) && good_slow_part(&p->y, lines)
+        && (!mixes(&p->x) || !mixes(&p->y) || p->x.slow->mixed != p->y.slow->mixed);
 }
 #endif
 
@@ -225,6 +305,25 @@ static void derive(dac_bank_axis *b, const dac_axis_program *p)
     allow_runs(b, p);
 }
 
+#if DAC_SLOW_PART
+/* Derives what dac_slow_begin_line() needs. */
+static void derive_slow_part(dac_bank_axis *b, const dac_axis_program *p, uint32_t lines)
+{
+    const uint32_t ticks = p->phase_period;
+
+    b->slow = p->slow;
+    b->fast = p->table;
+    b->lines = lines;
+    b->bits = p->bits;
+    b->ramp_step = UINT32_MAX / ticks + (UINT32_MAX % ticks == ticks - 1 ? 1u : 0u); /* 0 for a line of 1 tick */
+    b->line_most = b->run_most;
+    b->ramp = 0;
+    b->run_ramp = 0;
+    if (mixes(p))
+        b->table = p->slow->mixed;
+}
+#endif
+
 dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
 {
     if (!dac_sequencer_writable(s))
@@ -234,6 +333,10 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
     const dac_loaded x = judge_axis(&p->x, &s->x), y = judge_axis(&p->y, &s->y);
     if (x != DAC_LOADED || y != DAC_LOADED)
         return x != DAC_LOADED ? x : y;
+#if DAC_SLOW_PART
+    if (!good_slow_parts(p))
+        return DAC_BAD_SLOW_PART;
+#endif
     if (!good_periods(p))
         return DAC_BAD_PERIOD;
 
@@ -241,6 +344,10 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
     bank->schedule = p->schedule;
     derive(&bank->x, &p->x);
     derive(&bank->y, &p->y);
+#if DAC_SLOW_PART
+    derive_slow_part(&bank->x, &p->x, p->schedule.frame_lines);
+    derive_slow_part(&bank->y, &p->y, p->schedule.frame_lines);
+#endif
     s->loaded = 1;
     s->loaded_after = s->swaps;
     return DAC_LOADED;

@@ -2,6 +2,7 @@
 #include "dac_arithmetic.h"
 #include "dac_axis.h"
 #include "dac_barriers.h"
+#include "dac_slow.h"
 
 enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
 #if DAC_COMMIT_MODES
@@ -99,6 +100,10 @@ bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode)
 /* Returns whether y has the same place in both programs at the start of each line. */
 DAC_CODE_ATTR static bool same_frame(const dac_bank *now, const dac_bank *next)
 {
+#if DAC_SLOW_PART
+    if ((now->y.slow == NULL) != (next->y.slow == NULL))
+        return false;
+#endif
     return now->schedule.line_ticks == next->schedule.line_ticks
         && now->schedule.frame_lines == next->schedule.frame_lines && now->y.holds == next->y.holds;
 }
@@ -182,6 +187,9 @@ DAC_CODE_ATTR static void unsettle(dac_sequencer *s)
 /* Starts at line 0 of the active program. Without one, swap() does so again with the program that waits. */
 DAC_CODE_ATTR static void begin(dac_sequencer *s)
 {
+#if DAC_SLOW_PART
+    s->line_due = true;
+#endif
     s->tick = 0;
     s->line = 0;
     to_start(&s->x);
@@ -284,6 +292,10 @@ DAC_CODE_ATTR static void keep_frame(dac_sequencer *s, const dac_position *step_
     dac_position way = bank->y.step;
 
     unsettle(s);
+#if DAC_SLOW_PART
+    if (bank->y.slow != NULL) /* it is at the start of a line in both programs */
+        return;
+#endif
     if (way.high == step_before->high && way.low == step_before->low)
         return;
     to_start(&s->y);
@@ -375,6 +387,20 @@ DAC_CODE_ATTR static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *marker
     return most;
 }
 
+#if DAC_SLOW_PART
+/* Prepares the line of the next tick, once. */
+DAC_CODE_ATTR static void begin_line(dac_sequencer *s)
+{
+    dac_bank *const bank = &s->bank[s->playing];
+
+    if (!s->line_due)
+        return;
+    s->line_due = false;
+    dac_slow_begin_line(&s->x, &bank->x, s->line);
+    dac_slow_begin_line(&s->y, &bank->y, s->line);
+}
+#endif
+
 DAC_CODE_ATTR static void go_on(dac_sequencer *s, uint32_t ticks)
 {
     const dac_bank *const bank = s->now;
@@ -385,6 +411,11 @@ DAC_CODE_ATTR static void go_on(dac_sequencer *s, uint32_t ticks)
     s->tick = 0;
     if (s->settle_left != 0)
         s->settle_left--;
+#if DAC_SLOW_PART
+    s->line_due = true;
+    if (bank->y.slow != NULL)
+        to_start(&s->y);
+#endif
     to_start(&s->x);
     if (bank->y.holds)
         dac_advance(&s->y.at, &bank->y.step);
@@ -403,6 +434,9 @@ DAC_CODE_ATTR static uint8_t play(dac_sequencer *s)
     const dac_bank *const bank = s->now;
     uint8_t markers;
     bool outside = false;
+#if DAC_SLOW_PART
+    begin_line(s);
+#endif
     bool reached = dac_axis_step(&s->x, &bank->x, &outside);
 
     reached &= dac_axis_step(&s->y, &bank->y, &outside);
@@ -451,11 +485,17 @@ DAC_CODE_ATTR void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
 DAC_CODE_ATTR static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t most)
 {
     const dac_bank *const bank = s->now;
+#if DAC_SLOW_PART
+    begin_line(s);
+#endif
 #if DAC_SHAPING
     const dac_axis before = s->x;
 #else
     const dac_position at = s->x.at;
     const int32_t code = s->x.code;
+#if DAC_SLOW_PART
+    const int64_t rise = s->x.rise;
+#endif
 #endif
     const uint32_t x_ticks = dac_axis_run(&s->x, &bank->x, x, most);
     const uint32_t ticks = dac_axis_run(&s->y, &bank->y, y, x_ticks);
@@ -466,6 +506,9 @@ DAC_CODE_ATTR static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y
         (void)dac_axis_run(&s->x, &bank->x, x, ticks);
 #else
         s->x.at = at;
+#if DAC_SLOW_PART
+        s->x.rise = rise;
+#endif
         s->x.code = ticks != 0 ? (int32_t)x[(ticks - 1) * DAC_STRIDE] : code;
         dac_axis_skip(&s->x, &bank->x, ticks);
 #endif

@@ -63,6 +63,25 @@ typedef struct {
     uint32_t first, count;
 } dac_window;
 
+#if DAC_SLOW_PART
+/* The slow part of an axis: what changes from line to line. Gain and ratio are straight between knots, `gain_spacing`
+ * and `ratio_spacing` lines apart, of which the first is at line 0 and the last at the end of the frame or behind it.
+ * All words stay where they are until the bank is idle again. */
+typedef struct {
+    const int32_t *gains;  /* at knots, signed 18 bits: they take the place of gain_word */
+    const int16_t *ratios; /* at knots, 12 fraction bits; not used without `second` */
+    const int8_t *second;  /* words mixed into the table, as many as its length; NULL: none */
+    dac_word *mixed;       /* memory for the table of a line, length + DAC_WORDS_BEHIND words; unused without `second`.
+                            * x and y need memory of their own, programs of one sequencer may share it */
+    const dac_word *table; /* of the offset over a frame: words of a cubic table, then its first three again */
+    uint32_t gain_spacing, ratio_spacing;
+    uint8_t gain_knots, ratio_knots; /* 2..65 */
+    uint8_t index_bits;              /* of this table, 3..14 */
+    int32_t gain_word;               /* of this table, signed 18 bits */
+    int64_t offset_word;             /* takes the place of that of the axis */
+} dac_slow_part;
+#endif
+
 /* One axis. The table stays where it is, in flash or in memory of the application, until its bank is idle again. */
 typedef struct {
     const dac_word *table; /* its words, then its first one again; of a cubic table its first three */
@@ -82,6 +101,9 @@ typedef struct {
 #if DAC_SHAPING
     uint8_t shaping_order; /* 0 off, 1 first, 2 second, 3 scanner; at most DAC_SHAPING */
     uint8_t shaping_zero;  /* 0..128, with order 3 only */
+#endif
+#if DAC_SLOW_PART
+    const dac_slow_part *slow; /* NULL: none */
 #endif
 } dac_axis_program;
 
@@ -115,8 +137,15 @@ typedef struct {
         DAC_AXIS_PROGRAM(NAME##_X, name##_x_table), DAC_AXIS_PROGRAM(NAME##_Y, name##_y_table)                        \
     }
 /* Initialiser for one axis of a program, with the emitted table or your own. */
-#define DAC_AXIS_PROGRAM(AXIS, words) DAC_AXIS_PROGRAM_OF(AXIS, words)
-#define DAC_AXIS_PROGRAM_OF(AXIS, words)                                                                              \
+#define DAC_AXIS_PROGRAM(AXIS, words) DAC_AXIS_PROGRAM_OF(AXIS, words, NULL)
+#if DAC_SLOW_PART
+/* The same with a slow part; `slow` is the address of a dac_slow_part. */
+#define DAC_SLOW_AXIS_PROGRAM(AXIS, words, slow) DAC_AXIS_PROGRAM_OF(AXIS, words, slow)
+#define DAC_SLOW_MEMBER(slow) , slow
+#else
+#define DAC_SLOW_MEMBER(slow)
+#endif
+#define DAC_AXIS_PROGRAM_OF(AXIS, words, slow)                                                                        \
     {                                                                                                                 \
         words, AXIS##_TABLE_LENGTH, DAC_STORAGE_BITS(words), AXIS##_TABLE_BITS,                                       \
         AXIS##_INDEX_BITS + (AXIS##_INTERPOLATED == 3 ? DAC_CUBIC : 0), AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,       \
@@ -125,7 +154,7 @@ typedef struct {
         AXIS##_DAC_TWOS_COMPLEMENT,                                                                                   \
         (AXIS##_DAC_LEFT_ALIGNED)                                                                                     \
             + 0 * DAC_SHAPED_BY_RUNTIME(DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER))                   \
-        DAC_SHAPING_MEMBERS(AXIS)                                                                                     \
+        DAC_SHAPING_MEMBERS(AXIS) DAC_SLOW_MEMBER(slow)                                                               \
     }
 /* A value of shaping if a header has AXIS_SHAPING_ORDER, 0 if it has none, as that of a scan without shaping: only an
  * order of 1 to 3 makes DAC_SHAPING_GIVEN_... two arguments of one. */
@@ -207,7 +236,8 @@ typedef enum {
     DAC_BAD_PERIOD,      /* the period does not fit the schedule */
     DAC_BAD_OUTPUT,      /* gain, offset, codes or step out of range */
     DAC_OTHER_STORAGE,   /* DAC_TABLE_STORAGE_BITS of the runtime differs from that of the table, or is too narrow */
-    DAC_BAD_SHAPING      /* an order above DAC_SHAPING, or no zero of that order */
+    DAC_BAD_SHAPING,     /* an order above DAC_SHAPING, or no zero of that order */
+    DAC_BAD_SLOW_PART    /* words missing or out of range, or a table or an output that has no slow part */
 } dac_loaded;
 
 /* Output of one tick. */
@@ -245,6 +275,9 @@ typedef struct {
 #if DAC_SHAPING
     uint8_t order, zero, remainder_bits;
 #endif
+#if DAC_SLOW_PART
+    uint8_t bits;
+#endif
     const dac_word *table;
     uint32_t length;            /* words of the table, without the one behind the last */
     int32_t gain, run_gain;     /* with gain_q and, if not shaped, with 32 fraction bits */
@@ -254,6 +287,15 @@ typedef struct {
     dac_position step;          /* step per advance, rounded up */
     int64_t offset;             /* offset_word and half an LSB */
     int64_t run_offset;         /* the same with 32 fraction bits; if shaped, offset_word as run_gain needs it */
+#if DAC_SLOW_PART
+    /* Of a program with a slow part, the consumer sets table, gain, offset, ramp and what belongs to runs at the start
+     * of each line that plays. */
+    const dac_slow_part *slow;
+    const dac_word *fast;       /* the table that others are mixed into */
+    uint32_t lines, ramp_step;  /* lines of a frame; 2^32 / ticks of a line, rounded down */
+    uint32_t line_most;         /* maximum ticks of a run, on lines whose ramp allows runs */
+    int64_t ramp, run_ramp;     /* what offset and run_offset grow by in a tick */
+#endif
 } dac_bank_axis;
 
 typedef struct {
@@ -276,6 +318,9 @@ typedef struct {
 #if DAC_SHAPING
     dac_shaper shaper;
 #endif
+#if DAC_SLOW_PART
+    int64_t rise; /* what the ramp has added to the offset since the start of the line */
+#endif
 } dac_axis;
 
 typedef struct {
@@ -287,6 +332,9 @@ typedef struct {
     uint8_t running, endless, armed, catching_up;
 #if DAC_COMMIT_MODES
     uint8_t commit; /* the request of the last commit, which has its mode */
+#endif
+#if DAC_SLOW_PART
+    uint8_t line_due; /* the line of the next tick has not been prepared */
 #endif
     /* the producer's own */
     uint8_t loaded, commits;

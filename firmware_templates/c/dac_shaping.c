@@ -114,7 +114,7 @@ DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint6
                                 uint32_t ticks, const unsigned order, const unsigned bits, const bool cubic)
 {
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {true, cubic, order, bits, NULL};
+    const dac_short_kind kind = {true, cubic, order, bits, NULL, false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 
@@ -213,7 +213,7 @@ DAC_NOINLINE uint32_t play_lines(dac_axis *axis, const dac_bank_axis *bank, uint
                                  dac_output *out, uint32_t ticks)
 {
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {true, false, 0, bank->remainder_bits, feeder_of(bank)};
+    const dac_short_kind kind = {true, false, 0, bank->remainder_bits, feeder_of(bank), false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 
@@ -222,7 +222,7 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
                                   dac_output *out, uint32_t ticks)
 {
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {true, true, 0, bank->remainder_bits, feeder_of(bank)};
+    const dac_short_kind kind = {true, true, 0, bank->remainder_bits, feeder_of(bank), false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 #endif

@@ -36,7 +36,9 @@
  * line and 32 of a spline; and the exact value T(s) = gain s + offset - base 2^below, so that the code is in the window
  * if 0 <= T < 2^(below + run_bits) <= 2^31. Samples have 20 bits, so that `rise` is below 2^(spread + 1) only if |s -
  * s0| <= 2^spread (spread <= 19). Then T(s) differs from T(s0) by |gain| 2^spread <= 2^31 at most, and is within
- * -2^31..2^32: its lower 32 bits are below 2^31 only if it is in 0..2^31.
+ * -2^31..2^32: its lower 32 bits are below 2^31 only if it is in 0..2^31. On a line with a ramp, `offset` of s differs
+ * from that of s0 by 16 |ramp| <= 2^30 at most, since s0 is the first sample of this block or the last one of the block
+ * before; spread is one less, so |gain| 2^spread <= 2^30, and both together are 2^31 at most.
  *
  * Shaped, `below` is 36 - dac_bits, 8 more than a remainder has, and what is checked is the code with what is fed back,
  * which takes 3 codes away at most, of a window of 16 codes or more. So it may take a value for one inside only if its
@@ -64,6 +66,7 @@ typedef struct {
     unsigned order;    /* of the shaping; not used with a feeder */
     unsigned bits;     /* below a code: those of the remainder if it is shaped, else gain_q */
     dac_feeder feeder; /* NULL: the loop that computes values also makes codes of them */
+    bool ramps;        /* the offset grows by a ramp every tick */
 } dac_short_kind;
 
 /* State of the block of ticks that is played. Functions that take it are inlined, so that it stays in registers. */
@@ -75,6 +78,9 @@ typedef struct {
     int32_t base;           /* lower end of the window */
     uint32_t *value;        /* with a feeder: place of the next value */
     dac_output *out, *stop; /* without: place of the next code, and the end of the block */
+#if DAC_SLOW_PART
+    uint32_t ramp; /* what `rest` grows by every tick */
+#endif
 #if DAC_SHAPING
     uint32_t mask; /* of a remainder */
     int32_t weight;
@@ -87,6 +93,10 @@ DAC_ALWAYS_INLINE void dac_short_put(dac_short_block *b, const dac_short_kind *k
 {
     uint32_t value = b->gain * rise + b->rest;
 
+#if DAC_SLOW_PART
+    if (kind->ramps)
+        b->rest += b->ramp;
+#endif
     b->rise = rise;
     b->rise_or |= rise;
     if (kind->feeder != NULL) {
@@ -115,7 +125,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     uint64_t at = s.at;
     dac_short_block b;
 #if DAC_SHAPING
-    const int64_t offset = kind.shaped ? bank->run_offset : bank->offset;
+    int64_t offset = kind.shaped ? bank->run_offset : bank->offset;
     const unsigned below = kind.shaped ? kind.bits + DAC_BELOW : kind.bits;
 
     b.gain = (uint32_t)(kind.shaped ? bank->run_gain : bank->gain);
@@ -123,10 +133,14 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.weight = DAC_WEIGHT(bank);
     b.shaper = axis->shaper;
 #else
-    const int64_t offset = bank->offset;
+    int64_t offset = bank->offset;
     const unsigned below = kind.bits;
 
     b.gain = (uint32_t)bank->gain;
+#endif
+#if DAC_SLOW_PART
+    if (kind.ramps)
+        offset += axis->rise;
 #endif
     const uint32_t spread = UINT32_C(1) << bank->run_spread;
     const int32_t begin = dac_sample_at(bank, (uint32_t)(at >> 32));
@@ -145,6 +159,9 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
         return 0;
     b.out = s.out;
     b.last = 0;
+#if DAC_SLOW_PART
+    b.ramp = (uint32_t)bank->ramp;
+#endif
     while (done < s.ticks) {
         const uint32_t length = dac_block_of(s.ticks - done);
         const uint32_t origin = sample - spread;
@@ -176,7 +193,8 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
                 if (!kind.shaped || fed)
                     DAC_HIGH_REGISTER(low);
                 if (!kind.shaped) {
-                    DAC_HIGH_REGISTER(b.base);
+                    if (!kind.ramps)
+                        DAC_HIGH_REGISTER(b.base);
                     DAC_HIGH_REGISTER(b.stop);
                 }
                 if (fed) {
@@ -194,7 +212,8 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
                 if (!kind.shaped || fed)
                     DAC_HIGH_REGISTER(low);
                 if (!kind.shaped) {
-                    DAC_HIGH_REGISTER(b.base);
+                    if (!kind.ramps)
+                        DAC_HIGH_REGISTER(b.base);
                     DAC_HIGH_REGISTER(b.stop);
                 }
                 const uint32_t high = (uint32_t)(at >> 32);
@@ -218,6 +237,10 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
 #endif
             axis->code = kind.shaped ? (int32_t)b.out[-DAC_STRIDE] : (int32_t)b.last;
         }
+#if DAC_SLOW_PART
+        if (kind.ramps)
+            offset += bank->ramp * (int64_t)length;
+#endif
         sample = origin + b.rise;
         done += length;
     }

@@ -7,8 +7,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import pixel_starts
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Bools, Ints
 
 Part = TypeVar("Part", np.int64, np.bool_)
@@ -30,9 +32,10 @@ class LineTicks:
 class PlayedLines:
     """The lines of a program one after another, from its beginning on: remainders of shaped axes run on."""
 
-    def __init__(self, program: DualProgram) -> None:
+    def __init__(self, program: ScanProgram) -> None:
         self._program = program
         self._remainders = program.x.output.begin(), program.y.output.begin()
+        self._x_codes: Ints | None = None
 
     def unclamped(self, line: int, count: int = 1) -> tuple[Ints, Ints]:
         """Return codes of x and y on the next lines, before clamp and slew guard.
@@ -49,12 +52,17 @@ class PlayedLines:
         x, y
             Codes, each of shape (count * ticks of a line,).
         """
-        program, ticks = self._program, self._program.schedule.ticks
-        y = program.y.unclamped(line * ticks, (line + count) * ticks, self._remainders[1])
-        if not program.x.output.shaping.order:
-            return _repeated(self._x_line, count), y
-        x = [program.x.unclamped(0, ticks, self._remainders[0]) for _ in range(count)]
-        return np.concatenate(x), y
+        x, y, ticks = self._program.x, self._program.y, self._program.schedule.ticks
+        if isinstance(y, FrameProgram):
+            y_codes = y.unclamped(line, count).ravel()
+        else:
+            y_codes = y.unclamped(line * ticks, (line + count) * ticks, self._remainders[1])
+        if isinstance(x, FrameProgram):
+            return x.unclamped(line, count).ravel(), y_codes
+        if not x.output.shaping.order:
+            return _repeated(self._x_line(x), count), y_codes
+        lines = [x.unclamped(0, ticks, self._remainders[0]) for _ in range(count)]
+        return np.concatenate(lines), y_codes
 
     def play(self, line: int, settled: bool = True) -> LineTicks:
         """Return the next line, which is ``line`` of a frame, as ``play_line`` does."""
@@ -93,10 +101,11 @@ class PlayedLines:
             valid=inside & np.repeat(images, schedule.ticks),
         )
 
-    @cached_property
-    def _x_line(self) -> Ints:
-        """The codes of x on every line, where it is not shaped."""
-        return self._program.x.unclamped(0, self._program.schedule.ticks, self._remainders[0])
+    def _x_line(self, x: Program) -> Ints:
+        """Return the codes of x on every line, where it is neither shaped nor has a slow part."""
+        if self._x_codes is None:
+            self._x_codes = x.unclamped(0, self._program.schedule.ticks, self._remainders[0])
+        return self._x_codes
 
     @cached_property
     def _markers(self) -> tuple[Bools, Bools, Bools, Bools]:
@@ -112,7 +121,7 @@ class PlayedLines:
         return k == 0, pixel, k >= schedule.turn_tick, inside
 
 
-def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTicks:
+def play_line(program: ScanProgram, line: int, settled: bool = True) -> LineTicks:
     """Return line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling.
 
     Raises
@@ -120,8 +129,9 @@ def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTick
     ValueError
         If an axis is shaped: its codes depend on the lines before, and ``PlayedLines`` plays them.
     """
-    program.x.require_period()
-    program.y.require_period()
+    for axis in (program.x, program.y):
+        if isinstance(axis, Program):
+            axis.require_period()
     return PlayedLines(program).play(line, settled)
 
 

@@ -10,10 +10,11 @@ from enum import Enum, IntFlag
 import numpy as np
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.played_lines import LineTicks, PlayedLines
 from tablegen.device.schedule import Schedule
 from tablegen.device.slew import limit_slew
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.numerics.arrays import Bools, Ints
 
 _MOST_TICKS = 1 << 14  # ticks of lines that are computed at a time, so that they fit the cache
@@ -64,9 +65,9 @@ class Sequencer:
     starts when that program is swapped in.
     """
 
-    playing: DualProgram | None
+    playing: ScanProgram | None
     codes: tuple[int, int] = (0, 0)  # at the converters now; with a program, its park codes
-    idle: DualProgram | None = None
+    idle: ScanProgram | None = None
     mode: CommitMode = CommitMode.LINE  # of the last commit
     running: bool = False
     parked: bool = False
@@ -98,7 +99,7 @@ class Sequencer:
             SequencerState.RUNNING if self.running else SequencerState.PARKED if self.parked else SequencerState.PARKING
         )
 
-    def commit(self, program: DualProgram, mode: CommitMode = CommitMode.LINE) -> None:
+    def commit(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> None:
         """Put a complete and checked program into the idle bank, to be swapped in as the mode says."""
         self.idle, self.mode = program, mode
 
@@ -233,7 +234,7 @@ class Sequencer:
         """Return True if the next tick of a running scan is one on which the mode of the commit swaps."""
         return self.tick == 0 and (self.mode != CommitMode.FRAME or self.line == 0)
 
-    def _begin(self, program: DualProgram, line: int = 0) -> None:
+    def _begin(self, program: ScanProgram, line: int = 0) -> None:
         """Start a line of a program, unsettled, and away from where the output is."""
         self.tick, self.line = 0, line
         self.settle_left = program.schedule.settle_lines
@@ -262,7 +263,7 @@ class Sequencer:
             self.parked = True
         return Tick(*self.codes, swapped=swapped, parked=self.parked, faults=self.faults)
 
-    def _approach(self, program: DualProgram, x: int, y: int) -> bool:
+    def _approach(self, program: ScanProgram, x: int, y: int) -> bool:
         """Move both codes towards their targets, by at most max_step each; return True if both arrived."""
         x_step, y_step = program.x.output.max_step, program.y.output.max_step
         x_now, y_now = self.codes
@@ -277,8 +278,12 @@ class Sequencer:
         self.fault_counts[fault] += 1
 
 
-def can_keep(playing: DualProgram, program: DualProgram) -> bool:
+def can_keep(playing: ScanProgram, program: ScanProgram) -> bool:
     """Return True if ``program`` can go on within the frame of ``playing``: y has the same place in both."""
     old, new = playing.schedule, program.schedule
-    same_frame = (old.ticks, old.lines) == (new.ticks, new.lines)
-    return same_frame and (playing.y.hold, playing.y.phase.ticks) == (program.y.hold, program.y.phase.ticks)
+    return (old.ticks, old.lines) == (new.ticks, new.lines) and _place_of(playing.y) == _place_of(program.y)
+
+
+def _place_of(y: AxisProgram) -> tuple[int, int] | None:
+    """Return the advances in which y counts its place in a frame; None with a slow part, whose place is the line."""
+    return None if isinstance(y, FrameProgram) else (y.hold, y.phase.ticks)

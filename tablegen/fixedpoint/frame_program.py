@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.output import GAIN_BITS, Output
 from tablegen.fixedpoint.phase import PHASE_BITS, RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import saturate, shift_round, signed_limits
@@ -173,6 +173,11 @@ class FrameProgram(Struct, frozen=True, eq=False):
         ratio = int(self.ratios.at(np.array(line)))
         return saturate(self.fast.words + shift_round(ratio * self.second, RATIO_FRACTION_BITS), self.fast.bits)
 
+    @property
+    def output(self) -> Output:
+        """The output stage of the axis, whose gain and offset words do not play."""
+        return self.fast.output
+
     def ramps(self) -> Ints:
         """Return by how much the slow part moves in a tick of each line, in the units of an offset word.
 
@@ -184,9 +189,7 @@ class FrameProgram(Struct, frozen=True, eq=False):
         Ints
             Shape (lines,).
         """
-        step = RationalPhase(self.fast.phase.ticks).step
-        slow = self.slow.at(np.arange(self.lines + 1), self.lines).tolist()
-        return np.array([ramp(after - here, step) for here, after in pairwise(slow)], dtype=np.int64)
+        return self._ramps(0, self.lines)
 
     def sums(self, line: int) -> Ints:
         """Return gain times sample plus slow part at all ticks of a line, before they are rounded to codes.
@@ -201,7 +204,24 @@ class FrameProgram(Struct, frozen=True, eq=False):
         Ints
             Codes with gain_q fraction bits, shape (ticks of a line,).
         """
-        return self._sums(line, int(self.ramps()[line]))
+        return np.asarray(self._sums(line, 1)[0])
+
+    def unclamped(self, first: int, count: int = 1) -> Ints:
+        """Return the codes of lines before the clamp.
+
+        Parameters
+        ----------
+        first
+            Line of the frame that is the first of them.
+        count
+            Number of lines, all of one frame.
+
+        Returns
+        -------
+        Ints
+            Codes, shape (count, ticks of a line).
+        """
+        return shift_round(self._sums(first, count), self.output.gain_q)
 
     def frame(self) -> Ints:
         """Return the codes of a frame before the slew guard.
@@ -211,16 +231,19 @@ class FrameProgram(Struct, frozen=True, eq=False):
         Ints
             Codes in [code_min, code_max], shape (lines, ticks of a line).
         """
-        ramps = self.ramps().tolist()
-        sums = np.stack([self._sums(line, ramps[line]) for line in range(self.lines)])
-        output = self.fast.output
-        return output.clamp(shift_round(sums, output.gain_q))
+        return self.output.clamp(self.unclamped(0, self.lines))
 
-    def _sums(self, line: int, ramp_word: int) -> Ints:
-        k = np.arange(self.fast.phase.ticks, dtype=np.int64)
-        samples = replace(self.fast, words=self.table(line)).samples(k)
-        gain, slow = int(self.gains.at(np.array(line))), int(self.slow.at(np.array(line), self.lines))
-        return np.asarray(gain * samples + slow + k * ramp_word)
+    def _ramps(self, first: int, stop: int) -> Ints:
+        step = RationalPhase(self.fast.phase.ticks).step
+        slow = self.slow.at(np.arange(first, stop + 1), self.lines).tolist()
+        return np.array([ramp(after - here, step) for here, after in pairwise(slow)], dtype=np.int64)
+
+    def _sums(self, first: int, count: int) -> Ints:
+        k, lines = np.arange(self.fast.phase.ticks, dtype=np.int64), np.arange(first, first + count)
+        samples = np.stack([replace(self.fast, words=self.table(line)).samples(k) for line in lines.tolist()])
+        gains, slow = self.gains.at(lines), self.slow.at(lines, self.lines)
+        ramps = self._ramps(first, first + count)
+        return np.asarray(gains[:, None] * samples + slow[:, None] + k * ramps[:, None])
 
 
 def ramp(distance: int, step: int) -> int:

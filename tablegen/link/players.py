@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import DualProgram, require_dual
 from tablegen.device.sequencer import Fault, Sequencer, Tick, can_keep
 from tablegen.link.messages import DeviceState
 
@@ -162,7 +162,8 @@ class SequencerPlayer(_Queue):
     @property
     def playing(self) -> DualProgram | None:
         """The active program."""
-        return self.sequencer.playing
+        playing = self.sequencer.playing
+        return None if playing is None else require_dual(playing)
 
     @property
     def faults(self) -> int:

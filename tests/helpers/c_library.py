@@ -11,8 +11,9 @@ import numpy as np
 from building import run_clean
 
 from tablegen.base.resources import c_runtime
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.sequencer import Fault, Sequencer, Tick
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.spline import WORDS_BEHIND
@@ -25,6 +26,7 @@ PROBE = HERE / "c_probe.c"
 OPTIONS = ("-std=c99", "-O1")
 SLEW, CLAMP, OVERRUN, UNDERRUN = 1, 2, 4, 8
 LOADED, BUSY, OTHER_CONVERTER, BAD_SCHEDULE, BAD_TABLE, BAD_PERIOD, BAD_OUTPUT, OTHER_STORAGE, BAD_SHAPING = range(9)
+BAD_SLOW_PART = 9
 MARKER = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 NOTHING_PLAYS = 2
 
@@ -62,6 +64,35 @@ class ShapedAxisProgram(AxisProgram):
     _fields_ = (("shaping_order", c_uint8), ("shaping_zero", c_uint8))
 
 
+class SlowAxisProgram(AxisProgram):
+    """With DAC_SLOW_PART."""
+
+    _fields_ = (("slow", c_void_p),)
+
+
+class ShapedSlowAxisProgram(ShapedAxisProgram):
+    """With DAC_SHAPING and DAC_SLOW_PART."""
+
+    _fields_ = (("slow", c_void_p),)
+
+
+class SlowPart(Structure):
+    _fields_ = (
+        ("gains", c_void_p),
+        ("ratios", c_void_p),
+        ("second", c_void_p),
+        ("mixed", c_void_p),
+        ("table", c_void_p),
+        ("gain_spacing", c_uint32),
+        ("ratio_spacing", c_uint32),
+        ("gain_knots", c_uint8),
+        ("ratio_knots", c_uint8),
+        ("index_bits", c_uint8),
+        ("gain_word", c_int32),
+        ("offset_word", c_int64),
+    )
+
+
 class CSchedule(Structure):
     _fields_ = (
         ("line_ticks", c_uint32),
@@ -82,6 +113,30 @@ class CProgram(Structure):
 
 class ShapedCProgram(Structure):
     _fields_ = (("schedule", CSchedule), ("x", ShapedAxisProgram), ("y", ShapedAxisProgram))
+
+
+class SlowCProgram(Structure):
+    _fields_ = (("schedule", CSchedule), ("x", SlowAxisProgram), ("y", SlowAxisProgram))
+
+
+class ShapedSlowCProgram(Structure):
+    _fields_ = (("schedule", CSchedule), ("x", ShapedSlowAxisProgram), ("y", ShapedSlowAxisProgram))
+
+
+AnyCProgram = CProgram | ShapedCProgram | SlowCProgram | ShapedSlowCProgram
+# By whether the runtime has DAC_SHAPING, and DAC_SLOW_PART.
+AXES: dict[tuple[bool, bool], Any] = {
+    (False, False): AxisProgram,
+    (True, False): ShapedAxisProgram,
+    (False, True): SlowAxisProgram,
+    (True, True): ShapedSlowAxisProgram,
+}
+PROGRAMS: dict[tuple[bool, bool], Any] = {
+    (False, False): CProgram,
+    (True, False): ShapedCProgram,
+    (False, True): SlowCProgram,
+    (True, True): ShapedSlowCProgram,
+}
 
 
 class Converter(Structure):
@@ -146,10 +201,12 @@ def compile_both(folder: Path, **how: Any) -> tuple[Path, ...]:
 
 @dataclass(frozen=True, eq=False)
 class CAxis:
-    """An axis of a program as C has it, and the table that it points to."""
+    """An axis of a program as C has it, its table, and its slow part with all that this points to."""
 
     program: AxisProgram
     words: Any
+    slow: SlowPart | None = None
+    slow_words: Sequence[Any] = ()
 
 
 class Library:
@@ -168,19 +225,34 @@ class Library:
         self.dll.dac_synthesize.restype = c_bool
         self.word_bytes, self.output_bytes = int(self.dll.probe_size(6)), int(self.dll.probe_size(7))
         self.stride, self.shaping = int(self.dll.probe_size(8)), int(self.dll.probe_size(9))
+        self.slow_part = bool(self.dll.probe_size(10))
+        self.words_behind = int(self.dll.probe_size(11))
         self.word = np.dtype(f"i{self.word_bytes}")
         self.output = np.dtype(f"u{self.output_bytes}")
 
-    def axis(self, program: Program) -> CAxis:
+    def array(self, kind: Any, values: Sequence[int]) -> Any:
+        """Words of a type, just as many."""
+        return (kind * len(values))(*values)
+
+    def axis(self, axis: Program | FrameProgram) -> CAxis:
         """An axis as C has it; its table has just the words that it needs, and the first ones again."""
+        program = axis.fast if isinstance(axis, FrameProgram) else axis
         cubic = program.mode == "cubic"
-        held = [*program.words.tolist(), *program.words[: WORDS_BEHIND if cubic else 1].tolist()]
-        table = ((ctypes.c_int16 if self.word_bytes == 2 else c_int32) * len(held))(*held)
+        word = ctypes.c_int16 if self.word_bytes == 2 else c_int32
+        table = self.array(word, [*program.words.tolist(), *program.words[: WORDS_BEHIND if cubic else 1].tolist()])
         output = program.output
-        shaping = {"shaping_order": output.shaping.order, "shaping_zero": output.shaping.zero}
+        more: dict[str, Any] = {}
+        if self.shaping:
+            more = {"shaping_order": output.shaping.order, "shaping_zero": output.shaping.zero}
+        part: SlowPart | None = None
+        words: list[Any] = []
+        if isinstance(axis, FrameProgram):
+            assert self.slow_part, "this runtime plays no slow part"
+            part, words = self.slow(axis, word)
+            more["slow"] = ctypes.addressof(part)
         return CAxis(
-            (ShapedAxisProgram if self.shaping else AxisProgram)(
-                **(shaping if self.shaping else {}),
+            AXES[bool(self.shaping), self.slow_part](
+                **more,
                 table=ctypes.addressof(table),
                 length=len(program.words),
                 storage_bits=8 * self.word_bytes,
@@ -201,9 +273,38 @@ class Library:
                 left_aligned=output.align == "left",
             ),
             table,
+            part,
+            words,
         )
 
-    def program(self, program: DualProgram) -> tuple[CProgram | ShapedCProgram, tuple[CAxis, CAxis]]:
+    def slow(self, frame: FrameProgram, word: Any) -> tuple[SlowPart, list[Any]]:
+        """The slow part of an axis, and what it points to. A second table of zeros is left out."""
+        mixes = bool(np.any(frame.second))
+        table = frame.slow.words.tolist()
+        gains = self.array(c_int32, frame.gains.words.tolist())
+        ratios = self.array(ctypes.c_int16, frame.ratios.words.tolist())
+        second = self.array(ctypes.c_int8, frame.second.tolist())
+        # Behind these words the memory is free, of a size that no test touches.
+        mixed = self.array(word, [0x55] * (len(frame.second) + self.words_behind))
+        slow = self.array(word, [*table, *table[:WORDS_BEHIND]])
+        words = [gains, ratios, second, mixed, slow]
+        part = SlowPart(
+            gains=ctypes.addressof(gains),
+            ratios=ctypes.addressof(ratios) if mixes else None,
+            second=ctypes.addressof(second) if mixes else None,
+            mixed=ctypes.addressof(mixed) if mixes else None,
+            table=ctypes.addressof(slow),
+            gain_spacing=frame.gains.spacing,
+            ratio_spacing=frame.ratios.spacing,
+            gain_knots=len(frame.gains.words),
+            ratio_knots=len(frame.ratios.words),
+            index_bits=len(table).bit_length() - 1,
+            gain_word=frame.slow.gain_word,
+            offset_word=frame.slow.offset_word,
+        )
+        return part, words
+
+    def program(self, program: ScanProgram) -> tuple[AnyCProgram, tuple[CAxis, CAxis]]:
         """A program as C has it, and its axes, which have to live as long as it plays."""
         schedule, axes = program.schedule, (self.axis(program.x), self.axis(program.y))
         windows = (
@@ -211,7 +312,7 @@ class Library:
             for each in (schedule.forward, schedule.backward, schedule.up, schedule.down)
         )  # fmt: skip
         times = schedule.ticks, schedule.lines, schedule.pixels, schedule.settle_lines, schedule.turn_tick
-        kind = ShapedCProgram if self.shaping else CProgram
+        kind = PROGRAMS[bool(self.shaping), self.slow_part]
         return kind(CSchedule(*times, *windows), axes[0].program, axes[1].program), axes
 
 
@@ -236,9 +337,9 @@ class Device:
         function = getattr(self.library.dll, f"dac_sequencer_{name}")
         return lambda *arguments: function(self.state, *arguments)
 
-    def load(self, program: DualProgram | CProgram | ShapedCProgram) -> int:
+    def load(self, program: ScanProgram | AnyCProgram) -> int:
         """Load a program."""
-        if isinstance(program, DualProgram):
+        if isinstance(program, ScanProgram):
             program, axes = self.library.program(program)
             self.alive.append(axes)
         return int(self.library.dll.dac_sequencer_load(self.state, byref(program)))
@@ -284,7 +385,7 @@ def markers_of(tick: Tick) -> int:
 class Twin:
     """A device and the model, which are asked for the same, and whose ticks have to be the same."""
 
-    def __init__(self, library: Library, program: DualProgram, power_up: tuple[int, int] = (0, 0)) -> None:
+    def __init__(self, library: Library, program: ScanProgram, power_up: tuple[int, int] = (0, 0)) -> None:
         self.outputs = program.x.output, program.y.output
         self.device = Device(
             library, *(converter_of(out, code) for out, code in zip(self.outputs, power_up, strict=True))
@@ -292,7 +393,7 @@ class Twin:
         self.model = Sequencer(None, codes=power_up)
         self.swaps = 0
 
-    def commit(self, program: DualProgram, loaded: CProgram | None = None) -> None:
+    def commit(self, program: ScanProgram, loaded: CProgram | None = None) -> None:
         """Load and commit a program; ``loaded`` is the same, if C has it from elsewhere."""
         result = self.device.load(program if loaded is None else loaded)
         assert result == LOADED, f"not loaded: {result}"

@@ -96,13 +96,13 @@ def long_program(rng: Generator, shape: SequencerShape, axis: str, schedule: Sch
     )
     program = Program(RationalPhase(period), hold, MODES[interpolated], bits, words, output)
     codes = program.codes(np.arange(program.ticks))
-    low, high = _limits(rng, codes, top)
-    step = _step(rng, codes, top)
+    low, high = within_limits(rng, codes, top)
+    step = step_about(rng, codes, top)
     park = int(rng.choice([low, high, (low + high) // 2]))
     return replace(program, output=replace(output, code_min=low, code_max=high, max_step=step, park_code=park))
 
 
-def _limits(rng: Generator, codes: Ints, top: int) -> tuple[int, int]:
+def within_limits(rng: Generator, codes: Ints, top: int) -> tuple[int, int]:
     lowest, highest = int(np.min(codes)), int(np.max(codes))
     match str(rng.choice(LIMITS, p=[0.4, 0.3, 0.25, 0.05])):
         case "tight":
@@ -115,7 +115,7 @@ def _limits(rng: Generator, codes: Ints, top: int) -> tuple[int, int]:
             return 0, top
 
 
-def _step(rng: Generator, codes: Ints, top: int) -> int:
+def step_about(rng: Generator, codes: Ints, top: int) -> int:
     largest = int(np.max(np.abs(codes - np.roll(codes, 1))))
     steps = dict(zip(STEEP, (largest, largest - 1, largest // 2, 2 * largest, 40 * largest, top, 1), strict=True))
     return min(max(steps[str(rng.choice(STEEP))], 1), top)

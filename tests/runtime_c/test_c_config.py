@@ -18,6 +18,7 @@ OTHER_VALUES = {
     "DAC_SHAPING": 3,
     "DAC_SPLINE": 1,
     "DAC_COMMIT_MODES": 1,
+    "DAC_SLOW_PART": 1,
     "DAC_STORE": 1,
     "DAC_REQUESTS": 128,
     "DAC_LONG_MULTIPLY": 0,
@@ -117,10 +118,11 @@ def test_tables_and_the_functions_of_the_consumer_go_where_the_firmware_wants_th
     sections: dict[str, str] = {}
     for source in (
         tmp_path / "out" / f"{NAME}.c",
-        *(FOLDER / f"dac_{name}.c" for name in ("axis", "shaping", "sequencer")),
+        *(FOLDER / f"dac_{name}.c" for name in ("axis", "shaping", "slow", "sequencer")),
     ):
-        for order in (0, 3):
-            run_clean([*CC, *options, f"-DDAC_SHAPING={order}", "-c", source, "-o", "unit.o"], tmp_path)
+        for order, slow in ((0, 0), (3, 0), (0, 1)):
+            chosen = [f"-DDAC_SHAPING={order}", f"-DDAC_SLOW_PART={slow}"]
+            run_clean([*CC, *options, *chosen, "-c", source, "-o", "unit.o"], tmp_path)
             symbols = run_clean(["objdump", "--syms", "unit.o"], tmp_path)
             sections |= {
                 name: where for where, name in re.findall(r" [FO] (\S+)\s+\S+ (?:\.hidden )?(\w+)$", symbols, re.M)
@@ -131,6 +133,7 @@ def test_tables_and_the_functions_of_the_consumer_go_where_the_firmware_wants_th
     elsewhere = {name for name, section in sections.items() if section.startswith(".text")}
     assert elsewhere <= PRODUCER, "functions that the consumer calls, outside the section"
     assert sections["dac_sequencer_fill"] == sections["dac_axis_run"] == sections["dac_shaping_play"] == ".fast"
+    assert sections["dac_slow_begin_line"] == sections["dac_slow_play"] == ".fast"
 
 
 def test_a_program_is_an_object_whose_names_may_come_from_the_build(tmp_path: Path) -> None:
@@ -162,3 +165,18 @@ def test_the_object_of_another_width_does_not_compile(tmp_path: Path) -> None:
     assert "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in run([*CC, "-c", unit, "-o", tmp_path / "o"]).stderr
     wide = [f"-DDAC_{name}_STORAGE_BITS=32" for name in ("TABLE", "OUTPUT")]
     run_clean([*CC, *wide, "-c", unit, "-o", tmp_path / "o"], tmp_path)
+
+
+def test_the_slow_part_of_the_page_compiles(tmp_path: Path) -> None:
+    """As an axis of a build, which the page calls SCAN; and not without the option."""
+    page = (REPOSITORY / "docs" / "c.md").read_text("utf-8")
+    (code,) = re.findall(r"^```c\n(static const int32_t gains.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    build(tmp_path, VARIANTS["example"])
+    code = code.replace("SCAN", NAME.upper()).replace("scan_x_table", f"{NAME}_x_table")
+    includes = f'#include "dac_sequencer.h"\n#include "{NAME}.h"\n'
+    main = f"{includes}{code}int main(void)\n{{\n    return x.slow != &slow_x;\n}}\n"
+    (tmp_path / "main.c").write_text(main, "ascii")
+    command = [*CC, f"-I{tmp_path / 'out'}", "main.c", tmp_path / "out" / f"{NAME}.c", "-o", "main"]
+    run_clean([*command, "-DDAC_SLOW_PART=1"], tmp_path)
+    run_clean([tmp_path / "main"], tmp_path)
+    assert run(command, tmp_path).returncode != 0

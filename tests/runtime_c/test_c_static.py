@@ -30,6 +30,15 @@ CHOICES = {
     "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
     "commit_modes": ["-DDAC_COMMIT_MODES=1"],
+    "slow_part": ["-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1"],
+    "slow_part_wide": [
+        "-DDAC_SLOW_PART=1",
+        "-DDAC_SPLINE=1",
+        "-DDAC_TABLE_STORAGE_BITS=32",
+        "-DDAC_OUTPUT_STORAGE_BITS=32",
+    ],
+    "slow_part_no_long_multiplication": ["-DDAC_SLOW_PART=1", "-DDAC_SPLINE=1", "-DDAC_LONG_MULTIPLY=0"],
+    "slow_part_shaped": ["-DDAC_SLOW_PART=1", "-DDAC_SHAPING=3"],
     "first_order": ["-DDAC_SHAPING=1"],
     "shaped": ["-DDAC_SHAPING=3"],
     "shaped_wide": ["-DDAC_SHAPING=3", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
@@ -54,8 +63,9 @@ WHOLE = (
     "spline_shaped",
     "spline_shaped_no_long_multiplication",
     "commit_modes",
+    "slow_part",
 )
-ANALYSED = (*WHOLE, "first_order", "shaped_wide")
+ANALYSED = (*WHOLE, "first_order", "shaped_wide", "slow_part_no_long_multiplication")
 # An analyser reports what it finds in a file that is wrong in this way.
 FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
 ANALYSERS = {
@@ -138,6 +148,7 @@ def declared(
     for option, given in (
         ("DAC_SHAPING", "-DDAC_SHAPING=3"),
         ("DAC_COMMIT_MODES", "-DDAC_COMMIT_MODES=1"),
+        ("DAC_SLOW_PART", "-DDAC_SLOW_PART=1"),
         ("DAC_STORE", "-DDAC_STORE=1"),
     ):
         if given not in options:
@@ -148,7 +159,12 @@ def declared(
 @pytest.mark.rest
 @pytest.mark.parametrize(
     "options",
-    [["-O0"], ["-O2"], ["-Os"], *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes"))],
+    [
+        ["-O0"],
+        ["-O2"],
+        ["-Os"],
+        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "slow_part")),
+    ],
     ids=" ".join,
 )
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))

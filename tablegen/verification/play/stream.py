@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import DualProgram, require_dual
 from tablegen.device.played_lines import LineTicks
 from tablegen.device.registers import program_words
 from tablegen.device.sequencer import Fault, Sequencer, Tick
@@ -374,8 +374,9 @@ class Script:
             tick = self.model.step()
             if tick.swapped:
                 assert self.model.playing is not None
-                self.swapped_programs.append(self.model.playing)
-                self.programs.append((len(self.expected), self.model.playing))
+                playing = require_dual(self.model.playing)
+                self.swapped_programs.append(playing)
+                self.programs.append((len(self.expected), playing))
                 self._writable_at = self.clocks + self.drain
             self.expected.append(self._with_reported(pack(tick)))
         self._until -= end - self.clocks

@@ -1,0 +1,282 @@
+/* The slow part of an axis: what a line begins with, and its ticks. docs/sequencer.md has the arithmetic. */
+#include "dac_slow.h"
+#include "dac_run.h"
+#include "dac_short.h"
+
+#if DAC_SLOW_PART
+
+/* What is divided, and the quotient. */
+typedef struct {
+    uint32_t rest, quotient;
+} dac_division;
+
+/* Divides 2^`bits` start + factor part by `whole`; start and part are below whole <= 2^31, and factor below 2^`bits`.
+ * Long division, since no processor here has one of 64 bits: some 8 instructions a bit. */
+DAC_CODE_ATTR static dac_division divide(uint32_t start, uint32_t part, uint32_t factor, unsigned bits, uint32_t whole)
+{
+    dac_division at = {start, 0};
+
+    while (bits-- != 0) {
+        at.rest <<= 1;
+        at.quotient <<= 1;
+        if (at.rest >= whole) {
+            at.rest -= whole;
+            at.quotient++;
+        }
+        if ((factor >> bits & 1u) == 0)
+            continue;
+        at.rest += part;
+        if (at.rest >= whole) {
+            at.rest -= whole;
+            at.quotient++;
+        }
+    }
+    return at;
+}
+
+/* Returns the nearest word to the straight line from `here` to `there`, ties up. */
+DAC_CODE_ATTR static int32_t between(int32_t here, int32_t there, uint32_t ahead, uint32_t spacing)
+{
+    const bool falls = there < here;
+    const uint32_t distance = falls ? (uint32_t)(here - there) : (uint32_t)(there - here);
+    const dac_division way = divide(0, ahead, distance, 19, spacing);
+    const uint32_t half = spacing >> 1;
+
+    if (falls)
+        return here - (int32_t)(way.quotient + (way.rest > half ? 1u : 0u));
+    return here + (int32_t)(way.quotient + (way.rest + half >= spacing ? 1u : 0u));
+}
+
+/* Returns the knot before a line, and moves `line` to the lines since then. */
+DAC_CODE_ATTR static unsigned knot_before(uint32_t *line, uint32_t spacing)
+{
+    unsigned knot = 0;
+
+    for (; *line >= spacing; knot++)
+        *line -= spacing;
+    return knot;
+}
+
+DAC_CODE_ATTR static int32_t gain_of(const dac_slow_part *slow, uint32_t line)
+{
+    const int32_t *const knot = slow->gains + knot_before(&line, slow->gain_spacing);
+    return between(knot[0], knot[1], line, slow->gain_spacing);
+}
+
+DAC_CODE_ATTR static int32_t ratio_of(const dac_slow_part *slow, uint32_t line)
+{
+    const int16_t *const knot = slow->ratios + knot_before(&line, slow->ratio_spacing);
+    return between(knot[0], knot[1], line, slow->ratio_spacing);
+}
+
+/* Mixes the table of a line. Behind its last word stand as many of the first ones as any table has. */
+DAC_CODE_ATTR static void mix(const dac_bank_axis *bank, int32_t ratio)
+{
+    const dac_word *const fast = bank->fast;
+    const int8_t *const second = bank->slow->second;
+    dac_word *const mixed = bank->slow->mixed;
+    const int32_t least = -(INT32_C(1) << (bank->bits - 1u));
+    const uint32_t range = (UINT32_C(1) << bank->bits) - 1, length = bank->length;
+
+    for (uint32_t i = 0; i < length; i++) {
+        int32_t word = fast[i] + ((ratio * second[i] + (1 << 11)) >> 12);
+        if ((uint32_t)(word - least) > range)
+            word = word < 0 ? least : -least - 1;
+        mixed[i] = (dac_word)word;
+    }
+    for (uint32_t i = 0; i < DAC_WORDS_BEHIND; i++)
+        mixed[length + i] = mixed[i];
+}
+
+/* Returns the offset at the start of a line. */
+DAC_CODE_ATTR static int64_t offset_of(const dac_slow_part *slow, uint32_t line, uint32_t lines)
+{
+    const uint32_t place = divide(line, 0, 0, 18u + slow->index_bits, lines).quotient;
+    const dac_segment segment = dac_segment_of(slow->table + (place >> 18));
+
+    return (int64_t)slow->gain_word * dac_spline_eval(&segment, place & 0x3ffffu) + slow->offset_word;
+}
+
+/* Returns what the offset grows by in a tick: distance step / 2^32, cut off towards 0. */
+DAC_CODE_ATTR static int64_t ramp_of(int64_t distance, uint32_t step)
+{
+    const uint64_t way = (uint64_t)(distance < 0 ? -distance : distance);
+    const int64_t ramp = (int64_t)((way >> 32) * step + ((way & UINT32_MAX) * step >> 32));
+
+    return distance < 0 ? -ramp : ramp;
+}
+
+/* Sets what runs of the line need; see dac_program.c and dac_short.h. */
+DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
+{
+#if DAC_LONG_MULTIPLY
+    if (bank->line_most == 0)
+        return;
+    const unsigned left = 32u - bank->gain_q;
+    bank->run_gain = bank->gain * (INT32_C(1) << left);
+    bank->run_offset = bank->offset * ((int64_t)1 << left);
+    bank->run_ramp = bank->ramp * ((int64_t)1 << left);
+#else
+    const int64_t ramp = bank->ramp < 0 ? -bank->ramp : bank->ramp;
+    uint8_t spread = 30;
+
+    for (uint32_t gain = (uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain); gain != 0; gain >>= 1)
+        spread--;
+    bank->run_spread = spread > 19 ? 19 : spread;
+    bank->run_most = DAC_RUN * ramp <= INT32_C(1) << 30 ? bank->line_most : 0;
+#endif
+}
+
+DAC_CODE_ATTR void dac_slow_begin_line(dac_axis *axis, dac_bank_axis *bank, uint32_t line)
+{
+    const dac_slow_part *const slow = bank->slow;
+
+    axis->rise = 0;
+    if (slow == NULL)
+        return;
+    const uint32_t after = line + 1 == bank->lines ? 0 : line + 1;
+    const int64_t here = offset_of(slow, line, bank->lines), there = offset_of(slow, after, bank->lines);
+    if (slow->second != NULL)
+        mix(bank, ratio_of(slow, line));
+    bank->gain = gain_of(slow, line);
+    bank->offset = here + ((int64_t)1 << (bank->gain_q - 1u));
+    bank->ramp = ramp_of(there - here, bank->ramp_step);
+    allow_runs(bank);
+}
+
+DAC_CODE_ATTR int32_t dac_slow_code(const dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
+{
+    return (int32_t)(((int64_t)bank->gain * sample + bank->offset + axis->rise) >> bank->gain_q); /* 28 bits or fewer */
+}
+
+#if DAC_LONG_MULTIPLY
+
+/* The fast path, as in dac_axis.c, but in two loops: samples first, then codes. One loop for both would need more
+ * registers than a Cortex-M has, of a spline by far. */
+
+enum { CHUNK = 4 * DAC_RUN };
+
+/* Writes the codes of samples, block by block; returns how many. Ends before a block with a code outside the window. */
+DAC_NOINLINE uint32_t put(dac_axis *axis, const dac_bank_axis *bank, const int32_t *sample, uint32_t ticks,
+                          int64_t rise, dac_output *out)
+{
+    const int64_t ramp = bank->run_ramp;
+    const int32_t gain = bank->run_gain;
+    int64_t offset = bank->run_offset + rise * ((int64_t)1 << (32u - bank->gain_q));
+    int32_t code = axis->code;
+    uint32_t done = 0;
+
+    while (done < ticks) {
+        const int32_t base = code - bank->run_half;
+        const uint32_t length = dac_block_of(ticks - done);
+        const int32_t *const end = sample + length;
+        uint32_t out_of_window = 0;
+
+        if (!dac_has_room(bank, base))
+            break;
+        do {
+            code = (int32_t)((offset + (int64_t)gain * *sample++) >> 32);
+            offset += ramp;
+            out_of_window |= (uint32_t)(code - base);
+            *out = (dac_output)code;
+            out += DAC_STRIDE;
+            DAC_HIDE_FROM_OPTIMIZER(out);
+            DAC_HIDE_FROM_OPTIMIZER(sample);
+        } while (sample != end);
+        if (out_of_window >> bank->run_bits != 0)
+            break;
+        axis->code = code;
+        done += length;
+    }
+    return done;
+}
+
+/* Writes samples of straight lines, up to `end`; returns the position after them. */
+DAC_NOINLINE uint64_t sample_lines(const dac_bank_axis *bank, uint64_t at, uint64_t step, int32_t *sample,
+                                   const int32_t *end)
+{
+    const dac_word *const table = bank->table;
+    const unsigned guard = DAC_GUARD(bank);
+    dac_wide half = DAC_HALF(guard);
+
+    DAC_HIDE_FROM_OPTIMIZER(half);
+    do {
+        const uint32_t high = (uint32_t)(at >> 32);
+        DAC_NEIGHBOURS(table, high >> 15, here, there);
+        *sample++ = dac_lerp(here, there, high & 0x7fffu, guard, half);
+        at += step;
+        DAC_HIDE_FROM_OPTIMIZER(sample);
+    } while (sample != end);
+    return at;
+}
+
+#if DAC_SPLINE
+DAC_NOINLINE void sample_spline(dac_track *track, int32_t *sample, const int32_t *end)
+{
+    dac_track here = *track;
+
+    do {
+        *sample++ = dac_track_next(&here);
+    } while (sample != end);
+    *track = here;
+}
+#endif
+
+DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                     dac_output *out, uint32_t ticks)
+{
+    int32_t samples[CHUNK];
+    int64_t rise = axis->rise;
+    uint32_t done = 0;
+#if DAC_SPLINE
+    dac_track track;
+
+    if (bank->cubic)
+        track = dac_track_of(bank->table, at, step);
+#endif
+    while (done < ticks) {
+        const uint32_t length = ticks - done < CHUNK ? ticks - done : CHUNK;
+        const int32_t *const end = samples + length;
+#if DAC_SPLINE
+        if (bank->cubic)
+            sample_spline(&track, samples, end);
+        else
+#endif
+            at = sample_lines(bank, at, step, samples, end);
+        const uint32_t played = put(axis, bank, samples, length, rise, out);
+        done += played;
+        if (played != length)
+            break;
+        rise += CHUNK * bank->ramp;
+        out += CHUNK * DAC_STRIDE;
+    }
+    return done;
+}
+
+#else
+
+#if DAC_SPLINE
+DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks)
+{
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL, true};
+    return dac_play_short(axis, bank, stretch, kind);
+}
+#endif
+
+DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                     dac_output *out, uint32_t ticks)
+{
+#if DAC_SPLINE
+    if (bank->cubic)
+        return play_spline(axis, bank, at, step, out, ticks);
+#endif
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL, true};
+    return dac_play_short(axis, bank, stretch, kind);
+}
+
+#endif
+
+#endif
