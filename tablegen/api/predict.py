@@ -1,7 +1,7 @@
 """Predict the position of an axis for any drive, on the operator of its scanner file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any, Literal
@@ -9,24 +9,17 @@ from typing import Any, Literal
 import numpy as np
 
 from tablegen.api.result import Result
-from tablegen.base.figures import shown_path
-from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
 from tablegen.calibration.tables.recorder import Columns, Recorder
 from tablegen.calibration.tables.table import MeasuredTable
 from tablegen.charts.chart import Chart, DrawnCurve
 from tablegen.charts.picture_file import PlottedCharts
-from tablegen.compensation.dynamics import Response
-from tablegen.compensation.offset import OffsetLaw
-from tablegen.compensation.offset_sizes import OffsetSurface
-from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.in_time import OperatorInTime, Start, mean_of, repeated_samples, turns_of
-from tablegen.compensation.operator.operator import STROKE_REACH, Operator
+from tablegen.compensation.operator.in_time import OperatorInTime, Start, mean_of, repeated_samples
+from tablegen.compensation.operator.operator import STROKE_REACH
 from tablegen.compensation.operator.prediction_uncertainty import possible_prediction_errors
-from tablegen.config.load import load_scanner
 from tablegen.numerics.arrays import Floats
-from tablegen.numerics.driver import Driver
-from tablegen.planning.laws import dynamics_of, offset_surface, size_law_of
+from tablegen.planning.known_axis import KnownAxis
 
 _LEAST_SAMPLES = 3
 _LEAST_STROKE = 0.005  # of the driver's range
@@ -98,7 +91,7 @@ def predict(
     if not isfinite(delay_s):
         raise ValueError(f"a delay of {delay_s} s is none")
     recorder = Recorder(columns, drive_gain, drive_offset)
-    known = _KnownAxis.read(Path(scanner), axis)
+    known = KnownAxis.read(Path(scanner), axis)
     table = recorder.read(Path(drive), [TIME, DRIVE], [DISPLACEMENT])
     time_s, volts = table[TIME], table[DRIVE]
     _check_times(table)
@@ -148,58 +141,6 @@ def predict(
         measured = np.interp(time_s + delay_s, other[TIME], other[DISPLACEMENT])
     bounds = possible_prediction_errors(operator, u, position, state)
     return Predicted(axis, state, time_s, volts, position, bounds, measured)
-
-
-@dataclass(frozen=True)
-class _KnownAxis:
-    operator: Operator
-    driver: Driver
-    surface: OffsetSurface
-    response: Response | None
-
-    @classmethod
-    def read(cls, path: Path, axis: str) -> "_KnownAxis":
-        """Read an axis of a scanner file that has an operator."""
-        scanner, document = load_scanner(path)
-        its = scanner.x if axis == "x" else scanner.y
-        named = None if its.hysteresis is None else its.hysteresis.operator_file
-        if named is None:
-            key = f"{axis}.hysteresis"
-            raise Rejected([document.problem(key, f"is no operator; `calibrate operator --axis {axis}` makes one")])
-        driver = scanner.driver
-        beside = path.parent / named
-        operator, file = read_operator(beside, shown_path(beside))
-        problems = Problems()
-        if file.axis != axis:
-            problems.add(document, f"{axis}.hysteresis.file", f"is the operator of {file.axis}")
-        if max(abs(file.v_max - driver.v_max), abs(file.v_min - driver.v_min)) > 1e-6 * driver.span:
-            why = f"was identified from {file.v_min:g} to {file.v_max:g} V; the scanner file has {driver}"
-            problems.add(document, f"{axis}.hysteresis.file", why)
-        surface, response = OffsetSurface.everywhere(OffsetLaw()), None
-        with problems.at(document, f"{axis}.offset"):
-            if its.offset is not None:
-                surface = offset_surface(its.offset, driver, size_law_of(its.size, driver))
-        with problems.at(document, f"{axis}.resonance"):
-            response = None if its.resonance is None else operator.dynamics(dynamics_of(its.resonance, path.parent))
-        problems.stop_if_any()
-        return cls(operator, driver, surface, response)
-
-    def operator_of(self, time_s: Floats, u: Floats) -> Operator:
-        """Return the operator at the mean rate of a record, with terms of creep as slow as the record shows.
-
-        Creep has no slowest time constant.
-        """
-        span_s = float(time_s[-1] - time_s[0])
-        sweeps = len(turns_of(u)) - 1
-        at_rate = self.operator.at_rate(0.5 * sweeps / span_s)
-        return replace(at_rate, creep=self.operator.creep.down_to(1.0 / span_s))
-
-    def factor(self, mean: float) -> float:
-        """Return m of (1) at a mean over that at the operator's centre."""
-        here, there = (
-            self.surface.small.factor(self.driver.p(self.driver.volts(v))) for v in (mean, self.operator.centre)
-        )
-        return float(here / there)
 
 
 def _check_times(table: MeasuredTable) -> None:

@@ -10,7 +10,7 @@ from editing import run
 from foreign_plants import SIX, BoucWen, ForeignPlant, record
 from replacing import replace
 
-from tablegen.api.predict import _KnownAxis
+from tablegen.planning.known_axis import KnownAxis
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_record_is_predicted_and_bad_input_is_named(scanner: Path, tmp_path: Pat
 
 @pytest.mark.common
 def test_loops_are_those_of_the_mean_rate_of_a_record(scanner: Path) -> None:
-    known = _KnownAxis.read(scanner, "x")
+    known = KnownAxis.read(scanner, "x")
     plays = replace(known.operator.family.plays, growth=0.05)
     growing = replace(known.operator, family=replace(known.operator.family, plays=plays))
     known = replace(known, operator=growing)
