@@ -75,6 +75,11 @@ class Setup(Struct, frozen=True, dict=True):
         return f"{place.key} of {name}" if place.in_scanner else place.key
 
     @property
+    def mixes_motions(self) -> bool:
+        """True if an axis follows the line and the frame: at an angle, on coupled axes, or with drift."""
+        return bool(self.scan.angle_deg % 360.0) or bool(self.scanner.coupling) or any(self.scan.drift_nm_per_s)
+
+    @property
     def files(self) -> list[Path]:
         """The files that decide this scan, each once: the scan, the scanner, and the files that it names."""
         return list(dict.fromkeys(path for path, _, _ in self.named_files))

@@ -123,6 +123,19 @@ class SlowScannerAxis(ScannerAxis, frozen=True, kw_only=True, forbid_unknown_fie
     ) = None
 
 
+class Coupling(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Coupling of the axes: what each moves along the other. A scan on coupled axes needs an operator on both."""
+
+    x_per_y: Annotated[
+        float, Meta(ge=-0.5, le=0.5, description="nm along x for each nm of the y axis, for example 0.02")
+    ] = 0.0
+    y_per_x: Annotated[float, Meta(ge=-0.5, le=0.5, description="nm along y for each nm of the x axis")] = 0.0
+
+    def __bool__(self) -> bool:
+        """Return True if an axis moves along the other."""
+        return self.x_per_y != 0.0 or self.y_per_x != 0.0
+
+
 class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A calibrated scanner."""
 
@@ -140,6 +153,7 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     )
     x: ScannerAxis
     y: SlowScannerAxis
+    coupling: Coupling = Coupling()
 
     @property
     def driver(self) -> Driver:

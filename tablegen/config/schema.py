@@ -443,6 +443,18 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         ]
         | None
     ) = None
+    angle_deg: Annotated[
+        float,
+        Meta(
+            ge=-360.0,
+            le=360.0,
+            description="scan angle: the fast direction, counterclockwise from the x axis; both axes need an operator",
+        ),
+    ] = 0.0
+    drift_nm_per_s: Annotated[
+        tuple[Annotated[float, Meta(ge=-1e6, le=1e6)], Annotated[float, Meta(ge=-1e6, le=1e6)]],
+        Meta(description="drift of the sample along x and y, which the scan follows; both axes need an operator"),
+    ] = (0.0, 0.0)
     dac: Annotated[
         Dac, Meta(description="The converter of both axes; keys that the scanner file has can be left out.")
     ] = Dac()

@@ -246,6 +246,18 @@ class FrameProgram(Struct, frozen=True, eq=False):
         return np.asarray(gains[:, None] * samples + slow[:, None] + k * ramps[:, None])
 
 
+def frame_extremes(program: FrameProgram) -> tuple[int, int, int]:
+    """Return the least and the greatest code of a frame before the clamp, and the largest step of a tick."""
+    least, most, steepest = 1 << 40, -(1 << 40), 0
+    before = int(program.unclamped(program.lines - 1)[0, -1])
+    for line in range(program.lines):
+        codes = program.unclamped(line)[0]
+        least, most = min(least, int(np.min(codes))), max(most, int(np.max(codes)))
+        steepest = max(steepest, int(np.max(np.abs(np.diff(codes, prepend=before)))))
+        before = int(codes[-1])
+    return least, most, steepest
+
+
 def ramp(distance: int, step: int) -> int:
     """Return the ramp of a tick towards the next line: distance step / 2^32, cut off towards 0.
 

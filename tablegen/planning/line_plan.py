@@ -6,7 +6,7 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from tablegen.base.input_errors import Problems
+from tablegen.base.input_errors import Document, Problems
 from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, Limits
 from tablegen.device.dual_program import DualProgram
@@ -26,6 +26,11 @@ from tablegen.planning.timing import AxisTiming, make_schedule
 from tablegen.planning.voltages import axis_voltages
 from tablegen.planning.waveforms import make_waveforms
 from tablegen.waveform.series import FourierSeries
+
+MIXED = (
+    "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the format c, and "
+    "`verify`; leave this out for anything else"
+)
 
 
 class LinePlan(Struct, frozen=True, eq=False):
@@ -142,6 +147,8 @@ def make_plan(setup: Setup) -> Plan:
         With every contradiction on both axes.
     """
     problems = Problems()
+    if setup.mixes_motions:
+        problems.add(*_mixing_key(setup), MIXED)
     schedule = make_schedule(setup, problems)
     if schedule is None:
         line_rate = setup.scan.timing.line_rate_hz
@@ -169,6 +176,13 @@ def make_plan(setup: Setup) -> Plan:
         tuple(scan.emit.formats or DEFAULT_FORMATS),
         clocks,
     )
+
+
+def _mixing_key(setup: Setup) -> tuple[Document, str]:
+    """Return the place of what makes an axis follow both motions."""
+    if setup.scan.angle_deg % 360.0:
+        return setup.scan_file, "angle_deg"
+    return (setup.scanner_file, "coupling") if setup.scanner.coupling else (setup.scan_file, "drift_nm_per_s")
 
 
 def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, problems: Problems) -> LinePlan | None:

@@ -1,0 +1,184 @@
+"""The certificate of a scan at an angle: where the integers of a frame put the tip, by the operators of both axes.
+
+The position of both axes at the imaged ticks is compared with the wanted one: an affine map fitted to it gives the
+sizes along and across the lines, the angle between them, and the scan angle; what is left is the residual.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from msgspec import Struct
+
+from tablegen.fixedpoint.frame_program import frame_extremes
+from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan
+
+_CHORD = 0.05  # of the line
+_MOST_SAMPLES = 512  # of a line, at which the position is computed
+
+
+class TurnedErrors(Struct, frozen=True):
+    """Errors of a frame by the operators, in percent of the size of each motion unless the name says otherwise.
+
+    ``fast_size`` and ``slow_size`` are errors of the sizes along and across the lines; ``shear`` is by how much the
+    angle between both differs from 90 degrees, as a slope; ``rms`` is the residual about the best affine image,
+    ``worst_line`` that of the worst line; ``mismatch`` the largest distance of trace and retrace of a line, as means of
+    1/20 of it, 0 without a retrace; ``scaling`` the scaling error along the mean line, peak to peak, of chords of 1/20
+    of it. ``code_lsb`` is the largest distance of a code from the drive that was learnt.
+    """
+
+    fast_size: float
+    slow_size: float
+    shear: float
+    rotation_deg: float
+    rms: float
+    worst_line: float
+    mismatch: float
+    scaling: float
+    code_lsb: tuple[float, float]
+
+
+class CodeRange(Struct, frozen=True):
+    """The range of an axis' codes in a frame, and the largest step of a tick."""
+
+    least: int
+    most: int
+    steepest: int
+
+
+class TurnedCertificate(Struct, frozen=True):
+    """The certificate of a scan at an angle: its errors, and the codes of x and y."""
+
+    errors: TurnedErrors
+    codes: tuple[CodeRange, CodeRange]
+
+
+def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda _: None) -> TurnedCertificate:
+    """Play the integers of a frame on the operators, and compare the position with the wanted one."""
+    progress("playing the frame on the operators")
+    schedule = plan.schedule
+    stride = -(-schedule.ticks // _MOST_SAMPLES)
+    ticks = np.arange(0, schedule.ticks, stride)
+    positions, distances = [], []
+    for axis in plan.axes:
+        codes = frame_codes(axis, ticks)
+        positions.append(played_position(axis, codes, ticks, schedule.ticks))
+        distances.append(_code_distance(axis, codes, ticks, schedule.ticks))
+    ranges = tuple(CodeRange(*frame_extremes(axis.program)) for axis in plan.axes)
+    errors = frame_errors(plan, positions[0], positions[1], (ticks + 0.5) / schedule.ticks)
+    return TurnedCertificate(
+        TurnedErrors(**errors, code_lsb=(distances[0], distances[1])),
+        (ranges[0], ranges[1]),
+    )
+
+
+def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
+    """Return the codes of a frame at some ticks of each line, shape (lines, len(ticks))."""
+    program = axis.program
+    lines = [program.unclamped(line)[0, ticks] for line in range(program.lines)]
+    return program.output.clamp(np.stack(lines))
+
+
+def played_position(axis: TurnedAxis, codes: Ints, ticks: Ints, line_ticks: int) -> Floats:
+    """Return the position in nm in the middle of ticks of a frame that repeats.
+
+    Parameters
+    ----------
+    codes
+        Shape (lines, len(ticks)).
+    ticks
+        Their ticks in the line.
+    line_ticks
+        All ticks of a line.
+    """
+    lines = len(codes)
+    tick_s = 1.0 / (axis.motion.line_rate_hz * line_ticks)
+    time_s = ((np.arange(lines)[:, None] * line_ticks + ticks) * tick_s).ravel()
+    u = axis.share(codes).ravel()
+    closed = np.append(time_s, lines * line_ticks * tick_s)
+    return axis.piezo.position(closed, np.append(u, u[0]))[:-1].reshape(codes.shape)
+
+
+def frame_errors(plan: TurnedPlan, x_nm: Floats, y_nm: Floats, t: Floats) -> dict[str, float]:
+    """Return the errors of positions of both axes.
+
+    Parameters
+    ----------
+    x_nm, y_nm
+        Positions up to a constant, shape (lines, len(t)).
+    t
+        Phases of the line, shape (samples,).
+    """
+    motion, (fast_nm, slow_nm) = plan.x.motion, plan.geometry.size_nm
+    lines = motion.lines
+    inside: Bools = motion.inside(t)
+    along = np.broadcast_to(motion.fast(t) - 0.5, (lines, len(t)))
+    across = motion.slow((np.arange(lines)[:, None] + t) / lines) - 0.5
+    time_s = (np.arange(lines)[:, None] + t) / motion.line_rate_hz
+    fast, slow = plan.geometry.on_the_sample(x_nm, y_nm, time_s)
+    at = np.ix_(np.flatnonzero(motion.imaged), np.flatnonzero(inside))
+    design = np.stack([np.ones(along[at].size), along[at].ravel(), across[at].ravel()], axis=1)
+    solutions, left = [], []
+    for values in (fast, slow):
+        measured = values[at].ravel()
+        solution = np.linalg.lstsq(design, measured, rcond=None)[0]
+        solutions.append(solution)
+        left.append((measured - design @ solution).reshape(along[at].shape))
+    (_, fast_fast, fast_slow), (_, slow_fast, slow_slow) = (row.tolist() for row in solutions)
+    squares = (left[0] / fast_nm) ** 2 + (left[1] / slow_nm) ** 2
+    return {
+        "fast_size": 100.0 * (float(np.hypot(fast_fast, slow_fast)) / fast_nm - 1.0),
+        "slow_size": 100.0 * (float(np.hypot(fast_slow, slow_slow)) / slow_nm - 1.0),
+        "shear": 100.0 * (slow_fast / fast_fast + fast_slow / slow_slow),
+        "rotation_deg": float(np.degrees(np.arctan2(slow_fast, fast_fast))),
+        "rms": 100.0 * float(np.sqrt(np.mean(squares))),
+        "worst_line": 100.0 * float(np.sqrt(np.max(np.mean(squares, axis=1)))),
+        "mismatch": _mismatch(plan, fast, t),
+        "scaling": _scaling(plan, fast, t),
+    }
+
+
+def _scaling(plan: TurnedPlan, fast: Floats, t: Floats) -> float:
+    """Return the scaling error along the mean of all imaged lines, peak to peak, in percent."""
+    motion, fast_nm = plan.x.motion, plan.geometry.size_nm[0]
+    inside, x = motion.inside(t), motion.fast(t)
+    mean = np.mean(fast[motion.imaged], axis=0) / fast_nm
+    worst = 0.0
+    for going in (t <= motion.fast_turn, t > motion.fast_turn):
+        here = np.flatnonzero(inside & going)
+        if len(here):
+            order = here[np.argsort(x[here])]
+            grid = np.linspace(x[order[0]], x[order[-1]], 401)
+            step = max(1, min(round(_CHORD / (grid[1] - grid[0])), 400))
+            line = np.interp(grid, x[order], mean[order])
+            worst = max(worst, float(np.ptp((line[step:] - line[:-step]) / (grid[step] - grid[0]))))
+    return 100.0 * worst
+
+
+def _mismatch(plan: TurnedPlan, fast: Floats, t: Floats) -> float:
+    """Return the largest distance of trace and retrace along the line, of bins of 1/20 of it, in percent."""
+    motion, fast_nm = plan.x.motion, plan.geometry.size_nm[0]
+    if not motion.both:
+        return 0.0
+    inside, x = motion.inside(t), motion.fast(t)
+    low, high = motion.fast_window
+    bins = np.clip(((x - low) / (high - low) * 20.0).astype(np.int64), 0, 19)
+    worst = 0.0
+    # The frame moves on between both: the slow share is not in ``fast`` but for the shear.
+    error = fast - fast_nm * (x - 0.5)
+    for line in np.flatnonzero(motion.imaged).tolist():
+        sides = []
+        for going in (t <= motion.fast_turn, t > motion.fast_turn):
+            here = inside & going
+            count = np.bincount(bins[here], minlength=20)
+            sides.append(np.bincount(bins[here], error[line][here], minlength=20) / np.maximum(count, 1))
+        worst = max(worst, float(np.max(np.abs(sides[0] - sides[1]))))
+    return 100.0 * worst / fast_nm
+
+
+def _code_distance(axis: TurnedAxis, codes: Ints, ticks: Ints, line_ticks: int) -> float:
+    """Return the largest distance of codes from the learnt drive, in LSB, without the hold's lead of half a tick."""
+    t = (ticks + 0.5) / line_ticks
+    exact = axis.drive.at(len(codes), t)
+    span = axis.known.driver.span / abs(axis.converter.v_per_code)
+    return float(np.max(np.abs(axis.share(codes) - exact))) * span

@@ -1,0 +1,400 @@
+"""Plan a scan at an angle: each axis follows a share of the line's motion and one of the frame's."""
+
+from collections.abc import Callable
+from math import ceil, floor
+from typing import Literal
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from tablegen.base.figures import at_most
+from tablegen.base.input_errors import Problems, Rejected, Unphysical
+from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.frequency import frequency_gain
+from tablegen.compensation.hold import hold_inverse
+from tablegen.compensation.operator.in_time import OperatorInTime
+from tablegen.compensation.operator.operator import STROKE_REACH
+from tablegen.compensation.operator.turned_frame import BeyondDriver, FrameDrive, FrameMotion, learn_frame
+from tablegen.config.load import Setup
+from tablegen.config.scanner import Coupling
+from tablegen.config.schema import Limits
+from tablegen.device.dual_program import ScanProgram
+from tablegen.device.schedule import Schedule
+from tablegen.fixedpoint.converter import Converter, fit_gain, make_output, scaled_output
+from tablegen.fixedpoint.frame_program import (
+    RATIO_BITS,
+    RATIO_FRACTION_BITS,
+    SECOND_BITS,
+    FrameProgram,
+    Knots,
+    SlowTable,
+    frame_extremes,
+)
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program, sample_gain
+from tablegen.fixedpoint.spline_words import spline_factors
+from tablegen.fixedpoint.synthesis import encode, synthesize
+from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.numerics.turns import sine_and_cosine_of
+from tablegen.planning.known_axis import KnownAxis
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.waveform.series import FourierSeries
+
+BITS = 16  # of the words of both tables
+KNOTS = 16  # intervals of gain and ratio over a frame
+_MOST_SLOW_HARMONICS = 24
+_LINES_PER_HARMONIC = 3
+_LEAST_LENGTH = 64
+_GRID = 1024
+_FIRST_GUESS = 0.85  # of the room by the first guess of a drive that cannot be learnt: it overshoots less in the turns
+_MOST_MIXED = 0.99 * ((1 << 7) - 1) * (1 << (RATIO_BITS - RATIO_FRACTION_BITS - 1)) / (1 << (BITS - 1))  # of full scale
+_MOST_SHARE = 4.0  # of the scale of the fast words that is given up for it: 2 bits,
+_FINEST_CODES = float(1 << 14)  # or as much as leaves an LSB of a word below half a code
+_PEAK_GRID = 1024  # peaks are rounded up to it, so that a scale does not depend on the last bit of one
+
+
+class TurnedAxis(Struct, frozen=True, eq=False):
+    """One axis of a scan at an angle.
+
+    ``fast_nm`` and ``slow_nm`` are its shares of both motions, from x = 0 to 1 of each. ``piezo`` is the axis in time,
+    ``drive`` what was learnt on it, of v_max, and ``series`` the fast and the second part as they are played, ahead of
+    the hold of the converter.
+    """
+
+    axis: Literal["x", "y"]
+    converter: Converter
+    motion: FrameMotion
+    piezo: OperatorInTime
+    known: KnownAxis
+    drive: FrameDrive
+    program: FrameProgram
+
+    def share(self, codes: Ints) -> Floats:
+        """Return codes as shares of v_max, of their shape."""
+        volts = self.converter.v_zero + self.converter.v_per_code * codes
+        share: Floats = self.known.driver.share(np.asarray(volts, dtype=np.float64))
+        return share
+
+
+class FrameGeometry(Struct, frozen=True):
+    """The linear map from the motions of the line and of the frame to both axes.
+
+    ``size_nm`` are those of the line and of the frame, from x = 0 to 1 of each. ``x_per_y`` and ``y_per_x`` are the
+    coupling of the axes; ``drift_nm_per_s`` is that of the sample along x and y, of which the frame follows
+    ``rise_s`` while it goes up once.
+    """
+
+    angle_deg: float
+    size_nm: tuple[float, float]
+    x_per_y: float
+    y_per_x: float
+    drift_nm_per_s: tuple[float, float]
+    rise_s: float
+
+    @classmethod
+    def of(cls, setup: Setup, straight: Plan) -> "FrameGeometry":
+        """Return the geometry of a scan whose plan at 0 degrees is known."""
+        coupling, (along_x, along_y) = setup.scanner.coupling, setup.scan.drift_nm_per_s
+        sizes = straight.x.drive.size_nm, straight.y.drive.size_nm
+        rise_s = setup.scan.y.turn / float(straight.schedule.frame_rate)
+        return cls(setup.scan.angle_deg, sizes, coupling.x_per_y, coupling.y_per_x, (along_x, along_y), rise_s)
+
+    @property
+    def shares(self) -> dict[str, tuple[float, float]]:
+        """The nm of the line and of the frame that each axis moves: the wanted ones through the inverse coupling."""
+        sine, cosine = sine_and_cosine_of(self.angle_deg / 360.0)
+        (fast_nm, slow_nm), (drift_x, drift_y) = self.size_nm, self.drift_nm_per_s
+        fast = cosine * fast_nm, sine * fast_nm
+        slow = drift_x * self.rise_s - sine * slow_nm, drift_y * self.rise_s + cosine * slow_nm
+        whole = 1.0 - self.x_per_y * self.y_per_x  # above 0: neither is above 1/2
+        x = tuple((u - self.x_per_y * v) / whole for u, v in (fast, slow))
+        y = tuple((v - self.y_per_x * u) / whole for u, v in (fast, slow))
+        return {"x": (x[0], x[1]), "y": (y[0], y[1])}
+
+    def on_the_sample(self, x_nm: Floats, y_nm: Floats, time_s: Floats) -> tuple[Floats, Floats]:
+        """Return where positions of the axes are along the lines and across them, on a sample that drifts.
+
+        Parameters
+        ----------
+        x_nm, y_nm
+            Positions of the axes, of one shape.
+        time_s
+            Times from the start of the frame, of a shape that broadcasts.
+        """
+        drift_x, drift_y = self.drift_nm_per_s
+        x = x_nm + self.x_per_y * y_nm - drift_x * time_s
+        y = y_nm + self.y_per_x * x_nm - drift_y * time_s
+        sine, cosine = sine_and_cosine_of(self.angle_deg / 360.0)
+        return cosine * x + sine * y, cosine * y - sine * x
+
+
+class TurnedPlan(Struct, frozen=True, eq=False):
+    """A scan at an angle: both axes and their schedule; ``straight`` is the plan of the same scan at 0 degrees."""
+
+    name: str
+    scanner: str
+    geometry: FrameGeometry
+    schedule: Schedule
+    x: TurnedAxis
+    y: TurnedAxis
+    limits: Limits
+    straight: Plan
+
+    @property
+    def axes(self) -> tuple[TurnedAxis, TurnedAxis]:
+        """Both axes, x first."""
+        return self.x, self.y
+
+    @property
+    def program(self) -> ScanProgram:
+        """The content of a bank of the device: the programs of both axes and their schedule."""
+        return ScanProgram(self.x.program, self.y.program, self.schedule)
+
+
+def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _: None) -> TurnedPlan:
+    """Plan a scan at an angle.
+
+    Parameters
+    ----------
+    progress
+        Called with each stage, in words.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction between the scan, the scanner and the hardware.
+    """
+    scan = setup.scan
+    problems = Problems()
+    if scan.y.motion != "ramp":
+        problems.add(setup.scan_file, "y.motion", "a scan at an angle moves y on every tick; leave this out")
+    for axis in ("x", "y"):
+        if getattr(scan, axis).refinement is not None:
+            problems.add(setup.scan_file, f"{axis}.refinement", "was learnt at 0 degrees, and does not serve an angle")
+        if setup.hardware(axis).dac.shaping != "off":
+            problems.entries.append(setup.hardware_problem(axis, "dac.shaping", "is not there for a scan at an angle"))
+    known = {}
+    for axis in ("x", "y"):
+        try:
+            known[axis] = KnownAxis.of(setup.scanner, setup.scanner_file, setup.scanner_folder, axis)
+        except Rejected as rejected:
+            problems.entries.extend(rejected.problems)
+    problems.stop_if_any()
+    progress("planning the scan at 0 degrees")
+    straight = make_plan(_at_0_degrees(setup))
+    schedule = straight.schedule
+    geometry = FrameGeometry.of(setup, straight)
+    if any(geometry.drift_nm_per_s) and schedule.down.count:
+        problems.add(
+            setup.scan_file, "drift_nm_per_s", "is followed in frames that go up alone; take timing.frame = 'flyback'"
+        )
+    shares = geometry.shares
+    axes = {}
+    for line in straight.lines:
+        progress(f"learning a frame of {schedule.lines} lines on the operator of {line.axis}")
+        motion = _motion(setup, straight, line, *shares[line.axis])
+        axes[line.axis] = _axis(setup, straight, line, known[line.axis], motion, problems)
+    problems.stop_if_any()
+    x, y = axes["x"], axes["y"]
+    assert x is not None
+    assert y is not None
+    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight)
+
+
+def _at_0_degrees(setup: Setup) -> Setup:
+    """Return the setup without an angle, coupling and drift."""
+    scan = replace(setup.scan, angle_deg=0.0, drift_nm_per_s=(0.0, 0.0))
+    return replace(setup, scan=scan, scanner=replace(setup.scanner, coupling=Coupling()))
+
+
+def _motion(setup: Setup, plan: Plan, line: LinePlan, fast_nm: float, slow_nm: float) -> FrameMotion:
+    schedule, x, y = plan.schedule, setup.scan.x, setup.scan.y
+    lines = np.arange(schedule.lines)
+    imaged: Bools = np.array([at in schedule.up or at in schedule.down for at in lines.tolist()], dtype=np.bool_)
+    return FrameMotion(
+        fast_nm=fast_nm,
+        slow_nm=slow_nm,
+        fast_turn=x.turn,
+        fast_window=x.band_limit.window,
+        both=x.band_limit.directions == "both",
+        slow_turn=y.turn,
+        imaged=imaged,
+        line_rate_hz=float(schedule.line_rate),
+        harmonics=plan.x.series.harmonics,
+        slow_harmonics=max(1, min(_MOST_SLOW_HARMONICS, schedule.lines // _LINES_PER_HARMONIC)),
+        centre=line.drive.driver.share(line.drive.v_offset),
+    )
+
+
+def _axis(
+    setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, motion: FrameMotion, problems: Problems
+) -> TurnedAxis | None:
+    axis, rate_hz = line.axis, motion.line_rate_hz
+    scanner = setup.scanner.x if axis == "x" else setup.scanner.y
+    operator = known.at_rates(rate_hz, float(plan.schedule.frame_rate))
+    rate = 1.0
+    if scanner.frequency is not None and not operator.knows_rates:  # (23), as for a line
+        law = scanner.frequency
+        rate = frequency_gain(rate_hz, law.alpha, law.reference_hz)
+        rate /= frequency_gain(operator.creep.reference_hz, law.alpha, law.reference_hz)
+    piezo = OperatorInTime(operator, lambda mean: rate * known.factor(mean), known.response)
+    n = np.arange(1.0, motion.harmonics + 1.0)
+    response, boost_db = line.drive.response, line.drive.max_boost_db
+
+    def inverse(series: FourierSeries) -> FourierSeries:
+        if response is None:
+            return series
+        real, imaginary, _ = capped_inverse(response, n * rate_hz, boost_db)
+        return series.times(real, imaginary)
+
+    drive = None
+    with problems.at(setup.scan_file, "angle_deg"):
+        try:
+            drive = learn_frame(piezo, motion, inverse, KNOTS)
+        except BeyondDriver as beyond:
+            centre = motion.centre
+            room = min(centre / max(centre - beyond.least, 1e-9), (1.0 - centre) / max(beyond.most - centre, 1e-9))
+            raise Unphysical(_what_fits(plan, setup.scan.angle_deg, line, _FIRST_GUESS * room)) from None
+        _check_reach(known, drive, plan.schedule.lines)
+    if drive is None:
+        return None
+    with problems.at(setup.scan_file, "angle_deg"):
+        program = _quantised(setup, plan, line, known, drive)
+        program = _within(setup, plan, line, program, problems)
+        return TurnedAxis(axis, line.converter, motion, piezo, known, drive, program)
+    return None
+
+
+def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
+    """Check that the operator was identified for strokes of this length."""
+    u = drive.on_grid(lines, _GRID // 4)
+    stroke, most = float(np.ptp(u)), max(line.stroke for line in known.operator.lines)
+    if stroke > most + STROKE_REACH:
+        span = known.driver.span
+        raise Unphysical(
+            f"the frame takes {stroke * span:.4g} V, and the largest trace of the operator has {most * span:.4g} V; a "
+            "smaller scan or a larger trace would do"
+        )
+
+
+def _quantised(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive) -> FrameProgram:
+    """Return the integers of a drive, without a slew guard."""
+    schedule, converter = plan.schedule, line.converter
+    codes = known.driver.span / converter.v_per_code
+    dac = setup.hardware(line.axis).dac
+    hold = hold_inverse(drive.fast.harmonics, schedule.ticks, steps=False)
+    fast, second = drive.fast.times(*hold), drive.second.times(*hold)
+    length = max(_LEAST_LENGTH, 1 << (4 * fast.harmonics - 1).bit_length())
+    mixed = _peak(_spline(second, length)) * float(np.max(np.abs(drive.ratios)))
+    words, gain_word, scale = _table(fast, mixed, length, codes, dac.bits)
+    slow_length = max(_LEAST_LENGTH, 1 << (4 * drive.slow.harmonics - 1).bit_length())
+    moving = FourierSeries(0.0, drive.slow.a, drive.slow.b)
+    slow_words, slow_gain, _ = _table(moving, 0.0, slow_length, codes, dac.bits)
+    second_words, ratio_scale = _second(second, length, scale, _peak(fast))
+    ratios = np.rint(drive.ratios * ratio_scale).astype(np.int64)
+    park_v = line.drive.v_offset if (its := getattr(setup.scan, line.axis).park_v) is None else its
+    output = make_output(dac, converter, known.driver, park_v)
+    offset = (known.driver.volts(drive.slow.a0) - converter.v_zero) / converter.v_per_code
+    output = scaled_output(output, offset, BITS, gain_word)
+    gains = np.rint(drive.gains * gain_word).astype(np.int64)
+    try:
+        return FrameProgram(
+            fast=Program(RationalPhase(schedule.ticks), 1, "cubic", BITS, words, output),
+            lines=schedule.lines,
+            gains=Knots(gains, drive.spacing),
+            ratios=Knots(ratios, drive.spacing),
+            second=second_words,
+            slow=SlowTable(slow_words, slow_gain, output.offset_word),
+        )
+    except OverflowError as reason:
+        raise Unphysical(f"{reason}; a smaller scan would fit") from None
+
+
+def _spline(series: FourierSeries, length: int) -> FourierSeries:
+    return series.times(*spline_factors(series.harmonics, length))
+
+
+def _peak(series: FourierSeries) -> float:
+    return float(np.max(np.abs(series.on_grid(max(_GRID, 32 * series.harmonics)))))
+
+
+def _table(series: FourierSeries, room: float, length: int, codes: float, dac_bits: int) -> tuple[Ints, int, float]:
+    """Return the words of a spline of a series in shares of v_max, its gain word, and the scale of its words.
+
+    ``room`` is what is mixed into it at most; ``codes`` are those of v_max.
+    """
+    spline = _spline(series, length)
+    peak = _peak(spline)
+    if not peak > 0.0:
+        return np.zeros(length, dtype=np.int64), 0, 1.0
+    # Beside a large second part the words of the fast one are smaller, so that those that are mixed in suffice.
+    share = ceil(max(1.0 + room / peak, room / peak / _MOST_MIXED) * _PEAK_GRID) / _PEAK_GRID
+    if share > max(_MOST_SHARE, _FINEST_CODES / (peak * abs(codes))):
+        raise Unphysical("lines of the frame differ by more than a second table holds; a smaller scan would fit")
+    gain_word, scale = fit_gain(sample_gain("cubic") * peak * codes, share, BITS, dac_bits)
+    fourier = encode(0.5, 0.5 * spline.a / peak, 0.5 * spline.b / peak, scale)
+    return synthesize(fourier, length, BITS), gain_word, scale * peak
+
+
+def _second(series: FourierSeries, length: int, scale: float, fast: float) -> tuple[Ints, float]:
+    """Return the words that are mixed in, and the ratio word of a ratio of 1.
+
+    ``scale`` is the share of v_max of a full word of the fast table.
+    """
+    spline = _spline(series, length)
+    peak = _peak(spline)
+    if not peak > 1e-9 * fast:
+        return np.zeros(length, dtype=np.int64), 0.0
+    top = float((1 << (SECOND_BITS - 1)) - 1)
+    words = np.rint(np.clip(spline.on_grid(length) / peak, -1.0, 1.0) * top).astype(np.int64)
+    in_lsb = peak / scale * float(1 << (BITS - 1))  # of a full word of the second table, in LSB of the fast one
+    return words, in_lsb / top * float(1 << RATIO_FRACTION_BITS)
+
+
+def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
+    """Return the program with its slew guard; what leaves the range or the slew rate goes to ``problems``."""
+    output = program.output
+    least, most, steepest = frame_extremes(program)
+    centre = output.offset_code
+    if least < output.code_min or most > output.code_max:
+        room = min(
+            (centre - output.code_min) / max(centre - least, 1), (output.code_max - centre) / max(most - centre, 1)
+        )
+        problems.add(setup.scan_file, "angle_deg", _what_fits(plan, setup.scan.angle_deg, line, room))
+    slew, last = setup.hardware(line.axis).amplifier.max_slew_v_per_s, (1 << output.dac_bits) - 1
+    if slew is None:
+        return _guarded(program, min(2 * steepest, last))
+    per_tick = slew / setup.hardware(line.axis).dac.update_rate_hz / abs(line.converter.v_per_code)
+    allowed = min(floor(per_tick), last)
+    if steepest > allowed:
+        slower = at_most(float(plan.schedule.line_rate) * max(allowed - 1.0, 0.5) / steepest)  # a code for the rounding
+        problems.add(
+            setup.scan_file,
+            "timing.line_rate_hz",
+            f"at {setup.scan.angle_deg:g} degrees {line.axis} steps by up to {steepest} codes a tick, {slew:.6g} V/s "
+            f"allow {allowed}; about {slower} Hz would fit",
+        )
+    return _guarded(program, max(allowed, 1))
+
+
+def _guarded(program: FrameProgram, max_step: int) -> FrameProgram:
+    fast = program.fast
+    return replace(program, fast=replace(fast, output=replace(fast.output, max_step=max(max_step, 1))))
+
+
+def _what_fits(plan: Plan, angle_deg: float, line: LinePlan, room: float) -> str:
+    """Return what fits the range: the share of the size at this angle, and the nearest angle for the whole size."""
+    sizes = plan.x.drive.size_nm, plan.y.drive.size_nm
+
+    def reach(degrees: float) -> float:
+        sine, cosine = (abs(one) for one in sine_and_cosine_of(degrees / 360.0))
+        shares = (cosine, sine) if line.axis == "x" else (sine, cosine)
+        return shares[0] * sizes[0] + shares[1] * sizes[1]
+
+    most = reach(angle_deg) * room
+    steps = np.arange(0.0, 180.5, 0.5)
+    near = [a for step in steps.tolist() for a in (angle_deg - step, angle_deg + step) if reach(a) <= most]
+    turned = f", or an angle of about {near[0]:.3g} degrees" if near else ""
+    size = at_most(room * max(sizes))
+    return f"{line.axis} leaves the range of the driver or the converter; a scan of about {size} nm would fit{turned}"
