@@ -6,6 +6,7 @@ from tablegen.api.build import (
     certify as certify,
     build as build,
 )
+from tablegen.api.turned import build_turned as build_turned
 from tablegen.api.many import (
     variants as variants,
     build_many as build_many,
@@ -43,6 +44,7 @@ from tablegen.config.load import Setup as Setup
 from tablegen.planning.line_plan import Plan as Plan
 from tablegen.certificate.certificate import Certificate as Certificate
 from tablegen.api.build import Build as Build
+from tablegen.api.turned import TurnedBuild as TurnedBuild
 from tablegen.api.samples import Samples as Samples
 from tablegen.config.variants import Variant as Variant
 from tablegen.api.many import BuildOutcome as BuildOutcome

@@ -94,7 +94,7 @@ def plan(
     >>> round(tablegen.plan("scan.toml").x.drive.v_amplitude, 2)  # V peak to peak at the piezo
     20.37
     """
-    return make_plan(_setup(source, scan, scanner))
+    return make_plan(setup_of(source, scan, scanner))
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:
@@ -165,7 +165,7 @@ def build(
     >>> scan.x.volts.shape  # a value a tick of one line
     (1250,)
     """
-    setup = _setup(source, scan, scanner)
+    setup = setup_of(source, scan, scanner)
     output_formats = _formats(setup, formats)
     certified = certify_scan(setup, progress)
     if certified.broken:
@@ -351,7 +351,14 @@ class Build(Result):
         return build_html(self.plan, self.certificates)
 
 
-def _setup(source: Source | None, scan: Mapping[str, Any] | None, scanner: Mapping[str, Any] | None) -> Setup:
+def setup_of(source: Source | None, scan: Mapping[str, Any] | None, scanner: Mapping[str, Any] | None) -> Setup:
+    """Return the setup of a scan file, of a setup, or of values.
+
+    Raises
+    ------
+    TypeError
+        If it is none of these, or more than one.
+    """
     if source is None and scan is not None and scanner is not None:
         return from_values(scan, scanner)
     if source is None or scan is not None or scanner is not None:

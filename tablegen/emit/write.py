@@ -246,10 +246,11 @@ def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
 
     A manifest of another program, or one that somebody has edited, says nothing of what may be removed.
     """
-    from tablegen.manifest.read import DamagedManifest, ForeignManifest, parse_manifest  # here: seldom needed
+    from tablegen.manifest.read import DamagedManifest, ForeignManifest  # here: seldom needed
+    from tablegen.manifest.turned import parse_any
 
     try:
-        stored = parse_manifest(read_bytes(folder / MANIFEST, MANIFEST_KIND))
+        stored = parse_any(read_bytes(folder / MANIFEST, MANIFEST_KIND))
     except (OSError, DamagedManifest, ForeignManifest):
         return {}
     if stored.own_hash != stored.manifest.hash:

@@ -163,6 +163,25 @@ class ManifestOutput(Struct):
     channel: Literal["", "A", "B"] = ""
     shaping: ManifestShaping | None = None
 
+    @property
+    def output(self) -> Output:
+        """The output stage in a device."""
+        return Output(
+            gain_word=self.gain_word,
+            gain_q=self.gain_q,
+            offset_word=self.offset_word,
+            code_min=self.code_min,
+            code_max=self.code_max,
+            max_step=self.max_step,
+            park_code=self.park_code,
+            dac_bits=self.dac_bits,
+            coding=self.coding,
+            align=self.align,
+            word_bits=self.word_bits,
+            channel=self.channel,
+            shaping=OFF if self.shaping is None else Shaping(self.shaping.order, self.shaping.zero),
+        )
+
 
 class ManifestFigure(Struct):
     """A figure in percent, and its uncertainty."""
@@ -305,28 +324,13 @@ class ManifestAxis(Struct):
     @property
     def program(self) -> Program:
         """The program of the axis in a device."""
-        output = self.output
         return Program(
             RationalPhase(self.line.ticks // self.line.hold_ticks),
             self.line.hold_ticks,
             self.table.mode,
             self.table.bits,
             np.array(self.table.words, dtype=np.int64),
-            Output(
-                gain_word=output.gain_word,
-                gain_q=output.gain_q,
-                offset_word=output.offset_word,
-                code_min=output.code_min,
-                code_max=output.code_max,
-                max_step=output.max_step,
-                park_code=output.park_code,
-                dac_bits=output.dac_bits,
-                coding=output.coding,
-                align=output.align,
-                word_bits=output.word_bits,
-                channel=output.channel,
-                shaping=OFF if output.shaping is None else Shaping(output.shaping.order, output.shaping.zero),
-            ),
+            self.output.output,
         )
 
     def unrounded_codes(self, k: Ints) -> Floats:

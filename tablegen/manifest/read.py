@@ -42,6 +42,10 @@ class ForeignManifest(ValueError):
     """A manifest of another program."""
 
 
+class AngleManifest(ForeignManifest):
+    """A manifest of a scan at an angle, which ``tablegen.manifest.turned`` reads."""
+
+
 class StoredBuild(Struct, frozen=True, eq=False, dict=True):
     """A build as its manifest has it; ``plain`` is the manifest as JSON."""
 
@@ -112,6 +116,10 @@ def read_build(folder: str | Path) -> StoredBuild:
         ) from None
     try:
         stored = parse_manifest(content)
+    except AngleManifest:
+        raise NotABuild(
+            f"{path}: is of a scan at an angle; of the commands that read a build `tablegen verify` alone takes it"
+        ) from None
     except ForeignManifest:
         raise NotABuild(f"{path}: is not a manifest of tablegen") from None
     except DamagedManifest as damage:
@@ -138,6 +146,8 @@ def parse_manifest(content: bytes) -> StoredBuild:
         plain: Any = read_json(content)
     except ValueError as error:
         raise DamagedManifest([str(error)]) from None
+    if isinstance(plain, dict) and "turned" in plain:
+        raise AngleManifest
     if not isinstance(plain, dict) or not {"tablegen", "hash", "axes"} <= plain.keys():
         raise ForeignManifest
     try:

@@ -14,6 +14,8 @@ from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.device.schedule import Schedule, Window
+from tablegen.fixedpoint.converter import Converter
+from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.numerics.arrays import Floats
@@ -26,7 +28,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
     x, y = axes["x"]["output"], axes["y"]["output"]
     if any(x[key] != y[key] for key in CONVERTER_KEYS):
         y["own_hardware"] = True
-    return {"name": plan.name, "scanner": plan.scanner, "sequence": _sequence(plan.schedule), "axes": axes}
+    return {"name": plan.name, "scanner": plan.scanner, "sequence": sequence_record(plan.schedule), "axes": axes}
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
@@ -132,7 +134,8 @@ def _window(window: Window) -> list[int]:
     return [window.first, window.count]
 
 
-def _sequence(schedule: Schedule) -> dict[str, Any]:
+def sequence_record(schedule: Schedule) -> dict[str, Any]:
+    """Return a schedule as JSON-ready data."""
     return {
         "update_rate_hz": [schedule.update_rate_hz.numerator, schedule.update_rate_hz.denominator],
         "line_ticks": schedule.ticks,
@@ -248,22 +251,27 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "words": program.words.tolist(),
             **_asked_table(line),
         },
-        "output": {
-            "gain_word": output.gain_word,
-            "gain_q": output.gain_q,
-            "offset_word": output.offset_word,
-            "offset_code": output.offset_code,
-            "code_min": output.code_min,
-            "code_max": output.code_max,
-            "max_step": output.max_step,
-            "park_code": output.park_code,
-            "v_zero": line.converter.v_zero,
-            "v_per_code": line.converter.v_per_code,
-            "dac_bits": output.dac_bits,
-            "coding": output.coding,
-            "align": output.align,
-            "word_bits": output.word_bits,
-            **({"channel": output.channel} if output.channel else {}),
-            **_shaping(output.shaping),
-        },
+        "output": output_record(output, line.converter),
+    }
+
+
+def output_record(output: Output, converter: Converter) -> dict[str, Any]:
+    """Return an output stage, and the volts of its codes, as JSON-ready data."""
+    return {
+        "gain_word": output.gain_word,
+        "gain_q": output.gain_q,
+        "offset_word": output.offset_word,
+        "offset_code": output.offset_code,
+        "code_min": output.code_min,
+        "code_max": output.code_max,
+        "max_step": output.max_step,
+        "park_code": output.park_code,
+        "v_zero": converter.v_zero,
+        "v_per_code": converter.v_per_code,
+        "dac_bits": output.dac_bits,
+        "coding": output.coding,
+        "align": output.align,
+        "word_bits": output.word_bits,
+        **({"channel": output.channel} if output.channel else {}),
+        **_shaping(output.shaping),
     }

@@ -49,7 +49,7 @@ def manifest_file(
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
         "axes": axes,
     }
-    return (_readable(manifest) + "\n").encode("ascii")
+    return (readable(manifest) + "\n").encode("ascii")
 
 
 def require_readable(content: bytes) -> None:
@@ -70,10 +70,10 @@ def require_readable(content: bytes) -> None:
         raise UnreadableManifest(str(damage)) from None
 
 
-def _readable(value: Any, indent: str = "") -> str:
+def readable(value: Any, indent: str = "") -> str:
     """Format JSON with a key a line, and arrays of numbers on one line."""
     if isinstance(value, dict) and value:
         inner = indent + "  "
-        items = (f"{inner}{_json(key)}: {_readable(item, inner)}" for key, item in value.items())
+        items = (f"{inner}{_json(key)}: {readable(item, inner)}" for key, item in value.items())
         return "{\n" + ",\n".join(items) + f"\n{indent}}}"
     return _json(value)

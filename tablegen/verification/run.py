@@ -8,9 +8,11 @@ from typing import Literal
 
 from tablegen.library.whole import whole_build
 from tablegen.manifest.read import read_build
+from tablegen.manifest.turned import is_turned
 from tablegen.verification.build_report import Report, Target, verify_build
 from tablegen.verification.files_target import FilesTarget
 from tablegen.verification.library_report import is_library, read_index, verify_library
+from tablegen.verification.turned_report import verify_turned
 
 TargetName = Literal["verilog", "c", "cortex-m", "files"]
 DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000, "files": 0}
@@ -87,6 +89,10 @@ def verify(
             )
 
         return verify_library(folder, verify_program)
+    if is_turned(folder):
+        with _work_folder(None if keep is None else Path(keep)) as work:
+            most = DEFAULT_TICKS["c"] if ticks is None else ticks
+            return verify_turned(folder, work, target, most, progress, other_version=other_version)
     player, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
         most = most_ticks if ticks is None else ticks

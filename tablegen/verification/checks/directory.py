@@ -1,6 +1,7 @@
 """The files of a build, compared with its manifest: digests of all, words and copies of those of its sequencer."""
 
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 
 from tablegen.base.reading import BUILD_FILE, file_sha256, read_text
@@ -11,8 +12,13 @@ _MAX_SHOWN = 5
 
 def wrong_files(folder: Path, stored: StoredBuild) -> list[str]:
     """List what is wrong with the files that the manifest names."""
+    return wrong_digests(folder, stored.manifest.files)
+
+
+def wrong_digests(folder: Path, files: Mapping[str, str]) -> list[str]:
+    """List what is wrong with files of a folder whose SHA-256 is known."""
     wrong = []
-    for name, digest in stored.manifest.files.items():
+    for name, digest in files.items():
         try:
             actual = file_sha256(folder / name)
         except OSError as error:

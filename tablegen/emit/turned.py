@@ -1,0 +1,108 @@
+"""The files of a scan at an angle: C99 for the sequencer with a slow part, and the manifest."""
+
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.base.resources import c_link, c_runtime, c_store
+from tablegen.device.dual_program import ScanProgram
+from tablegen.emit.constants import axis_constants, sequence_constants, storage_bits
+from tablegen.emit.formats.c import literal
+from tablegen.emit.templates import comment_safe, rows, template
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.interpolation import index_bits_of
+from tablegen.fixedpoint.spline import WORDS_BEHIND
+from tablegen.numerics.arrays import Ints
+
+
+class TurnedContent(Struct, frozen=True, eq=False):
+    """A scan at an angle as its files have it; words of comments are empty where a manifest is the source."""
+
+    name: str
+    hash: str
+    program: ScanProgram
+    version: str = ""
+    scanner: str = ""
+    summary: tuple[str, ...] = ()
+
+
+def turned_files(content: TurnedContent) -> dict[str, bytes]:
+    """Render the C files that were made for a scan at an angle, by name."""
+    context = _context(content)
+    sources = {
+        f"{content.name}.h": "c/turned.h.j2",
+        f"{content.name}.c": "c/turned.c.j2",
+        f"{content.name}_program.h": "c/program.h.j2",
+        f"{content.name}_program.c": "c/turned_program.c.j2",
+    }
+    return {name: template(source, context, literal) for name, source in sources.items()}
+
+
+def turned_runtime() -> dict[str, bytes]:
+    """Read the files of the C sequencer, by name."""
+    return {path.name: read_bytes(path, BUILD_FILE) for path in (*c_runtime(), *c_link(), *c_store())}
+
+
+def turned_options(program: ScanProgram) -> dict[str, int]:
+    """Return the macros that the runtime and an application are compiled with."""
+    return {f"DAC_{key}": value for key, value in _storage(program).items()} | {"DAC_SLOW_PART": 1}
+
+
+def _storage(program: ScanProgram) -> dict[str, int]:
+    widest = max(program.x.output.word_bits, program.y.output.word_bits)
+    return {"TABLE_STORAGE_BITS": 16, "OUTPUT_STORAGE_BITS": storage_bits(widest), "SPLINE": 1}
+
+
+def _context(content: TurnedContent) -> dict[str, Any]:
+    return {
+        "version": content.version,
+        "name": content.name,
+        "NAME": content.name.upper(),
+        "hash": content.hash,
+        "scanner": comment_safe(content.scanner),
+        "summary": content.summary,
+        "sequence": sequence_constants(content.program.schedule),
+        "storage": _storage(content.program),
+        "axes": [_axis(content, axis) for axis in "xy"],
+    }
+
+
+def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
+    program = content.program.x if axis == "x" else content.program.y
+    assert isinstance(program, FrameProgram)
+    prefix = f"{content.name}_{axis}"
+    constants = {
+        key: value
+        for key, value in axis_constants(program.fast, 0).items()
+        if not key.startswith("FOURIER") and key != "HARMONICS"
+    }
+    arrays = {
+        "table": ("int16_t", _with_first_again(program.fast.words)),
+        "second": ("int8_t", program.second),
+        "gains": ("int32_t", program.gains.words),
+        "ratios": ("int16_t", program.ratios.words),
+        "slow": ("int16_t", _with_first_again(program.slow.words)),
+    }
+    return {
+        "axis": axis,
+        "prefix": prefix,
+        "PREFIX": prefix.upper(),
+        "constants": constants,
+        "arrays": [
+            {"name": f"{prefix}_{key}", "type": kind, "length": len(words), "rows": rows(words)}
+            for key, (kind, words) in arrays.items()
+        ],
+        "gain_spacing": program.gains.spacing,
+        "ratio_spacing": program.ratios.spacing,
+        "gain_knots": len(program.gains.words),
+        "ratio_knots": len(program.ratios.words),
+        "slow_index_bits": index_bits_of(len(program.slow.words)),
+        "slow_gain_word": program.slow.gain_word,
+        "slow_offset_word": program.slow.offset_word,
+    }
+
+
+def _with_first_again(words: Ints) -> Ints:
+    return np.append(words, words[:WORDS_BEHIND])

@@ -1,0 +1,200 @@
+"""A build of a scan at an angle read back from its ``manifest.json``: the program that its integers are."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
+from tablegen.base.reading import read_bytes
+from tablegen.config.names import why_not_a_name
+from tablegen.device.dual_program import ScanProgram
+from tablegen.fixedpoint.frame_program import MOST_KNOTS, FrameProgram, Knots, SlowTable
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.manifest.fields import BuildFileName, Digest, FileName, ManifestOutput, ManifestSequence, Version
+from tablegen.manifest.format import MANIFEST, content_hash, read_json
+from tablegen.manifest.read import AngleManifest, DamagedManifest, NotABuild, StoredBuild, parse_manifest
+
+Words = Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=8, max_length=1 << 14)]
+KnotWords = Annotated[list[Annotated[int, Meta(ge=-(1 << 17), lt=1 << 17)]], Meta(min_length=2, max_length=MOST_KNOTS)]
+
+
+class TurnedKnots(Struct, forbid_unknown_fields=True):
+    """Words at knots, so many lines apart."""
+
+    spacing: Annotated[int, Meta(ge=1, le=1 << 16)]
+    words: KnotWords
+
+
+class TurnedSlow(Struct, forbid_unknown_fields=True):
+    """The cubic table of the slow part over a frame."""
+
+    gain_word: Annotated[int, Meta(ge=-(1 << 17), lt=1 << 17)]
+    offset_word: Annotated[int, Meta(gt=-(1 << 43), lt=1 << 43)]
+    words: Words
+
+
+class TurnedAxisFields(Struct, forbid_unknown_fields=True):
+    """One axis: its shares of both motions in nm, and its integers."""
+
+    fast_nm: float
+    slow_nm: float
+    bits: Annotated[int, Meta(ge=8, le=16)]
+    words: Words
+    second: Words
+    gains: TurnedKnots
+    ratios: TurnedKnots
+    slow: TurnedSlow
+    output: ManifestOutput
+
+    def program(self, sequence: ManifestSequence) -> FrameProgram:
+        """Return the program of the axis in a device.
+
+        Raises
+        ------
+        ValueError, OverflowError
+            If no device plays it.
+        """
+        words, second, gains, ratios, slow = (
+            np.array(each, dtype=np.int64)
+            for each in (self.words, self.second, self.gains.words, self.ratios.words, self.slow.words)
+        )
+        fast = Program(RationalPhase(sequence.line_ticks), 1, "cubic", self.bits, words, self.output.output)
+        return FrameProgram(
+            fast,
+            sequence.frame_lines,
+            Knots(gains, self.gains.spacing),
+            Knots(ratios, self.ratios.spacing),
+            second,
+            SlowTable(slow, self.slow.gain_word, self.slow.offset_word),
+        )
+
+
+class TurnedAxes(Struct, forbid_unknown_fields=True):
+    """Both axes."""
+
+    x: TurnedAxisFields
+    y: TurnedAxisFields
+
+
+class TurnedFields(Struct):
+    """What a scan at an angle is; keys that were added since are ignored."""
+
+    angle_deg: float
+    size_nm: tuple[float, float]
+    coupling: tuple[float, float]
+    drift_nm_per_s: tuple[float, float]
+    axes: TurnedAxes
+
+
+class TurnedCodes(Struct):
+    """The codes of an axis by the certificate: the least, the greatest, and the largest step of a tick."""
+
+    least: int
+    most: int
+    steepest: int
+
+
+class TurnedFigures(Struct):
+    """The part of the certificate that follows from the integers alone."""
+
+    codes: dict[Literal["x", "y"], TurnedCodes]
+
+
+class TurnedManifest(Struct):
+    """The part of a manifest that is read."""
+
+    tablegen: Version
+    hash: Digest
+    name: FileName
+    scanner: str
+    files: dict[BuildFileName, Digest]
+    sequence: ManifestSequence
+    turned: TurnedFields
+    certificate: TurnedFigures
+
+
+class StoredTurned(Struct, frozen=True, eq=False):
+    """A build of a scan at an angle as its manifest has it; ``plain`` is the manifest as JSON."""
+
+    manifest: TurnedManifest
+    program: ScanProgram
+    plain: dict[str, Any]
+
+    @property
+    def own_hash(self) -> str:
+        """The hash of the plan, computed again from the manifest."""
+        keys = "name", "scanner", "sequence", "turned"
+        return content_hash({key: self.plain[key] for key in keys})
+
+    def certified(self, axis: Literal["x", "y"]) -> tuple[int, int, int] | None:
+        """Return the least and the greatest code, and the largest step, by the certificate; None if it has none."""
+        codes = self.manifest.certificate.codes.get(axis)
+        return None if codes is None else (codes.least, codes.most, codes.steepest)
+
+
+def is_turned(folder: Path) -> bool:
+    """Return True if a directory holds a build of a scan at an angle."""
+    try:
+        plain = read_json(read_bytes(folder / MANIFEST, MANIFEST_KIND))
+    except (OSError, ValueError):
+        return False
+    return isinstance(plain, dict) and "turned" in plain
+
+
+def read_turned(folder: Path) -> StoredTurned:
+    """Read a build of a scan at an angle back from the manifest in its directory.
+
+    Raises
+    ------
+    NotABuild
+        The manifest is missing, damaged, or cannot be played.
+    """
+    path = folder / MANIFEST
+    try:
+        return parse_turned(read_bytes(path, MANIFEST_KIND))
+    except OSError as error:
+        raise NotABuild(f"{path}: cannot be read: {error.strerror or error}") from None
+    except DamagedManifest as damage:
+        raise NotABuild("\n".join(f"{path}: is damaged: {why}; build it again" for why in damage.reasons)) from None
+
+
+def parse_any(content: bytes) -> StoredBuild | StoredTurned:
+    """Read a build, at an angle or not, from the content of its manifest.
+
+    Raises
+    ------
+    ForeignManifest
+        The content is JSON, and no manifest of tablegen.
+    DamagedManifest
+        The content is no JSON, or no device can play it.
+    """
+    try:
+        return parse_manifest(content)
+    except AngleManifest:
+        return parse_turned(content)
+
+
+def parse_turned(content: bytes) -> StoredTurned:
+    """Read a build of a scan at an angle from the content of its manifest.
+
+    Raises
+    ------
+    DamagedManifest
+        The content is no JSON, or no device can play it.
+    """
+    try:
+        plain = read_json(content)
+        manifest = msgspec.convert(plain, TurnedManifest)
+        fields = manifest.turned.axes
+        program = ScanProgram(
+            fields.x.program(manifest.sequence), fields.y.program(manifest.sequence), manifest.sequence.schedule
+        )
+    except (msgspec.ValidationError, ValueError, OverflowError, RecursionError) as error:
+        raise DamagedManifest([str(error)]) from None
+    if (why := why_not_a_name(manifest.name)) is not None:
+        raise DamagedManifest([f"name: {why}"])
+    return StoredTurned(manifest, program, plain)

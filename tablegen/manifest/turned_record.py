@@ -1,0 +1,76 @@
+"""The plan of a scan at an angle and its certificate as plain data: the content of its manifest."""
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+from msgspec import structs
+
+from tablegen.certificate.turned_errors import TurnedCertificate
+from tablegen.manifest.record import output_record, sequence_record
+from tablegen.manifest.write import readable
+from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan
+from tablegen.version import __version__
+
+
+def turned_record(plan: TurnedPlan) -> dict[str, Any]:
+    """Return everything that decides what a device plays, as JSON-ready data."""
+    geometry = plan.geometry
+    return {
+        "name": plan.name,
+        "scanner": plan.scanner,
+        "sequence": sequence_record(plan.schedule),
+        "turned": {
+            "angle_deg": geometry.angle_deg,
+            "size_nm": list(geometry.size_nm),
+            "coupling": [geometry.x_per_y, geometry.y_per_x],
+            "drift_nm_per_s": list(geometry.drift_nm_per_s),
+            "axes": {axis.axis: _axis(axis) for axis in plan.axes},
+        },
+    }
+
+
+def turned_manifest(
+    record: dict[str, Any], digest: str, certificate: TurnedCertificate, files: Mapping[str, bytes]
+) -> bytes:
+    """Write the plan's record with its hash, the certificate, and the SHA-256 of every other file of the build."""
+    manifest = {
+        "tablegen": __version__,
+        "hash": digest,
+        **record,
+        "certificate": certificate_record(certificate),
+        "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
+    }
+    return (readable(manifest) + "\n").encode("ascii")
+
+
+def certificate_record(certificate: TurnedCertificate) -> dict[str, Any]:
+    """Return a certificate as JSON-ready data, its figures to six significant digits."""
+
+    def figure(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [figure(each) for each in value]
+        return float(f"{value:.6g}")
+
+    errors = {key: figure(value) for key, value in structs.asdict(certificate.errors).items()}
+    codes = {axis: structs.asdict(one) for axis, one in zip("xy", certificate.codes, strict=True)}
+    return {"errors": errors, "codes": codes}
+
+
+def _axis(axis: TurnedAxis) -> dict[str, Any]:
+    program = axis.program
+    return {
+        "fast_nm": axis.motion.fast_nm,
+        "slow_nm": axis.motion.slow_nm,
+        "bits": program.fast.bits,
+        "words": program.fast.words.tolist(),
+        "second": program.second.tolist(),
+        "gains": {"spacing": program.gains.spacing, "words": program.gains.words.tolist()},
+        "ratios": {"spacing": program.ratios.spacing, "words": program.ratios.words.tolist()},
+        "slow": {
+            "gain_word": program.slow.gain_word,
+            "offset_word": program.slow.offset_word,
+            "words": program.slow.words.tolist(),
+        },
+        "output": output_record(program.output, axis.converter),
+    }

@@ -1,0 +1,252 @@
+"""Verify a build of a scan at an angle: its files, its certificate, and what its C plays on this machine."""
+
+from collections.abc import Callable
+from itertools import zip_longest
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from tablegen.base.input_errors import shortened
+from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.device.dual_program import AxisProgram
+from tablegen.device.sequencer import Sequencer, Tick
+from tablegen.emit.turned import TurnedContent, turned_files, turned_options, turned_runtime
+from tablegen.fixedpoint.frame_program import FrameProgram, frame_extremes
+from tablegen.manifest.read import NotABuild
+from tablegen.manifest.turned import StoredTurned, read_turned
+from tablegen.numerics.arrays import Ints
+from tablegen.verification.build_report import Report, Stopwatch, differing_check
+from tablegen.verification.c.bench import require_compiler
+from tablegen.verification.c.host import host_compiler
+from tablegen.verification.c.play import compile_line, record, require_headers
+from tablegen.verification.c.program import OPTIONS
+from tablegen.verification.checks.directory import copies, wrong_digests
+from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.failures import SimulationFailed
+from tablegen.verification.play.stream import FLAGS
+from tablegen.version import __version__
+
+_BENCH = Path(__file__).parent / "c" / "frame_bench.c"
+_REST = 5  # ticks before the scan
+_FRAMES = 2
+_TICK = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1"), ("faults", "u1")])
+_LEAST_TICKS_A_SECOND = 5000  # a slower program counts as hanging
+
+
+def verify_turned(
+    folder: Path,
+    work: Path,
+    target: Literal["verilog", "c", "cortex-m", "files"] | None,
+    most_ticks: int,
+    progress: Callable[[str | Callable[[], str]], None],
+    *,
+    other_version: bool = False,
+) -> Report:
+    """Verify the build of a scan at an angle in ``folder``.
+
+    Parameters
+    ----------
+    work
+        Empty directory in which the build is played.
+    target
+        "c", which is the default, or "files", which plays nothing.
+    most_ticks
+        Bound of the ticks that are played.
+    other_version
+        True to accept a build of another version, whose runtime cannot be compared with the installed one.
+
+    Raises
+    ------
+    NotABuild
+        If the folder holds no such build, or the target cannot play one.
+    ToolMissing
+        If a compiler is not installed.
+    """
+    stored = read_turned(folder)
+    if target not in (None, "c", "files"):
+        raise NotABuild(f"{folder}: is a scan at an angle, which plays in C alone; verify it with --target c or files")
+    if target != "files":
+        require_compiler(host_compiler())
+    watch, manifest = Stopwatch(), stored.manifest
+    progress("hashing the files")
+    checks = watch.timed(_file_checks(folder, stored, other_version))
+    progress("measuring the codes of a frame")
+    checks += watch.timed([_code_check(stored)])
+    notes: list[str] = []
+    difference = None
+    if target != "files":
+        progress("compiling the C, and playing it")
+        ticks = min(_FRAMES * manifest.sequence.schedule.frame_ticks, most_ticks)
+        if ticks < manifest.sequence.schedule.frame_ticks:
+            whole = manifest.sequence.schedule.frame_ticks
+            notes.append(f"{ticks} of the {whole} ticks of a frame were played; --ticks {whole} plays them all")
+        played, difference = _played_checks(folder, work, stored, ticks)
+        checks += watch.timed(played)
+    return Report(manifest.name, checks, difference, notes, watch.seconds)
+
+
+def _file_checks(folder: Path, stored: StoredTurned, other_version: bool) -> list[Check]:
+    manifest = stored.manifest
+    edited = None
+    if stored.own_hash != manifest.hash:
+        edited = "manifest: edited: its plan does not match its hash; build it again"
+    checks = [Check("manifest", "its own hash", "1 plan", failure=edited)]
+    wrong = wrong_digests(folder, manifest.files)
+    checks.append(differing_check("files", "SHA-256 in the manifest", f"{len(manifest.files)} files", wrong))
+    own = turned_files(TurnedContent(manifest.name, manifest.hash, stored.program))
+    different = [why for name, right in own.items() if (why := _difference(folder / name, right))]
+    checks.append(differing_check("c files", "manifest", f"{len(own)} files", different))
+    if manifest.tablegen == __version__:
+        runtime = turned_runtime()
+        unlike = [f"{name}: is not that of tablegen" for name in runtime if _content(folder / name) != runtime[name]]
+        unlike += [f"{name}: is not listed" for name in (*own, *runtime) if name not in manifest.files]
+        checks.append(differing_check("files", f"tablegen {__version__}", f"{len(runtime)} files", unlike))
+    elif not other_version:
+        why = (
+            f"files: built by tablegen {shortened(manifest.tablegen)}, and this is {__version__}: its runtime cannot "
+            "be compared with the installed one; build it again, or use --other-version"
+        )
+        checks.append(Check("files", f"tablegen {__version__}", "0 files", failure=why))
+    return checks
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        return read_bytes(path, BUILD_FILE)
+    except OSError:
+        return None
+
+
+def _difference(path: Path, right: bytes) -> str | None:
+    """Return the first line of a C file that is not as the manifest has it, behind the banner."""
+    content = _content(path)
+    if content is None:
+        return f"{path.name}: cannot be read"
+    ours = content.decode("utf-8", "replace").partition("*/")[2].splitlines()
+    expected = right.decode("ascii").partition("*/")[2].splitlines()
+    if ours == expected:
+        return None
+    line, other = next(pair for pair in zip_longest(ours, expected, fillvalue="") if pair[0] != pair[1])
+    return f"{path.name}: a line is {line.strip()[:60]!r}, it is {other.strip()[:60]!r} by the manifest"
+
+
+def _code_check(stored: StoredTurned) -> Check:
+    """Check that no code of a frame is clamped, and no step held back."""
+    wrong = []
+    axes: tuple[tuple[Literal["x", "y"], AxisProgram], ...] = ("x", stored.program.x), ("y", stored.program.y)
+    for name, axis in axes:
+        assert isinstance(axis, FrameProgram)
+        least, most, steepest = frame_extremes(axis)
+        output = axis.output
+        if least < output.code_min or most > output.code_max:
+            wrong.append(f"{name}: codes {least}..{most} leave {output.code_min}..{output.code_max}")
+        if steepest > output.max_step:
+            wrong.append(f"{name}: a step of {steepest} codes is above the limit of {output.max_step}")
+        certified = stored.certified(name)
+        if certified is not None and certified != (least, most, steepest):
+            wrong.append(f"{name}: codes {least}..{most}, steps of {steepest}; the certificate has {certified}")
+    return differing_check("codes", "limits, certificate", f"{2 * stored.program.schedule.frame_ticks} codes", wrong)
+
+
+def _played_checks(folder: Path, work: Path, stored: StoredTurned, ticks: int) -> tuple[list[Check], str | None]:
+    """Play some frames and a park, a tick a call and many ticks a call, and compare every tick with the model."""
+    name = stored.manifest.name
+    names = [each for each in stored.manifest.files if each.endswith((".c", ".h")) and not each.startswith("dac_link")]
+    names = [each for each in names if not each.startswith("dac_store")]
+    files, missing = copies(folder, sorted({*names, f"{name}.h", f"{name}.c", f"{name}_program.c"}), work / "c")
+    if missing:
+        return [Check("c", "the model", "0 ticks", failure=f"c: {'; '.join(missing)}")], None
+    parked = (
+        2
+        * (1 << stored.program.x.output.dac_bits)
+        // min(stored.program.x.output.max_step, stored.program.y.output.max_step)
+    )
+    parked = min(parked + 10, ticks)
+    expected = _model(stored, ticks, parked)
+    checks, difference = [], None
+    try:
+        program = _compiled(files, work, stored)
+        for way in ("steps", "fills"):
+            capture = work / f"{way}.bin"
+            timeout = 60.0 + (ticks + parked) / _LEAST_TICKS_A_SECOND
+            most = 2 * _TICK.itemsize * len(expected) + 1000
+            record([str(program), way, str(ticks), str(parked)], b"", capture, most, timeout)
+            played = np.frombuffer(read_bytes(capture, BUILD_FILE), dtype=_TICK)
+            differs = _first_difference(played, expected, way)
+            difference = difference or differs
+            checks.append(
+                Check(f"c, {way}", "the model", f"{len(expected)} ticks", failure=differs and f"c, {way}: {differs}")
+            )
+    except SimulationFailed as error:
+        checks.append(Check("c", "the model", f"{len(expected)} ticks", failure=f"c: {error}"))
+    return checks, difference
+
+
+def _compiled(files: list[Path], work: Path, stored: StoredTurned) -> Path:
+    compiler = require_compiler(host_compiler())
+    name = stored.manifest.name
+    macros = {
+        **turned_options(stored.program),
+        "BENCH_PROGRAM_HEADER": f'"{name}_program.h"',
+        "BENCH_PROGRAM": f"{name}_program",
+        "BENCH_X_CONVERTER": f"{name}_x_converter",
+        "BENCH_Y_CONVERTER": f"{name}_y_converter",
+    }
+    program = work / "frame_bench"
+    sources = [str(path) for path in files if path.suffix == ".c"]
+    line = [*compiler, *OPTIONS, "-w", *(f"-D{key}={value}" for key, value in macros.items()), f"-I{files[0].parent}"]
+    try:
+        compile_line([*line, *sources, str(_BENCH), "-o", str(program)])
+    except SimulationFailed:
+        require_headers(compiler)
+        raise
+    return program
+
+
+def _model(stored: StoredTurned, ticks: int, parked: int) -> Ints:
+    """Return what the integer model plays: rows of converter words of x and y, markers, and faults."""
+    model = Sequencer(None)
+    outputs = stored.program.x.output, stored.program.y.output
+    parts: list[Ints] = []
+
+    def put(tick: Tick) -> None:
+        markers = sum(1 << bit for bit, flag in enumerate(FLAGS) if getattr(tick, flag))
+        words = outputs[0].word(tick.x), outputs[1].word(tick.y)
+        parts.append(np.array([[*words, markers, tick.faults.value]], dtype=np.int64))
+
+    for _ in range(_REST):
+        put(model.step())
+    model.commit(stored.program)
+    model.arm()
+    model.trigger()
+    left = ticks
+    while left:
+        ahead = model.ahead(left)
+        if ahead is None:
+            put(model.step())
+            left -= 1
+            continue
+        line, faults = ahead
+        markers = np.full(len(faults), 1 << FLAGS.index("playing"), dtype=np.int64)
+        for flag in ("line", "frame", "pixel", "backward", "valid"):
+            markers += getattr(line, flag) * (1 << FLAGS.index(flag))
+        parts.append(np.stack([outputs[0].word(line.x), outputs[1].word(line.y), markers, faults], axis=1))
+        left -= len(faults)
+    model.park()
+    for _ in range(parked):
+        put(model.step())
+    return np.concatenate(parts)
+
+
+def _first_difference(played: np.ndarray, expected: Ints, way: str) -> str | None:
+    if len(played) != len(expected):
+        return f"{len(played)} ticks were played, not {len(expected)}"
+    for at, key in enumerate(("x", "y", "markers", "faults")):
+        if key == "faults" and way == "fills":  # those of the status, after as many ticks as a fill has
+            continue
+        different = np.flatnonzero(played[key].astype(np.int64) != expected[:, at])
+        if len(different):
+            tick = int(different[0])
+            return f"{key} of tick {tick} is {played[key][tick]}, {expected[tick, at]} by the model"
+    return None
