@@ -13,7 +13,7 @@ from tablegen.cli.shared.common import (
     check_place,
     fail,
     format_option,
-    planned,
+    planned_at_any_angle,
     rendered,
     scan_argument,
     strict_option,
@@ -24,6 +24,8 @@ from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, p
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
+    from tablegen.api.turned import TurnedBuild
+    from tablegen.charts.picture_file import PlottedCharts
 
 _NAMES_SHOWN = 8
 
@@ -99,7 +101,7 @@ def build(
         check_place(output)
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     try:
-        built = planned(scan, list(formats) or None, strict)
+        built = planned_at_any_angle(scan, list(formats) or None, strict)
         files = rendered(built)
     except KeyboardInterrupt as interruption:
         where = f" {interruption}".rstrip()  # that of a plug-in names it
@@ -131,10 +133,7 @@ def build(
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
     if plot is not None:
-        from tablegen.html_report.scan_charts import scan_charts
-
-        brief = in_terminal(plot)
-        show_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
+        show_plot(plot, lambda: _charts(built, in_terminal(plot)))
     return ExitStatus.OK
 
 
@@ -148,7 +147,7 @@ def _check_usage(only_check: bool, depfile: Path | None, depfile_target: str | N
         raise click.UsageError("--check cannot be used with --plot")
 
 
-def _stale(built: "Build", files: dict[str, bytes], output: Path) -> list[str]:
+def _stale(built: "Build | TurnedBuild", files: dict[str, bytes], output: Path) -> list[str]:
     """Return the differences of the directory from the files of this build, a line each."""
     from tablegen.cli.shared.directory_difference import differences
 
@@ -157,19 +156,33 @@ def _stale(built: "Build", files: dict[str, bytes], output: Path) -> list[str]:
     return lines + [_leftover(output / name) for name in built.leftovers(output)]
 
 
-def _print_certificate(built: "Build") -> None:
+def _print_certificate(built: "Build | TurnedBuild") -> None:
     """Print the certificate, the findings that impair the image, and the choices of the build."""
+    from tablegen.api.build import Build
     from tablegen.cli.certificate_text import certificate_table
 
     click.echo("\n".join([*built.brief(), ""]))
-    click.echo("\n".join(certificate_table(built.plan, built.certificates)))
-    for finding in built.findings:
-        if finding.weight == "spoils":  # `show` prints the small print too
-            click.echo(finding.line)
+    if isinstance(built, Build):
+        click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        for finding in built.findings:
+            if finding.weight == "spoils":  # `show` prints the small print too
+                click.echo(finding.line)
+    else:
+        click.echo(built.summary())
     if built.choices:
         click.echo()
     for choice in built.choices:
         click.echo(f"chosen: {choice}")
+
+
+def _charts(built: "Build | TurnedBuild", brief: bool) -> "PlottedCharts":
+    from tablegen.api.build import Build
+
+    if not isinstance(built, Build):
+        return built.charts()
+    from tablegen.html_report.scan_charts import scan_charts
+
+    return scan_charts(built.setup, built.plan, built.certificates, brief)
 
 
 def _few(names: list[str]) -> str:
@@ -184,7 +197,7 @@ def _leftover(path: Path) -> str:
     return f"{path}: left over from an earlier build, and edited since; remove it"
 
 
-def _state(built: "Build", changed: list[str]) -> str:
+def _state(built: "Build | TurnedBuild", changed: list[str]) -> str:
     """Describe what was written; the runtime, which changes with tablegen only, is many files and one thing."""
     runtime = built.runtime
     own, count = sum(name not in runtime for name in changed), len(built.files) - len(runtime)

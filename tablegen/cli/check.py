@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.shared.common import planned, scan_argument, strict_option
+from tablegen.cli.shared.common import planned_at_any_angle, scan_argument, strict_option
 
 
 @click.command(short_help="Check a scan file and its scanner file.")
@@ -25,7 +25,7 @@ def check(scan: Path, strict: bool) -> None:
     Exit status: 0 correct, 2 wrong input, 3 a limit of the certificate is exceeded, or, with
     --strict, there is a warning.
     """
-    built = planned(scan, strict=strict)
+    built = planned_at_any_angle(scan, strict=strict)
     count = len(built.warnings)
     result = f"{scan}: correct" + (f", with {count} warning{'s' if count > 1 else ''}" if count else "")
     click.echo("\n".join([*built.brief(), result]))

@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.shared.common import format_option, planned, rendered, require, scan_argument
+from tablegen.cli.shared.common import format_option, planned_at_any_angle, rendered, require, scan_argument
 from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, show_plot
 from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
+    from tablegen.api.turned import TurnedBuild
     from tablegen.charts.picture_file import PlottedCharts
 
 
@@ -55,10 +56,22 @@ def show(
         if as_json:
             raise click.UsageError("The manifest has no optimum: leave out --json or --optimum.")
         require("scipy", extra="calibrate")
-    built = planned(scan, list(formats) or None)
+    from tablegen.api.build import Build
+
+    built = planned_at_any_angle(scan, list(formats) or None)
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
         show_plot(plot, lambda: _charts(built, plot))
+        return
+    if not isinstance(built, Build):
+        if optimum:
+            raise click.UsageError("A scan at an angle has no optimum: leave out --optimum.")
+        for text in built.summary().splitlines():
+            tell(text)
+        click.echo()
+        show_plot(plot, built.charts, by_default=not no_plot)
+        for choice in built.choices:
+            click.echo(f"chosen: {choice}")
         return
     plan = built.plan
     lines = (built.summary() if complete else built.overview()).splitlines()
@@ -82,7 +95,11 @@ def show(
         click.echo(finding.line)
 
 
-def _charts(built: "Build", plot: Path | None) -> "PlottedCharts":
+def _charts(built: "Build | TurnedBuild", plot: Path | None) -> "PlottedCharts":
+    from tablegen.api.build import Build
+
+    if not isinstance(built, Build):
+        return built.charts()
     from tablegen.html_report.scan_charts import scan_charts
 
     return scan_charts(built.setup, built.plan, built.certificates, in_terminal(plot))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from tablegen.api.build import Build
+    from tablegen.api.turned import TurnedBuild
 
 scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
 
@@ -164,15 +165,46 @@ def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = F
         fail(broken.problems, ExitStatus.BROKEN_LIMIT)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    _warn(warnings, strict)
+    return built
+
+
+def _warn(warnings: "Sequence[str]", strict: bool) -> None:
+    """Print warnings; with ``strict`` they end the command."""
     lines = [f"warning: {warning}" for warning in warnings]
     if lines and strict:
         fail(lines, ExitStatus.BROKEN_LIMIT)
     for line in lines:
         click.echo(line, err=True)
+
+
+def planned_at_any_angle(
+    scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False
+) -> "Build | TurnedBuild":
+    """Load, plan and certify a scan as ``planned`` does, or a scan with ``angle_deg``."""
+    quiet_blas()
+    from tablegen.api.build import BrokenLimit
+    from tablegen.api.turned import build_turned
+    from tablegen.base.input_errors import Rejected
+    from tablegen.config.load import load
+
+    try:
+        setup = load(scan)
+        if not setup.mixes_motions:
+            return planned(scan, formats, strict)
+        if formats is not None and list(formats) != ["c"]:
+            fail(["formats: a scan at an angle, on coupled axes or with drift has c alone"], ExitStatus.WRONG_INPUT)
+        with Progress() as progress:
+            built = build_turned(setup, progress=progress.now)
+    except BrokenLimit as broken:
+        fail(broken.problems, ExitStatus.BROKEN_LIMIT)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    _warn(built.warnings, strict)
     return built
 
 
-def rendered(built: "Build") -> "dict[str, bytes]":
+def rendered(built: "Build | TurnedBuild") -> "dict[str, bytes]":
     """Return the files of a build; a scan that one of its formats cannot hold ends the command."""
     from tablegen.base.input_errors import Rejected
 
