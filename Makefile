@@ -151,6 +151,7 @@ figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_virtual.py
 	$(BIN)/python docs/figures/make_operator.py
 	$(BIN)/python docs/figures/make_correct.py
+	$(BIN)/python docs/figures/make_angle.py
 	$(BIN)/python docs/figures/make_gallery.py
 	$(BIN)/python docs/figures/make_evidence.py $(STAGE)
 	@.ci/system-packages chromium

@@ -45,12 +45,12 @@ def turned_manifest(
 
 
 def certificate_record(certificate: TurnedCertificate) -> dict[str, Any]:
-    """Return a certificate as JSON-ready data, its figures to six significant digits."""
+    """Return a certificate as JSON-ready data; figures have 5 decimals, since their last bits differ by machine."""
 
     def figure(value: Any) -> Any:
         if isinstance(value, tuple):
             return [figure(each) for each in value]
-        return float(f"{value:.6g}")
+        return round(value, 5)
 
     errors = {key: figure(value) for key, value in structs.asdict(certificate.errors).items()}
     codes = {axis: structs.asdict(one) for axis, one in zip("xy", certificate.codes, strict=True)}

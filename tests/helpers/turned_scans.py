@@ -85,13 +85,13 @@ def on_the_piezo(plan: TurnedPlan, piezo: str) -> dict[str, float]:
     stride = max(plan.schedule.ticks // SAMPLES, 1)
     ticks = np.arange(0, plan.schedule.ticks, stride)
     positions = [
-        _moved(core, axis.share(frame_codes(axis, ticks)), plan.x.motion.line_rate_hz)
+        moved_by(core, axis.share(frame_codes(axis, ticks)), plan.x.motion.line_rate_hz)
         for core, axis in zip(PIEZOS[piezo], plan.axes, strict=True)
     ]
     return frame_errors(plan, *positions, (ticks + 0.5) / plan.schedule.ticks)
 
 
-def _moved(core: Core, u: Floats, line_rate_hz: float) -> Floats:
+def moved_by(core: Core, u: Floats, line_rate_hz: float) -> Floats:
     """Position in nm of a frame of normalised drives that has been repeated, shape of ``u``."""
     frame = u.ravel()
     parts = [np.linspace(0.0, frame[0], 200), frame, frame]
