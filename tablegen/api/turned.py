@@ -61,10 +61,19 @@ def build_turned(
         The certificate exceeds a limit of the scan.
     CannotWrite
         The directory cannot be written.
+
+    Examples
+    --------
+    >>> try:
+    ...     built = tablegen.build_turned("scan.toml", "turned")
+    ... except tablegen.Rejected as rejected:  # a scan that `build` builds
+    ...     print(rejected.problems[0].why)
+    this scan has no angle, coupling or drift; `build` builds it
     """
     setup = setup_of(source, scan, scanner)
     if not setup.mixes_motions:
-        raise Rejected([setup.scan_file.problem("", "has no angle, coupling or drift; `build` builds such a scan")])
+        why = "this scan has no angle, coupling or drift; `build` builds it"
+        raise Rejected([setup.scan_file.problem("name", why)])
     formats = setup.scan.emit.formats
     if formats is not None and formats != ["c"]:
         raise Rejected([setup.scan_file.problem("emit.formats", "a scan at an angle has the format c alone")])

@@ -143,5 +143,5 @@ def test_python_has_the_same(scan: Path, tmp_path: Path) -> None:
     assert built.write(tmp_path / "out") == []
     assert built.record["turned"]["angle_deg"] == 30.0
     assert len(built.charts().charts) == 4
-    with pytest.raises(tablegen.Rejected, match="has no angle, coupling or drift"):
+    with pytest.raises(tablegen.Rejected, match="this scan has no angle, coupling or drift"):
         tablegen.build_turned(turned_setup(tmp_path, 360.0, *SHORT))
