@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from tablegen.api.build import Build
     from tablegen.api.turned import TurnedBuild
+    from tablegen.config.load import Setup
 
 scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
 
@@ -147,7 +148,7 @@ def quiet_blas() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False) -> "Build":
+def planned(scan: "Path | Setup", formats: "Sequence[str] | None" = None, strict: bool = False) -> "Build":
     """Load, plan and certify a scan; every failure ends the command with its status.
 
     Warnings go to stderr; with ``strict`` they end the command too.
@@ -181,19 +182,26 @@ def _warn(warnings: "Sequence[str]", strict: bool) -> None:
 def planned_at_any_angle(
     scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False
 ) -> "Build | TurnedBuild":
-    """Load, plan and certify a scan as ``planned`` does, or a scan with ``angle_deg``."""
+    """Load, plan and certify a scan as ``planned`` does, also one at an angle, on coupled axes or with drift."""
     quiet_blas()
-    from tablegen.api.build import BrokenLimit
-    from tablegen.api.turned import build_turned
     from tablegen.base.input_errors import Rejected
     from tablegen.config.load import load
 
     try:
         setup = load(scan)
-        if not setup.mixes_motions:
-            return planned(scan, formats, strict)
-        if formats is not None and list(formats) != ["c"]:
-            fail(["formats: a scan at an angle, on coupled axes or with drift has c alone"], ExitStatus.WRONG_INPUT)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    return _turned(setup, formats, strict) if setup.mixes_motions else planned(setup, formats, strict)
+
+
+def _turned(setup: "Setup", formats: "Sequence[str] | None", strict: bool) -> "TurnedBuild":
+    from tablegen.api.build import BrokenLimit
+    from tablegen.api.turned import build_turned
+    from tablegen.base.input_errors import Rejected
+
+    if formats is not None and list(formats) != ["c"]:
+        fail(["formats: a scan at an angle, on coupled axes or with drift has c alone"], ExitStatus.WRONG_INPUT)
+    try:
         with Progress() as progress:
             built = build_turned(setup, progress=progress.now)
     except BrokenLimit as broken:
