@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from operator_files import operator_file
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.file import operator_text, read_operator
 from tablegen.compensation.operator.in_time import OperatorInTime
 from tablegen.compensation.operator.operator import Operator
@@ -152,3 +153,39 @@ def test_knots_are_periodic() -> None:
 def test_a_frame_beyond_the_driver_is_refused() -> None:
     with pytest.raises(Unphysical, match=r"the frame takes -?\d+\.?\d* to \d+\.?\d* % of the driver's range"):
         learn_frame(OperatorInTime(operator()), motion(900.0, 600.0), unchanged, KNOTS)
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "quality", "says"),
+    [
+        (900.0, 8.0, "grows from round to round on the operator; a lower line rate may help"),
+        (2500.0, 2.0, r"did not settle on the operator: .* % are left after \d+ rounds"),
+    ],
+)
+def test_a_drive_that_does_not_settle_is_refused(frequency_hz: float, quality: float, says: str) -> None:
+    """Beside a resonance that nobody undoes the position lags."""
+    axis, of = OperatorInTime(operator(), response=SecondOrder(frequency_hz, quality)), motion()
+    with pytest.raises(Unphysical, match=says):
+        learn_frame(axis, of, unchanged, KNOTS)
+
+
+def test_a_resonance_is_undone_by_its_inverse() -> None:
+    response, of = SecondOrder(40e3, 20.0, 2e-6), motion()
+
+    def inverse(series: FourierSeries) -> FourierSeries:
+        real, imaginary = response.inverse(np.arange(1.0, series.harmonics + 1.0) * of.line_rate_hz)
+        return series.times(real, imaginary)
+
+    axis = OperatorInTime(operator(), response=response)
+    drive = learn_frame(axis, of, inverse, KNOTS)
+    along, across, rms = affine(of, position(axis, of, drive))
+    assert abs(along - 200.0) < 0.1
+    assert abs(across + 120.0) < 0.1
+    assert rms < 0.05
+
+
+def test_a_frame_of_two_lines_is_learnt() -> None:
+    of = replace(motion(lines=2), imaged=np.array([True, False]), slow_harmonics=1)
+    drive = learn_frame(OperatorInTime(operator()), of, unchanged, KNOTS)
+    assert drive.distance_percent < 1.0
+    assert len(drive.gains) == 3

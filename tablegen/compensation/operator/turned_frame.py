@@ -28,11 +28,13 @@ _SAMPLES_PER_HARMONIC = 8
 _LEAST_SAMPLES = 256  # of a line
 _ROUNDS = 24
 _CONVERGED = 1e-4  # rms distance inside the windows, of the longer of both motions
+_SETTLED = 1e-2  # of the longer motion: a drive that leaves more is refused
 _STUCK = 0.97  # of the distance of the round before: what goes on so slowly has converged
 _LEAST_ROUNDS = 8
 _SMOOTHNESS = 1e-8  # of the penalty on n^4, against the mean square of the error
 _SLOW_RELAXATION = 0.7  # of the slow correction: the sensitivity to a slow drive is the larger one
 _FIRST_ROUNDS = 3
+_NEAR = 0.1  # of v_max, from an end of the driver's range: a first guess further inside does not leave it by its size
 _BEYOND = 0.01  # of v_max: what a round may leave the driver's range by
 _AT_REST = 1e-9  # of the longer motion: a fast motion that is none, as at 90 degrees
 _POWERS = 60  # rounds of the power iteration, whose ratio of lines is 0.1 or less
@@ -153,16 +155,16 @@ def learn_frame(axis: OperatorInTime, motion: FrameMotion, inverse: Inverse, kno
     for turn in range(1, _ROUNDS + 1):
         left = learner.missing(learner.drive(slow, lines))
         distance = learner.rms(left)
-        if distance < _CONVERGED or (turn > least_rounds and distance > _STUCK * before):
-            return learner.separated(slow, lines, knots, turn)
+        if distance < _CONVERGED or turn == _ROUNDS or (turn > least_rounds and distance > _STUCK * before):
+            break
         before = distance
         slow, lines = learner.corrected(slow, lines, left)
-    if before > 0.01:
+    if distance > _SETTLED:
         raise Unphysical(
-            f"the drive of the frame did not settle within {_ROUNDS} rounds on the operator: {100.0 * before:.2g} % "
-            "are left; a smaller scan or a lower line rate may help"
+            f"the drive of the frame did not settle on the operator: {100.0 * distance:.2g} % are left after {turn} "
+            "rounds; a smaller scan or a lower line rate may help"
         )
-    return learner.separated(slow, lines, knots, _ROUNDS)
+    return learner.separated(slow, lines, knots, turn)
 
 
 def _coarse(axis: OperatorInTime, motion: FrameMotion, inverse: Inverse) -> tuple[FourierSeries, Floats]:
@@ -238,7 +240,12 @@ class _FrameLearner:
         if self._rounds == 1:
             self._first_reach = least, most
         if (least < -_BEYOND or most > 1.0 + _BEYOND) and self._rounds > _FIRST_ROUNDS:
-            raise BeyondDriver(*self._first_reach)  # what was clipped since has grown beyond all measure
+            low, high = self._first_reach  # what was clipped since has grown beyond all measure
+            if low > _NEAR and high < 1.0 - _NEAR:
+                raise Unphysical(
+                    "the drive of the frame grows from round to round on the operator; a lower line rate may help"
+                )
+            raise BeyondDriver(low, high)
         u = np.clip(u, -_BEYOND, 1.0 + _BEYOND)  # amplitudes are not known in the first rounds
         position = self._axis.position(self._time_s, np.append(u, u[0]))[:-1]
         rows = position.reshape(self._motion.lines, self._count)
