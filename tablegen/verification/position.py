@@ -10,6 +10,7 @@ from math import ceil, isfinite, pi
 import numpy as np
 import numpy.typing as npt
 
+from tablegen.base.input_errors import shortened
 from tablegen.manifest.fields import ManifestAxis, ManifestPassage, ManifestSeries
 from tablegen.numerics.arrays import Floats
 from tablegen.verification.checks.certified import PlayedPeriod, different_figures, on_grid
@@ -51,7 +52,7 @@ def wrong_position(
     sides, stated_sides = position_scaling(axis, period, errors), stated.scaling_error_percent
     name = "position.scaling_error_percent"
     if sides.keys() != stated_sides.keys():
-        wrong.append(f"certificate.{name} has {', '.join(stated_sides) or 'no direction'}")
+        wrong.append(f"certificate.{name} has {shortened(', '.join(stated_sides)) or 'no direction'}")
     else:
         wrong += different_figures(stated_sides, sides, True, f"{name}.")
     return len(figures) + len(sides), wrong

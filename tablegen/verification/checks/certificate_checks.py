@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.input_errors import shortened
 from tablegen.manifest.fields import ManifestAxis, ManifestShaped
 from tablegen.manifest.read import StoredBuild
 from tablegen.verification.checks.certified import PlayedPeriod, different_figures
@@ -63,7 +64,7 @@ def _wrong_rounded(stated: ManifestShaped, sides: dict[str, float] | None, exact
     if sides is None:
         return []
     if sides.keys() != sides_stated.keys():
-        return [f"certificate.{name} has {', '.join(sides_stated) or 'no direction'}"]
+        return [f"certificate.{name} has {shortened(', '.join(sides_stated)) or 'no direction'}"]
     return different_figures(sides_stated, sides, exact, f"{name}.")
 
 
@@ -98,7 +99,7 @@ def _check(
         ):
             stated = getattr(axis.certificate, key)
             if (stated or {}).keys() != (sides or {}).keys():
-                wrong.append(f"certificate.{key} has {', '.join(stated or {}) or 'no direction'}")
+                wrong.append(f"certificate.{key} has {shortened(', '.join(stated or {})) or 'no direction'}")
                 continue
             for side, parts in (sides or {}).items():
                 count += len(parts)

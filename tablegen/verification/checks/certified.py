@@ -9,6 +9,7 @@ from math import floor, log10, tau
 
 import numpy as np
 
+from tablegen.base.input_errors import shortened
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.manifest.fields import ManifestAxis, ManifestSeries
 from tablegen.numerics.arrays import Floats, Ints, union_sorted
@@ -230,5 +231,5 @@ def different_figures(
         tiny = 1e-3 if name.endswith("_db") else 1e-9
         if not agree(stated.get(name), value, exact, tiny):
             right = "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
-            wrong.append(f"certificate.{prefix}{name} is {stated.get(name)}, the words make it {right}")
+            wrong.append(f"certificate.{prefix}{name} is {shortened(str(stated.get(name)))}, the words make it {right}")
     return wrong

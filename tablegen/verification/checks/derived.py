@@ -113,7 +113,7 @@ def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Results:
         ("drive.v_amplitude", _close(drive.v_amplitude, drive.m * drive.g * drive.v_scan), "not m g v_scan"),
         ("drive.window_nm", _close(drive.window_nm, drive.size_nm * (high - low)), "not size_nm times the window"),
         ("fourier.window", 0.0 <= low < high <= 1.0, f"{[low, high]}"),
-        ("table.scale", _close(table.scale, abs(output.gain_word) / unit), "not what gain_word makes of the amplitude"),
+        ("table.scale", _close(table.scale * unit, abs(output.gain_word)), "not what gain_word makes of the amplitude"),
         ("output.gain_word", output.gain_word * amplitude > 0.0, f"{output.gain_word}, of the wrong sign"),
         ("output.offset_word", output.offset_word == offset, f"{output.offset_word}, v_offset makes it {offset}"),
         ("output.offset_code", output.offset_code == middle, f"{output.offset_code}, the word makes it {middle}"),

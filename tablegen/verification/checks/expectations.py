@@ -5,6 +5,7 @@ The traces of an operator, and the laws of a scanner file, are in no build. So t
 
 from collections.abc import Iterator
 
+from tablegen.base.input_errors import shortened
 from tablegen.manifest.fields import ManifestAxis, ManifestExpected
 from tablegen.verification.checks.scaling import OPERATOR
 
@@ -31,7 +32,7 @@ def _wrong(axis: ManifestAxis, expected: ManifestExpected) -> Iterator[str]:
     for name in ("rms_percent", "scaling_percent"):
         figures = getattr(expected, name)
         if sorted(figures) != sorted(sides):
-            yield f"{name} has {', '.join(figures) or 'no direction'}, not {', '.join(sides) or 'none'}"
+            yield f"{name} has {shortened(', '.join(figures)) or 'no direction'}, not {', '.join(sides) or 'none'}"
         for side, figure in figures.items():
             if figure.value < 0.0 or (figure.uncertainty or 0.0) < 0.0:
                 yield f"{name}.{side} is below 0"
