@@ -82,6 +82,8 @@ def build(
     A scaling error above 1 %, or above that of the uncompensated line, is a warning on stderr, with its cause and with
     remedies that were tried.
 
+    A scan at an angle, on coupled axes or with drift is built in C alone.
+
     \b
     Examples:
       tablegen build annexin_200nm.toml -o build            write all files to build
