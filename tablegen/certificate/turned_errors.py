@@ -21,10 +21,11 @@ class TurnedErrors(Struct, frozen=True):
     """Errors of a frame by the operators, in percent of the size of each motion unless the name says otherwise.
 
     ``fast_size`` and ``slow_size`` are errors of the sizes along and across the lines; ``shear`` is by how much the
-    angle between both differs from 90 degrees, as a slope; ``rms`` is the residual about the best affine image,
-    ``worst_line`` that of the worst line; ``mismatch`` the largest distance of trace and retrace of a line, as means of
-    1/20 of it, 0 without a retrace; ``scaling`` the scaling error along the mean line, peak to peak, of chords of 1/20
-    of it. ``code_lsb`` is the largest distance of a code from the drive that was learnt.
+    angle between both differs from 90 degrees, as a slope; ``rotation_deg`` is the error of the scan angle. ``rms`` is
+    the residual about the best affine image, ``worst_line`` that of the worst line; ``mismatch`` the largest distance
+    of trace and retrace of a line, as means of 1/20 of it, 0 without a retrace; ``scaling`` the scaling error along the
+    mean line, peak to peak, of chords of 1/20 of it. ``code_lsb`` is the largest distance of a code from the drive that
+    was learnt, in LSB of the converter, of x and y.
     """
 
     fast_size: float

@@ -148,7 +148,7 @@ def make_plan(setup: Setup) -> Plan:
     """
     problems = Problems()
     if setup.mixes_motions:
-        problems.add(*_mixing_key(setup), MIXED)
+        problems.add(*mixing_key(setup), MIXED)
     schedule = make_schedule(setup, problems)
     if schedule is None:
         line_rate = setup.scan.timing.line_rate_hz
@@ -178,7 +178,7 @@ def make_plan(setup: Setup) -> Plan:
     )
 
 
-def _mixing_key(setup: Setup) -> tuple[Document, str]:
+def mixing_key(setup: Setup) -> tuple[Document, str]:
     """Return the place of what makes an axis follow both motions."""
     if setup.scan.angle_deg % 360.0:
         return setup.scan_file, "angle_deg"

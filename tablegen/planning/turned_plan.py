@@ -1,7 +1,7 @@
 """Plan a scan at an angle: each axis follows a share of the line's motion and one of the frame's."""
 
 from collections.abc import Callable
-from math import ceil, floor
+from math import floor
 from typing import Literal
 
 import numpy as np
@@ -21,45 +21,30 @@ from tablegen.config.scanner import Coupling
 from tablegen.config.schema import Limits
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
-from tablegen.fixedpoint.converter import Converter, fit_gain, make_output, scaled_output
+from tablegen.fixedpoint.converter import Converter, make_output
 from tablegen.fixedpoint.frame_program import (
-    RATIO_BITS,
-    RATIO_FRACTION_BITS,
-    SECOND_BITS,
     FrameProgram,
-    Knots,
-    SlowTable,
     frame_extremes,
 )
-from tablegen.fixedpoint.phase import RationalPhase
-from tablegen.fixedpoint.program import Program, sample_gain
-from tablegen.fixedpoint.spline_words import spline_factors
-from tablegen.fixedpoint.synthesis import encode, synthesize
+from tablegen.fixedpoint.frame_words import FrameParts, quantise_frame
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
 from tablegen.planning.known_axis import KnownAxis
-from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan, mixing_key
 from tablegen.waveform.series import FourierSeries
 
-BITS = 16  # of the words of both tables
 KNOTS = 16  # intervals of gain and ratio over a frame
 _MOST_SLOW_HARMONICS = 24
 _LINES_PER_HARMONIC = 3
-_LEAST_LENGTH = 64
-_GRID = 1024
+_SAMPLES = 256  # of a line, at which the stroke of a drive is taken
 _FIRST_GUESS = 0.85  # of the room by the first guess of a drive that cannot be learnt: it overshoots less in the turns
-_MOST_MIXED = 0.99 * ((1 << 7) - 1) * (1 << (RATIO_BITS - RATIO_FRACTION_BITS - 1)) / (1 << (BITS - 1))  # of full scale
-_MOST_SHARE = 4.0  # of the scale of the fast words that is given up for it: 2 bits,
-_FINEST_CODES = float(1 << 14)  # or as much as leaves an LSB of a word below half a code
-_PEAK_GRID = 1024  # peaks are rounded up to it, so that a scale does not depend on the last bit of one
 
 
 class TurnedAxis(Struct, frozen=True, eq=False):
     """One axis of a scan at an angle.
 
-    ``fast_nm`` and ``slow_nm`` are its shares of both motions, from x = 0 to 1 of each. ``piezo`` is the axis in time,
-    ``drive`` what was learnt on it, of v_max, and ``series`` the fast and the second part as they are played, ahead of
-    the hold of the converter.
+    ``motion`` has its shares of both motions. ``piezo`` is the axis in time, ``drive`` what was learnt on it, of v_max,
+    without the lead over the hold of the converter that ``program`` has.
     """
 
     axis: Literal["x", "y"]
@@ -130,7 +115,7 @@ class FrameGeometry(Struct, frozen=True):
 
 
 class TurnedPlan(Struct, frozen=True, eq=False):
-    """A scan at an angle: both axes and their schedule; ``straight`` is the plan of the same scan at 0 degrees."""
+    """A scan at an angle: both axes and their schedule."""
 
     name: str
     scanner: str
@@ -139,7 +124,6 @@ class TurnedPlan(Struct, frozen=True, eq=False):
     x: TurnedAxis
     y: TurnedAxis
     limits: Limits
-    straight: Plan
 
     @property
     def axes(self) -> tuple[TurnedAxis, TurnedAxis]:
@@ -199,7 +183,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     x, y = axes["x"], axes["y"]
     assert x is not None
     assert y is not None
-    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight)
+    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits)
 
 
 def _at_0_degrees(setup: Setup) -> Setup:
@@ -248,8 +232,7 @@ def _axis(
         real, imaginary, _ = capped_inverse(response, n * rate_hz, boost_db)
         return series.times(real, imaginary)
 
-    drive = None
-    with problems.at(setup.scan_file, "angle_deg"):
+    with problems.at(*mixing_key(setup)):
         try:
             drive = learn_frame(piezo, motion, inverse, KNOTS)
         except BeyondDriver as beyond:
@@ -257,18 +240,14 @@ def _axis(
             room = min(centre / max(centre - beyond.least, 1e-9), (1.0 - centre) / max(beyond.most - centre, 1e-9))
             raise Unphysical(_what_fits(plan, setup.scan.angle_deg, line, _FIRST_GUESS * room)) from None
         _check_reach(known, drive, plan.schedule.lines)
-    if drive is None:
-        return None
-    with problems.at(setup.scan_file, "angle_deg"):
-        program = _quantised(setup, plan, line, known, drive)
-        program = _within(setup, plan, line, program, problems)
+        program = _within(setup, plan, line, _quantised(setup, plan, line, known, drive), problems)
         return TurnedAxis(axis, line.converter, motion, piezo, known, drive, program)
     return None
 
 
 def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
     """Check that the operator was identified for strokes of this length."""
-    u = drive.on_grid(lines, _GRID // 4)
+    u = drive.on_grid(lines, _SAMPLES)
     stroke, most = float(np.ptp(u)), max(line.stroke for line in known.operator.lines)
     if stroke > most + STROKE_REACH:
         span = known.driver.span
@@ -281,75 +260,24 @@ def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
 def _quantised(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive) -> FrameProgram:
     """Return the integers of a drive, without a slew guard."""
     schedule, converter = plan.schedule, line.converter
-    codes = known.driver.span / converter.v_per_code
     dac = setup.hardware(line.axis).dac
     hold = hold_inverse(drive.fast.harmonics, schedule.ticks, steps=False)
-    fast, second = drive.fast.times(*hold), drive.second.times(*hold)
-    length = max(_LEAST_LENGTH, 1 << (4 * fast.harmonics - 1).bit_length())
-    mixed = _peak(_spline(second, length)) * float(np.max(np.abs(drive.ratios)))
-    words, gain_word, scale = _table(fast, mixed, length, codes, dac.bits)
-    slow_length = max(_LEAST_LENGTH, 1 << (4 * drive.slow.harmonics - 1).bit_length())
-    moving = FourierSeries(0.0, drive.slow.a, drive.slow.b)
-    slow_words, slow_gain, _ = _table(moving, 0.0, slow_length, codes, dac.bits)
-    second_words, ratio_scale = _second(second, length, scale, _peak(fast))
-    ratios = np.rint(drive.ratios * ratio_scale).astype(np.int64)
     park_v = line.drive.v_offset if (its := getattr(setup.scan, line.axis).park_v) is None else its
-    output = make_output(dac, converter, known.driver, park_v)
-    offset = (known.driver.volts(drive.slow.a0) - converter.v_zero) / converter.v_per_code
-    output = scaled_output(output, offset, BITS, gain_word)
-    gains = np.rint(drive.gains * gain_word).astype(np.int64)
-    try:
-        return FrameProgram(
-            fast=Program(RationalPhase(schedule.ticks), 1, "cubic", BITS, words, output),
-            lines=schedule.lines,
-            gains=Knots(gains, drive.spacing),
-            ratios=Knots(ratios, drive.spacing),
-            second=second_words,
-            slow=SlowTable(slow_words, slow_gain, output.offset_word),
-        )
-    except OverflowError as reason:
-        raise Unphysical(f"{reason}; a smaller scan would fit") from None
-
-
-def _spline(series: FourierSeries, length: int) -> FourierSeries:
-    return series.times(*spline_factors(series.harmonics, length))
-
-
-def _peak(series: FourierSeries) -> float:
-    return float(np.max(np.abs(series.on_grid(max(_GRID, 32 * series.harmonics)))))
-
-
-def _table(series: FourierSeries, room: float, length: int, codes: float, dac_bits: int) -> tuple[Ints, int, float]:
-    """Return the words of a spline of a series in shares of v_max, its gain word, and the scale of its words.
-
-    ``room`` is what is mixed into it at most; ``codes`` are those of v_max.
-    """
-    spline = _spline(series, length)
-    peak = _peak(spline)
-    if not peak > 0.0:
-        return np.zeros(length, dtype=np.int64), 0, 1.0
-    # Beside a large second part the words of the fast one are smaller, so that those that are mixed in suffice.
-    share = ceil(max(1.0 + room / peak, room / peak / _MOST_MIXED) * _PEAK_GRID) / _PEAK_GRID
-    if share > max(_MOST_SHARE, _FINEST_CODES / (peak * abs(codes))):
-        raise Unphysical("lines of the frame differ by more than a second table holds; a smaller scan would fit")
-    gain_word, scale = fit_gain(sample_gain("cubic") * peak * codes, share, BITS, dac_bits)
-    fourier = encode(0.5, 0.5 * spline.a / peak, 0.5 * spline.b / peak, scale)
-    return synthesize(fourier, length, BITS), gain_word, scale * peak
-
-
-def _second(series: FourierSeries, length: int, scale: float, fast: float) -> tuple[Ints, float]:
-    """Return the words that are mixed in, and the ratio word of a ratio of 1.
-
-    ``scale`` is the share of v_max of a full word of the fast table.
-    """
-    spline = _spline(series, length)
-    peak = _peak(spline)
-    if not peak > 1e-9 * fast:
-        return np.zeros(length, dtype=np.int64), 0.0
-    top = float((1 << (SECOND_BITS - 1)) - 1)
-    words = np.rint(np.clip(spline.on_grid(length) / peak, -1.0, 1.0) * top).astype(np.int64)
-    in_lsb = peak / scale * float(1 << (BITS - 1))  # of a full word of the second table, in LSB of the fast one
-    return words, in_lsb / top * float(1 << RATIO_FRACTION_BITS)
+    return quantise_frame(
+        FrameParts(
+            fast=drive.fast.times(*hold),
+            second=drive.second.times(*hold),
+            slow=FourierSeries(0.0, drive.slow.a, drive.slow.b),
+            gains=drive.gains,
+            ratios=drive.ratios,
+            spacing=drive.spacing,
+            codes=known.driver.span / converter.v_per_code,
+            offset=converter.code(known.driver.volts(drive.slow.a0)),
+        ),
+        make_output(dac, converter, known.driver, park_v),
+        schedule.ticks,
+        schedule.lines,
+    )
 
 
 def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
@@ -361,7 +289,7 @@ def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, pro
         room = min(
             (centre - output.code_min) / max(centre - least, 1), (output.code_max - centre) / max(most - centre, 1)
         )
-        problems.add(setup.scan_file, "angle_deg", _what_fits(plan, setup.scan.angle_deg, line, room))
+        problems.add(*mixing_key(setup), _what_fits(plan, setup.scan.angle_deg, line, room))
     slew, last = setup.hardware(line.axis).amplifier.max_slew_v_per_s, (1 << output.dac_bits) - 1
     if slew is None:
         return _guarded(program, min(2 * steepest, last))

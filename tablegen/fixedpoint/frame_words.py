@@ -1,0 +1,121 @@
+"""Quantise the drive of a frame into the integers of an axis with a fast and a slow part."""
+
+from math import ceil
+
+import numpy as np
+from msgspec import Struct
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.fixedpoint.converter import fit_gain, scaled_output
+from tablegen.fixedpoint.frame_program import (
+    RATIO_BITS,
+    RATIO_FRACTION_BITS,
+    SECOND_BITS,
+    FrameProgram,
+    Knots,
+    SlowTable,
+)
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program, sample_gain
+from tablegen.fixedpoint.spline_words import spline_factors
+from tablegen.fixedpoint.synthesis import encode, synthesize
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.waveform.series import FourierSeries
+
+BITS = 16  # of the words of both tables
+_LEAST_LENGTH = 64
+_GRID = 1024
+_PEAK_GRID = 1024  # peaks are rounded up to it, so that a scale does not depend on the last bit of one
+_MOST_MIXED = 0.99 * ((1 << 7) - 1) * (1 << (RATIO_BITS - RATIO_FRACTION_BITS - 1)) / (1 << (BITS - 1))  # of full scale
+_MOST_SHARE = 4.0  # of the scale of the fast words that is given up for it: 2 bits,
+_FINEST_CODES = float(1 << 14)  # or as much as leaves an LSB of a word below half a code
+
+
+class FrameParts(Struct, frozen=True, eq=False):
+    """The drive of a frame in its parts, of which 1 is ``codes`` codes, about ``offset``, a code as a real number.
+
+    ``fast``, ``second`` and ``slow`` have no mean; ``gains`` and ``ratios`` are at knots ``spacing`` lines apart,
+    shape (knots,).
+    """
+
+    fast: FourierSeries
+    second: FourierSeries
+    slow: FourierSeries
+    gains: Floats
+    ratios: Floats
+    spacing: int
+    codes: float
+    offset: float
+
+
+def quantise_frame(parts: FrameParts, output: Output, ticks: int, lines: int) -> FrameProgram:
+    """Return the program of a drive; its gain and offset take the place of those of ``output``.
+
+    Raises
+    ------
+    Unphysical
+        If a word does not fit.
+    """
+    length = _length(parts.fast)
+    mixed = _peak(_spline(parts.second, length)) * float(np.max(np.abs(parts.ratios)))
+    words, gain_word, scale = _table(parts.fast, mixed, length, parts.codes, output.dac_bits)
+    slow_words, slow_gain, _ = _table(parts.slow, 0.0, _length(parts.slow), parts.codes, output.dac_bits)
+    second, ratio_word = _second(parts.second, length, scale, _peak(parts.fast))
+    output = scaled_output(output, parts.offset, BITS, gain_word)
+    try:
+        return FrameProgram(
+            fast=Program(RationalPhase(ticks), 1, "cubic", BITS, words, output),
+            lines=lines,
+            gains=Knots(np.rint(parts.gains * gain_word).astype(np.int64), parts.spacing),
+            ratios=Knots(np.rint(parts.ratios * ratio_word).astype(np.int64), parts.spacing),
+            second=second,
+            slow=SlowTable(slow_words, slow_gain, output.offset_word),
+        )
+    except OverflowError as reason:
+        raise Unphysical(f"{reason}; a smaller scan would fit") from None
+
+
+def _length(series: FourierSeries) -> int:
+    return max(_LEAST_LENGTH, 1 << (4 * series.harmonics - 1).bit_length())
+
+
+def _spline(series: FourierSeries, length: int) -> FourierSeries:
+    return series.times(*spline_factors(series.harmonics, length))
+
+
+def _peak(series: FourierSeries) -> float:
+    return float(np.max(np.abs(series.on_grid(max(_GRID, 32 * series.harmonics)))))
+
+
+def _table(series: FourierSeries, room: float, length: int, codes: float, dac_bits: int) -> tuple[Ints, int, float]:
+    """Return the words of a spline of a series in shares of v_max, its gain word, and the scale of its words.
+
+    ``room`` is what is mixed into it at most; ``codes`` are those of v_max.
+    """
+    spline = _spline(series, length)
+    peak = _peak(spline)
+    if not peak > 0.0:
+        return np.zeros(length, dtype=np.int64), 0, 1.0
+    # Beside a large second part the words of the fast one are smaller, so that those that are mixed in suffice.
+    share = ceil(max(1.0 + room / peak, room / peak / _MOST_MIXED) * _PEAK_GRID) / _PEAK_GRID
+    if share > max(_MOST_SHARE, _FINEST_CODES / (peak * abs(codes))):
+        raise Unphysical("lines of the frame differ by more than a second table holds; a smaller scan would fit")
+    gain_word, scale = fit_gain(sample_gain("cubic") * peak * codes, share, BITS, dac_bits)
+    fourier = encode(0.5, 0.5 * spline.a / peak, 0.5 * spline.b / peak, scale)
+    return synthesize(fourier, length, BITS), gain_word, scale * peak
+
+
+def _second(series: FourierSeries, length: int, scale: float, fast: float) -> tuple[Ints, float]:
+    """Return the words that are mixed in, and the ratio word of a ratio of 1.
+
+    ``scale`` is the share of v_max of a full word of the fast table.
+    """
+    spline = _spline(series, length)
+    peak = _peak(spline)
+    if not peak > 1e-9 * fast:
+        return np.zeros(length, dtype=np.int64), 0.0
+    top = float((1 << (SECOND_BITS - 1)) - 1)
+    words = np.rint(np.clip(spline.on_grid(length) / peak, -1.0, 1.0) * top).astype(np.int64)
+    in_lsb = peak / scale * float(1 << (BITS - 1))  # of a full word of the second table, in LSB of the fast one
+    return words, in_lsb / top * float(1 << RATIO_FRACTION_BITS)
