@@ -161,15 +161,18 @@ DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, ui
 
 #endif
 
-#if DAC_SLOW_PART
-#define PLAY_ROUNDED(bank) ((bank)->ramp != 0 ? dac_slow_play : play)
-#else
-#define PLAY_ROUNDED(bank) play
-#endif
 #if DAC_SHAPING
-#define PLAY(bank) ((bank)->order != 0 ? dac_shaping_play : PLAY_ROUNDED(bank))
+#define PLAY_LEVEL(bank) ((bank)->order != 0 ? dac_shaping_play : play)
 #else
-#define PLAY(bank) PLAY_ROUNDED(bank)
+#define PLAY_LEVEL(bank) play
+#endif
+#if DAC_SLOW_PART && DAC_SHAPING
+#define PLAY(bank)                                                                                                    \
+    ((bank)->ramp != 0 || ((bank)->slow != NULL && (bank)->order != 0) ? dac_slow_play : PLAY_LEVEL(bank))
+#elif DAC_SLOW_PART
+#define PLAY(bank) ((bank)->ramp != 0 ? dac_slow_play : PLAY_LEVEL(bank))
+#else
+#define PLAY(bank) PLAY_LEVEL(bank)
 #endif
 
 DAC_CODE_ATTR uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks)

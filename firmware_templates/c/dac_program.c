@@ -133,10 +133,6 @@ static bool good_slow_part(const dac_axis_program *p, uint32_t lines)
 
     if (slow == NULL)
         return true;
-#if DAC_SHAPING
-    if (p->shaping_order != 0)
-        return false;
-#endif
     return p->index_bits != 0 && good_mixture(p, slow, lines) && good_gains(slow, lines) && slow->table != NULL
         && slow->index_bits >= 3 && slow->index_bits <= 14 && slow->gain_word >= -(INT32_C(1) << 17)
         && slow->gain_word < INT32_C(1) << 17 && slow->offset_word < most && slow->offset_word > -most

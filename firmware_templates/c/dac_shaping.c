@@ -9,7 +9,10 @@
 DAC_CODE_ATTR int32_t dac_shaping_code(dac_axis *axis, const dac_bank_axis *bank, int32_t sample)
 {
     const unsigned bits = bank->remainder_bits;
-    const int64_t sum = (int64_t)bank->gain * sample + bank->offset - ((int64_t)1 << (bank->gain_q - 1));
+    int64_t sum = (int64_t)bank->gain * sample + bank->offset - ((int64_t)1 << (bank->gain_q - 1));
+#if DAC_SLOW_PART
+    sum += axis->rise;
+#endif
     const uint32_t fed = (uint32_t)(sum >> (bank->gain_q - bits)) + axis->shaper.back;
 
     axis->shaper = dac_shaper_next(axis->shaper, fed, (UINT32_C(1) << bits) - 1, bank->order, DAC_WEIGHT(bank));
@@ -265,6 +268,38 @@ DAC_CODE_ATTR uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *ban
     }
 #endif
     return PLAY(bank->order, bank->remainder_bits);
+}
+
+#endif
+
+#if DAC_SLOW_PART && !DAC_LONG_MULTIPLY
+
+#if DAC_FEW_REGISTERS
+#define FEEDER_OF(bank) feeder_of(bank)
+#else
+#define FEEDER_OF(bank) NULL
+#endif
+
+#if DAC_SPLINE
+DAC_NOINLINE uint32_t ramp_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                  dac_output *out, uint32_t ticks)
+{
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, true, bank->order, bank->remainder_bits, FEEDER_OF(bank), true};
+    return dac_play_short(axis, bank, stretch, kind);
+}
+#endif
+
+DAC_CODE_ATTR uint32_t dac_shaping_ramp(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
+                                        dac_output *out, uint32_t ticks)
+{
+    const dac_stretch stretch = {at, step, out, ticks};
+    const dac_short_kind kind = {true, false, bank->order, bank->remainder_bits, FEEDER_OF(bank), true};
+#if DAC_SPLINE
+    if (bank->cubic)
+        return ramp_spline(axis, bank, at, step, out, ticks);
+#endif
+    return dac_play_short(axis, bank, stretch, kind);
 }
 
 #endif

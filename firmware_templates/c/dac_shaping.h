@@ -11,6 +11,12 @@ int32_t dac_shaping_code(dac_axis *axis, const dac_bank_axis *bank, int32_t samp
 /* Plays a run, as dac_axis_run() does, from position `at` on: as many ticks as 64 bits of position are enough for. */
 uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                           uint32_t ticks);
+
+#if DAC_SLOW_PART && !DAC_LONG_MULTIPLY
+/* The same on a line of a slow part. */
+uint32_t dac_shaping_ramp(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                          uint32_t ticks);
+#endif
 #endif
 
 #endif

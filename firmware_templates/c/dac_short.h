@@ -139,8 +139,11 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.gain = (uint32_t)bank->gain;
 #endif
 #if DAC_SLOW_PART
+    const unsigned up = kind.shaped ? 16u - bank->bits : 0u;
+    const int64_t ramp = kind.shaped ? bank->run_ramp : bank->ramp;
+
     if (kind.ramps)
-        offset += axis->rise;
+        offset += axis->rise * (INT64_C(1) << up);
 #endif
     const uint32_t spread = UINT32_C(1) << bank->run_spread;
     const int32_t begin = dac_sample_at(bank, (uint32_t)(at >> 32));
@@ -160,7 +163,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.out = s.out;
     b.last = 0;
 #if DAC_SLOW_PART
-    b.ramp = (uint32_t)bank->ramp;
+    b.ramp = (uint32_t)ramp;
 #endif
     while (done < s.ticks) {
         const uint32_t length = dac_block_of(s.ticks - done);
@@ -239,7 +242,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
         }
 #if DAC_SLOW_PART
         if (kind.ramps)
-            offset += bank->ramp * (int64_t)length;
+            offset += ramp * (int64_t)length;
 #endif
         sample = origin + b.rise;
         done += length;

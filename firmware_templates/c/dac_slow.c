@@ -1,9 +1,16 @@
 /* The slow part of an axis: what a line begins with, and its ticks. docs/sequencer.md has the arithmetic. */
 #include "dac_slow.h"
 #include "dac_run.h"
+#include "dac_shaping.h"
 #include "dac_short.h"
 
 #if DAC_SLOW_PART
+
+#if DAC_SHAPING
+#define SHAPED(bank) ((bank)->order != 0)
+#else
+#define SHAPED(bank) false
+#endif
 
 /* What is divided, and the quotient. */
 typedef struct {
@@ -110,18 +117,24 @@ DAC_CODE_ATTR static int64_t ramp_of(int64_t distance, uint32_t step)
 DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
 {
 #if DAC_LONG_MULTIPLY
-    if (bank->line_most == 0)
+    if (bank->line_most == 0 || SHAPED(bank)) /* shaped runs take gain, offset and ramp as they are */
         return;
     const unsigned left = 32u - bank->gain_q;
     bank->run_gain = bank->gain * (INT32_C(1) << left);
     bank->run_offset = bank->offset * ((int64_t)1 << left);
     bank->run_ramp = bank->ramp * ((int64_t)1 << left);
 #else
-    const int64_t ramp = bank->ramp < 0 ? -bank->ramp : bank->ramp;
+    const unsigned up = SHAPED(bank) ? 16u - bank->bits : 0u; /* a sample of 16-bit words, as in dac_program.c */
+    const int64_t ramp = (bank->ramp < 0 ? -bank->ramp : bank->ramp) << up;
     uint8_t spread = 30;
 
-    for (uint32_t gain = (uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain); gain != 0; gain >>= 1)
+    for (uint32_t gain = (uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain) << up; gain != 0; gain >>= 1)
         spread--;
+#if DAC_SHAPING
+    bank->run_gain = bank->gain * (INT32_C(1) << up);
+    bank->run_offset = (bank->offset - ((int64_t)1 << (bank->gain_q - 1u))) * ((int64_t)1 << up);
+    bank->run_ramp = bank->ramp * ((int64_t)1 << up);
+#endif
     bank->run_spread = spread > 19 ? 19 : spread;
     bank->run_most = DAC_RUN * ramp <= INT32_C(1) << 30 ? bank->line_most : 0;
 #endif
@@ -191,6 +204,49 @@ DAC_NOINLINE uint32_t put(dac_axis *axis, const dac_bank_axis *bank, const int32
     return done;
 }
 
+#if DAC_SHAPING
+/* As put(), of shaped output: `rise` is what the ramp has added at the first sample. What is fed back is stored behind
+ * each block; that of a block that is refused never is. The sum of a code above `base` and its remainder is below 2^31,
+ * since offsets stay within twice the range of a code. */
+DAC_NOINLINE uint32_t put_shaped(dac_axis *axis, const dac_bank_axis *bank, const int32_t *sample, uint32_t ticks,
+                                 int64_t rise, dac_output *out)
+{
+    const int64_t ramp = bank->ramp;
+    const int32_t gain = bank->gain, weight = DAC_WEIGHT(bank);
+    const unsigned bits = bank->remainder_bits, below = bank->gain_q - bits;
+    const uint32_t mask = (UINT32_C(1) << bits) - 1;
+    int64_t offset = bank->offset - ((int64_t)1 << (bank->gain_q - 1u)) + rise;
+    dac_shaper shaper = axis->shaper;
+    uint32_t done = 0;
+
+    while (done < ticks) {
+        const int32_t base = axis->code - bank->run_half;
+        const uint32_t length = dac_block_of(ticks - done);
+        const int32_t *const end = sample + length;
+        uint32_t out_of_window = 0, code = 0;
+
+        if (!dac_has_room(bank, base))
+            break;
+        do {
+            const uint32_t fed = (uint32_t)((offset + (int64_t)gain * *sample++) >> below)
+                               - ((uint32_t)base << bits) + shaper.back;
+            shaper = dac_shaper_next(shaper, fed, mask, bank->order, weight);
+            offset += ramp;
+            out_of_window |= fed;
+            code = (fed >> bits) + (uint32_t)base;
+            *out = (dac_output)code;
+            out += DAC_STRIDE;
+        } while (sample != end);
+        if (out_of_window >> bits >> bank->run_bits != 0)
+            break;
+        axis->shaper = shaper;
+        axis->code = (int32_t)code;
+        done += length;
+    }
+    return done;
+}
+#endif
+
 /* Writes samples of straight lines, up to `end`; returns the position after them. */
 DAC_NOINLINE uint64_t sample_lines(const dac_bank_axis *bank, uint64_t at, uint64_t step, int32_t *sample,
                                    const int32_t *end)
@@ -243,7 +299,12 @@ DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, 
         else
 #endif
             at = sample_lines(bank, at, step, samples, end);
+#if DAC_SHAPING
+        const uint32_t played = SHAPED(bank) ? put_shaped(axis, bank, samples, length, rise, out)
+                                             : put(axis, bank, samples, length, rise, out);
+#else
         const uint32_t played = put(axis, bank, samples, length, rise, out);
+#endif
         done += played;
         if (played != length)
             break;
@@ -268,6 +329,10 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
 DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
                                      dac_output *out, uint32_t ticks)
 {
+#if DAC_SHAPING
+    if (SHAPED(bank))
+        return dac_shaping_ramp(axis, bank, at, step, out, ticks);
+#endif
 #if DAC_SPLINE
     if (bank->cubic)
         return play_spline(axis, bank, at, step, out, ticks);

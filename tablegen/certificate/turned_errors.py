@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from msgspec import Struct
 
-from tablegen.fixedpoint.frame_program import frame_extremes
+from tablegen.fixedpoint.frame_program import played_extremes
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan
 
@@ -40,7 +40,7 @@ class TurnedErrors(Struct, frozen=True):
 
 
 class CodeRange(Struct, frozen=True):
-    """The range of an axis' codes in a frame, and the largest step of a tick."""
+    """The range of an axis' codes in a frame, and the largest step of a tick, with what shaping can add."""
 
     least: int
     most: int
@@ -65,7 +65,7 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
         codes = frame_codes(axis, ticks)
         positions.append(played_position(axis, codes, ticks, schedule.ticks))
         distances.append(_code_distance(axis, codes, ticks, schedule.ticks))
-    ranges = tuple(CodeRange(*frame_extremes(axis.program)) for axis in plan.axes)
+    ranges = tuple(CodeRange(*played_extremes(axis.program)) for axis in plan.axes)
     errors = frame_errors(plan, positions[0], positions[1], (ticks + 0.5) / schedule.ticks)
     return TurnedCertificate(
         TurnedErrors(**errors, code_lsb=(distances[0], distances[1])),
@@ -74,7 +74,7 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
 
 
 def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
-    """Return the codes of a frame at some ticks of each line, shape (lines, len(ticks))."""
+    """Return the codes of a frame at some ticks of each line, unshaped, shape (lines, len(ticks))."""
     program = axis.program
     lines = [program.unclamped(line)[0, ticks] for line in range(program.lines)]
     return program.output.clamp(np.stack(lines))

@@ -54,11 +54,11 @@ class PlayedLines:
         """
         x, y, ticks = self._program.x, self._program.y, self._program.schedule.ticks
         if isinstance(y, FrameProgram):
-            y_codes = y.unclamped(line, count).ravel()
+            y_codes = y.played(line, count, self._remainders[1])
         else:
             y_codes = y.unclamped(line * ticks, (line + count) * ticks, self._remainders[1])
         if isinstance(x, FrameProgram):
-            return x.unclamped(line, count).ravel(), y_codes
+            return x.played(line, count, self._remainders[0]), y_codes
         if not x.output.shaping.order:
             return _repeated(self._x_line(x), count), y_codes
         lines = [x.unclamped(0, ticks, self._remainders[0]) for _ in range(count)]
@@ -130,8 +130,7 @@ def play_line(program: ScanProgram, line: int, settled: bool = True) -> LineTick
         If an axis is shaped: its codes depend on the lines before, and ``PlayedLines`` plays them.
     """
     for axis in (program.x, program.y):
-        if isinstance(axis, Program):
-            axis.require_period()
+        (axis if isinstance(axis, Program) else axis.fast).require_period()
     return PlayedLines(program).play(line, settled)
 
 

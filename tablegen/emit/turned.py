@@ -51,8 +51,10 @@ def turned_options(program: ScanProgram) -> dict[str, int]:
 
 
 def _storage(program: ScanProgram) -> dict[str, int]:
-    widest = max(program.x.output.word_bits, program.y.output.word_bits)
-    return {"TABLE_STORAGE_BITS": 16, "OUTPUT_STORAGE_BITS": storage_bits(widest), "SPLINE": 1}
+    outputs = program.x.output, program.y.output
+    widest, order = max(each.word_bits for each in outputs), max(each.shaping.order for each in outputs)
+    options = {"TABLE_STORAGE_BITS": 16, "OUTPUT_STORAGE_BITS": storage_bits(widest), "SPLINE": 1}
+    return options | ({"SHAPING": order} if order else {})
 
 
 def _context(content: TurnedContent) -> dict[str, Any]:
@@ -90,6 +92,7 @@ def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
         "prefix": prefix,
         "PREFIX": prefix.upper(),
         "constants": constants,
+        "shaped": bool(program.output.shaping.order),
         "arrays": [
             {"name": f"{prefix}_{key}", "type": kind, "length": len(words), "rows": rows(words)}
             for key, (kind, words) in arrays.items()

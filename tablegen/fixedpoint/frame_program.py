@@ -7,10 +7,11 @@ In line l of a frame, at tick k of L, as docs/decisions/0089 has it::
     ramp(l)     = (slow(l + 1) - slow(l)) step / 2^32, towards 0, with step = floor(2^32 / L)
     c           = round(gain(l) S(table(l), k) + slow(l) + k ramp(l), gain_q)
 
-Clamp, slew guard and coding of the converter follow as for every program. Shaping is not part of this module.
+Shaping, clamp, slew guard and coding of the converter follow as for every program.
 """
 
 from itertools import pairwise
+from math import ceil
 
 import numpy as np
 from msgspec import Struct
@@ -20,7 +21,7 @@ from tablegen.fixedpoint.output import GAIN_BITS, Output
 from tablegen.fixedpoint.phase import PHASE_BITS, RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import saturate, shift_round, signed_limits
-from tablegen.fixedpoint.shaping import OFF
+from tablegen.fixedpoint.shaping import Remainders
 from tablegen.fixedpoint.spline import cubic
 from tablegen.numerics.arrays import Ints, freeze
 
@@ -121,8 +122,8 @@ class FrameProgram(Struct, frozen=True, eq=False):
 
     def __post_init__(self) -> None:
         freeze(self.second)
-        if self.fast.hold != 1 or self.fast.mode == "direct" or self.fast.output.shaping != OFF:
-            raise ValueError("a frame program has an unshaped table of lines or of a spline, which advances every tick")
+        if self.fast.hold != 1 or self.fast.mode == "direct":
+            raise ValueError("a frame program has a table of lines or of a spline, which advances every tick")
         if len(self.second) != len(self.fast.words):
             raise ValueError(f"{len(self.second)} words are mixed into {len(self.fast.words)}")
         slow = self.slow.at(np.arange(self.lines), self.lines)
@@ -207,7 +208,7 @@ class FrameProgram(Struct, frozen=True, eq=False):
         return np.asarray(self._sums(line, 1)[0])
 
     def unclamped(self, first: int, count: int = 1) -> Ints:
-        """Return the codes of lines before the clamp.
+        """Return the codes of lines before the clamp, unshaped.
 
         Parameters
         ----------
@@ -223,8 +224,29 @@ class FrameProgram(Struct, frozen=True, eq=False):
         """
         return shift_round(self._sums(first, count), self.output.gain_q)
 
+    def played(self, first: int, count: int, remainders: Remainders) -> Ints:
+        """Return the codes of consecutive lines before the clamp, and update ``remainders``.
+
+        Parameters
+        ----------
+        first
+            Line of the frame that is the first of them.
+        count
+            Number of lines, all of one frame.
+        remainders
+            Those that the line before ``first`` has left.
+
+        Returns
+        -------
+        Ints
+            Codes, shape (count * ticks of a line,).
+        """
+        if not self.output.shaping.order:
+            return self.unclamped(first, count).ravel()
+        return remainders.codes(self.output.with_remainders(self._sums(first, count).ravel()))
+
     def frame(self) -> Ints:
-        """Return the codes of a frame before the slew guard.
+        """Return the codes of a frame before the slew guard, unshaped.
 
         Returns
         -------
@@ -246,8 +268,16 @@ class FrameProgram(Struct, frozen=True, eq=False):
         return np.asarray(gains[:, None] * samples + slow[:, None] + k * ramps[:, None])
 
 
+def played_extremes(program: FrameProgram) -> tuple[int, int, int]:
+    """Return bounds of the codes of all frames before the clamp, and of the step of a tick, with what shaping adds."""
+    least, most, steepest = frame_extremes(program)
+    shaping = program.output.shaping
+    room = ceil(shaping.excess - 0.5)
+    return least - room, most + room, steepest + shaping.step_excess
+
+
 def frame_extremes(program: FrameProgram) -> tuple[int, int, int]:
-    """Return the least and the greatest code of a frame before the clamp, and the largest step of a tick."""
+    """Return the least and the greatest code of a frame before the clamp, and the largest step of a tick, unshaped."""
     least, most, steepest = 1 << 40, -(1 << 40), 0
     before = int(program.unclamped(program.lines - 1)[0, -1])
     for line in range(program.lines):

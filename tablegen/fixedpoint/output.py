@@ -137,8 +137,23 @@ class Output(Struct, frozen=True):
         Ints
             Fixed-point codes, shape of ``sample``.
         """
+        return self.with_remainders(self.gain_word * sample + self.offset_word)
+
+    def with_remainders(self, sums: Ints) -> Ints:
+        """Return codes with ``remainder_bits`` fraction bits, and half a code more.
+
+        Parameters
+        ----------
+        sums
+            Codes with ``gain_q`` fraction bits, any shape.
+
+        Returns
+        -------
+        Ints
+            Fixed-point codes, shape of ``sums``.
+        """
         half = 1 << (self.gain_q - 1)
-        return (self.gain_word * sample + self.offset_word + half) >> (self.gain_q - remainder_bits(self.dac_bits))
+        return (sums + half) >> (self.gain_q - remainder_bits(self.dac_bits))
 
     def word(self, code: Integer) -> Integer:
         """Return a code as it is sent to the converter: its coding, then its alignment."""

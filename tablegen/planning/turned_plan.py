@@ -22,10 +22,7 @@ from tablegen.config.schema import Limits
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.converter import Converter, make_output
-from tablegen.fixedpoint.frame_program import (
-    FrameProgram,
-    frame_extremes,
-)
+from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.fixedpoint.frame_words import FrameParts, quantise_frame
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
@@ -156,8 +153,6 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     for axis in ("x", "y"):
         if getattr(scan, axis).refinement is not None:
             problems.add(setup.scan_file, f"{axis}.refinement", "was learnt at 0 degrees, and does not serve an angle")
-        if setup.hardware(axis).dac.shaping != "off":
-            problems.entries.append(setup.hardware_problem(axis, "dac.shaping", "is not there for a scan at an angle"))
     known = {}
     for axis in ("x", "y"):
         try:
@@ -274,7 +269,7 @@ def _quantised(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive
             codes=known.driver.span / converter.v_per_code,
             offset=converter.code(known.driver.volts(drive.slow.a0)),
         ),
-        make_output(dac, converter, known.driver, park_v),
+        make_output(dac, converter, known.driver, park_v, line.program.output.shaping),
         schedule.ticks,
         schedule.lines,
     )
@@ -283,7 +278,7 @@ def _quantised(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive
 def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
     """Return the program with its slew guard; what leaves the range or the slew rate goes to ``problems``."""
     output = program.output
-    least, most, steepest = frame_extremes(program)
+    least, most, steepest = played_extremes(program)
     centre = output.offset_code
     if least < output.code_min or most > output.code_max:
         room = min(

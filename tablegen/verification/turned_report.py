@@ -12,7 +12,7 @@ from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.device.dual_program import AxisProgram
 from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.emit.turned import TurnedContent, turned_files, turned_options, turned_runtime
-from tablegen.fixedpoint.frame_program import FrameProgram, frame_extremes
+from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import StoredTurned, read_turned
 from tablegen.numerics.arrays import Ints
@@ -137,7 +137,7 @@ def _code_check(stored: StoredTurned) -> Check:
     axes: tuple[tuple[Literal["x", "y"], AxisProgram], ...] = ("x", stored.program.x), ("y", stored.program.y)
     for name, axis in axes:
         assert isinstance(axis, FrameProgram)
-        least, most, steepest = frame_extremes(axis)
+        least, most, steepest = played_extremes(axis)
         output = axis.output
         if least < output.code_min or most > output.code_max:
             wrong.append(f"{name}: codes {least}..{most} leave {output.code_min}..{output.code_max}")

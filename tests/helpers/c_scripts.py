@@ -143,15 +143,17 @@ def wave_program(shape: SequencerShape, codes: int, ticks: int = 499) -> DualPro
     return DualProgram(axis, replace(axis, words=np.roll(words, 3)), schedule)
 
 
+def any_shaping(rng: Generator, output: Output, order: int = 3) -> Output:
+    """The output with any shaping up to an order, off too."""
+    of = int(rng.integers(0, order + 1))
+    zero = int(rng.choice([0, MAXIMUM_ZERO, rng.integers(0, MAXIMUM_ZERO + 1)])) if of == 3 else 0
+    return replace(output, shaping=Shaping(of, zero))
+
+
 def shaped(rng: Generator, program: DualProgram, order: int = 3) -> DualProgram:
     """The program with any shaping of both axes up to an order, off too."""
-
-    def one(axis: Program) -> Program:
-        of = int(rng.integers(0, order + 1))
-        zero = int(rng.choice([0, MAXIMUM_ZERO, rng.integers(0, MAXIMUM_ZERO + 1)])) if of == 3 else 0
-        return replace(axis, output=replace(axis.output, shaping=Shaping(of, zero)))
-
-    return replace(program, x=one(program.x), y=one(program.y))
+    x, y = (replace(axis, output=any_shaping(rng, axis.output, order)) for axis in (program.x, program.y))
+    return replace(program, x=x, y=y)
 
 
 def long_play(name: str, samples: int, seed: int = 0, order: int = 0) -> Script:

@@ -1,7 +1,7 @@
 """Programs with a slow part for tests: smooth ones, whose lines take runs, and wild ones of any words."""
 
 import numpy as np
-from c_scripts import long_program, step_about, within_limits
+from c_scripts import any_shaping, long_program, step_about, within_limits
 from numpy.random import Generator
 from replacing import replace
 
@@ -80,3 +80,14 @@ def scan_program(
         return frame_program(rng, long_program(rng, replace(shape, **as_x), "x", schedule), schedule.lines, kind)
 
     return ScanProgram(axis("x"), axis("y"), schedule)
+
+
+def shaped_scan(rng: Generator, program: ScanProgram) -> ScanProgram:
+    """The program with any shaping of both axes, off too."""
+
+    def one(axis: AxisProgram) -> AxisProgram:
+        if isinstance(axis, FrameProgram):
+            return replace(axis, fast=one(axis.fast))
+        return replace(axis, output=any_shaping(rng, axis.output))
+
+    return replace(program, x=one(program.x), y=one(program.y))

@@ -17,12 +17,11 @@ from c_library import (
     BAD_SLOW_PART,
     LOADED,
     Library,
-    ShapedSlowCProgram,
     Twin,
     compile_library,
 )
 from c_scripts import long_dual
-from frame_programs import scan_program
+from frame_programs import scan_program, shaped_scan
 from limits import limit
 from programs import random_schedule
 from replacing import replace
@@ -34,6 +33,7 @@ from tablegen.device.dual_program import ScanProgram
 from tablegen.device.sequencer import can_keep
 from tablegen.fixedpoint.frame_program import FrameProgram, Knots
 from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.shaping import Shaping
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 SLOW = ("-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1")
@@ -44,7 +44,10 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "short_spline": ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SPLINE=1"),
     "shaping": ("-DDAC_SHAPING=3",),
     "short_shaping": ("-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"),
+    "spline_shaping": ("-DDAC_SHAPING=3", "-DDAC_SPLINE=1"),
+    "few_spline_shaping": ("-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0", "-DDAC_FEW_REGISTERS=1", "-DDAC_SPLINE=1"),
     "wide": ("-DDAC_SPLINE=1",),
+    "wide_shaping": ("-DDAC_SHAPING=3", "-DDAC_SPLINE=1"),
 }
 TICKS, LINES = 90, 5
 LONG_TICKS = 700  # of lines with many runs
@@ -54,7 +57,7 @@ WIDE = (SequencerShape(20, 1, 6, 24, 3, 5, 21), SequencerShape(24, 3, 4, 20, 1, 
 
 
 def shapes(option: str) -> tuple[SequencerShape, ...]:
-    if option == "wide":
+    if "wide" in option:
         return WIDE
     return LINEAR + (CUBIC if "spline" in option else ())
 
@@ -74,6 +77,8 @@ def programs(option: str) -> list[ScanProgram]:
         for ticks, lines in ((60, LINES), (TICKS, 3), (1, 7), (8, 1), (LONG_TICKS, 2)):
             schedule = replace(random_schedule(rng, ticks, 1), lines=lines)
             made.append(scan_program(rng, shape, schedule, "xy"))
+    if "shaping" in option:
+        made = [shaped_scan(rng, each) for each in made]
     return [replace(each, schedule=replace(each.schedule, settle_lines=int(rng.integers(0, 3)))) for each in made]
 
 
@@ -95,7 +100,7 @@ def library_of(path: Path) -> Library:
 
 
 def compiled(folder: Path, option: str, **how: object) -> Path:
-    bits = 32 if option == "wide" else 16
+    bits = 32 if "wide" in option else 16
     more = [*SLOW, *OPTIONS[option]]
     return compile_library(folder / f"{option}.so", bits, bits, 2, more=more, **how)  # type: ignore[arg-type]
 
@@ -135,7 +140,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("option", common(("plain", "short_spline"), OPTIONS))
+@pytest.mark.parametrize("option", common(("plain", "short_spline", "few_spline_shaping"), OPTIONS))
 def test_slow_parts_equal_the_model(option: str, folder: Path) -> None:
     library = library_of(compiled(folder, option))
     seen = Counter[str]()
@@ -192,11 +197,24 @@ def even_waves(option: str, seed: int) -> ScanProgram:
         )
         gains = replace(axis.gains, words=np.linspace(20000, 24000, len(axis.gains.words)).astype(np.int64))
         top = (1 << fast.output.dac_bits) - 1
-        output = replace(fast.output, code_min=0, code_max=top, max_step=top // 32, park_code=top // 2)
+        order = 1 + (seed + number) % 3 if "shaping" in option else 0
+        shaping = Shaping(order, 100 if order == 3 else 0)
+        output = replace(fast.output, code_min=0, code_max=top, max_step=top // 32, park_code=top // 2, shaping=shaping)
         return replace(axis, fast=replace(fast, words=words, output=output), slow=slow, gains=gains)
 
     axes = [free(axis, number) for number, axis in enumerate((program.x, program.y)) if isinstance(axis, FrameProgram)]
     return replace(program, x=axes[0], y=axes[1])
+
+
+def without_ramps(program: ScanProgram) -> ScanProgram:
+    """The program with a slow part of x and y that stands still."""
+
+    def still(axis: FrameProgram) -> FrameProgram:
+        return replace(axis, slow=replace(axis.slow, gain_word=0))
+
+    assert isinstance(program.x, FrameProgram)
+    assert isinstance(program.y, FrameProgram)
+    return replace(program, x=still(program.x), y=still(program.y))
 
 
 def jumps() -> ScanProgram:
@@ -395,13 +413,6 @@ def test_tables_and_outputs_without_a_slow_part_are_refused(plain: Library, fold
     assert loading.loads() == BAD_SLOW_PART, "one memory for both"
     y_part.second = None
     assert loading.loads() == LOADED
-    shaping = Loading(library_of(compiled(folder / "loading", "shaping")), LINEAR[0])
-    assert isinstance(shaping.program, ShapedSlowCProgram)
-    for shaped in (shaping.program.x, shaping.program.y):
-        shaped.shaping_order = 1
-        assert shaping.loads() == BAD_SLOW_PART
-        shaped.shaping_order = 0
-        assert shaping.loads() == LOADED
 
 
 @pytest.mark.common
@@ -436,7 +447,7 @@ WINDOW = """        if (out_of_window >> bank->run_bits != 0)
     return done;
 }
 
-/* Writes"""
+#if DAC_SHAPING"""
 MUTANTS = {
     "a line is never prepared": ("    s->line_due = false;\n    dac_slow", "    return;\n    dac_slow"),
     "only the first line is prepared": (DUE, "    if (bank"),
@@ -465,10 +476,50 @@ MUTANTS = {
     "a chunk begins with the ramp of the last one": ("        rise += CHUNK * bank->ramp;\n", ""),
     "runs without a window": (WINDOW, WINDOW.replace("if (out_of_window >> bank->run_bits != 0)", "if (false)")),
 }
+FED = "            out_of_window |= fed;\n            code = (fed >> bits)"
+SHAPED_WINDOW = WINDOW.replace("out_of_window >> bank", "out_of_window >> bits >> bank").replace(
+    "axis->code = code", "axis->shaper = shaper;\n        axis->code = (int32_t)code"
+)
+SHAPED_WINDOW = SHAPED_WINDOW[: SHAPED_WINDOW.index("\n\n#if")]
+SHAPED_MUTANTS = {
+    "shaped steps have no ramp": ("    sum += axis->rise;\n", ""),
+    "shaped runs begin without what the ramp has added": ("(bank->gain_q - 1u)) + rise;", "(bank->gain_q - 1u));"),
+    "shaped runs have no ramp": (f"            offset += ramp;\n{FED}", FED),
+    "shaped runs round the sum": (
+        "int64_t offset = bank->offset - ((int64_t)1 << (bank->gain_q - 1u)) + rise;",
+        "int64_t offset = bank->offset + rise;",
+    ),
+    "remainders are lost at the end of a block": (SHAPED_WINDOW, SHAPED_WINDOW.replace("axis->shaper = shaper;", "")),
+    "remainders of a refused block are kept": (
+        SHAPED_WINDOW,
+        SHAPED_WINDOW.replace("axis->shaper = shaper;", "").replace("  if (out", "axis->shaper = shaper; if (out"),
+    ),
+    "shaped runs without a window": (
+        SHAPED_WINDOW,
+        SHAPED_WINDOW.replace("out_of_window >> bits >> bank->run_bits != 0", "false"),
+    ),
+    "shaped lines without a ramp have the gain of the axis": (
+        "(bank)->ramp != 0 || ((bank)->slow != NULL && (bank)->order != 0) ? dac_slow_play",
+        "(bank)->ramp != 0 ? dac_slow_play",
+    ),
+}
+SHORT_SHAPED_MUTANTS = {
+    "short shaped runs have the gain of the axis": ("    bank->run_gain = bank->gain * (INT32_C(1) << up);\n", ""),
+    "short shaped runs have the offset of the axis": (
+        "    bank->run_offset = (bank->offset - ((int64_t)1 << (bank->gain_q - 1u))) * ((int64_t)1 << up);\n",
+        "",
+    ),
+    "short shaped runs have no ramp": ("    bank->run_ramp = bank->ramp * ((int64_t)1 << up);\n", ""),
+    "short shaped runs begin with a small ramp": ("axis->rise * (INT64_C(1) << up)", "axis->rise"),
+    "the spread is that of the unshaped gain": (" : bank->gain) << up; gain", " : bank->gain); gain"),
+}
 SHORT_MUTANTS = {
     "a ramp is added twice": ("        b->rest += b->ramp;", "        b->rest += 2 * b->ramp;"),
-    "a block begins with the ramp of the last one": ("            offset += bank->ramp * (int64_t)length;\n", ""),
-    "runs begin without what the ramp has added": ("    if (kind.ramps)\n        offset += axis->rise;\n", ""),
+    "a block begins with the ramp of the last one": ("            offset += ramp * (int64_t)length;\n", ""),
+    "runs begin without what the ramp has added": (
+        "    if (kind.ramps)\n        offset += axis->rise * (INT64_C(1) << up);\n",
+        "",
+    ),
     "the spread is that of the axis": ("    bank->run_spread = spread > 19 ? 19 : spread;\n", ""),
 }
 _FORK = get_context("fork")
@@ -484,6 +535,7 @@ def differs(path: Path, option: str) -> bool:
         try:
             for seed in range(3):
                 play_fills(library, even_waves(option, seed), 9000)
+            play_fills(library, without_ramps(even_waves(option, 3)), 9000)
             play_fills(library, jumps(), 5000)
             for seed in range(16):
                 play(library, option, seed)
@@ -500,15 +552,20 @@ def differs(path: Path, option: str) -> bool:
 @pytest.mark.rest
 @pytest.mark.parametrize(
     ("option", "breaks"),
-    [*(("plain", breaks) for breaks in MUTANTS), *(("short", breaks) for breaks in SHORT_MUTANTS)],
+    [
+        *(("plain", breaks) for breaks in MUTANTS),
+        *(("short", breaks) for breaks in SHORT_MUTANTS),
+        *(("shaping", breaks) for breaks in SHAPED_MUTANTS),
+        *(("short_shaping", breaks) for breaks in SHORT_SHAPED_MUTANTS),
+    ],
 )
 def test_every_mutant_is_found(option: str, breaks: str, tmp_path: Path) -> None:
-    old, new = (MUTANTS | SHORT_MUTANTS)[breaks]
+    old, new = (MUTANTS | SHORT_MUTANTS | SHAPED_MUTANTS | SHORT_SHAPED_MUTANTS)[breaks]
     runtime = runtime_with({old: new}, tmp_path / "mutant")
     assert differs(compiled(tmp_path, option, runtime=runtime), option)
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("option", ["plain", "short"])
+@pytest.mark.parametrize("option", ["plain", "short", "shaping", "short_shaping"])
 def test_the_runtime_as_it_is_does_not_differ(option: str, tmp_path: Path) -> None:
     assert not differs(compiled(tmp_path, option), option)

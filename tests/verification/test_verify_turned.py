@@ -71,6 +71,20 @@ def test_a_build_is_verified(build: Path) -> None:
     assert all(int(check.compared.split()[0]) > ticks for check in report.checks[-2:])
 
 
+@pytest.mark.common
+@pytest.mark.parametrize("shaping", ["first", "second"])
+def test_a_shaped_build_is_verified(shaping: str, tmp_path: Path) -> None:
+    """And without its order of shaping the C is refused."""
+    edits = ("timing.lines = 16", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400")
+    build_turned(turned_setup(tmp_path, 30.0, *edits, "dac.bits = 14", f"dac.shaping = '{shaping}'"), tmp_path / "out")
+    assert verify(tmp_path / "out").failures == []
+    order = read_turned(tmp_path / "out").program.y.output.shaping.order
+    assert order == {"first": 1, "second": 2}[shaping]
+    header = tmp_path / "out" / f"{NAME}.h"
+    header.write_text(header.read_text("ascii").replace(f"_Y_SHAPING_ORDER {order}", "_Y_SHAPING_ORDER 0"), "ascii")
+    assert any(failure.startswith("c, ") for failure in verify(tmp_path / "out").failures)
+
+
 def test_files_alone(build: Path) -> None:
     report = verify(build, "files")
     assert report.failures == []
