@@ -37,6 +37,7 @@ class Request(IntEnum):
     SELECT = 16
     CONFIRM = 17
     DELETE = 18
+    MOVE = 19
 
 
 class Reason(IntEnum):
@@ -78,6 +79,7 @@ class Reason(IntEnum):
     GENERATION = 34
     TRIAL = 35
     FLASH = 36
+    SLOW_PART = 38
 
 
 class Feature(IntFlag):
@@ -130,7 +132,8 @@ class Upload(IntEnum):
     WAITING = 3
 
 
-PERMITS = 1  # bit of Status.flags
+PERMITS = 1  # bits of Status.flags
+MOVED = 2
 NO_SLOT = 255  # the program of the firmware, or no trial
 STORES_WHILE_PLAYING = 1  # bit of StoreStatus.flags
 
@@ -304,6 +307,11 @@ class DeviceStatus:
         """True if the interlock permits a scan, or there is none."""
         return bool(self.flags & PERMITS)
 
+    @property
+    def moved(self) -> bool:
+        """True if MOVE has changed words of the program that plays, so that no plan is its own; ``hash`` is 0 then."""
+        return bool(self.flags & MOVED)
+
     def pack(self) -> bytes:
         """Return the answer to STATUS."""
         return self.LAYOUT.pack(
@@ -419,6 +427,39 @@ class StoreStatus(_Struct):
     content: int
     flags: int
     room: int
+
+
+@dataclass(frozen=True, slots=True)
+class AxisWords:
+    """The words of an axis that MOVE replaces: the gain, and the offset with the fraction bits of the program."""
+
+    gain_word: int
+    offset_word: int
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """The payload of MOVE (28 bytes): new gain and offset words of the program ``generation``, whose tables stay.
+
+    Those of an axis are as words 3 to 5 of its page.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<IiIiiIi")
+    LOW_BITS: ClassVar[int] = 18  # of an offset, as in tablegen.device.registers, which imports numpy
+
+    generation: int
+    x: AxisWords
+    y: AxisWords
+
+    def pack(self) -> bytes:
+        """Return the payload of MOVE without its tag."""
+        mask = (1 << self.LOW_BITS) - 1
+        words = [
+            word
+            for axis in (self.x, self.y)
+            for word in (axis.gain_word, axis.offset_word & mask, axis.offset_word >> self.LOW_BITS)
+        ]
+        return self.LAYOUT.pack(self.generation, *words)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,10 +35,15 @@ def replay_of(device: HostDevice, heard: bytes) -> Replay:
 
 
 def random_replay(
-    shape: SequencerShape, seed: int, keyed: bool = False, modes: bool = False, store: bool = False
+    shape: SequencerShape,
+    seed: int,
+    keyed: bool = False,
+    modes: bool = False,
+    store: bool = False,
+    moves: bool = False,
 ) -> Replay:
-    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, or kept programs."""
-    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, store=store, modes=modes)
+    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, kept programs, moves."""
+    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, store=store, modes=modes, moves=moves)
     dialogue.play(STEPS)
     return replay_of(dialogue.device, bytes(dialogue.heard))
 
