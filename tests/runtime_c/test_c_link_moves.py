@@ -87,9 +87,7 @@ def test_random_dialogues_of_other_devices_are_those_of_the_model(name: str, sto
             Dialogue(SHAPES[name], seed, key, store=store, moves=True).play(STEPS)
 
 
-@pytest.mark.parametrize(
-    "moves", [pytest.param(300, marks=pytest.mark.common), pytest.param(100_000, marks=LONG_TEST)]
-)
+@pytest.mark.parametrize("moves", [pytest.param(300, marks=pytest.mark.common), pytest.param(100_000, marks=LONG_TEST)])
 def test_every_line_of_a_scan_that_is_moved_is_whole_and_within_its_limits(moves: int) -> None:
     scan = _scan(1)
     scan.play(moves)
