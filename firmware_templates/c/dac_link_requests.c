@@ -116,7 +116,7 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     a->length = DEVICE + STATUS;
     put_device(l, a->payload);
     put_status(l, a->payload + DEVICE);
-#if FURTHER
+#if FURTHER != 0
     dac_link_put(a->payload + DEVICE + STATUS, FURTHER);
     a->length = DEVICE + STATUS + 4;
 #endif

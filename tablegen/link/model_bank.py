@@ -251,17 +251,17 @@ class Bank:
             raise RequestRefused(Reason.READBACK)
         if generation != self._player.swaps:
             raise RequestRefused(Reason.GENERATION, self._player.swaps)
-        words = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", active.image)
+        playing = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", active.image)
         for axis in range(2):
-            if words[PAGE_WORDS * (axis + 1) + _SLOW_WORD]:
+            if playing[PAGE_WORDS * (axis + 1) + _SLOW_WORD]:
                 raise RequestRefused(Reason.SLOW_PART, axis)
         if not permits:
             raise RequestRefused(Reason.INTERLOCK)
         data = bytearray(active.image)
         for axis in range(2):
             at = 4 * (PAGE_WORDS * (axis + 1) + AXIS_WORDS.index("gain"))
-            given = 4 + _MOVED_BYTES * axis
-            data[at : at + _MOVED_BYTES] = payload[given : given + _MOVED_BYTES]
+            words = payload[4 + _MOVED_BYTES * axis :]
+            data[at : at + _MOVED_BYTES] = words[:_MOVED_BYTES]
         self.move = IncomingUpload(replace(active.info, hash=bytes(HASH_BYTES)), b"", data, Upload.CHECKING)
         return self.move
 

@@ -22,6 +22,7 @@ from tablegen.link.messages import REFUSAL, AxisWords, Move, Reason, Refusal, Re
 from tablegen.verification.play.stream import FLAGS
 
 BOOT, SCAN = (make_scan(seed, ticks=40, lines=5) for seed in (1, 3))  # y of both in steps
+_BIT = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 _RECORD = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1")])
 _REFUSED = {Reason.OUTPUT, Reason.RANGE, Reason.SLEW, Reason.JUMP}  # what the random words may be refused for
 
@@ -81,9 +82,18 @@ class MovedLines:
 
     def _play(self, ticks: int) -> NDArray[Any]:
         records = np.zeros(ticks, dtype=_RECORD)
-        for k in range(ticks):
-            tick = self._sequencer.step()
-            records[k] = tick.x, tick.y, sum(1 << bit for bit, name in enumerate(FLAGS) if getattr(tick, name))
+        tick = self._sequencer.step()  # with the swap, if there is one
+        records[0] = tick.x, tick.y, sum(bit for name, bit in _BIT.items() if getattr(tick, name))
+        at = 1
+        while at < ticks:
+            ahead = self._sequencer.ahead(ticks - at)
+            assert ahead is not None
+            played, _ = ahead
+            part = records[at : at + len(played.x)]
+            part["x"], part["y"], part["markers"] = played.x, played.y, _BIT["playing"]
+            for name in ("line", "frame", "pixel", "backward", "valid"):
+                part["markers"] |= np.where(getattr(played, name), _BIT[name], 0).astype(np.uint8)
+            at += len(part)
         return records
 
     def _check_codes(self, records: NDArray[Any]) -> None:

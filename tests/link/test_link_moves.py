@@ -5,6 +5,7 @@ import struct
 import pytest
 from client_line import VirtualLine
 from client_rig import KEY, Watched, client, model
+from line_log import PlayedLine, WrongLine
 from link_programs import INFO, make_scan
 from moved_scans import BOOT as OTHER_BOOT
 from moved_scans import MovedScan, moved
@@ -148,6 +149,25 @@ class _Moving:
         """Those that ended since the last call."""
         lines, self._log.lines = self._log.lines, []
         return [(one.generation, one.line, one.ticks, one.crc, one.markers, one.faults) for one in lines]
+
+
+@pytest.mark.parametrize("change", [{"crc": 1}, {"line": 4}, {"generation": 1}, {"ticks": 3}])
+def test_a_line_that_cannot_be_is_noticed(change: dict[str, int]) -> None:
+    """The control of the check below: of a good log one field of one line is changed."""
+    lines = []
+
+    class Noted(_Moving):
+        def lines(self) -> list[tuple[int, ...]]:
+            lines.extend(super().lines())
+            return []
+
+    scan = MovedScan(Noted(), 2)
+    scan.play(30)
+    log = [PlayedLine(*line) for line in lines]
+    scan.check.follow(log[:5])
+    ((name, by),) = change.items()
+    with pytest.raises((WrongLine, KeyError)):
+        scan.check.follow([replace(log[5], **{name: getattr(log[5], name) ^ by})])
 
 
 @pytest.mark.parametrize(
