@@ -7,7 +7,7 @@ from pathlib import Path
 
 from building import run_clean, tool
 from limits import ENDED, within
-from link_device import HERE, LINES, HostDevice
+from link_device import HERE, LINES, HostDevice, Line
 from link_random import KEY, Dialogue
 
 from tablegen.base.resources import c_link, c_runtime, c_store
@@ -27,10 +27,15 @@ class Replay:
     lines: tuple[str, ...]
 
 
+def line_text(line: Line) -> str:
+    """A line that was played, as a replay prints it."""
+    return f"{line.generation} {line.line} {line.ticks} {line.crc:08x} {line.markers:02x} {line.faults:02x}"
+
+
 def replay_of(device: HostDevice, heard: bytes) -> Replay:
     """Of a device that took notes from its start."""
     assert device.notes is not None
-    lines = [f"{one[0]} {one[1]} {one[2]} {one.crc:08x} {one.markers:02x} {one.faults:02x}" for one in device.lines()]
+    lines = [line_text(line) for line in device.lines()]
     return Replay(8 * device.library.word_bytes, "\n".join(device.notes) + "\n", heard.hex(), tuple(lines))
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from link_device import DeviceLibrary, HostDevice, compile_device
+from link_device import DeviceLibrary, HostDevice, Line, compile_device
 from link_images import resealed
 from link_random import KEY, Dialogue, Differs
+from link_replay import Replay, compile_replay, differs, line_text
 from link_talk import Talk
 from moved_scans import BOOT, SCAN, MovedScan
 from sets import LONG_TEST
@@ -95,6 +96,43 @@ def test_every_line_of_a_scan_that_is_moved_is_whole_and_within_its_limits(moves
     assert scan.seen["RANGE"] > 0
     assert scan.seen["BUSY"] > 0
     assert scan.check.lines > moves // 2
+
+
+class _Noted:
+    """A device that takes notes, with all that it has sent and played."""
+
+    def __init__(self) -> None:
+        self.device = HostDevice(BOOT.program, BOOT.program, moves=True)
+        self.device.take_notes()
+        self.heard, self.played = bytearray(), []  # type: ignore[var-annotated]
+        self.receive, self.tick = self.device.receive, self.device.tick
+
+    def transmit(self) -> bytes:
+        """Bytes to the host."""
+        sent = self.device.transmit()
+        self.heard += sent
+        return sent
+
+    def lines(self) -> list[Line]:
+        """The lines that ended since the last call."""
+        lines = self.device.lines()
+        self.played += lines
+        return lines
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("moves", [2000, pytest.param(100_000, marks=LONG_TEST)])
+def test_the_same_moves_on_another_processor(moves: int, tmp_path: Path) -> None:
+    """A big-endian one of 32 bits, in QEMU: the same bytes and the same lines, of which each was checked here."""
+    noted = _Noted()
+    scan = MovedScan(noted, 3)
+    scan.play(moves)
+    lines = [line_text(line) for line in noted.played]
+    assert noted.device.notes is not None
+    replay = Replay(16, "\n".join(noted.device.notes) + "\n", noted.heard.hex(), tuple(lines))
+    options = ("-std=c99", "-O2", "-static", "-DDAC_MOVE=1")
+    program = compile_replay(tmp_path / "replay", 16, ("mips-linux-gnu-gcc",), options)
+    assert differs(program, replay, "qemu-mips") is None
 
 
 def _try_all(library: DeviceLibrary) -> None:
