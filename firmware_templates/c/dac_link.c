@@ -103,16 +103,32 @@ static uint8_t next_byte(dac_link *l)
 
 /* Requests. */
 
-#if DAC_STORE
+#if DAC_STORE || DAC_MOVE
 typedef uint32_t request_set;
-#define KNOWN DAC_LINK_DELETE /* the last request */
-#define TAGGED (TAGGED_ALWAYS | UINT32_C(1) << DAC_LINK_SAVE | UINT32_C(1) << DAC_LINK_SELECT \
-                | UINT32_C(1) << DAC_LINK_CONFIRM | UINT32_C(1) << DAC_LINK_DELETE)
 #else
 typedef unsigned request_set;
-#define KNOWN DAC_LINK_LIMITS
-#define TAGGED TAGGED_ALWAYS
 #endif
+#if DAC_MOVE
+#define KNOWN DAC_LINK_MOVE /* the last request */
+#define ABOUT_KEPT(request) ((request) > DAC_LINK_LIMITS && (request) < DAC_LINK_MOVE)
+#elif DAC_STORE
+#define KNOWN DAC_LINK_DELETE
+#define ABOUT_KEPT(request) ((request) > DAC_LINK_LIMITS)
+#else
+#define KNOWN DAC_LINK_LIMITS
+#endif
+#if DAC_STORE
+#define TAGGED_STORE (UINT32_C(1) << DAC_LINK_SAVE | UINT32_C(1) << DAC_LINK_SELECT \
+                      | UINT32_C(1) << DAC_LINK_CONFIRM | UINT32_C(1) << DAC_LINK_DELETE)
+#else
+#define TAGGED_STORE 0u
+#endif
+#if DAC_MOVE
+#define TAGGED_MOVE (UINT32_C(1) << DAC_LINK_MOVE)
+#else
+#define TAGGED_MOVE 0u
+#endif
+#define TAGGED (TAGGED_ALWAYS | TAGGED_STORE | TAGGED_MOVE)
 #define TAGGED_ALWAYS (1u << DAC_LINK_COMMIT | 1u << DAC_LINK_PARK | 1u << DAC_LINK_ARM | 1u << DAC_LINK_TRIGGER \
                        | 1u << DAC_LINK_CLEAR | 1u << DAC_LINK_LIMITS)
 
@@ -145,6 +161,10 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
         return 2;
     case DAC_LINK_SAVE:
         return 5;
+#endif
+#if DAC_MOVE
+    case DAC_LINK_MOVE:
+        return DAC_LINK_MOVE_BYTES;
 #endif
     default:
         return 0;
@@ -233,6 +253,10 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
     case DAC_LINK_DELETE:
         return dac_link_delete(l, payload);
 #endif
+#if DAC_MOVE
+    case DAC_LINK_MOVE:
+        return dac_link_move(l, payload, a);
+#endif
     default:
         return dac_link_set_limits(l, payload, length, a);
     }
@@ -249,7 +273,10 @@ static dac_link_finding admit(dac_link *l, const uint8_t *frame, uint8_t length,
         || (request == DAC_LINK_CHALLENGE && l->config->key_bytes == 0))
         return dac_link_because(DAC_LINK_TYPE, 0);
 #if DAC_STORE
-    if (request > DAC_LINK_LIMITS && l->config->store == NULL)
+    if (ABOUT_KEPT(request) && l->config->store == NULL)
+        return dac_link_because(DAC_LINK_TYPE, 0);
+#elif DAC_MOVE
+    if (ABOUT_KEPT(request))
         return dac_link_because(DAC_LINK_TYPE, 0);
 #endif
     const dac_link_finding found = check_payload(l, request, frame + DAC_LINK_HEADER, length);

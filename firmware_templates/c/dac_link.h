@@ -150,7 +150,7 @@ typedef struct {
     uint32_t taken_generation, taken_line; /* when the program became active */
     dac_link_place place;
     dac_link_part x_part, y_part;
-    dac_link_image image[2];
+    dac_link_image image[DAC_MOVE ? 3 : 2]; /* the third is that of a MOVE, with the tables that play */
 
     /* a COMMIT in progress, and ABORTs that wait with it */
     bool committing, commit_is_last, commit_due, abort_is_last, aborts_due;
@@ -169,6 +169,11 @@ typedef struct {
     uint32_t challenges, challenged_at; /* how many, and milliseconds() of the last one */
     uint8_t nonce[16], commit_nonce[16], commit_tag[16];
     dac_link_mac digest;
+
+#if DAC_MOVE
+    bool moving, moved;    /* a MOVE is checked or waits; the program that plays was moved */
+    uint8_t upload_before; /* `upload` without the MOVE */
+#endif
 
 #if DAC_STORE
     bool loading;               /* a kept program is checked or waits: it has no tag, and no COMMIT to be answered */

@@ -450,6 +450,10 @@ static bool good_tag(dac_link *l)
     if (l->loading)
         return true;
 #endif
+#if DAC_MOVE
+    if (l->moving)
+        return true;
+#endif
     request[0] = DAC_LINK_COMMIT;
     request[1] = l->commit_seq;
     dac_link_put(request + 2, l->commit_session);
@@ -471,6 +475,12 @@ static dac_link_finding check(dac_link *l, bool *done)
 
     switch (l->check.stage) {
     case CRC:
+#if DAC_MOVE
+        if (l->moving) { /* nothing was received, and its tag has been checked */
+            *done = true;
+            return nothing;
+        }
+#endif
         return check_crc(l, done);
     case PROGRAM:
         *done = true;
@@ -506,6 +516,10 @@ dac_link_finding dac_link_check_work(dac_link *l, bool *passed)
     } else {
         c->axis = 0;
         c->stage++;
+#if DAC_MOVE
+        if (l->moving && c->stage == FOURIER) /* its tables have been rendered and checked */
+            c->stage = RANGE;
+#endif
     }
     c->at = 0;
     c->phase = c->remainder = 0;

@@ -177,7 +177,7 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
         dac_axis_program *const a = axis == 0 ? &p->x : &p->y;
         const unsigned page = axis + 1, guard = shape[1] > 21 ? 25u - shape[1] : 4u;
         const bool held = axis == 1 && dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) != 0;
-        a->table = here->table[l->idle];
+        a->table = here->table[dac_link_tables(l)];
         a->length = dac_link_table_words(image, axis);
         a->storage_bits = DAC_TABLE_STORAGE_BITS;
         a->bits = shape[1];

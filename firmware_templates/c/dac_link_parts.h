@@ -6,7 +6,8 @@
 
 enum { DAC_LINK_HELLO = 1, DAC_LINK_BEGIN, DAC_LINK_DATA, DAC_LINK_COMMIT, DAC_LINK_ABORT, DAC_LINK_STATUS,
        DAC_LINK_READ, DAC_LINK_PARK, DAC_LINK_ARM, DAC_LINK_TRIGGER, DAC_LINK_CLEAR, DAC_LINK_CHALLENGE,
-       DAC_LINK_LIMITS, DAC_LINK_SLOT, DAC_LINK_SAVE, DAC_LINK_SELECT, DAC_LINK_CONFIRM, DAC_LINK_DELETE };
+       DAC_LINK_LIMITS, DAC_LINK_SLOT, DAC_LINK_SAVE, DAC_LINK_SELECT, DAC_LINK_CONFIRM, DAC_LINK_DELETE,
+       DAC_LINK_MOVE };
 enum { DAC_LINK_ANSWER = 0x80, DAC_LINK_REFUSAL = 0xFF };
 
 /* Why a request is refused; docs/protocol.md, "Reasons". */
@@ -47,7 +48,8 @@ enum {
     DAC_LINK_NOT_PARKED,
     DAC_LINK_GENERATION,
     DAC_LINK_NO_TRIAL,
-    DAC_LINK_FLASH
+    DAC_LINK_FLASH,
+    DAC_LINK_SLOW_PART = 38
 };
 
 typedef struct {
@@ -103,7 +105,7 @@ enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LIN
        DAC_LINK_BACKWARD = 6, DAC_LINK_UP = 8, DAC_LINK_DOWN = 10, DAC_LINK_PIXELS = 12, DAC_LINK_Y_STEPS };
 enum { DAC_LINK_PHASE_STEP, DAC_LINK_PHASE_REMAINDER, DAC_LINK_PHASE_PERIOD, DAC_LINK_GAIN, DAC_LINK_OFFSET_LOW,
        DAC_LINK_OFFSET_HIGH, DAC_LINK_CODE_MIN, DAC_LINK_CODE_MAX, DAC_LINK_MAX_STEP, DAC_LINK_PARK_CODE,
-       DAC_LINK_ORDER, DAC_LINK_SHAPING_WORD };
+       DAC_LINK_ORDER, DAC_LINK_SHAPING_WORD, DAC_LINK_SLOW_WORD };
 
 static inline bool dac_link_permits(const dac_link *l)
 {
@@ -113,6 +115,16 @@ static inline bool dac_link_permits(const dac_link *l)
 static inline const dac_link_axis *dac_link_axis_of(const dac_link *l, unsigned axis)
 {
     return axis == 0 ? &l->config->x : &l->config->y;
+}
+
+/* Which of the two tables the image has that is received or checked. */
+static inline uint8_t dac_link_tables(const dac_link *l)
+{
+#if DAC_MOVE
+    return l->moving ? l->playing : l->idle;
+#else
+    return l->idle;
+#endif
 }
 
 /* A program word: page 0 is the scan's, 1 and 2 are those of x and y. */
@@ -208,6 +220,18 @@ dac_link_finding dac_link_abort(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_readback(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
 dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+
+#if DAC_MOVE
+/* dac_link_move.c */
+#define DAC_LINK_MOVE_BYTES 28 /* generation; gain, offset low and high of x, then of y */
+dac_link_finding dac_link_move(dac_link *l, const uint8_t *payload, dac_link_answer *a);
+
+/* The sequencer plays the moved program. */
+void dac_link_take_move(dac_link *l);
+
+/* The MOVE in progress has an answer; the upload is as it was, or forgotten if the MOVE was withdrawn. */
+void dac_link_end_move(dac_link *l, bool withdrawn);
+#endif
 
 #if DAC_STORE
 /* dac_link_kept.c */

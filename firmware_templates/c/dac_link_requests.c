@@ -11,6 +11,10 @@ enum { ALWAYS = TAKES_TABLES | READS_BACK | NARROWS };
 #if DAC_STORE
 enum { KEEPS_PROGRAMS = 128 };
 #endif
+#define FURTHER (DAC_MOVE ? 2u : 0u) /* further features, by the options; HELLO ends with them if there are any */
+#if DAC_MOVE
+enum { MOVED = 2 }; /* behind PERMITS */
+#endif
 enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
 enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
 
@@ -64,18 +68,34 @@ static void put_status(const dac_link *l, uint8_t *at)
     /* A program may have become active before dac_link_work() has seen it. */
     const bool swapped = l->upload == DAC_LINK_WAITING && s.swaps != l->swaps;
     const bool uploaded = swapped || l->uploaded;
+#if DAC_MOVE
+    /* A MOVE leaves an upload as it is, which STATUS has again once the MOVE is done. */
+    const uint8_t after = l->moving ? l->upload_before : (uint8_t)DAC_LINK_NONE;
+    const uint8_t upload = swapped ? after : l->upload;
+    const uint8_t received = l->moving && !swapped ? (uint8_t)DAC_LINK_NONE : upload;
+    const uint8_t image = l->moving ? (uint8_t)(1u - l->playing) : l->idle;
+#else
     const uint8_t upload = swapped ? (uint8_t)DAC_LINK_NONE : l->upload;
+#endif
     const uint8_t *const hash = uploaded ? l->image[swapped ? l->idle : l->playing].info : l->config->hash;
 
     at[0] = s.swaps == 0 ? NO_PROGRAM : s.markers & DAC_PLAYING ? PLAYING : s.markers & DAC_PARKED ? PARKED : PARKING;
     at[1] = upload;
     at[2] = s.faults;
     at[3] = dac_link_permits(l);
+#if DAC_MOVE
+    at[3] = (uint8_t)(at[3] | ((swapped ? l->moving : l->moved) ? MOVED : 0));
+#endif
     dac_link_put(at + 4, l->boot);
     dac_link_put(at + 8, s.swaps);
     dac_link_put(at + 12, s.line);
+#if DAC_MOVE
+    dac_link_put(at + 16, received == DAC_LINK_NONE ? 0 : l->received);
+    dac_link_put(at + 20, received == DAC_LINK_NONE ? 0 : dac_link_get(l->image[image].info + DAC_LINK_IMAGE_CRC));
+#else
     dac_link_put(at + 16, upload == DAC_LINK_NONE ? 0 : l->received);
     dac_link_put(at + 20, upload == DAC_LINK_NONE ? 0 : dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC));
+#endif
     for (unsigned i = 0; i < DAC_FAULTS; i++)
         dac_link_put(at + 24 + 4 * i, s.fault_counts[i]);
     dac_link_put(at + 40, l->bad_frames);
@@ -96,6 +116,10 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     a->length = DEVICE + STATUS;
     put_device(l, a->payload);
     put_status(l, a->payload + DEVICE);
+#if FURTHER != 0
+    dac_link_put(a->payload + DEVICE + STATUS, FURTHER);
+    a->length = DEVICE + STATUS + 4;
+#endif
     return dac_link_fine();
 }
 

@@ -26,7 +26,12 @@ dac_link_finding dac_link_begin(dac_link *l, const uint8_t *info, dac_link_answe
         return dac_link_because(DAC_LINK_LENGTH, most);
     if (l->upload == DAC_LINK_NONE || !dac_link_same(info, l->image[l->idle].info, sizeof l->image[0].info)) {
         const dac_link_place start = {0, 0, 0, 0};
+#if DAC_MOVE
+        /* Not the idle bank of the sequencer: a program that was moved has changed the bank, and not the tables. */
+        l->idle = l->uploaded ? (uint8_t)(1u - l->playing) : 0;
+#else
         l->idle = (uint8_t)dac_sequencer_idle(l->sequencer);
+#endif
         dac_link_copy(l->image[l->idle].info, info, sizeof l->image[0].info);
         l->place = start;
         l->received = 0;
@@ -41,6 +46,10 @@ dac_link_finding dac_link_data(dac_link *l, const uint8_t *payload, uint8_t leng
 {
     const uint8_t count = (uint8_t)(length - 4);
 
+#if DAC_MOVE
+    if (l->moving)
+        return dac_link_because(DAC_LINK_BUSY, 0);
+#endif
     if (l->upload == DAC_LINK_NONE)
         return dac_link_because(DAC_LINK_UPLOAD, 0);
     const uint32_t bytes = dac_link_get(l->image[l->idle].info + DAC_LINK_BYTES);
@@ -67,6 +76,12 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
 {
     const uint32_t crc = dac_link_get(payload);
 
+#if DAC_MOVE
+    if (l->moving)
+        return dac_link_because(DAC_LINK_BUSY, 0);
+    if (l->upload == DAC_LINK_NONE && l->moved) /* what plays is no image that was uploaded */
+        return dac_link_because(DAC_LINK_UPLOAD, 0);
+#endif
     if (l->upload == DAC_LINK_NONE) {
         if (!l->uploaded || dac_link_get(l->image[l->playing].info + DAC_LINK_IMAGE_CRC) != crc)
             return dac_link_because(DAC_LINK_UPLOAD, 0);
@@ -127,15 +142,22 @@ static void conclude_refused(dac_link *l, dac_link_finding why)
 {
     const bool stays = why.reason == DAC_LINK_INTERLOCK || why.reason == DAC_LINK_KEY || why.reason == DAC_LINK_TICKS
                        || why.reason == DAC_LINK_KEEP;
-    uint8_t payload[6];
+    uint8_t payload[6], upload = stays ? DAC_LINK_RECEIVING : DAC_LINK_NONE, request = DAC_LINK_COMMIT;
     dac_link_answer a = {0, 0, 0, 0, payload};
 
     if (why.reason == DAC_LINK_KEY && l->commit_is_last) { /* its number is still free */
         l->last = l->before_commit;
         l->commit_is_last = false;
     }
-    dac_link_refuse(&a, DAC_LINK_COMMIT, why);
-    conclude(l, stays ? DAC_LINK_RECEIVING : DAC_LINK_NONE, a.type, payload, a.length);
+#if DAC_MOVE
+    if (l->moving) {
+        dac_link_end_move(l, why.reason == DAC_LINK_WITHDRAWN);
+        upload = l->upload;
+        request = DAC_LINK_MOVE;
+    }
+#endif
+    dac_link_refuse(&a, request, why);
+    conclude(l, upload, a.type, payload, a.length);
 }
 
 /* Commits the loaded program with the mode that was asked for. A frame that cannot go on is not restarted. */
@@ -199,13 +221,24 @@ void dac_link_settle(dac_link *l)
 
     /* Another look: if there was no swap even now, the line was one of the old program. */
     if (dac_sequencer_status(l->sequencer).swaps != l->swaps) {
-        uint8_t payload[8];
+        uint8_t payload[8], upload = DAC_LINK_NONE, request = DAC_LINK_COMMIT;
         l->taken_generation = l->swaps + 1;
         l->taken_line = l->line;
+#if DAC_MOVE
+        if (l->moving) {
+            dac_link_take_move(l);
+            upload = l->upload;
+            request = DAC_LINK_MOVE;
+        } else {
+            l->playing = l->idle;
+            l->moved = false;
+        }
+#else
         l->playing = l->idle;
+#endif
         l->uploaded = true;
         say_taken(l, payload);
-        conclude(l, DAC_LINK_NONE, DAC_LINK_COMMIT | DAC_LINK_ANSWER, payload, sizeof payload);
+        conclude(l, upload, request | DAC_LINK_ANSWER, payload, sizeof payload);
     } else if (dac_sequencer_writable(l->sequencer) && dac_sequencer_status(l->sequencer).swaps == l->swaps) {
         conclude_refused(l, dac_link_because(DAC_LINK_WITHDRAWN, 0));
     } else {

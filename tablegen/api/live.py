@@ -1,11 +1,13 @@
 """A scan that is changed while a device plays it: each change is a whole plan, checked before anything is sent."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build
+from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, words_of
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.variants import Variant, other_settings, variants
@@ -13,8 +15,10 @@ from tablegen.device.commit_mode import CommitMode
 from tablegen.device.sequencer import can_keep
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused, Unsuitable
-from tablegen.link.messages import DeviceState, Feature
+from tablegen.link.messages import AxisWords, DeviceState, Feature, More
+from tablegen.link.outcome import UploadResult
 from tablegen.link.prepare import check
+from tablegen.link.program_image import ProgramImage
 from tablegen.planning.line_plan import LinePlan, Plan
 
 _AXES = "xy"
@@ -49,7 +53,8 @@ class LiveScan:
     """The scan that a device plays, and how it came to play it.
 
     ``swap`` is the mode in which it took the place of the scan before: ``keep`` where the frame went on; None where
-    the device played it already. ``generation`` counts the programs of the device.
+    the device played it already. ``generation`` counts the programs of the device. ``preview`` is what played first,
+    None without one.
     """
 
     name: str
@@ -60,6 +65,7 @@ class LiveScan:
     lines: int
     x: LiveAxis
     y: LiveAxis
+    preview: LivePreview | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields, and those of the axes, as plain data."""
@@ -75,6 +81,21 @@ class _Scan:
     build: Build
 
 
+@dataclass(frozen=True)
+class _Playing:
+    """What the device plays by its last answer: the scan whose tables it has, their words, and the generation."""
+
+    tables: _Scan
+    words: tuple[AxisWords, AxisWords]
+    generation: int
+
+    @classmethod
+    def of_upload(cls, scan: _Scan, generation: int) -> "_Playing":
+        """Return the state after an upload."""
+        x, y = scan.build.plan.lines
+        return cls(scan, (words_of(x.program.output), words_of(y.program.output)), generation)
+
+
 class Live:
     """A scan on a device that is moved, zoomed and changed while it plays.
 
@@ -84,9 +105,18 @@ class Live:
 
     A change continues the frame if the device can (firmware with ``DAC_COMMIT_MODES``), and ticks and lines stay the
     same. Otherwise it waits for the next frame; a device without modes begins a frame at the next line.
+
+    A device with ``DAC_MOVE`` plays a preview first where the schedule stays: the tables that it has, with the gain and
+    the offset that come closest to the new plan. The plan follows at once.
     """
 
-    def __init__(self, device: Device, scan: str | Path, settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        device: Device,
+        scan: str | Path,
+        settings: Mapping[str, Any] | None = None,
+        on_preview: Callable[[LivePreview], None] | None = None,
+    ) -> None:
         """Read a scan file; nothing is sent before ``start`` or a change.
 
         Parameters
@@ -97,6 +127,8 @@ class Live:
             Scan file of one scan.
         settings
             Values by key of the scan file, such as ``{"x.size_nm": 500}``, in place of those of the file.
+        on_preview
+            Function that is called when a preview plays, before the upload of the plan.
 
         Raises
         ------
@@ -108,6 +140,9 @@ class Live:
         self._scan = self._planned(dict(settings or {}))
         self._sent: _Scan | None = None  # by an upload whose end is not known
         self._is_sent = False  # the device has taken ``_scan``
+        self._on_preview = on_preview
+        self._playing: _Playing | None = None
+        self._previewed: _Playing | None = None  # what plays if the device has taken the last MOVE
 
     @property
     def plan(self) -> Plan:
@@ -161,8 +196,12 @@ class Live:
         """Find out whether the device took the scan of an upload that ended without an answer."""
         if self._sent is None:
             return
-        if self._device.status().hash.hex() == self._sent.build.prepared.digest:
+        status, previewed = self._device.status(), self._previewed
+        if status.hash.hex() == self._sent.build.prepared.digest:
             self._scan, self._is_sent = self._sent, True
+            self._playing = _Playing.of_upload(self._sent, status.generation)
+        elif previewed is not None and status.moved and status.generation == previewed.generation:
+            self._scan, self._playing = self._sent, previewed
         self._sent = None
 
     def _send(self, live: "_Scan") -> LiveScan:
@@ -171,13 +210,14 @@ class Live:
         swap = self._swap(plan)
         check(scan, image, device.info, self._limits, swap=swap)
         try:
-            result = device.upload(image, limits=self._limits, swap=swap)
+            preview, result = self._upload(image, plan, swap)
         except (Refused, Unsuitable):
             raise
         except LinkError:
             self._sent = live
             raise
         self._scan, self._is_sent = live, True
+        self._playing = _Playing.of_upload(live, result.generation)
         return LiveScan(
             name=scan.name,
             digest=scan.digest,
@@ -187,7 +227,50 @@ class Live:
             lines=plan.schedule.lines,
             x=LiveAxis.of_plan(plan.x),
             y=LiveAxis.of_plan(plan.y),
+            preview=preview,
         )
+
+    def _upload(self, image: ProgramImage, plan: Plan, swap: CommitMode) -> tuple[LivePreview | None, UploadResult]:
+        """Move to a preview where the device can, and upload the plan; what is refused leaves the scan that plays."""
+        before = self._playing
+        preview = self._move(plan)
+        try:
+            return preview, self._device.upload(image, limits=self._limits, swap=swap)
+        except (Refused, Unsuitable):
+            if preview is not None and before is not None and self._playing is not None:
+                with suppress(LinkError):  # otherwise the preview goes on
+                    moved_back = self._device.move(*before.words, self._playing.generation)
+                    self._playing = replace(before, generation=moved_back.generation)
+            raise
+
+    def _move(self, plan: Plan) -> LivePreview | None:
+        """Play the preview of a plan that is checked; None where there is none, or the device refuses it."""
+        playing, self._previewed = self._playing, None
+        words = None if playing is None else self._preview(playing, plan)
+        if playing is None or words is None:
+            return None
+        self._previewed = replace(playing, words=(words.x, words.y), generation=playing.generation + 1)
+        try:
+            generation = self._device.move(words.x, words.y, playing.generation).generation
+        except Refused:
+            self._previewed = None
+            return None
+        self._playing = self._previewed
+        preview = LivePreview(generation, words.x_error_percent, words.y_error_percent)
+        if self._on_preview is not None:
+            self._on_preview(preview)
+        return preview
+
+    def _preview(self, playing: _Playing, plan: Plan) -> PreviewWords | None:
+        """Return the words of a preview, if the device takes moves, and accepts them and the plan behind them."""
+        info, limits, tables = self._device.info, self._limits, playing.tables.build.plan.program
+        if More.MOVE not in info.more:
+            return None
+        now = PreviewWords(*playing.words, 0.0, 0.0).program(tables)
+        words = preview_words(tables, plan.program)
+        if words is None or not is_accepted(plan.program, limits, now, info.shaping):
+            return None
+        return words if is_accepted(words.program(tables), limits, now, info.shaping) else None
 
     def _swap(self, plan: Plan) -> CommitMode:
         """Return the mode that restarts no frame, if the device has one."""

@@ -12,22 +12,24 @@ from typing import TYPE_CHECKING, Self
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.link.claims import check_length, check_limits, has_restarted, most_bytes
-from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
+from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused, Unsuitable
 from tablegen.link.kept import CHANGE_S, KeptPrograms, change_kept, read_kept, require_store
 from tablegen.link.messages import (
     DATA_BYTES,
     NO_SLOT,
     AxisLimits,
+    AxisWords,
     DeviceInfo,
     DeviceState,
     DeviceStatus,
+    Move,
     Reason,
     Request,
 )
-from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, restart_count
+from tablegen.link.outcome import MoveResult, ProgressCall, UploadResult, UploadState, restart_count
 from tablegen.link.pace import LATENCY_S, Deadline
 from tablegen.link.readback import read_back
-from tablegen.link.refusal_reasons import Limits
+from tablegen.link.refusal_reasons import Limits, lacks_move
 from tablegen.link.session import LinkSession
 from tablegen.link.transport import Opener, Transport, byte_s, open_port
 from tablegen.link.upload import Uploader
@@ -42,6 +44,8 @@ _MAX_LATE_S = 5.0  # lateness of answers that time-outs allow for
 _MAX_LATE_SUM_S = 900.0  # total lateness of the answers of a transfer that time-outs allow for
 _MAX_LINE_S = 600.0  # a device that announces a rate of 1 Hz must not hold the host for months
 _MAX_TRIES = 8  # tries that fit into a time-out when answers are late
+_MOVE_S = 60.0  # a move waits for the start of a line
+_MOVED = struct.Struct("<2I")
 _POLL_S = 0.05
 _HELLO_FRESH_S = 0.25  # a HELLO this recent is not repeated: an upload notices a change by itself
 _MAX_READINGS = 3
@@ -270,6 +274,37 @@ class Device:
             if (before.boot, before.generation) == (after.boot, after.generation):
                 return reading.image()
         raise OutOfTime("the scan changed while it was read; is another program uploading?")
+
+    def move(self, x: AxisWords, y: AxisWords, generation: int, timeout_s: float = _MOVE_S) -> MoveResult:
+        """Give the program that plays other gain and offset words; its tables stay, and the frame goes on.
+
+        Parameters
+        ----------
+        x, y
+            The words of both axes, with the fraction bits of the program.
+        generation
+            That of the program, as ``UploadResult``, ``MoveResult`` or the status has it.
+        timeout_s
+            Bound in s; a move waits for the start of a line.
+
+        Raises
+        ------
+        Unsuitable
+            If the device takes no moves (``More.MOVE``); nothing was sent.
+        Refused
+            If another program plays, or the moved one would break a limit; the device plays as before.
+        LinkLost
+            If the device is gone; the scan plays as before, or moved.
+        """
+        if why := lacks_move(self.info):
+            raise Unsuitable([why])
+        payload, tries = Move(generation, x, y).pack(), _MAX_TRIES + math.ceil(timeout_s)
+        session = self._session
+        deadline = session.now() + timeout_s
+        session.status_at = -math.inf  # the status changes
+        answer = session.act(Request.MOVE, payload, _MOVED.size, deadline, tries=tries, one_session=True)
+        check_length("MOVE", answer, _MOVED.size)
+        return MoveResult(*_MOVED.unpack_from(answer))
 
     def park(self) -> None:
         """Park: end the scan, ramp to the park codes and hold them; ``wait_for(State.PARKED)`` waits for the end."""

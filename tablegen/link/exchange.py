@@ -11,7 +11,7 @@ from tablegen.link.pace import Pace
 from tablegen.link.transport import Transport
 
 _FRAME_END = b"\0"  # in front of a frame, it ends a frame that noise began
-_ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # their answers tell nothing about the latency
+_ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT, Request.MOVE)  # their answers tell nothing about the latency
 _COUNTED_FRAMES = 40  # the last requests, of which the lost ones are counted
 _MIN_LOST_FRAMES = 4  # fewer say nothing about a line
 _MAX_ON_WAY = 255  # a seq has 8 bits

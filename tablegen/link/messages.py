@@ -37,6 +37,7 @@ class Request(IntEnum):
     SELECT = 16
     CONFIRM = 17
     DELETE = 18
+    MOVE = 19
 
 
 class Reason(IntEnum):
@@ -78,6 +79,7 @@ class Reason(IntEnum):
     GENERATION = 34
     TRIAL = 35
     FLASH = 36
+    SLOW_PART = 38
 
 
 class Feature(IntFlag):
@@ -91,6 +93,17 @@ class Feature(IntFlag):
     NARROWS = 32
     COMMIT_MODES = 64
     STORE = 128
+
+
+class More(IntFlag):
+    """The further features of a device, which HELLO has behind the status."""
+
+    SLOW_PARTS = 1
+    MOVE = 2
+    PIXEL_TABLES = 4
+
+
+NO_MORE = More(0)
 
 
 class DeviceState(IntEnum):
@@ -119,7 +132,8 @@ class Upload(IntEnum):
     WAITING = 3
 
 
-PERMITS = 1  # bit of Status.flags
+PERMITS = 1  # bits of Status.flags
+MOVED = 2
 NO_SLOT = 255  # the program of the firmware, or no trial
 STORES_WHILE_PLAYING = 1  # bit of StoreStatus.flags
 
@@ -201,9 +215,13 @@ class AxisLimits(_Struct):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """The properties of a device, fixed at its build (56 bytes); ``shaping`` is its highest order of shaped output."""
+    """The properties of a device, fixed at its build; ``shaping`` is its highest order of shaped output.
+
+    They are 56 bytes in front of the status in the answer to HELLO, and ``more`` behind it, where it is not 0.
+    """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
+    MORE: ClassVar[struct.Struct] = struct.Struct("<I")
 
     version: int
     features: Feature
@@ -218,6 +236,7 @@ class DeviceInfo:
     update_rate_hz: int
     shaping: int = 0
     degree: int = 0  # highest degree of a spline; 0 of a device that plays lines only
+    more: More = NO_MORE
 
     def pack(self) -> bytes:
         """Return the beginning of the answer to HELLO."""
@@ -225,9 +244,13 @@ class DeviceInfo:
         first = (self.version, self.features, self.window, self.data_bytes, self.harmonics, self.shaping, self.degree)
         return self.LAYOUT.pack(*first, self.image_bytes, *parts, self.update_rate_hz)
 
+    def hello(self, status: "DeviceStatus") -> bytes:
+        """Return the answer to HELLO; without further features it has the length that it had before them."""
+        return self.pack() + status.pack() + (self.MORE.pack(self.more) if self.more else b"")
+
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
-        """Read the beginning of the answer to HELLO.
+        """Read the properties from the answer to HELLO, or from its beginning.
 
         Raises
         ------
@@ -240,6 +263,8 @@ class DeviceInfo:
             payload
         )
         x, y, x_limits, y_limits = parts
+        more_at = cls.LAYOUT.size + DeviceStatus.LAYOUT.size
+        (more,) = cls.MORE.unpack_from(payload, more_at) if len(payload) >= more_at + cls.MORE.size else (0,)
         return cls(
             version,
             Feature(features),
@@ -254,6 +279,7 @@ class DeviceInfo:
             rate,
             shaping,
             degree,
+            More(more),
         )
 
 
@@ -280,6 +306,11 @@ class DeviceStatus:
     def permits(self) -> bool:
         """True if the interlock permits a scan, or there is none."""
         return bool(self.flags & PERMITS)
+
+    @property
+    def moved(self) -> bool:
+        """True if MOVE has changed words of the program that plays, so that no plan is its own; ``hash`` is 0 then."""
+        return bool(self.flags & MOVED)
 
     def pack(self) -> bytes:
         """Return the answer to STATUS."""
@@ -396,6 +427,39 @@ class StoreStatus(_Struct):
     content: int
     flags: int
     room: int
+
+
+@dataclass(frozen=True, slots=True)
+class AxisWords:
+    """The words of an axis that MOVE replaces: the gain, and the offset with the fraction bits of the program."""
+
+    gain_word: int
+    offset_word: int
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """The payload of MOVE (28 bytes): new gain and offset words of the program ``generation``, whose tables stay.
+
+    Those of an axis are as words 3 to 5 of its page.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<IiIiiIi")
+    LOW_BITS: ClassVar[int] = 18  # of an offset, as in tablegen.device.registers, which imports numpy
+
+    generation: int
+    x: AxisWords
+    y: AxisWords
+
+    def pack(self) -> bytes:
+        """Return the payload of MOVE without its tag."""
+        mask = (1 << self.LOW_BITS) - 1
+        words = [
+            word
+            for axis in (self.x, self.y)
+            for word in (axis.gain_word, axis.offset_word & mask, axis.offset_word >> self.LOW_BITS)
+        ]
+        return self.LAYOUT.pack(self.generation, *words)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,22 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
-from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
+from tablegen.link.messages import (
+    HASH_BYTES,
+    SPLINE_DEGREE,
+    AxisLimits,
+    DeviceInfo,
+    DeviceState,
+    ImageInfo,
+    Reason,
+    Upload,
+)
 from tablegen.link.players import Player
 from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, layout, make_image, take_apart
 
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table
+_MOVED_BYTES = 12  # words of an axis that MOVE replaces: the gain, and the low and the high part of the offset
+_SLOW_WORD = 12  # of a page: not 0 with a slow part
 
 
 class RequestRefused(Exception):
@@ -38,12 +49,16 @@ class IncomingUpload:
 
 @dataclass(frozen=True)
 class ActiveUpload:
-    """An upload that plays: the generation since which it does, and the last line of the old program."""
+    """An upload that plays: the generation since which it does, and the last line of the old program.
+
+    ``moved``: MOVE has changed its words since it was uploaded.
+    """
 
     info: ImageInfo
     image: bytes
     generation: int
     line: int
+    moved: bool = False
 
 
 def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
@@ -85,6 +100,7 @@ class Bank:
     def power_up(self) -> None:
         """Reset the memory to the firmware's."""
         self.incoming: IncomingUpload | None = None
+        self.move: IncomingUpload | None = None  # the image of a MOVE that is checked or waits
         self.active: ActiveUpload | None = None
         self.limits = self._info.x_limits, self._info.y_limits
         self._stage_is_whole = True
@@ -99,7 +115,7 @@ class Bank:
         """
         info = ImageInfo.unpack(payload)
         incoming = self.incoming
-        if (incoming is not None and incoming.state is not Upload.RECEIVING) or not self._player.writable:
+        if self._is_at_work() or not self._player.writable:
             raise RequestRefused(Reason.BUSY)
         self._check_announcement(info)
         if incoming is None or incoming.announcement != payload:
@@ -128,6 +144,8 @@ class Bank:
             If no upload was announced, or its program words cannot be played.
         """
         incoming = self.incoming
+        if self.move is not None:
+            raise RequestRefused(Reason.BUSY)
         if incoming is None:
             raise RequestRefused(Reason.UPLOAD)
         (offset,) = struct.unpack_from("<I", payload)
@@ -168,8 +186,10 @@ class Bank:
             If no complete upload has this CRC, or one is being checked.
         """
         incoming, active = self.incoming, self.active
+        if self.move is not None:
+            raise RequestRefused(Reason.BUSY)
         if incoming is None:
-            if active is None or active.info.image_crc != image_crc:
+            if active is None or active.moved or active.info.image_crc != image_crc:
                 raise RequestRefused(Reason.UPLOAD)
             return active
         if incoming.info.image_crc != image_crc:
@@ -194,9 +214,10 @@ class Bank:
             If the image is damaged or cannot be played within the limits.
         """
         image = bytes(incoming.data)
-        if zlib.crc32(image) != incoming.info.image_crc:
-            raise RequestRefused(Reason.IMAGE)
-        authentic(image)
+        if incoming is not self.move:  # of which nothing was received, and whose tag has been checked
+            if zlib.crc32(image) != incoming.info.image_crc:
+                raise RequestRefused(Reason.IMAGE)
+            authentic(image)
         contents = take_apart(image, incoming.info.x, incoming.info.y)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
@@ -205,10 +226,54 @@ class Bank:
         return program_of(contents, self._info.update_rate_hz)
 
     def take(self, incoming: IncomingUpload) -> None:
-        """Make an upload the current one, once the sequencer has taken its program."""
-        self.active = ActiveUpload(incoming.info, bytes(incoming.data), self._player.swaps, self._player.swapped_at)
+        """Make an upload, or a move, the current one, once the sequencer has taken its program."""
+        moved = incoming is self.move
+        generation, line = self._player.swaps, self._player.swapped_at
+        self.active = ActiveUpload(incoming.info, bytes(incoming.data), generation, line, moved)
+        if moved:
+            self.move = None
+            return
         self.incoming = None
         self._stage_is_whole = True
+
+    def begin_move(self, payload: bytes, permits: bool) -> IncomingUpload:
+        """Return the image that plays with the words of a MOVE, as something that is checked.
+
+        Raises
+        ------
+        RequestRefused
+            If another program is checked, waits or plays, or none that could be moved.
+        """
+        active, (generation,) = self.active, struct.unpack_from("<I", payload)
+        if self._is_at_work() or not self._player.writable:
+            raise RequestRefused(Reason.BUSY)
+        if active is None:
+            raise RequestRefused(Reason.READBACK)
+        if generation != self._player.swaps:
+            raise RequestRefused(Reason.GENERATION, self._player.swaps)
+        playing = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", active.image)
+        for axis in range(2):
+            if playing[PAGE_WORDS * (axis + 1) + _SLOW_WORD]:
+                raise RequestRefused(Reason.SLOW_PART, axis)
+        if not permits:
+            raise RequestRefused(Reason.INTERLOCK)
+        data = bytearray(active.image)
+        for axis in range(2):
+            at = 4 * (PAGE_WORDS * (axis + 1) + AXIS_WORDS.index("gain"))
+            words = payload[4 + _MOVED_BYTES * axis :]
+            data[at : at + _MOVED_BYTES] = words[:_MOVED_BYTES]
+        self.move = IncomingUpload(replace(active.info, hash=bytes(HASH_BYTES)), b"", data, Upload.CHECKING)
+        return self.move
+
+    def at_work(self) -> IncomingUpload | None:
+        """Return the upload or the move that is checked or waits."""
+        if self.move is not None:
+            return self.move
+        incoming = self.incoming
+        return None if incoming is None or incoming.state is Upload.RECEIVING else incoming
+
+    def _is_at_work(self) -> bool:
+        return self.at_work() is not None
 
     def load(self, image: ProgramImage) -> DualProgram:
         """Check a kept image at a start, make it the current one, and return its program.
@@ -229,7 +294,7 @@ class Bank:
 
     def put(self, image: ProgramImage) -> IncomingUpload | None:
         """Make a kept image the upload that is checked; None if it does not suit the device, or not now."""
-        if self.incoming is not None or not self._player.writable:
+        if self.incoming is not None or self._is_at_work() or not self._player.writable:
             return None
         try:
             self._check_announcement(image.info)

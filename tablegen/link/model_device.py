@@ -13,6 +13,7 @@ from tablegen.link import messages
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
     ANSWER,
+    MOVED,
     NONCE_BYTES,
     PERMITS,
     TAG_BYTES,
@@ -22,6 +23,8 @@ from tablegen.link.messages import (
     DeviceStatus,
     Feature,
     ImageInfo,
+    More,
+    Move,
     Reason,
     Refusal,
     Request,
@@ -33,7 +36,7 @@ from tablegen.link.players import Player
 from tablegen.link.store import Flash, Layout, Store
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
-_TAGGED |= {Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE}
+_TAGGED |= {Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE, Request.MOVE}
 _ACTING = _TAGGED | {Request.ABORT}
 _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.BEGIN: ImageInfo.LAYOUT.size,
@@ -44,6 +47,7 @@ _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.SAVE: 5,
     Request.SELECT: 2,
     Request.DELETE: 1,
+    Request.MOVE: Move.LAYOUT.size,
 }
 _COMMIT_WITH_MODE = 5  # bytes
 _MAX_FRAMES = 1 << 31
@@ -62,7 +66,7 @@ class _LastRequest:
 
 @dataclass
 class _PendingRequest:
-    """A COMMIT or an ABORT that has not been answered yet; without a request a kept program, which has no answer."""
+    """A COMMIT, MOVE or ABORT that has not been answered yet; without a request a kept program, which has no answer."""
 
     request: Frame | None
     memory: _LastRequest | None
@@ -112,6 +116,8 @@ class ModelDevice:
             raise ValueError("a key and the feature go together")
         if (flash is not None) != (Feature.STORE in info.features):
             raise ValueError("a flash and the feature go together")
+        if More.MOVE in info.more and (staged or Feature.COMMIT_MODES not in info.features):
+            raise ValueError("a device that takes MOVE keeps tables and has modes of a COMMIT")
         self.info, self.player, self.boot = info, player, boot
         self.permits = True
         if key and len(identity) not in IDENTITY_BYTES:
@@ -148,6 +154,8 @@ class ModelDevice:
                 Request.CONFIRM: lambda frame: self._store.confirm(),
                 Request.DELETE: lambda frame: self._store.delete(frame.payload),
             }
+        if More.MOVE in info.more:
+            self._requests[Request.MOVE] = self._move
         self._flash, self._stores_while_playing = flash, stores_while_playing
         self._store: ModelStore
         self._power_up()
@@ -214,7 +222,7 @@ class ModelDevice:
 
     def tick(self, ticks: int = 1) -> None:
         """Play so many ticks, and answer what waited for them."""
-        commit, incoming = self._pending, self._bank.incoming
+        commit, incoming = self._pending, self._bank.at_work()
         if commit is not None and incoming is not None and incoming.state is Upload.CHECKING:
             first = min(ticks, commit.ticks)
             self.player.advance(first)
@@ -227,13 +235,15 @@ class ModelDevice:
 
     def status(self) -> DeviceStatus:
         """Return the answer to STATUS."""
-        player, incoming, active = self.player, self._bank.incoming, self._bank.active
+        player, active, move = self.player, self._bank.active, self._bank.move
+        incoming = None if move is not None else self._bank.incoming
         known = self._boot_hash if active is None else active.info.hash
+        upload = move or incoming
         return DeviceStatus(
             state=player.state,
-            upload=Upload.NONE if incoming is None else incoming.state,
+            upload=Upload.NONE if upload is None else upload.state,
             faults=player.faults,
-            flags=PERMITS if self.permits else 0,
+            flags=(PERMITS if self.permits else 0) | (MOVED if active is not None and active.moved else 0),
             boot=self.boot,
             generation=player.swaps,
             line=player.line,
@@ -352,7 +362,7 @@ class ModelDevice:
     def _hello(self, frame: Frame) -> bytes:
         if frame.session != self._session:
             self._session, self._last = frame.session, None
-        return self.info.pack() + self.status().pack()
+        return self.info.hello(self.status())
 
     def _commit(self, frame: Frame) -> bytes | None:
         upload = self._bank.find(*struct.unpack_from("<I", frame.payload))
@@ -367,13 +377,21 @@ class ModelDevice:
             self._check(self._pending, upload)
         return None
 
+    def _move(self, frame: Frame) -> None:
+        """Begin the checks of the program that plays, with other gain and offset words."""
+        move = self._bank.begin_move(frame.payload, self.permits)
+        assert self._last is not None
+        self._pending = _PendingRequest(frame, self._last, self._before, ticks=self._checking)
+        if self._checking == 0:
+            self._check(self._pending, move)
+
     def _check(self, commit: _PendingRequest, incoming: IncomingUpload) -> None:
         """Check an image, and bring it into the idle bank."""
         try:
             program = self._bank.accept(incoming, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
-            mode = CommitMode.LINE if commit.request is None else _mode_of(commit.request)
+            mode = _mode_of(commit.request)
             if mode is CommitMode.KEEP and not self._can_keep(program):
                 raise RequestRefused(Reason.KEEP)
             if not self.player.commit(program, mode):
@@ -381,7 +399,9 @@ class ModelDevice:
         except RequestRefused as refused:
             self._pending = None
             stays = refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP)
-            if stays and commit.request is not None:
+            if incoming is self._bank.move:
+                self._bank.move = None
+            elif stays and commit.request is not None:
                 incoming.state = Upload.RECEIVING
             else:
                 self._bank.incoming = None
@@ -399,15 +419,15 @@ class ModelDevice:
         return self.player.state != DeviceState.PLAYING or playing is None or can_keep(playing, program)
 
     def _settle(self) -> None:
-        """Answer a COMMIT and its ABORTs once the sequencer has said what became of the program that waited."""
-        commit, incoming, player = self._pending, self._bank.incoming, self.player
+        """Answer a COMMIT or MOVE and its ABORTs once the sequencer has said what became of the program that waited."""
+        commit, incoming, player = self._pending, self._bank.at_work(), self.player
         if commit is None or incoming is None or incoming.state is not Upload.WAITING:
             return
         if player.swaps != commit.swaps:
             self._bank.take(incoming)
             self._answer(commit.request, struct.pack("<II", player.swaps, player.swapped_at), commit.memory)
         elif player.writable:
-            self._bank.incoming = None
+            self._bank.incoming = self._bank.move = None
             self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         else:
             return
@@ -417,14 +437,14 @@ class ModelDevice:
         self._aborts.clear()
 
     def _abort(self, frame: Frame) -> bytes | None:
-        commit, incoming = self._pending, self._bank.incoming
+        commit, incoming = self._pending, self._bank.at_work()
         assert self._last is not None
         if incoming is not None and incoming.state is Upload.WAITING:
             if not self.player.withdraw():
                 raise RequestRefused(Reason.TICKS)
             self._aborts.append(_PendingRequest(frame, self._last))
             return None
-        self._pending = self._bank.incoming = None
+        self._pending = self._bank.incoming = self._bank.move = None
         if commit is not None:
             self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         return struct.pack("<I", self.player.swaps)
@@ -457,8 +477,12 @@ def _plain_bytes(frame: Frame) -> int:
     return _PAYLOAD_BYTES.get(frame.type, 0)
 
 
-def _mode_of(frame: Frame) -> CommitMode:
-    """Return the mode of a COMMIT."""
+def _mode_of(frame: Frame | None) -> CommitMode:
+    """Return the mode of a COMMIT or a MOVE; without a request that of a kept program."""
+    if frame is None:
+        return CommitMode.LINE
+    if frame.type == Request.MOVE:
+        return CommitMode.KEEP
     return CommitMode(frame.payload[4]) if _plain_bytes(frame) == _COMMIT_WITH_MODE else CommitMode.LINE
 
 

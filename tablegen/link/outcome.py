@@ -34,6 +34,14 @@ class UploadResult:
 
 
 @dataclass(frozen=True, slots=True)
+class MoveResult:
+    """The result of a move: the generation that it has begun, and the last line before it."""
+
+    generation: int
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
 class UploadState:
     """The progress of an upload: the bytes that the device confirmed, all bytes, and whether a COMMIT was sent."""
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.link.errors import Refused
-from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Feature, Reason, Request
+from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Feature, More, Reason, Request
 
 if TYPE_CHECKING:
     from tablegen.link.messages import AxisShape
@@ -21,6 +21,7 @@ _AXIS_REASONS = {
     "FPGA plays one mode and length; build for this device",
     Reason.PERIOD: "its period, phase step and remainder do not match; build it again",
     Reason.OUTPUT: "gain, offset, code limits or max_step are out of range or order; build it again",
+    Reason.SLOW_PART: "it has a slow part, whose gain and offset are not those of a table; upload the new scan instead",
     Reason.FOURIER: "its Fourier words sum to 4.0 or more, too much for the device; upload --as table",
 }
 _MESSAGES = {
@@ -72,6 +73,13 @@ def lacks_mode(info: DeviceInfo, swap: CommitMode) -> str | None:
         f"--swap {swap.name.lower()}: the device starts a new scan at the next line, from line 0; build its firmware "
         "with DAC_COMMIT_MODES=1 (FPGAs have no other mode), or use --swap line"
     )
+
+
+def lacks_move(info: DeviceInfo) -> str | None:
+    """Return why a device does not take MOVE; None if it does."""
+    if More.MOVE in info.more:
+        return None
+    return "the device takes no MOVE: build its firmware with DAC_MOVE=1 and DAC_COMMIT_MODES=1; FPGAs take none"
 
 
 def keyless(request: Request) -> Refused:
@@ -140,7 +148,7 @@ def _room(detail: int, info: DeviceInfo | None) -> str:
 
 
 def _generation(detail: int, info: DeviceInfo | None) -> str:
-    return f"another scan became active meanwhile (generation {detail}); did another program upload? Save that one?"
+    return f"another scan became active meanwhile (generation {detail}); did another program upload?"
 
 
 def _shaping(detail: int, info: DeviceInfo | None) -> str:

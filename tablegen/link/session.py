@@ -174,10 +174,12 @@ class LinkSession:
         deadline: float,
         tagged: bool = True,
         tries: int = _MAX_TRIES,
+        one_session: bool = False,
     ) -> bytes:
         """Send a request that acts, with a tag where the device needs one; it is carried out once.
 
-        It is sent at most ``tries`` times without an answer.
+        It is sent at most ``tries`` times without an answer; with ``one_session`` not in another session either, since
+        the device may have restarted.
 
         Raises
         ------
@@ -203,6 +205,8 @@ class LinkSession:
                     last, body = refusal, None  # a repeated frame may have used up the challenge
                 elif refusal.reason in (Reason.SESSION, Reason.OLD):
                     self.greet(deadline, new_session=True)
+                    if one_session:
+                        raise self.contested() from None
                     last, body = self.contested(), None
                 else:
                     raise

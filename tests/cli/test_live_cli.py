@@ -28,9 +28,9 @@ from tablegen.cli.device.live_keys import KEYS
 from tablegen.config.load import load
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
-from tablegen.link.errors import LinkLost
+from tablegen.link.errors import LinkLost, Refused
 from tablegen.link.frames import FrameReader
-from tablegen.link.messages import DeviceInfo, DeviceState, Feature, Request
+from tablegen.link.messages import DeviceInfo, DeviceState, Feature, More, Reason, Request
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
 from tablegen.link.prepare import PreparedScan
@@ -97,6 +97,7 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
         "generation": 5,
         "faults": 0,
         "digest": slower["scan"]["digest"],
+        "moved": False,
     }
     words = [(line.program.output, line.program.words.tolist()) for line in same.lines]
     device_words = Bench(model(info, boot=BOOT))
@@ -275,6 +276,121 @@ def test_a_line_with_faults_plays_what_was_asked_for(info: DeviceInfo, file: Pat
     assert line.device.player.swaps == 2 + 6
 
 
+# Previews
+
+
+@pytest.fixture(scope="module")
+def moves(info: DeviceInfo) -> DeviceInfo:
+    """Of a device that takes MOVE as well."""
+    return replace(info, more=More.MOVE)
+
+
+def test_a_change_plays_its_preview_first(moves: DeviceInfo, file: Path) -> None:
+    start, moved, zoomed, slower, status = said(
+        Bench(model(moves, boot=BOOT)),
+        file,
+        {"do": "move", "x_nm": 30, "y_nm": -20.5},
+        {"do": "zoom", "factor": 0.8},
+        {"do": "set", "values": {"timing.line_rate_hz": 200.0}},
+        {"do": "status"},
+    )
+    assert start["scan"]["preview"] is slower["scan"]["preview"] is None  # words cannot change the rate
+    for change in (moved, zoomed):
+        preview = change["scan"]["preview"]
+        assert preview["generation"] == change["scan"]["generation"] - 1
+        assert 0.0 < preview["x_error_percent"] < 3.0
+        assert 0.0 < preview["y_error_percent"] < 3.0
+        assert change["scan"]["swap"] == "keep"
+    assert status["status"]["generation"] == 7
+    assert not status["status"]["moved"]
+
+
+def test_a_preview_has_the_size_of_the_plan(moves: DeviceInfo, file: Path) -> None:
+    """The offset alone would leave the size of the old place, from which the sensitivity differs."""
+    machine = model(moves, boot=BOOT)
+    played: list[tuple[float, float]] = []
+    with client(VirtualLine(machine, baud=115200, tick_hz=500_000)) as device:
+
+        def note(_: object) -> None:
+            playing = machine.player.playing
+            assert playing is not None
+            axis = playing.x
+            codes = axis.output.code(axis.samples(np.arange(axis.phase.ticks)))
+            played.append((float(np.ptp(codes)), float(np.mean(codes))))
+
+        live = Live(device, file, on_preview=note)
+        live.start()
+        old = live.plan.x.program
+        live.move(200.0)
+        new = live.plan.x.program
+    ((size, middle),) = played
+    spans, middles = (
+        [float(of(axis.output.code(axis.samples(np.arange(axis.phase.ticks))))) for axis in (old, new)]
+        for of in (np.ptp, np.mean)
+    )
+    assert abs(spans[0] / spans[1] - 1.0) > 0.02
+    assert abs(size / spans[1] - 1.0) < 0.01
+    assert abs(middle - middles[1]) < 0.01 * spans[1]
+
+
+def test_nothing_is_sent_of_what_a_limit_refuses(moves: DeviceInfo, file: Path) -> None:
+    narrow = replace(moves, x_limits=replace(moves.x_limits, max_jump=MOST_JUMP))
+    machine = model(narrow, boot=BOOT)
+    start, smaller, far, wide, status = said(
+        Bench(machine),
+        file,
+        {"do": "zoom", "factor": 0.5},
+        {"do": "move", "x_nm": 1e6},
+        {"do": "move", "x_nm": 250.0},
+        {"do": "status"},
+    )
+    assert [one["ok"] for one in (smaller, far, wide)] == [False] * 3
+    assert "(jump)" in wide["error"]
+    assert status["status"]["generation"] == start["scan"]["generation"]
+
+
+def test_a_plan_that_is_refused_behind_its_preview_leaves_the_scan_that_plays(moves: DeviceInfo, file: Path) -> None:
+    """The words of the scan before play again, and the next change begins there."""
+    machine = model(moves, boot=BOOT)
+    with client(VirtualLine(machine, baud=115200, tick_hz=500_000)) as device:
+        live = Live(device, file)
+        before = live.start()
+        outputs = [line.program.output for line in live.plan.lines]
+        refusal = Refused(Request.COMMIT, Reason.JUMP, 0, "the device refused COMMIT")
+        with patch.object(device, "upload", side_effect=refusal), pytest.raises(Refused):
+            live.move(20.0)
+        playing = machine.player.playing
+        assert playing is not None
+        assert [axis.output for axis in (playing.x, playing.y)] == outputs
+        assert machine.player.swaps == before.generation + 2
+        after = live.move(10.0)
+    assert after.x.position_nm == pytest.approx(before.x.position_nm + 10.0, abs=1e-6)
+    assert after.preview is not None
+
+
+def test_a_lost_link_behind_a_preview_leaves_it_playing(moves: DeviceInfo, file: Path) -> None:
+    """The next change begins where the preview is."""
+    line = VirtualLine(model(moves, boot=BOOT), baud=115200, tick_hz=500_000)
+    with client(line) as device:
+        live = Live(device, file)
+        before = live.start()
+
+        def cut(piece: bytes) -> list[bytes]:
+            line.there = all(frame.type != Request.COMMIT for frame in FrameReader().feed(piece))
+            return [piece] if line.there else []
+
+        line.spoil_out = cut
+        with pytest.raises(LinkLost):
+            live.move(20.0)
+        line.device.tick(100_000)
+        assert line.device.player.swaps == before.generation + 1
+        assert line.device.status().moved
+        line.spoil_out, line.there = intact, True
+        after = live.move(20.0)
+    assert after.preview is not None
+    assert after.x.position_nm == pytest.approx(before.x.position_nm + 40.0, abs=1e-6)
+
+
 # Keys
 
 
@@ -311,6 +427,12 @@ def test_keys_move_zoom_and_change_the_rate(info: DeviceInfo, file: Path) -> Non
     assert " 160 nm at " in smaller.splitlines()[0]
     assert faster.splitlines()[2] == "500 Hz, 40 lines; from a new frame"
     assert bench.device.player.swaps == 6
+
+
+def test_keys_show_the_preview_and_the_plan_behind_it(moves: DeviceInfo, file: Path) -> None:
+    _, _, preview, right = pressed(Bench(model(moves, boot=BOOT)), file, "\x1b[C", "q")
+    assert re.fullmatch(r"preview plays, within \S+ % of x, \S+ % of y; the exact scan follows", preview)
+    assert right.splitlines()[2].endswith("the frame goes on")
 
 
 def test_a_key_that_leaves_the_range_says_so(info: DeviceInfo, file: Path) -> None:

@@ -134,17 +134,24 @@ class DeviceLibrary(Library):
 
 @cache
 def device_library(
-    bits: int = 16, shaping: int = 0, spline: bool = False, modes: bool = False, store: bool = False
+    bits: int = 16,
+    shaping: int = 0,
+    spline: bool = False,
+    modes: bool = False,
+    store: bool = False,
+    moves: bool = False,
 ) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
-    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept.
+    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept; one that
+    ``moves`` takes MOVE.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     more = [f"-DDAC_SHAPING={shaping}"] if shaping else []
     more += ["-DDAC_SPLINE=1"] if spline else []
-    more += ["-DDAC_COMMIT_MODES=1"] if modes else []
+    more += ["-DDAC_COMMIT_MODES=1"] if modes or moves else []
+    more += ["-DDAC_MOVE=1"] if moves else []
     more += ["-DDAC_STORE=1"] if store else []
     sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
     return DeviceLibrary(compile_device(folder / "device.so", bits, sources=sources, more=more))
@@ -159,9 +166,9 @@ class HostDevice:
     """A device whose converters are those of ``like`` and which boots into ``boot``, if that is not None.
 
     ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
-    can do, ``library`` to that of ``device_library`` with the order ``shaping``, and with ``modes`` of a COMMIT. Nonces
-    are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``; ``started`` is why the link was
-    not.
+    can do, ``library`` to that of ``device_library`` with the order ``shaping``, and with ``modes`` of a COMMIT, or
+    ``moves``. Nonces are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``; ``started`` is
+    why the link was not.
     ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout.
     """
 
@@ -187,12 +194,13 @@ class HostDevice:
         boot_persists: bool = True,
         shaping: int = 0,
         modes: bool = False,
+        moves: bool = False,
         flash: tuple[CutFlash, Layout] | None = None,
         stores_while_playing: bool = False,
     ) -> None:
         bits = 16 if max(like.x.bits, like.y.bits, like.x.output.word_bits, like.y.output.word_bits) <= 16 else 32
         spline, store = "cubic" in (like.x.mode, like.y.mode), flash is not None
-        self.library = library or device_library(bits, shaping, spline, modes, store)
+        self.library = library or device_library(bits, shaping, spline, modes, store, moves)
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True

@@ -19,8 +19,11 @@ from tablegen.link.messages import (
     SPLINE_DEGREE,
     VERSION,
     AxisShape,
+    AxisWords,
     DeviceInfo,
     Feature,
+    More,
+    Move,
     Refusal,
     Request,
 )
@@ -90,7 +93,8 @@ class Dialogue:
         if notes:
             self.device.take_notes()
         features = Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.NARROWS
-        self._modes = bool(how.get("modes"))
+        self._moves = bool(how.get("moves"))
+        self._modes = bool(how.get("modes")) or self._moves
         features |= Feature.COMMIT_MODES if self._modes else Feature(0)
         features |= Feature.STORE if store else Feature(0)
         shapes = [AxisShape(index[0], like.x.bits, shape.dac_bits, shape.dac_bits)]
@@ -110,6 +114,7 @@ class Dialogue:
             20000,
             order,
             degree,
+            More.MOVE if self._moves else More(0),
         )
         self._clock = 0
         self.device.set_clock(0)
@@ -201,6 +206,8 @@ class Dialogue:
         if self.flashes:
             doings += [(12, self._keep), (2, self._cut), (1, self._reboot), (4, self._whole), (3, self._trial)]
             doings += [(3, self._play)]
+        if self._moves:
+            doings += [(15, self._move), (2, self._whole)]
         if self.device.notes is not None:  # a replay has no cuts
             doings = [doing for doing in doings if doing[1] != self._cut]
         weights = np.array([weight for weight, _ in doings])
@@ -250,6 +257,40 @@ class Dialogue:
         if self._modes and self.rng.random() < 0.8:
             payload += bytes([int(self.rng.choice([*CommitMode, *CommitMode, 3]))])
         self._send(self._tagged(Request.COMMIT, payload, self._image.data))
+
+    def _move(self) -> None:
+        """New words: near those that play, or any; mostly of a program that was uploaded."""
+        playing = self.model.player.playing
+        if (
+            self.rng.random() < 0.9
+            and self.model.status().hash in (BOOT_HASH, bytes(32))
+            and not self.model.status().moved
+        ):
+            self._send(self.talk.acting(Request.ABORT))
+            self._image, _ = random_image(self.rng, self.shape, HARMONICS, "smooth", self.order)
+            self._whole()
+            self._tick(60)
+        if playing is None:
+            return
+        words = []
+        for axis in (playing.x.output, playing.y.output):
+            gain, offset, one = axis.gain_word, axis.offset_word, 1 << axis.gain_q
+            kind = self.rng.random()
+            if kind < 0.7:
+                gain = round(gain * self.rng.uniform(0.9, 1.0))
+                offset += round(self.rng.normal(0.0, 1.0) * one)
+            elif kind < 0.8:
+                gain = int(self.rng.integers(-(1 << 17) - 2, (1 << 17) + 2))
+            elif kind < 0.9:
+                offset += int(self.rng.integers(-(1 << axis.dac_bits), 1 << axis.dac_bits)) * one
+            words.append(AxisWords(gain, offset))
+        wrong = int(self.rng.random() < 0.05)
+        payload = bytearray(Move(self.model.status().generation + wrong, *words).pack())
+        if self.rng.random() < 0.05:
+            payload[int(self.rng.integers(4, len(payload)))] ^= 1 << int(self.rng.integers(0, 8))
+        self._send(self._tagged(Request.MOVE, bytes(payload)))
+        if self.rng.random() < 0.3:
+            self._send(self.talk.request(Request.READBACK, struct.pack("<IB", 64, 240)))
 
     def _ticks(self) -> None:
         self._tick(int(self.rng.choice([0, 1, 2, 20, 60])))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from building import run_clean, tool
 from limits import ENDED, within
-from link_device import HERE, LINES, HostDevice
+from link_device import HERE, LINES, HostDevice, Line
 from link_random import KEY, Dialogue
 
 from tablegen.base.resources import c_link, c_runtime, c_store
@@ -27,18 +27,28 @@ class Replay:
     lines: tuple[str, ...]
 
 
+def line_text(line: Line) -> str:
+    """A line that was played, as a replay prints it."""
+    return f"{line.generation} {line.line} {line.ticks} {line.crc:08x} {line.markers:02x} {line.faults:02x}"
+
+
 def replay_of(device: HostDevice, heard: bytes) -> Replay:
     """Of a device that took notes from its start."""
     assert device.notes is not None
-    lines = [f"{one[0]} {one[1]} {one[2]} {one.crc:08x} {one.markers:02x} {one.faults:02x}" for one in device.lines()]
+    lines = [line_text(line) for line in device.lines()]
     return Replay(8 * device.library.word_bytes, "\n".join(device.notes) + "\n", heard.hex(), tuple(lines))
 
 
 def random_replay(
-    shape: SequencerShape, seed: int, keyed: bool = False, modes: bool = False, store: bool = False
+    shape: SequencerShape,
+    seed: int,
+    keyed: bool = False,
+    modes: bool = False,
+    store: bool = False,
+    moves: bool = False,
 ) -> Replay:
-    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, or kept programs."""
-    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, store=store, modes=modes)
+    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, kept programs, moves."""
+    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, store=store, modes=modes, moves=moves)
     dialogue.play(STEPS)
     return replay_of(dialogue.device, bytes(dialogue.heard))
 

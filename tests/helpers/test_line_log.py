@@ -21,7 +21,7 @@ _PROGRAMS = {scan.digest: scan.program for scan in (make_scan(seed, ticks=40, li
 _BOOT = make_scan(0, ticks=40, lines=5).program
 
 
-class _Log:
+class Log:
     """A log as firmware keeps it, of the model's ticks."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ def _ask(player: SequencerPlayer | LinePlayer, request: str, number: int, mode: 
 
 
 def _played(steps: list[Step]) -> list[PlayedLine]:
-    log = _Log()
+    log = Log()
     player = SequencerPlayer(_BOOT, on_tick=log)
     parking = False
     for number, (request, ticks) in enumerate([("wait", 60), *steps, ("park", 60)]):

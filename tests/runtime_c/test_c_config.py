@@ -20,6 +20,7 @@ OTHER_VALUES = {
     "DAC_COMMIT_MODES": 1,
     "DAC_SLOW_PART": 1,
     "DAC_STORE": 1,
+    "DAC_MOVE": 1,
     "DAC_REQUESTS": 128,
     "DAC_LONG_MULTIPLY": 0,
     "DAC_LINK_RING": 512,

@@ -24,6 +24,7 @@ CHOICES = {
     "commit_modes": ["-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1"],
     "store": ["-DDAC_STORE=1"],
+    "moves": ["-DDAC_MOVE=1"],
 }
 
 

@@ -11,6 +11,7 @@ pytestmark = pytest.mark.rest
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 MODES = "-DDAC_COMMIT_MODES=1"
+MOVES = "-DDAC_MOVE=1"
 STORE = "-DDAC_STORE=1"
 WAYS = {
     "gcc": (("gcc",), SANITIZED),
@@ -42,6 +43,13 @@ def replays_with_modes() -> list[Replay]:
 
 
 @pytest.fixture(scope="module")
+def replays_with_moves() -> list[Replay]:
+    """Of devices that take MOVE."""
+    kinds = [SequencerShape(16, 1, 5, 16, 1, 4, 16), SequencerShape(24, 1, 4, 18, 1, 3, 24)]
+    return [random_replay(shape, seed, keyed, moves=True) for shape in kinds for seed, keyed in ((8, False), (9, True))]
+
+
+@pytest.fixture(scope="module")
 def replays_with_a_store() -> list[Replay]:
     """Of devices that keep programs."""
     kinds = [SequencerShape(16, 1, 5, 16, 1, 4, 16), SequencerShape(24, 1, 4, 18, 1, 3, 24)]
@@ -65,6 +73,11 @@ def test_compilers_and_sanitizers(way: str, replays: list[Replay], tmp_path: Pat
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_sanitizers_with_modes_of_a_commit(compiler: str, replays_with_modes: list[Replay], tmp_path: Path) -> None:
     hold(replays_with_modes, tmp_path, compiler=(compiler,), options=(*SANITIZED, MODES))
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_sanitizers_with_moves(compiler: str, replays_with_moves: list[Replay], tmp_path: Path) -> None:
+    hold(replays_with_moves, tmp_path, compiler=(compiler,), options=(*SANITIZED, MOVES))
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -30,6 +30,7 @@ CHOICES = {
     "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
     "commit_modes": ["-DDAC_COMMIT_MODES=1"],
+    "moves": ["-DDAC_MOVE=1", "-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1"],
     "slow_part_wide": [
         "-DDAC_SLOW_PART=1",
@@ -136,12 +137,10 @@ def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     assert run([*ANALYSERS[analyser], source]).returncode != 0
 
 
-ALL_FUNCTIONS = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", "-DDAC_STORE=1")
+ALL_FUNCTIONS = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", "-DDAC_STORE=1", "-DDAC_MOVE=1")
 
 
-def declared(
-    *headers: str, options: Sequence[str] = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", "-DDAC_STORE=1")
-) -> set[str]:
+def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
     """Functions that headers declare with these options, but for those that they define themselves."""
     text = "".join(HEADERS[name].read_text("utf-8") for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
@@ -150,6 +149,7 @@ def declared(
         ("DAC_COMMIT_MODES", "-DDAC_COMMIT_MODES=1"),
         ("DAC_SLOW_PART", "-DDAC_SLOW_PART=1"),
         ("DAC_STORE", "-DDAC_STORE=1"),
+        ("DAC_MOVE", "-DDAC_MOVE=1"),
     ):
         if given not in options:
             text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
@@ -163,7 +163,7 @@ def declared(
         ["-O0"],
         ["-O2"],
         ["-Os"],
-        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "slow_part")),
+        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "moves", "slow_part")),
     ],
     ids=" ".join,
 )

@@ -52,17 +52,17 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
     """
     from tablegen.api.live import Live
     from tablegen.base.input_errors import Rejected
+    from tablegen.cli.device.live_keys import follow_keys, show_preview
 
     planned(scan)  # what is wrong with it needs no device
     with connected(port, baud, key_file, goes_on="with the scan that plays") as device:
+        in_terminal = sys.stdin.isatty() and sys.stdout.isatty()
         try:
-            live_scan = Live(device, scan)
+            live_scan = Live(device, scan, on_preview=show_preview if in_terminal else None)
             first = live_scan.start()
         except Rejected as rejected:
             fail(rejected.problems, ExitStatus.WRONG_INPUT)
-        if sys.stdin.isatty() and sys.stdout.isatty():
-            from tablegen.cli.device.live_keys import follow_keys
-
+        if in_terminal:
             follow_keys(live_scan, device, first)
             return ExitStatus.OK
         _say({"ok": True, "scan": first.as_dict()})
@@ -158,6 +158,7 @@ def _status(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dic
             "generation": status.generation,
             "faults": status.faults,
             "digest": status.hash.hex(),
+            "moved": status.moved,
         }
     }
 

@@ -8,6 +8,7 @@ from tablegen.cli.shared.terminal import ARROWS
 
 if TYPE_CHECKING:
     from tablegen.api.live import Live, LiveScan
+    from tablegen.api.live_preview import LivePreview
     from tablegen.link.device import Device
     from tablegen.planning.line_plan import LinePlan
 
@@ -26,6 +27,12 @@ def follow_keys(live: "Live", device: "Device", first: "LiveScan") -> None:
     while (key := _key()) not in ("q", "Q", ""):
         if text := _done(live, device, key):
             click.echo(text)
+
+
+def show_preview(preview: "LivePreview") -> None:
+    """Show that a preview plays, and how far it is from the scan that follows."""
+    errors = f"{preview.x_error_percent:.2g} % of x, {preview.y_error_percent:.2g} % of y"
+    click.echo(f"preview plays, within {errors}; the exact scan follows")
 
 
 def _key() -> str:

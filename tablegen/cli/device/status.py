@@ -81,6 +81,7 @@ def _record(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status:
             "image_crc": status.image_crc,
             "bad_frames": status.bad_frames,
             "hash": status.hash.hex() if any(status.hash) else None,
+            "moved": status.moved,
         },
     }
 
@@ -102,6 +103,7 @@ def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "
         DeviceState.PLAYING: f"playing, line {status.line}",
     }[status.state]
     scan = status.hash.hex()[:12] if any(status.hash) else "hash unknown"
+    scan = "moved by new words, which no plan has" if status.moved else scan
     upload = {
         Upload.NONE: "none in progress",
         Upload.RECEIVING: f"{status.received} bytes received; repeat the upload to continue",
