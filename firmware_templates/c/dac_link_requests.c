@@ -11,6 +11,7 @@ enum { ALWAYS = TAKES_TABLES | READS_BACK | NARROWS };
 #if DAC_STORE
 enum { KEEPS_PROGRAMS = 128 };
 #endif
+#define FURTHER 0 /* further features, by the options; HELLO ends with them if there are any */
 enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
 enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
 
@@ -96,6 +97,10 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     a->length = DEVICE + STATUS;
     put_device(l, a->payload);
     put_status(l, a->payload + DEVICE);
+#if FURTHER
+    dac_link_put(a->payload + DEVICE + STATUS, FURTHER);
+    a->length = DEVICE + STATUS + 4;
+#endif
     return dac_link_fine();
 }
 

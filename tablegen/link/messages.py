@@ -93,6 +93,17 @@ class Feature(IntFlag):
     STORE = 128
 
 
+class More(IntFlag):
+    """The further features of a device, which HELLO has behind the status."""
+
+    SLOW_PARTS = 1
+    MOVE = 2
+    PIXEL_TABLES = 4
+
+
+NO_MORE = More(0)
+
+
 class DeviceState(IntEnum):
     """The states of the sequencer of a device."""
 
@@ -201,9 +212,13 @@ class AxisLimits(_Struct):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """The properties of a device, fixed at its build (56 bytes); ``shaping`` is its highest order of shaped output."""
+    """The properties of a device, fixed at its build; ``shaping`` is its highest order of shaped output.
+
+    They are 56 bytes in front of the status in the answer to HELLO, and ``more`` behind it, where it is not 0.
+    """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
+    MORE: ClassVar[struct.Struct] = struct.Struct("<I")
 
     version: int
     features: Feature
@@ -218,6 +233,7 @@ class DeviceInfo:
     update_rate_hz: int
     shaping: int = 0
     degree: int = 0  # highest degree of a spline; 0 of a device that plays lines only
+    more: More = NO_MORE
 
     def pack(self) -> bytes:
         """Return the beginning of the answer to HELLO."""
@@ -225,9 +241,13 @@ class DeviceInfo:
         first = (self.version, self.features, self.window, self.data_bytes, self.harmonics, self.shaping, self.degree)
         return self.LAYOUT.pack(*first, self.image_bytes, *parts, self.update_rate_hz)
 
+    def hello(self, status: "DeviceStatus") -> bytes:
+        """Return the answer to HELLO; without further features it has the length that it had before them."""
+        return self.pack() + status.pack() + (self.MORE.pack(self.more) if self.more else b"")
+
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
-        """Read the beginning of the answer to HELLO.
+        """Read the properties from the answer to HELLO, or from its beginning.
 
         Raises
         ------
@@ -240,6 +260,8 @@ class DeviceInfo:
             payload
         )
         x, y, x_limits, y_limits = parts
+        more_at = cls.LAYOUT.size + DeviceStatus.LAYOUT.size
+        (more,) = cls.MORE.unpack_from(payload, more_at) if len(payload) >= more_at + cls.MORE.size else (0,)
         return cls(
             version,
             Feature(features),
@@ -254,6 +276,7 @@ class DeviceInfo:
             rate,
             shaping,
             degree,
+            More(more),
         )
 
 

@@ -352,7 +352,7 @@ class ModelDevice:
     def _hello(self, frame: Frame) -> bytes:
         if frame.session != self._session:
             self._session, self._last = frame.session, None
-        return self.info.pack() + self.status().pack()
+        return self.info.hello(self.status())
 
     def _commit(self, frame: Frame) -> bytes | None:
         upload = self._bank.find(*struct.unpack_from("<I", frame.payload))

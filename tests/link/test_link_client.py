@@ -23,7 +23,7 @@ from tablegen.link.errors import (
 )
 from tablegen.link.exchange import Exchange
 from tablegen.link.frames import FrameReader
-from tablegen.link.messages import AxisLimits, DeviceState, Feature, Reason, Request, Upload
+from tablegen.link.messages import AxisLimits, DeviceState, Feature, More, Reason, Request, Upload
 from tablegen.link.session import LinkSession
 
 
@@ -43,6 +43,16 @@ def test_it_knows_the_device_after_hello() -> None:
         assert device.limits() == (INFO.x_limits, INFO.y_limits)
     assert [frame.type for frame in line.frames] == [Request.HELLO, Request.STATUS, Request.STATUS, Request.LIMITS]
     assert len({frame.session for frame in line.frames}) == 1
+
+
+def test_further_features_follow_the_status() -> None:
+    """Bits that only a later version knows are no error; without any, the answer has its old length."""
+    further = More.SLOW_PARTS | More.MOVE | More(1 << 31)
+    with client(VirtualLine(model(replace(INFO, more=further)))) as device:
+        assert device.info.more == further
+        hello = device.info.hello(device.hello)
+        assert hello[132:] == further.to_bytes(4, "little")
+        assert replace(device.info, more=More(0)).hello(device.hello) == hello[:132]
 
 
 def test_it_plays_parks_and_clears() -> None:
