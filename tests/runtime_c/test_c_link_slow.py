@@ -1,0 +1,90 @@
+"""Programs with slow parts over the C link: its checks against their specification, and dialogues against the model."""
+
+import os
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pytest
+from link_images import damaged_slow, digest, random_limits, random_slow_program
+from link_random import KEY, Dialogue
+from replacing import replace
+from test_c_link_acceptance import Bench
+
+from tablegen.link.acceptance import first_objection
+from tablegen.link.messages import AxisLimits, Reason
+from tablegen.link.program_image import make_image, take_apart
+from tablegen.verification.play.sequencer_shape import SequencerShape
+
+pytestmark = pytest.mark.common
+
+SHAPES = {
+    "cubic": SequencerShape(16, 3, 5, 16, 3, 4, 16),
+    "lines": SequencerShape(16, 1, 5, 16, 1, 3, 14),
+    "21 bits": SequencerShape(18, 3, 3, 21, 1, 4, 18),
+}
+STATES = ("nothing plays", "parked", "playing")
+PROGRAMS = int(os.environ.get("SLOW_LINK_PROGRAMS", "120"))  # of each shape and state
+CHECKED = {reason for reason in Reason if Reason.SCHEDULE <= reason <= Reason.JUMP} - {Reason.FOURIER}
+
+
+@cache
+def compare(name: str, state: str, count: int, seed: int) -> Counter[Reason | None]:
+    """Hold so many programs against the specification; returns how often each reason came."""
+    rng, shape = np.random.default_rng([seed, *map(ord, state)]), SHAPES[name]
+    seen: Counter[Reason | None] = Counter()
+    everything = AxisLimits(0, (1 << shape.dac_bits) - 1, 1 << 24, 1 << 24)
+    bench, limits = None, (everything, everything)
+    for at in range(count):
+        if at % 20 == 0:
+            bench = None
+        program = random_slow_program(rng, shape)
+        image = make_image(program, digest(rng))
+        contents = take_apart(image.data, image.info.x, image.info.y)
+        if bench is None:
+            if first_objection(contents, everything, everything, None) is not None:
+                continue
+            limits = everything, everything
+            if rng.random() < 0.2:
+                limits = random_limits(rng, program)
+            elif rng.random() < 0.5:
+                x, y = (replace(everything, max_step=axis.output.max_step) for axis in (program.x, program.y))
+                limits = replace(x, max_jump=x.code_max // 16), replace(y, max_jump=y.code_max // 4)
+            bench = Bench(program, state, limits, shape, slow=True)
+        if rng.random() < 0.4:
+            image = damaged_slow(rng, image)
+            contents = take_apart(image.data, image.info.x, image.info.y)
+        expected = first_objection(contents, *limits, bench.playing)
+        got = bench.objection(image)
+        assert got == (None if expected is None else (int(expected[0]), expected[1])), (at, expected, got)
+        seen[None if expected is None else expected[0]] += 1
+    return seen
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_device_objects_to_what_its_specification_objects_to(name: str, state: str) -> None:
+    assert compare(name, state, PROGRAMS, 1)[None] > PROGRAMS // 20
+
+
+def test_every_check_was_met() -> None:
+    """A control of the test above."""
+    seen: Counter[Reason | None] = Counter()
+    for name in SHAPES:
+        for state in STATES:
+            seen += compare(name, state, PROGRAMS, 1)
+    assert {reason for reason in CHECKED if seen[reason] > 3} == CHECKED, seen
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("key", [b"", KEY], ids=["open", "keyed"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_random_dialogue_is_that_of_the_model(name: str, key: bytes) -> None:
+    for seed in range(3):
+        Dialogue(SHAPES[name], seed, key, slow=True, modes=True).play(200)
+
+
+@pytest.mark.rest
+def test_programs_with_slow_parts_are_kept() -> None:
+    for seed in range(4):
+        Dialogue(SHAPES["cubic"], seed, store=True, slow=True).play(250)
