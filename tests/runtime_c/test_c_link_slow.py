@@ -3,16 +3,27 @@
 import os
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from client_rig import Served
+from editing import run
+from limits import PATIENCE_S
+from line_log import LineCheck, PlayedLine
+from link_device import HostDevice
 from link_images import damaged_slow, digest, random_limits, random_slow_program
 from link_random import KEY, Dialogue
 from replacing import replace
 from test_c_link_acceptance import Bench
+from turned_scans import turned_setup
 
+from tablegen.api.turned import build_turned
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.acceptance import first_objection
-from tablegen.link.messages import AxisLimits, Reason
+from tablegen.link.device import Device
+from tablegen.link.messages import AxisLimits, DeviceState, Reason
+from tablegen.link.prepare import PreparedScan
 from tablegen.link.program_image import make_image, take_apart
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
@@ -88,3 +99,29 @@ def test_a_random_dialogue_is_that_of_the_model(name: str, key: bytes) -> None:
 def test_programs_with_slow_parts_are_kept() -> None:
     for seed in range(4):
         Dialogue(SHAPES["cubic"], seed, store=True, slow=True).play(250)
+
+
+@pytest.mark.rest
+def test_a_turned_scan_on_a_pty_plays_as_the_integer_model(tmp_path: Path) -> None:
+    """From the command line to the samples: each line of a frame that a compiled device plays after the upload."""
+    setup = turned_setup(
+        tmp_path, 30.0, "timing.lines = 16", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400"
+    )
+    build_turned(setup, tmp_path / "out")
+    scan = PreparedScan.of_build(tmp_path / "out")
+    x = scan.program.x
+    assert isinstance(x, FrameProgram)
+    boot = replace(scan.program, x=replace(x, gains=replace(x.gains, words=x.gains.words * 7 // 8)))
+    device = HostDevice(scan.program, boot, update_rate_hz=500_000, slow=True)
+    check = LineCheck(boot)
+    check.offer("upload", scan.program)
+    with Served(device, "pty", 500_000) as served:
+        assert run("upload", tmp_path / "out", "--port", served.url, "--timeout", str(PATIENCE_S)).status == 0
+        with Device(served.url) as client:
+            client.arm(1)
+            client.trigger()
+            client.wait_for(DeviceState.PARKED, PATIENCE_S)
+            status = client.status()
+    assert (status.hash.hex(), status.faults) == (scan.digest, 0)
+    check.follow(PlayedLine(**line._asdict()) for line in device.lines())
+    assert (check.lines, check.taken[2]) == (scan.program.schedule.lines, "upload")
