@@ -33,6 +33,7 @@ _MAXIMUM_WORD_BYTES = 3
 MAXIMUM_IMAGE_BYTES = PROGRAM_BYTES + 2 * (_MAXIMUM_WORD_BYTES << MAXIMUM_INDEX_BITS)
 MAXIMUM_KNOTS = 65  # as in tablegen.fixedpoint.frame_program
 _SLOW_INDEX_BITS = range(3, 15)
+_SLOW_PART_BYTES = (112, 176)  # where an image has the words slow_part of x and y
 _KNOT_BYTES = 3 + 2  # a gain and a ratio
 # Of both axes: a word more for each of the table, the slow table and the knots.
 MAXIMUM_SLOW_BYTES = 2 * (
@@ -55,6 +56,11 @@ def _table_bytes(axis: AxisShape, info: DeviceInfo) -> int:
         return table
     slow_table = axis.word_bytes << info.slow_index_bits
     return table + (1 << axis.index_bits) + slow_table + _KNOT_BYTES * info.slow_knots
+
+
+def has_slow_parts(image: bytes) -> bool:
+    """Return True if an axis of an image has a slow part, by its program words."""
+    return any(any(image[at : at + 4]) for at in _SLOW_PART_BYTES)
 
 
 def check_device(info: DeviceInfo) -> None:
