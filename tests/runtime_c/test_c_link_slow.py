@@ -1,17 +1,20 @@
 """Programs with slow parts over the C link: its checks against their specification, and dialogues against the model."""
 
+import faulthandler
 import os
 from collections import Counter
 from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 
+import link_device
 import numpy as np
 import pytest
 from client_rig import Served
 from editing import run
-from limits import PATIENCE_S
+from limits import PATIENCE_S, limit
 from line_log import LineCheck, PlayedLine
-from link_device import HostDevice
+from link_device import DeviceLibrary, HostDevice, compile_device
 from link_images import damaged_slow, digest, random_limits, random_slow_program
 from link_random import KEY, Dialogue
 from replacing import replace
@@ -19,6 +22,7 @@ from test_c_link_acceptance import Bench
 from turned_scans import turned_setup
 
 from tablegen.api.turned import build_turned
+from tablegen.base.resources import c_link, c_runtime
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.acceptance import first_objection
 from tablegen.link.device import Device
@@ -34,6 +38,7 @@ SHAPES = {
     "lines": SequencerShape(16, 1, 5, 16, 1, 3, 14),
     "21 bits": SequencerShape(18, 3, 3, 21, 1, 4, 18),
 }
+SLOW = "-DDAC_SLOW_PART=1"
 STATES = ("nothing plays", "parked", "playing")
 PROGRAMS = int(os.environ.get("SLOW_LINK_PROGRAMS", "120"))  # of each shape and state
 CHECKED = {reason for reason in Reason if Reason.SCHEDULE <= reason <= Reason.JUMP} - {Reason.FOURIER}
@@ -125,3 +130,81 @@ def test_a_turned_scan_on_a_pty_plays_as_the_integer_model(tmp_path: Path) -> No
     assert (status.hash.hex(), status.faults) == (scan.digest, 0)
     check.follow(PlayedLine(**line._asdict()) for line in device.lines())
     assert (check.lines, check.taken[2]) == (scan.program.schedule.lines, "upload")
+
+
+CHECK, IMAGE = "dac_link_check.c", "dac_link_image.c"
+MUTANTS = {
+    "words always show that a line is in range": (CHECK, "return least >> o->gain_q", "return true || 0"),
+    "words always show that steps are small": (CHECK, "return rest < max_step &&", "return true ||"),
+    "a step does not count the ramp": (CHECK, "(ramp + gain * (3", "(gain * (3"),
+    "a range does not count the ramp": (CHECK, "line->at.ramp * (int64_t)(ticks - 1)", "0"),
+    "steps between lines are not checked": (CHECK, "(slew && distance(now, c->before) > max_step)", "(0)"),
+    "the step to the next frame is not checked": (CHECK, "*done && slew && distance", "false && distance"),
+    "steps of ticks are not checked": (CHECK, "slew ? c->at != 0 && distance", "slew ? false && distance"),
+    "codes of ticks are not checked": (CHECK, ": wide < o.code_min || wide > o.code_max", ": false"),
+    "only the first line is checked": (CHECK, "*done = c->line == o.lines;", "*done = true;"),
+    "offsets of the slow table are not checked": (CHECK, " || offset >= reach || offset <= -reach", ""),
+    "gains are not checked": (CHECK, "} else if (slow->gains", "} else if (false && slow->gains"),
+    "knots need not reach the end": (CHECK, "spacing * ((slow & 127u) - 1) < lines", "false"),
+    "the step of the frame is not checked": (CHECK, "!good_phase(image, axis, lines, DAC_LINK_SLOW_STEP)", "false"),
+    "y may step once a line": (CHECK, "(axis == 1 && steps) || ", ""),
+    "a slow part may be shaped": (CHECK, " || (order != 0 && dac_link_slow_word(l, image, axis) != 0)", ""),
+    "the jump is that from line 0": (CHECK, "line_of(&old, c->at);", "line_of(&old, 0);"),
+    "ratios are gains": (IMAGE, "axis->slow[image].ratios[at] = (int16_t)word;", "axis->slow[image].gains[at] = word;"),
+    "words behind the slow table are missing": (CHECK, "table[words + i] = table[i];", "(void)i;"),
+}  # fmt: skip
+_FORK = get_context("fork")
+
+
+def differs(path: Path) -> bool:
+    """Return True if a device differs from its specification, or crashes; it is asked in a process of its own."""
+
+    def trial() -> None:
+        limit(120)
+        faulthandler.disable()
+        library = DeviceLibrary(path)
+        link_device.device_library = lambda *_: library  # type: ignore[assignment]
+        try:
+            for state in ("playing", "parked"):
+                for seed in range(2, 5):
+                    compare.__wrapped__("cubic", state, 300, seed)
+            for seed in range(3):
+                Dialogue(SHAPES["cubic"], seed, slow=True).play(200)
+        except Exception:
+            os._exit(1)
+        os._exit(0)
+
+    process = _FORK.Process(target=trial)
+    process.start()
+    process.join()
+    return process.exitcode != 0
+
+
+def device_with(mutant: tuple[str, str, str] | None, folder: Path) -> Path:
+    """Compile a device with another text in one of its files."""
+    sources = []
+    for path in (*c_runtime(), *c_link()):
+        text = path.read_text("utf-8")
+        if mutant is not None and path.name == mutant[0]:
+            assert text.count(mutant[1]) == 1, mutant
+            text = text.replace(mutant[1], mutant[2])
+        (folder / path.name).write_text(text, "utf-8")
+        sources.append(folder / path.name)
+    options = ("-std=c99", "-O1", "-w")
+    return compile_device(folder / "device.so", options=options, sources=sources, more=["-DDAC_SPLINE=1", SLOW])
+
+
+def test_every_mutant_is_of_the_link_as_it_is() -> None:
+    texts = {path.name: path.read_text("utf-8") for path in c_link()}
+    assert {breaks for breaks, (file, old, _) in MUTANTS.items() if texts[file].count(old) != 1} == set()
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("breaks", MUTANTS)
+def test_every_mutant_is_found(breaks: str, tmp_path: Path) -> None:
+    assert differs(device_with(MUTANTS[breaks], tmp_path))
+
+
+@pytest.mark.rest
+def test_the_link_as_it_is_does_not_differ(tmp_path: Path) -> None:
+    assert not differs(device_with(None, tmp_path))
