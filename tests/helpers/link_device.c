@@ -305,6 +305,19 @@ dac_link_started device_refusal(const device *d, unsigned fault)
     case 9: c.identity_bytes = 33; break;
     case 10: c.random = NULL; c.boot_persists = false; break;
     case 11: c.milliseconds = NULL; break;
+#if DAC_SLOW_PART
+    case 12: c.slow_knots = 1; break;
+    case 13: c.slow_knots = 66; break;
+    case 14: c.slow_index_bits = 2; break;
+    case 15: c.slow_index_bits = 15; break;
+    case 16: c.x.slow[0].second = NULL; break;
+    case 17: c.x.slow[1].table = NULL; break;
+    case 18: c.y.slow[0].gains = NULL; break;
+    case 19: c.y.slow[1].ratios = NULL; break;
+    case 20: c.x.mixed = NULL; break;
+    case 21: c.y.mixed = NULL; break;
+    case 22: c.y.mixed = c.x.mixed; break;
+#endif
     default: break;
     }
     const dac_link_started started = dac_link_init(&link, &c, (dac_sequencer *)&d->sequencer, 0);

@@ -58,6 +58,7 @@ class Started(IntEnum):
     NO_IDENTITY = 4
     NO_RANDOM = 5
     NO_CLOCK = 6
+    BAD_SLOW = 7
 
 
 class _Record(Structure):

@@ -2,6 +2,8 @@
 
 import faulthandler
 import os
+import subprocess
+import sys
 from collections import Counter
 from functools import cache
 from multiprocessing import get_context
@@ -10,12 +12,14 @@ from pathlib import Path
 import link_device
 import numpy as np
 import pytest
+from building import run_clean
 from client_rig import Served
 from editing import run
 from limits import PATIENCE_S, limit
 from line_log import LineCheck, PlayedLine
-from link_device import DeviceLibrary, HostDevice, compile_device
+from link_device import SANITIZED, DeviceLibrary, HostDevice, Started, compile_device
 from link_images import damaged_slow, digest, random_limits, random_slow_program
+from link_programs import make_scan
 from link_random import KEY, Dialogue
 from replacing import replace
 from test_c_link_acceptance import Bench
@@ -132,6 +136,28 @@ def test_a_turned_scan_on_a_pty_plays_as_the_integer_model(tmp_path: Path) -> No
     assert (check.lines, check.taken[2]) == (scan.program.schedule.lines, "upload")
 
 
+def test_a_configuration_with_one_fault_is_refused() -> None:
+    scan = make_scan(1, index_bits=(5, 5))
+    device = HostDevice(scan.program, scan.program, key=KEY, slow=True)
+    assert device.started is Started.STARTED
+    assert [device.refusal(fault) for fault in range(52, 63)] == [Started.BAD_SLOW] * 11
+
+
+@pytest.mark.rest
+def test_checks_and_dialogues_with_sanitizers(tmp_path: Path) -> None:
+    """Memory of a slow part has just the words that the configuration says."""
+    more = ["-DDAC_SPLINE=1", SLOW]
+    device = compile_device(tmp_path / "device.so", options=SANITIZED, more=more)
+    runtime = run_clean(["gcc", "-print-file-name=libasan.so"]).strip()
+    environment = {
+        **os.environ, "LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0", "PYTHONMALLOC": "malloc",
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }  # fmt: skip
+    command = [sys.executable, "-c", f"import test_c_link_slow as t; t.ask_all(t.Path({str(device)!r}), 40, 1)"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+
+
 CHECK, IMAGE = "dac_link_check.c", "dac_link_image.c"
 MUTANTS = {
     "words always show that a line is in range": (CHECK, "return least >> o->gain_q", "return true || 0"),
@@ -156,20 +182,25 @@ MUTANTS = {
 _FORK = get_context("fork")
 
 
+def ask_all(path: Path, programs: int, seeds: int) -> None:
+    """Ask a compiled device for its opinion of programs, and talk with it; raise where it differs."""
+    library = DeviceLibrary(path)
+    link_device.device_library = lambda *_: library  # type: ignore[assignment]
+    for state in ("playing", "parked"):
+        for seed in range(seeds):
+            compare.__wrapped__("cubic", state, programs, 2 + seed)
+    for seed in range(seeds):
+        Dialogue(SHAPES["cubic"], seed, slow=True).play(200)
+
+
 def differs(path: Path) -> bool:
     """Return True if a device differs from its specification, or crashes; it is asked in a process of its own."""
 
     def trial() -> None:
         limit(120)
         faulthandler.disable()
-        library = DeviceLibrary(path)
-        link_device.device_library = lambda *_: library  # type: ignore[assignment]
         try:
-            for state in ("playing", "parked"):
-                for seed in range(2, 5):
-                    compare.__wrapped__("cubic", state, 300, seed)
-            for seed in range(3):
-                Dialogue(SHAPES["cubic"], seed, slow=True).play(200)
+            ask_all(path, 300, 3)
         except Exception:
             os._exit(1)
         os._exit(0)
