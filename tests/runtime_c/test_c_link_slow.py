@@ -15,18 +15,21 @@ import pytest
 from building import run_clean
 from client_rig import Served
 from editing import run
+from frame_programs import common_knots, scan_program
 from limits import PATIENCE_S, limit
 from line_log import LineCheck, PlayedLine
 from link_device import SANITIZED, DeviceLibrary, HostDevice, Started, compile_device
-from link_images import damaged_slow, digest, random_limits, random_slow_program
+from link_images import damaged_slow, digest, random_limits, random_slow_program, resealed
 from link_programs import make_scan
 from link_random import KEY, Dialogue
+from programs import random_schedule
 from replacing import replace
 from test_c_link_acceptance import Bench
 from turned_scans import turned_setup
 
 from tablegen.api.turned import build_turned
 from tablegen.base.resources import c_link, c_runtime
+from tablegen.device.registers import OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.acceptance import first_objection
 from tablegen.link.device import Device
@@ -85,6 +88,30 @@ def compare(name: str, state: str, count: int, seed: int) -> Counter[Reason | No
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_device_objects_to_what_its_specification_objects_to(name: str, state: str) -> None:
     assert compare(name, state, PROGRAMS, 1)[None] > PROGRAMS // 20
+
+
+def test_rare_words_are_refused() -> None:
+    """A y that steps once a line, an offset that the words of the slow table carry too far, and a shaped output."""
+    rng, shape = np.random.default_rng(4), SHAPES["cubic"]
+    schedule = replace(random_schedule(rng, 40, 1), lines=5)
+    program = common_knots(rng, scan_program(rng, shape, schedule, "xy"))
+    widest = (AxisLimits(0, (1 << 16) - 1, 1 << 24, 1 << 24),) * 2
+    bench = Bench(program, "nothing plays", widest, shape, order=1, slow=True)
+    image = make_image(program, digest(rng))
+    low, high = (1 << OFFSET_LOW_BITS) - 1, (2 << (16 + program.x.output.gain_q) >> OFFSET_LOW_BITS) - 1
+    for words, reason in (
+        ({SCAN_WORDS.index("y_steps"): 1}, Reason.PERIOD),
+        ({PAGE_WORDS + 11: 1}, Reason.SHAPING),
+        ({PAGE_WORDS + 3: 1, PAGE_WORDS + 4: low, PAGE_WORDS + 5: high}, Reason.WORD),
+    ):
+        data = bytearray(image.data)
+        for at, word in words.items():
+            data[4 * at : 4 * at + 4] = word.to_bytes(4, "little")
+        changed = resealed(image, bytes(data))
+        expected = first_objection(take_apart(changed.data, image.info.x, image.info.y), *widest, None, 1)
+        assert expected is not None
+        assert expected[0] == reason
+        assert bench.objection(changed) == (int(expected[0]), expected[1])
 
 
 def test_every_check_was_met() -> None:
@@ -174,7 +201,6 @@ MUTANTS = {
     "knots need not reach the end": (CHECK, "spacing * ((slow & 127u) - 1) < lines", "false"),
     "the step of the frame is not checked": (CHECK, "!good_phase(image, axis, lines, DAC_LINK_SLOW_STEP)", "false"),
     "y may step once a line": (CHECK, "(axis == 1 && steps) || ", ""),
-    "a slow part may be shaped": (CHECK, " || (order != 0 && dac_link_slow_word(l, image, axis) != 0)", ""),
     "the jump is that from line 0": (CHECK, "line_of(&old, c->at);", "line_of(&old, 0);"),
     "ratios are gains": (IMAGE, "axis->slow[image].ratios[at] = (int16_t)word;", "axis->slow[image].gains[at] = word;"),
     "words behind the slow table are missing": (CHECK, "table[words + i] = table[i];", "(void)i;"),
@@ -186,6 +212,7 @@ def ask_all(path: Path, programs: int, seeds: int) -> None:
     """Ask a compiled device for its opinion of programs, and talk with it; raise where it differs."""
     library = DeviceLibrary(path)
     link_device.device_library = lambda *_: library  # type: ignore[assignment]
+    test_rare_words_are_refused()
     for state in ("playing", "parked"):
         for seed in range(seeds):
             compare.__wrapped__("cubic", state, programs, 2 + seed)
