@@ -385,16 +385,16 @@ static dac_link_finding check_words(dac_link *l, unsigned axis, bool *done)
 static dac_link_finding check_slow_words(dac_link *l, unsigned axis, bool *done)
 {
     const dac_link_image *const image = &l->image[l->idle];
-    const dac_slow_part *const slow = &l->slow[l->idle][axis];
     const int32_t half = INT32_C(1) << (dac_link_shape(image, axis)[1] - 1);
-    const uint32_t words = UINT32_C(1) << slow->index_bits, before = 2 * dac_link_table_words(image, axis);
-    dac_word *const table = dac_link_axis_of(l, axis)->slow[l->idle].table;
-    dac_program program;
     dac_link_check *const c = &l->check;
+    dac_program program;
 
     *done = true;
     if (dac_link_slow_word(l, image, axis) == 0)
         return nothing;
+    const dac_slow_part *const slow = &l->slow[l->idle][axis];
+    const uint32_t words = UINT32_C(1) << slow->index_bits, before = 2 * dac_link_table_words(image, axis);
+    dac_word *const table = dac_link_axis_of(l, axis)->slow[l->idle].table;
     dac_link_program_of(l, &program);
     const dac_axis_program *const p = axis == 0 ? &program.x : &program.y;
     const int64_t reach = INT64_C(2) << (p->dac_bits + p->gain_q); /* as that of an offset word */
