@@ -34,12 +34,32 @@ static bool good_fourier(const dac_link_config *c)
             && c->sine_index_bits >= c->y.index_bits);
 }
 
+#if DAC_SLOW_PART
+static bool good_slow_memory(const dac_link_slow *slow)
+{
+    return slow->second != NULL && slow->table != NULL && slow->gains != NULL && slow->ratios != NULL;
+}
+
+static bool good_slow(const dac_link_config *c)
+{
+    return c->slow_knots == 0
+        || (c->slow_knots >= 2 && c->slow_knots <= 65 && c->slow_index_bits >= 3 && c->slow_index_bits <= 14
+            && good_slow_memory(&c->x.slow[0]) && good_slow_memory(&c->x.slow[1])
+            && good_slow_memory(&c->y.slow[0]) && good_slow_memory(&c->y.slow[1])
+            && c->x.mixed != NULL && c->y.mixed != NULL && c->x.mixed != c->y.mixed);
+}
+#endif
+
 static dac_link_started judge_config(const dac_link_config *c)
 {
     if (!good_axis(&c->x) || !good_axis(&c->y))
         return DAC_LINK_BAD_AXIS;
     if (!good_fourier(c))
         return DAC_LINK_BAD_FOURIER;
+#if DAC_SLOW_PART
+    if (!good_slow(c))
+        return DAC_LINK_BAD_SLOW;
+#endif
     return dac_link_judge_key(c);
 }
 

@@ -39,6 +39,22 @@ typedef struct {
     uint32_t code_min, code_max, max_step, max_jump;
 } dac_link_limits;
 
+#if DAC_SLOW_PART
+#define DAC_LINK_PARTS 5 /* of an axis in an image: its table, and the words of a slow part */
+/* Words of memory of a slow table. */
+#define DAC_LINK_SLOW_ROOM(index_bits) ((UINT32_C(1) << (index_bits)) + 3)
+
+/* Memory of the slow part of an axis. */
+typedef struct {
+    int8_t *second;  /* 2^index_bits of the axis */
+    dac_word *table; /* DAC_LINK_SLOW_ROOM(slow_index_bits) */
+    int32_t *gains;  /* slow_knots */
+    int16_t *ratios; /* slow_knots */
+} dac_link_slow;
+#else
+#define DAC_LINK_PARTS 1
+#endif
+
 /* The resources of an axis. */
 typedef struct {
     dac_converter converter;
@@ -48,6 +64,10 @@ typedef struct {
     uint32_t room;      /* words of memory of each table: DAC_TABLE_ROOM(index_bits) or more */
     dac_word *table[2]; /* one is written while the other one plays */
     int32_t *fourier;   /* 2 harmonics + 1 words */
+#if DAC_SLOW_PART
+    dac_link_slow slow[2]; /* as the tables; unused without slow_knots */
+    dac_word *mixed;       /* `room` words for the line that plays, of this axis alone */
+#endif
 } dac_link_axis;
 
 typedef struct {
@@ -56,6 +76,10 @@ typedef struct {
     uint8_t sine_index_bits;  /* at least the index_bits of both axes */
     const int32_t *sine;      /* NAME_sine, for dac_synthesize() */
     uint32_t update_rate_hz;  /* 0: unknown */
+#if DAC_SLOW_PART
+    uint8_t slow_knots;       /* maximum knots of a slow part, 2..65; 0: the link takes no slow parts */
+    uint8_t slow_index_bits;  /* of the longest slow table, 3..14 */
+#endif
     uint8_t window;           /* frames that the host may send without an answer; 0: as many as the ring holds */
     uint8_t key_bytes;        /* 16..32, or 0: no key */
     const uint8_t *key;
@@ -84,7 +108,8 @@ typedef enum {
     DAC_LINK_BAD_KEY,     /* not 16..32 bytes */
     DAC_LINK_NO_IDENTITY, /* a key, but no identity of 4..32 bytes */
     DAC_LINK_NO_RANDOM,   /* a key, but neither `random` nor boot_persists: challenges would come again after a start */
-    DAC_LINK_NO_CLOCK     /* a key, but no `milliseconds`: challenges would last for ever */
+    DAC_LINK_NO_CLOCK,    /* a key, but no `milliseconds`: challenges would last for ever */
+    DAC_LINK_BAD_SLOW     /* slow_knots or slow_index_bits out of range, or memory of slow parts missing or shared */
 } dac_link_started;
 
 /* Private, down to the functions. It is declared here so that the application can allocate it. */
@@ -97,13 +122,15 @@ typedef struct {
 
 /* A position in an image. */
 typedef struct {
-    uint8_t part;  /* 0 program words, 1 x, 2 y, 3 behind them */
+    uint8_t part;  /* 0 program words, then the DAC_LINK_PARTS of x, those of y, DAC_LINK_END behind them */
     uint8_t byte;  /* byte of the word */
     uint32_t word; /* word of the part */
     uint32_t held; /* the bytes of a word that were received already */
 } dac_link_place;
 
-/* The content of an image for an axis. */
+#define DAC_LINK_END (1 + 2 * DAC_LINK_PARTS)
+
+/* A part of an image for an axis. */
 typedef struct {
     uint32_t words; /* number of words: table words, or Fourier words */
     uint8_t bytes;  /* bytes per word */
@@ -125,7 +152,11 @@ typedef struct {
     uint32_t phase, remainder; /* phase and remainder of the advance */
     int32_t first, before;     /* codes */
     uint32_t steepest, rise;   /* of a table */
-    int32_t lowest, highest;   /* words of the table of y that plays */
+    int32_t lowest, highest;   /* words of the table of y that plays, or of a line */
+#if DAC_SLOW_PART
+    bool exact;                /* the ticks of the line are checked, not its words */
+    uint32_t line;
+#endif
     uint64_t sum;
     uint32_t crc;
     dac_link_place place;
@@ -149,7 +180,10 @@ typedef struct {
     uint32_t received;
     uint32_t taken_generation, taken_line; /* when the program became active */
     dac_link_place place;
-    dac_link_part x_part, y_part;
+    dac_link_part x_part[DAC_LINK_PARTS], y_part[DAC_LINK_PARTS];
+#if DAC_SLOW_PART
+    dac_slow_part slow[2][2]; /* of both images: those of x and y */
+#endif
     dac_link_image image[DAC_MOVE ? 3 : 2]; /* the third is that of a MOVE, with the tables that play */
 
     /* a COMMIT in progress, and ABORTs that wait with it */

@@ -105,7 +105,8 @@ enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LIN
        DAC_LINK_BACKWARD = 6, DAC_LINK_UP = 8, DAC_LINK_DOWN = 10, DAC_LINK_PIXELS = 12, DAC_LINK_Y_STEPS };
 enum { DAC_LINK_PHASE_STEP, DAC_LINK_PHASE_REMAINDER, DAC_LINK_PHASE_PERIOD, DAC_LINK_GAIN, DAC_LINK_OFFSET_LOW,
        DAC_LINK_OFFSET_HIGH, DAC_LINK_CODE_MIN, DAC_LINK_CODE_MAX, DAC_LINK_MAX_STEP, DAC_LINK_PARK_CODE,
-       DAC_LINK_ORDER, DAC_LINK_SHAPING_WORD, DAC_LINK_SLOW_WORD };
+       DAC_LINK_ORDER, DAC_LINK_SHAPING_WORD, DAC_LINK_SLOW_WORD, DAC_LINK_KNOT_SPACING, DAC_LINK_SLOW_STEP,
+       DAC_LINK_SLOW_REMAINDER };
 
 static inline bool dac_link_permits(const dac_link *l)
 {
@@ -143,6 +144,19 @@ static inline const uint8_t *dac_link_shape(const dac_link_image *image, unsigne
 static inline unsigned dac_link_index_bits(const dac_link_image *image, unsigned axis)
 {
     return dac_link_shape(image, axis)[0] & (DAC_SPLINE ? DAC_CUBIC - 1u : 255u);
+}
+
+/* The word that describes the slow part of an axis; 0 without one, and on a device that has none. */
+static inline uint32_t dac_link_slow_word(const dac_link *l, const dac_link_image *image, unsigned axis)
+{
+#if DAC_SLOW_PART
+    return l->config->slow_knots != 0 ? dac_link_program_word(image, axis + 1, DAC_LINK_SLOW_WORD) : 0;
+#else
+    (void)l;
+    (void)image;
+    (void)axis;
+    return 0;
+#endif
 }
 
 /* dac_link_answer.c */

@@ -11,6 +11,9 @@ enum { ALWAYS = TAKES_TABLES | READS_BACK | NARROWS };
 #if DAC_STORE
 enum { KEEPS_PROGRAMS = 128 };
 #endif
+#if DAC_SLOW_PART
+enum { PLAYS_SLOW_PARTS = 1 };
+#endif
 #define FURTHER (DAC_MOVE ? 2u : 0u) /* further features, by the options; HELLO ends with them if there are any */
 #if DAC_MOVE
 enum { MOVED = 2 }; /* behind PERMITS */
@@ -116,6 +119,15 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     a->length = DEVICE + STATUS;
     put_device(l, a->payload);
     put_status(l, a->payload + DEVICE);
+#if DAC_SLOW_PART
+    if (l->config->slow_knots != 0) {
+        dac_link_put(a->payload + DEVICE + STATUS, FURTHER | PLAYS_SLOW_PARTS);
+        a->payload[DEVICE + STATUS + 4] = l->config->slow_knots;
+        a->payload[DEVICE + STATUS + 5] = l->config->slow_index_bits;
+        a->length = DEVICE + STATUS + 6;
+        return dac_link_fine();
+    }
+#endif
 #if FURTHER != 0
     dac_link_put(a->payload + DEVICE + STATUS, FURTHER);
     a->length = DEVICE + STATUS + 4;

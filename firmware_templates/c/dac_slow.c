@@ -83,14 +83,10 @@ DAC_CODE_ATTR static void mix(const dac_bank_axis *bank, int32_t ratio)
     const int8_t *const second = bank->slow->second;
     dac_word *const mixed = bank->slow->mixed;
     const int32_t least = -(INT32_C(1) << (bank->bits - 1u));
-    const uint32_t range = (UINT32_C(1) << bank->bits) - 1, length = bank->length;
+    const uint32_t length = bank->length;
 
-    for (uint32_t i = 0; i < length; i++) {
-        int32_t word = fast[i] + ((ratio * second[i] + (1 << 11)) >> 12);
-        if ((uint32_t)(word - least) > range)
-            word = word < 0 ? least : -least - 1;
-        mixed[i] = (dac_word)word;
-    }
+    for (uint32_t i = 0; i < length; i++)
+        mixed[i] = dac_slow_mix(fast[i], second[i], ratio, least);
     for (uint32_t i = 0; i < DAC_WORDS_BEHIND; i++)
         mixed[length + i] = mixed[i];
 }
@@ -140,6 +136,19 @@ DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
 #endif
 }
 
+DAC_CODE_ATTR dac_slow_line dac_slow_line_of(const dac_slow_part *slow, uint32_t line, uint32_t lines, uint32_t step)
+{
+    const int64_t here = offset_of(slow, line, lines);
+    const int64_t there = offset_of(slow, line + 1 == lines ? 0 : line + 1, lines);
+    const dac_slow_line at = {
+        gain_of(slow, line),
+        slow->second != NULL ? ratio_of(slow, line) : 0,
+        here,
+        ramp_of(there - here, step),
+    };
+    return at;
+}
+
 DAC_CODE_ATTR void dac_slow_begin_line(dac_axis *axis, dac_bank_axis *bank, uint32_t line)
 {
     const dac_slow_part *const slow = bank->slow;
@@ -147,13 +156,12 @@ DAC_CODE_ATTR void dac_slow_begin_line(dac_axis *axis, dac_bank_axis *bank, uint
     axis->rise = 0;
     if (slow == NULL)
         return;
-    const uint32_t after = line + 1 == bank->lines ? 0 : line + 1;
-    const int64_t here = offset_of(slow, line, bank->lines), there = offset_of(slow, after, bank->lines);
+    const dac_slow_line at = dac_slow_line_of(slow, line, bank->lines, bank->ramp_step);
     if (slow->second != NULL)
-        mix(bank, ratio_of(slow, line));
-    bank->gain = gain_of(slow, line);
-    bank->offset = here + ((int64_t)1 << (bank->gain_q - 1u));
-    bank->ramp = ramp_of(there - here, bank->ramp_step);
+        mix(bank, at.ratio);
+    bank->gain = at.gain;
+    bank->offset = at.offset + ((int64_t)1 << (bank->gain_q - 1u));
+    bank->ramp = at.ramp;
     allow_runs(bank);
 }
 

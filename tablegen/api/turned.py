@@ -24,6 +24,7 @@ from tablegen.version import __version__
 
 if TYPE_CHECKING:
     from tablegen.charts.picture_file import PlottedCharts
+    from tablegen.link.prepare import PreparedScan
 
 _WARNED_PERCENT = 1.0
 _POINTS = 200  # of a line in a chart
@@ -161,6 +162,13 @@ class TurnedBuild(Result):
     def runtime(self) -> set[str]:
         """The names of those files that are the same in every build."""
         return set(turned_runtime())
+
+    @property
+    def prepared(self) -> "PreparedScan":
+        """The program that ``Device.upload`` sends: ``device.upload(scan.prepared.image("table", device.info))``."""
+        from tablegen.link.prepare import PreparedScan
+
+        return PreparedScan.of_turned(self.plan)
 
     @property
     def record(self) -> dict[str, Any]:

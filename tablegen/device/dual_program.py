@@ -45,7 +45,5 @@ def require_dual(program: ScanProgram) -> DualProgram:
         If an axis has one, or might have one.
     """
     if not isinstance(program, DualProgram):
-        raise ValueError(
-            "a program with a slow part plays in the sequencer alone, neither over the link nor in Verilog"
-        )
+        raise ValueError("a program with a slow part plays in the sequencer of C and over its link, not in Verilog")
     return program

@@ -224,6 +224,26 @@ class FrameProgram(Struct, frozen=True, eq=False):
         """
         return shift_round(self._sums(first, count), self.output.gain_q)
 
+    def at(self, line: int, k: Ints) -> Ints:
+        """Return the codes of ticks of a line before the clamp, unshaped.
+
+        Parameters
+        ----------
+        line
+            Line in [0, lines).
+        k
+            Ticks in [0, ticks of a line), any shape.
+
+        Returns
+        -------
+        Ints
+            Codes, shape of ``k``.
+        """
+        samples = replace(self.fast, words=self.table(line)).samples(k)
+        here = np.array(line)
+        sums = self.gains.at(here) * samples + self.slow.at(here, self.lines) + k * self._ramps(line, line + 1)[0]
+        return shift_round(sums, self.output.gain_q)
+
     def played(self, first: int, count: int, remainders: Remainders) -> Ints:
         """Return the codes of consecutive lines before the clamp, and update ``remainders``.
 

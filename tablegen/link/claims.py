@@ -15,6 +15,7 @@ from tablegen.link.messages import (
     AxisShape,
     DeviceInfo,
     DeviceStatus,
+    More,
     SlotContent,
     StoreStatus,
 )
@@ -30,6 +31,14 @@ _MAXIMUM_CONVERTER_BITS = 32
 _FOURIER_BYTES = 4
 _MAXIMUM_WORD_BYTES = 3
 MAXIMUM_IMAGE_BYTES = PROGRAM_BYTES + 2 * (_MAXIMUM_WORD_BYTES << MAXIMUM_INDEX_BITS)
+MAXIMUM_KNOTS = 65  # as in tablegen.fixedpoint.frame_program
+_SLOW_INDEX_BITS = range(3, 15)
+_SLOW_PART_BYTES = (112, 176)  # where an image has the words slow_part of x and y
+_KNOT_BYTES = 3 + 2  # a gain and a ratio
+# Of both axes: a word more for each of the table, the slow table and the knots.
+MAXIMUM_SLOW_BYTES = 2 * (
+    (1 << MAXIMUM_INDEX_BITS) + (_MAXIMUM_WORD_BYTES << _SLOW_INDEX_BITS[-1]) + _KNOT_BYTES * MAXIMUM_KNOTS
+)
 
 
 def most_bytes(info: DeviceInfo) -> int:
@@ -38,7 +47,20 @@ def most_bytes(info: DeviceInfo) -> int:
     ``image_bytes`` may be more, where its memory is; and less, where tables are longer than what was uploaded for them.
     """
     fourier = _FOURIER_BYTES * (2 * info.harmonics + 1)
-    return PROGRAM_BYTES + sum(max(axis.word_bytes << axis.index_bits, fourier) for axis in (info.x, info.y))
+    return PROGRAM_BYTES + sum(max(_table_bytes(axis, info), fourier) for axis in (info.x, info.y))
+
+
+def _table_bytes(axis: AxisShape, info: DeviceInfo) -> int:
+    table = axis.word_bytes << axis.index_bits
+    if More.SLOW_PARTS not in info.more:
+        return table
+    slow_table = axis.word_bytes << info.slow_index_bits
+    return table + (1 << axis.index_bits) + slow_table + _KNOT_BYTES * info.slow_knots
+
+
+def has_slow_parts(image: bytes) -> bool:
+    """Return True if an axis of an image has a slow part, by its program words."""
+    return any(any(image[at : at + 4]) for at in _SLOW_PART_BYTES)
 
 
 def check_device(info: DeviceInfo) -> None:
@@ -57,7 +79,13 @@ def check_device(info: DeviceInfo) -> None:
         _check_shape(name, shape)
         _check("HELLO", f"{name} code_max", limits.code_max, limits.code_min, (1 << shape.dac_bits) - 1)
         _check("HELLO", f"{name} max_step", limits.max_step, 1, (1 << 32) - 1)
-    _check("HELLO", "image_bytes", info.image_bytes, 0, MAXIMUM_IMAGE_BYTES)
+    slow_bytes = 0
+    if More.SLOW_PARTS in info.more:
+        _check("HELLO", "knots of a slow part", info.slow_knots, 2, MAXIMUM_KNOTS)
+        bits = _SLOW_INDEX_BITS
+        _check("HELLO", "index_bits of a slow table", info.slow_index_bits, bits[0], bits[-1])
+        slow_bytes = MAXIMUM_SLOW_BYTES
+    _check("HELLO", "image_bytes", info.image_bytes, 0, MAXIMUM_IMAGE_BYTES + slow_bytes)
 
 
 def _check_shape(name: str, shape: AxisShape) -> None:

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.link.claims import check_length, check_limits, has_restarted, most_bytes
+from tablegen.link.claims import check_length, check_limits, has_restarted, has_slow_parts, most_bytes
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused, Unsuitable
 from tablegen.link.kept import CHANGE_S, KeptPrograms, change_kept, read_kept, require_store
 from tablegen.link.messages import (
@@ -46,6 +46,7 @@ _MAX_LINE_S = 600.0  # a device that announces a rate of 1 Hz must not hold the 
 _MAX_TRIES = 8  # tries that fit into a time-out when answers are late
 _MOVE_S = 60.0  # a move waits for the start of a line
 _MOVED = struct.Struct("<2I")
+_CHECK_FRAMES = 8  # frames that the checks of slow parts may take: a tick is checked slower than it is played
 _POLL_S = 0.05
 _HELLO_FRESH_S = 0.25  # a HELLO this recent is not repeated: an upload notices a change by itself
 _MAX_READINGS = 3
@@ -232,7 +233,8 @@ class Device:
     def upload_time_s(self, image: "ProgramImage", swap: CommitMode = CommitMode.LINE) -> float:
         """Return the default time for an upload, in seconds: many times what it takes, and two long lines.
 
-        An upload that waits for a frame start has two frames of the new scan, as the old one's are not known.
+        An upload that waits for a frame start has two frames of the new scan, as the old one's are not known; one with
+        slow parts has some more, since a device may play all ticks of a frame to check them.
 
         Answers that come late, through a long way or a slow line, add to it, each by at most 5 s and all of them by at
         most an hour. A line counts as 10 minutes at most, whatever rate the device announces.
@@ -241,7 +243,8 @@ class Device:
         line_ticks, lines = struct.unpack_from("<2I", image.data)
         ticks = line_ticks * lines if swap is CommitMode.FRAME else line_ticks
         wait_s = ticks / rate if rate else 0.0
-        return self._transfer_time_s(len(image.data)) + 2.0 * min(wait_s, _MAX_LINE_S)
+        checks_s = _CHECK_FRAMES * line_ticks * lines / rate if rate and has_slow_parts(image.data) else 0.0
+        return self._transfer_time_s(len(image.data)) + 2.0 * min(wait_s, _MAX_LINE_S) + min(checks_s, _MAX_LINE_S)
 
     def _transfer_time_s(self, size: int) -> float:
         exchange, info = self._session.exchange, self.info

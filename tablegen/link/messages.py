@@ -217,11 +217,13 @@ class AxisLimits(_Struct):
 class DeviceInfo:
     """The properties of a device, fixed at its build; ``shaping`` is its highest order of shaped output.
 
-    They are 56 bytes in front of the status in the answer to HELLO, and ``more`` behind it, where it is not 0.
+    They are 56 bytes in front of the status in the answer to HELLO, and ``more`` behind it, where it is not 0; behind
+    that ``slow_knots`` and ``slow_index_bits``, the most knots and the longest slow table, where it plays slow parts.
     """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
     MORE: ClassVar[struct.Struct] = struct.Struct("<I")
+    SLOW: ClassVar[struct.Struct] = struct.Struct("<2B")
 
     version: int
     features: Feature
@@ -237,6 +239,8 @@ class DeviceInfo:
     shaping: int = 0
     degree: int = 0  # highest degree of a spline; 0 of a device that plays lines only
     more: More = NO_MORE
+    slow_knots: int = 0
+    slow_index_bits: int = 0
 
     def pack(self) -> bytes:
         """Return the beginning of the answer to HELLO."""
@@ -246,7 +250,9 @@ class DeviceInfo:
 
     def hello(self, status: "DeviceStatus") -> bytes:
         """Return the answer to HELLO; without further features it has the length that it had before them."""
-        return self.pack() + status.pack() + (self.MORE.pack(self.more) if self.more else b"")
+        answer = self.pack() + status.pack() + (self.MORE.pack(self.more) if self.more else b"")
+        slow = More.SLOW_PARTS in self.more
+        return answer + (self.SLOW.pack(self.slow_knots, self.slow_index_bits) if slow else b"")
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
@@ -265,6 +271,9 @@ class DeviceInfo:
         x, y, x_limits, y_limits = parts
         more_at = cls.LAYOUT.size + DeviceStatus.LAYOUT.size
         (more,) = cls.MORE.unpack_from(payload, more_at) if len(payload) >= more_at + cls.MORE.size else (0,)
+        slow_at = more_at + cls.MORE.size
+        has_slow = more & More.SLOW_PARTS and len(payload) >= slow_at + cls.SLOW.size
+        knots, slow_bits = cls.SLOW.unpack_from(payload, slow_at) if has_slow else (0, 0)
         return cls(
             version,
             Feature(features),
@@ -280,6 +289,8 @@ class DeviceInfo:
             shaping,
             degree,
             More(more),
+            knots,
+            slow_bits,
         )
 
 

@@ -2,31 +2,34 @@
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from tablegen.config.schema import MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
-from tablegen.device.dual_program import DualProgram
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.device.dual_program import ScanProgram
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SLOW_INDEX_SHIFT, SLOW_WORDS
 from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.messages import (
     HASH_BYTES,
     SPLINE_DEGREE,
     AxisLimits,
+    AxisShape,
     DeviceInfo,
     DeviceState,
     ImageInfo,
+    More,
     Reason,
     Upload,
 )
 from tablegen.link.players import Player
 from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, layout, make_image, take_apart
 
-_MIN_INDEX_BITS = 3  # least index bits of an interpolated table
+_MIN_INDEX_BITS = 3  # least index bits of an interpolated table, and of a slow one
+_MIXED_INDEX_BITS = 8  # most index bits of a table of lines with a slow part
+_MIN_KNOTS = 2
 _MOVED_BYTES = 12  # words of an axis that MOVE replaces: the gain, and the low and the high part of the offset
-_SLOW_WORD = 12  # of a page: not 0 with a slow part
 
 
 class RequestRefused(Exception):
@@ -61,7 +64,7 @@ class ActiveUpload:
     moved: bool = False
 
 
-def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
+def program_of(contents: Contents, update_rate_hz: int = 0) -> ScanProgram:
     """Return the program of an image.
 
     Raises
@@ -84,7 +87,7 @@ def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
         up=Window(scan("up_first"), scan("up_count")),
         down=Window(scan("down_first"), scan("down_count")),
     )
-    return DualProgram(contents.program(1), contents.program(2), schedule)
+    return ScanProgram(contents.program(1), contents.program(2), schedule)
 
 
 class Bank:
@@ -166,16 +169,37 @@ class Bank:
         shapes = ((info.x, self._info.x), (info.y, self._info.y))
         for page, (shape, _) in enumerate(shapes, 1):
             harmonics = words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]
-            most = self._info.harmonics if shape.index_bits else 0
+            most = self._info.harmonics if shape.index_bits and not self._slow_part(words, page) else 0
             if harmonics > most:
                 raise RequestRefused(Reason.HARMONICS, most)
         for page, (shape, ours) in enumerate(shapes, 1):
             period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
             if not shape.index_bits and period > 1 << ours.index_bits:
                 raise RequestRefused(Reason.SHAPE, page - 1)
-        size = PROGRAM_BYTES + sum(layout(words, info.x, info.y))
+            if (slow := self._slow_part(words, page)) and not self._plays(slow, shape):
+                raise RequestRefused(Reason.SHAPE, page - 1)
+        size = PROGRAM_BYTES + sum(layout(words, info.x, info.y, self._slow_parts))
         if size != info.image_bytes:
             raise RequestRefused(Reason.LENGTH, size)
+
+    @property
+    def _slow_parts(self) -> bool:
+        return More.SLOW_PARTS in self._info.more
+
+    def _slow_part(self, words: Sequence[int], page: int) -> int:
+        """Return the word that describes the slow part of an axis; 0 without one."""
+        at = page * PAGE_WORDS + len(AXIS_WORDS) + SLOW_WORDS.index("slow_part")
+        return words[at] if self._slow_parts else 0
+
+    def _plays(self, slow: int, shape: AxisShape) -> bool:
+        """Return True if the device plays a slow part of this size beside a table of this shape."""
+        knots, index_bits = slow & ((1 << SLOW_INDEX_SHIFT) - 1), slow >> SLOW_INDEX_SHIFT
+        return (
+            _MIN_KNOTS <= knots <= self._info.slow_knots
+            and _MIN_INDEX_BITS <= index_bits <= self._info.slow_index_bits
+            and (shape.mode == "cubic" or (shape.mode == "interpolated" and shape.length_bits <= _MIXED_INDEX_BITS))
+            and shape.word_bits <= MAXIMUM_SPLINE_BITS
+        )
 
     def find(self, image_crc: int) -> ActiveUpload | IncomingUpload:
         """Find what a COMMIT means: the program that plays already, or a complete upload.
@@ -200,7 +224,7 @@ class Bank:
             raise RequestRefused(Reason.INCOMPLETE, len(incoming.data))
         return incoming
 
-    def accept(self, incoming: IncomingUpload, authentic: Callable[[bytes], None]) -> DualProgram:
+    def accept(self, incoming: IncomingUpload, authentic: Callable[[bytes], None]) -> ScanProgram:
         """Check an upload, and return its program.
 
         Parameters
@@ -218,7 +242,7 @@ class Bank:
             if zlib.crc32(image) != incoming.info.image_crc:
                 raise RequestRefused(Reason.IMAGE)
             authentic(image)
-        contents = take_apart(image, incoming.info.x, incoming.info.y)
+        contents = take_apart(image, incoming.info.x, incoming.info.y, self._slow_parts)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
         if objection := first_objection(contents, *self.limits, playing, self._info.shaping):
@@ -253,7 +277,7 @@ class Bank:
             raise RequestRefused(Reason.GENERATION, self._player.swaps)
         playing = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", active.image)
         for axis in range(2):
-            if playing[PAGE_WORDS * (axis + 1) + _SLOW_WORD]:
+            if playing[PAGE_WORDS * (axis + 1) + len(AXIS_WORDS) + SLOW_WORDS.index("slow_part")]:
                 raise RequestRefused(Reason.SLOW_PART, axis)
         if not permits:
             raise RequestRefused(Reason.INTERLOCK)
@@ -275,7 +299,7 @@ class Bank:
     def _is_at_work(self) -> bool:
         return self.at_work() is not None
 
-    def load(self, image: ProgramImage) -> DualProgram:
+    def load(self, image: ProgramImage) -> ScanProgram:
         """Check a kept image at a start, make it the current one, and return its program.
 
         Raises
@@ -286,7 +310,7 @@ class Bank:
         info = image.info
         self._check_announcement(info)
         self._check_words(info, image.data)
-        contents = take_apart(image.data, info.x, info.y)
+        contents = take_apart(image.data, info.x, info.y, self._slow_parts)
         if objection := first_objection(contents, *self.limits, None, self._info.shaping):
             raise RequestRefused(*objection)
         self.active = ActiveUpload(info, image.data, 1, 0)
@@ -314,7 +338,7 @@ class Bank:
         """
         if self.active is None:
             raise RequestRefused(Reason.READBACK)
-        data = _of_tables(self.active)
+        data = self._of_tables(self.active)
         return ProgramImage(replace(self.active.info, image_bytes=len(data), image_crc=zlib.crc32(data)), data)
 
     def readback(self, offset: int, count: int) -> bytes:
@@ -328,7 +352,7 @@ class Bank:
         active = self.active
         if active is None or (self._staged and not self._stage_is_whole):
             raise RequestRefused(Reason.READBACK)
-        image = active.image if self._staged else _of_tables(active)
+        image = active.image if self._staged else self._of_tables(active)
         return image[offset : offset + count]
 
     def limit(self, payload: bytes) -> bytes:
@@ -339,8 +363,7 @@ class Bank:
             self.limits = x.within(self._info.x_limits), y.within(self._info.y_limits)
         return b"".join(limits.pack() for limits in self.limits)
 
-
-def _of_tables(active: ActiveUpload) -> bytes:
-    """Return the image of the tables that play."""
-    program = program_of(take_apart(active.image, active.info.x, active.info.y))
-    return make_image(program, active.info.hash.hex()).data
+    def _of_tables(self, active: ActiveUpload) -> bytes:
+        """Return the image of the tables that play."""
+        program = program_of(take_apart(active.image, active.info.x, active.info.y, self._slow_parts))
+        return make_image(program, active.info.hash.hex()).data

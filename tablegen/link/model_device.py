@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.sequencer import can_keep
 from tablegen.link import messages
 from tablegen.link.frames import Frame, FrameReader
@@ -181,7 +181,7 @@ class ModelDevice:
         self._power_up()
         self.player.restart(self._kept_program())
 
-    def _kept_program(self) -> DualProgram | None:
+    def _kept_program(self) -> ScanProgram | None:
         """Return the kept program that a start begins with; None for that of the firmware."""
         if self._flash is None:
             return None
@@ -413,7 +413,7 @@ class ModelDevice:
         incoming.state = Upload.WAITING
         commit.swaps = self.player.swaps
 
-    def _can_keep(self, program: DualProgram) -> bool:
+    def _can_keep(self, program: ScanProgram) -> bool:
         """Return False if a scan plays whose frame this program cannot continue."""
         playing = self.player.playing
         return self.player.state != DeviceState.PLAYING or playing is None or can_keep(playing, program)

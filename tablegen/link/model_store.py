@@ -3,7 +3,7 @@
 import struct
 from collections.abc import Callable
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.link.messages import NO_SLOT, STORES_WHILE_PLAYING, DeviceState, Reason, SlotContent, StoreStatus
 from tablegen.link.model_bank import Bank, RequestRefused
 from tablegen.link.players import Player
@@ -28,7 +28,7 @@ class ModelStore:
         self._store, self._bank, self._player, self._while_playing = store, bank, player, while_playing
         self._start, self._reason = NO_SLOT, 0
 
-    def load(self) -> DualProgram | None:
+    def load(self) -> ScanProgram | None:
         """Return the program that is due at a start, or None for that of the firmware."""
         store = self._store
         state = store.state
@@ -39,7 +39,7 @@ class ModelStore:
         program = self._load(slot)
         return self._load(store.state.selected) if program is None and slot != store.state.selected else program
 
-    def _load(self, slot: int) -> DualProgram | None:
+    def _load(self, slot: int) -> ScanProgram | None:
         image = self._store.image(slot)
         if image is None:
             return None

@@ -6,8 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram, require_dual
+from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.sequencer import Fault, Sequencer, Tick, can_keep
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.messages import DeviceState
 
 MAX_REQUESTS = 8  # requests that a sequencer in C queues until its next tick
@@ -33,7 +34,7 @@ class Player(Protocol):
         """The state after the last tick."""
 
     @property
-    def playing(self) -> DualProgram | None:
+    def playing(self) -> ScanProgram | None:
         """The active program."""
 
     @property
@@ -48,7 +49,7 @@ class Player(Protocol):
     def writable(self) -> bool:
         """True if no program waits to be swapped in, nor will."""
 
-    def commit(self, program: DualProgram, mode: CommitMode = CommitMode.LINE) -> bool:
+    def commit(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> bool:
         """Commit a program, to be swapped in as its mode says, or on the next tick where no scan plays."""
 
     def withdraw(self) -> bool:
@@ -69,21 +70,21 @@ class Player(Protocol):
     def advance(self, ticks: int) -> None:
         """Play so many ticks."""
 
-    def restart(self, program: DualProgram | None = None) -> None:
+    def restart(self, program: ScanProgram | None = None) -> None:
         """Restart as at power-up, with this program in place of the one of the firmware."""
 
 
 class _Queue:
     """The requests that wait for the next tick, as in the C runtime."""
 
-    def __init__(self, boot: DualProgram | None) -> None:
+    def __init__(self, boot: ScanProgram | None) -> None:
         self._boot = boot
         self._requests: list[Callable[[], None]] = []
         self._commits = 0
         self.swaps = self.swapped_at = 0
         self.restart()
 
-    def restart(self, program: DualProgram | None = None) -> None:
+    def restart(self, program: ScanProgram | None = None) -> None:
         """Restart as at power-up: this program, or else the boot program, if there is one, waits for the first tick."""
         self._requests.clear()
         self._commits = self.swaps = self.swapped_at = 0
@@ -95,10 +96,10 @@ class _Queue:
     def _power_up(self) -> None:
         raise NotImplementedError
 
-    def _take(self, program: DualProgram, mode: CommitMode) -> None:
+    def _take(self, program: ScanProgram, mode: CommitMode) -> None:
         raise NotImplementedError
 
-    def commit(self, program: DualProgram, mode: CommitMode = CommitMode.LINE) -> bool:
+    def commit(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> bool:
         """Commit a program, to be swapped in at the next start of a line, or of a frame as its mode says."""
 
         def act() -> None:
@@ -125,7 +126,7 @@ class SequencerPlayer(_Queue):
 
     def __init__(
         self,
-        boot: DualProgram | None,
+        boot: ScanProgram | None,
         codes: tuple[int, int] = (0, 0),
         on_tick: Callable[[int, int, Tick], None] | None = None,
     ) -> None:
@@ -137,7 +138,7 @@ class SequencerPlayer(_Queue):
         self.sequencer = Sequencer(None, codes=self._codes)
         self._last = None
 
-    def _take(self, program: DualProgram, mode: CommitMode) -> None:
+    def _take(self, program: ScanProgram, mode: CommitMode) -> None:
         self.sequencer.commit(program, mode)
 
     @property
@@ -160,10 +161,9 @@ class SequencerPlayer(_Queue):
         )
 
     @property
-    def playing(self) -> DualProgram | None:
+    def playing(self) -> ScanProgram | None:
         """The active program."""
-        playing = self.sequencer.playing
-        return None if playing is None else require_dual(playing)
+        return self.sequencer.playing
 
     @property
     def faults(self) -> int:
@@ -228,13 +228,13 @@ class LinePlayer(_Queue):
     and no axis is shaped.
     """
 
-    def __init__(self, boot: DualProgram | None, codes: tuple[int, int] = (0, 0)) -> None:
+    def __init__(self, boot: ScanProgram | None, codes: tuple[int, int] = (0, 0)) -> None:
         self._codes = codes
         super().__init__(boot)
 
     def _power_up(self) -> None:
-        self.playing: DualProgram | None = None
-        self._waits: DualProgram | None = None
+        self.playing: ScanProgram | None = None
+        self._waits: ScanProgram | None = None
         self._mode = CommitMode.LINE
         self._running = self._armed = self._endless = False
         self._armed_frames = self._frames_left = 0
@@ -244,7 +244,7 @@ class LinePlayer(_Queue):
         self.faults = 0
         self.fault_counts = 0, 0, 0, 0
 
-    def _take(self, program: DualProgram, mode: CommitMode) -> None:
+    def _take(self, program: ScanProgram, mode: CommitMode) -> None:
         self._waits, self._mode = program, mode
 
     @property
@@ -319,7 +319,7 @@ class LinePlayer(_Queue):
     def _at_swap(self) -> bool:
         return self._tick == 0 and (self._mode is not CommitMode.FRAME or self.line == 0)
 
-    def _swap(self, program: DualProgram) -> None:
+    def _swap(self, program: ScanProgram) -> None:
         old, self.playing, self._waits = self.playing, program, None
         self.swaps += 1
         self.swapped_at = self.line
@@ -330,7 +330,7 @@ class LinePlayer(_Queue):
             from_codes = self._codes if old is None else (old.x.output.park_code, old.y.output.park_code)
             self._parks_for = max(self._parks_for, _ramp(program, from_codes))
 
-    def _play(self, program: DualProgram, most: int) -> int:
+    def _play(self, program: ScanProgram, most: int) -> int:
         """Play at most so many ticks of the line, and return how many."""
         ticks = min(most, program.schedule.ticks - self._tick)
         self._played = True
@@ -342,7 +342,7 @@ class LinePlayer(_Queue):
                 self._end_frame(program)
         return ticks
 
-    def _end_frame(self, program: DualProgram) -> None:
+    def _end_frame(self, program: ScanProgram) -> None:
         self.line = 0
         if self._endless:
             return
@@ -351,18 +351,22 @@ class LinePlayer(_Queue):
             self._running = False
             self._parks_for = self._way_to_park(program)
 
-    def _way_to_park(self, program: DualProgram) -> int:
+    def _way_to_park(self, program: ScanProgram) -> int:
         """Return the ticks of parking from the last tick that was played."""
         schedule = program.schedule
         k = (self.line * schedule.ticks + self._tick - 1) % schedule.frame_ticks
-        x, y = (
-            int(axis.output.code(axis.samples(np.array([tick])))[0])
-            for axis, tick in ((program.x, k % schedule.ticks), (program.y, k))
-        )
-        return _ramp(program, (x, y))
+        return _ramp(program, (_code(program.x, k), _code(program.y, k)))
 
 
-def _ramp(program: DualProgram, codes: tuple[int, int]) -> int:
+def _code(axis: AxisProgram, k: int) -> int:
+    """Return the code of a tick of the frame."""
+    if isinstance(axis, FrameProgram):
+        line, tick = divmod(k, axis.fast.phase.ticks)
+        return int(axis.output.clamp(axis.at(line, np.array([tick])))[0])
+    return int(axis.output.code(axis.samples(np.array([k % axis.ticks])))[0])
+
+
+def _ramp(program: ScanProgram, codes: tuple[int, int]) -> int:
     """Return the ticks of the ramp from these codes to the park codes of both axes."""
     return max(
         -(-abs(axis.output.park_code - code) // axis.output.max_step)

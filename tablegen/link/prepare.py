@@ -7,20 +7,32 @@ from typing import Literal
 import numpy as np
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.output import Output
-from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import first_objection
 from tablegen.link.errors import Unsuitable
-from tablegen.link.messages import SPLINE_DEGREE, AxisShape, DeviceInfo, Feature
-from tablegen.link.program_image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, shape_of, take_apart
+from tablegen.link.messages import SPLINE_DEGREE, AxisShape, DeviceInfo, Feature, More
+from tablegen.link.program_image import (
+    FOURIER_BYTES,
+    PROGRAM_BYTES,
+    ProgramImage,
+    fast_of,
+    make_image,
+    shape_of,
+    take_apart,
+)
 from tablegen.link.refusal_reasons import Limits, explain, lacks_mode
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.read import NotABuild, read_build
 from tablegen.manifest.record import plan_record
+from tablegen.manifest.turned import StoredTurned, is_turned, read_turned
+from tablegen.manifest.turned_record import turned_record
 from tablegen.numerics.arrays import Ints
 from tablegen.planning.line_plan import Plan
+from tablegen.planning.turned_plan import TurnedPlan
 
 Form = Literal["auto", "table", "fourier"]
 TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # bits of AxisShape.converter
@@ -31,20 +43,26 @@ _RATE_TOLERANCE_HZ = 1.0  # a device states its rate to the nearest integer
 class PreparedScan:
     """A scan that can be uploaded: a program, the hash of its plan, and the Fourier words of both axes.
 
-    These are int64 of shape (2 H + 1,), in the order of devices.
+    These are int64 of shape (2 H + 1,), in the order of devices; None of a scan at an angle, whose tables they do not
+    make.
     """
 
     name: str
     digest: str
-    program: DualProgram
-    x_fourier: Ints
-    y_fourier: Ints
+    program: ScanProgram
+    x_fourier: Ints | None
+    y_fourier: Ints | None
 
     @classmethod
     def of_plan(cls, plan: Plan) -> "PreparedScan":
         """Prepare the scan of a plan."""
         digest = content_hash(plan_record(plan))
         return cls(plan.name, digest, plan.program, plan.x.fourier.in_order, plan.y.fourier.in_order)
+
+    @classmethod
+    def of_turned(cls, plan: TurnedPlan) -> "PreparedScan":
+        """Prepare the scan of a plan at an angle."""
+        return cls(plan.name, content_hash(turned_record(plan)), plan.program, None, None)
 
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
@@ -55,21 +73,23 @@ class PreparedScan:
         NotABuild
             If the folder holds none, or its manifest was changed.
         """
-        stored = read_build(folder)
+        stored = read_turned(folder) if is_turned(folder) else read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
             raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")
-        axes = manifest.axes
+        if isinstance(stored, StoredTurned):
+            return cls(manifest.name, manifest.hash, stored.program, None, None)
+        axes = stored.manifest.axes
         return cls(manifest.name, manifest.hash, stored.program, axes.x.fourier_words, axes.y.fourier_words)
 
     @property
-    def axes(self) -> tuple[tuple[str, Program, Ints], tuple[str, Program, Ints]]:
+    def axes(self) -> tuple[tuple[str, AxisProgram, Ints | None], tuple[str, AxisProgram, Ints | None]]:
         """The name, the program and the Fourier words of each axis, x first.
 
         Returns
         -------
         tuple of tuple
-            The words are Q2.30 of shape (2 H + 1,).
+            The words are Q2.30 of shape (2 H + 1,), or None.
         """
         return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
 
@@ -81,15 +101,18 @@ class PreparedScan:
         Unsuitable
             If an axis has no Fourier words that would render its table.
         """
-        if form == "fourier" and (direct := [name for name, axis, _ in self.axes if axis.mode == "direct"]):
-            raise Unsuitable(
-                [f"{name}: a direct table cannot be computed from Fourier words; use --as table" for name in direct]
-            )
+        if form == "fourier" and (
+            why := [why for name, axis, words in self.axes for why in _unrendered(name, axis, words)]
+        ):
+            raise Unsuitable(why)
         fourier = [
             words if form == "fourier" or (form == "auto" and _rendered(axis, words, info)) else None
             for _, axis, words in self.axes
         ]
-        return make_image(self.program, self.digest, fourier[0], fourier[1])
+        try:
+            return make_image(self.program, self.digest, fourier[0], fourier[1])
+        except ValueError as error:
+            raise Unsuitable([str(error)]) from None
 
     def like(self, image: bytes) -> ProgramImage:
         """Make the image that a device which plays this scan should hold, each axis in the form that this one has."""
@@ -104,9 +127,18 @@ def harmonics_of(image: bytes) -> tuple[int, int]:
     return x, y
 
 
-def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
+def _unrendered(name: str, axis: AxisProgram, words: Ints | None) -> list[str]:
+    """Return why the table of an axis cannot be sent as Fourier words; empty if it can."""
+    if words is None:
+        return [f"{name}: a table with a slow part is not sent as Fourier words; use --as table"]
+    if fast_of(axis).mode == "direct":
+        return [f"{name}: a direct table cannot be computed from Fourier words; use --as table"]
+    return []
+
+
+def _rendered(axis: AxisProgram, words: Ints | None, info: DeviceInfo | None) -> bool:
     """Return True if Fourier words are the smaller form of an axis that the device takes."""
-    if axis.mode == "direct":
+    if words is None or isinstance(axis, FrameProgram) or axis.mode == "direct":
         return False
     if info is not None:
         if not info.features & Feature.FOURIER or len(words) // 2 > info.harmonics:
@@ -138,7 +170,7 @@ def check(
     Unsuitable
         If it would not, with every objection.
     """
-    objections = [*_device(image, info, scan), *([] if any_rate else _rate(scan, info))]
+    objections = [*_device(image, info, scan), *_slow_parts(scan, info), *([] if any_rate else _rate(scan, info))]
     if why := lacks_mode(info, swap):
         objections.append(why)
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
@@ -172,8 +204,33 @@ def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[s
             f"{name}: a cubic table; the device plays none: build it with DAC_SPLINE=1 in C, "
             f"{name.upper()}_INTERPOLATED=3 in Verilog, or set table.mode"
             for name, axis, _ in scan.axes
-            if axis.mode == "cubic"
+            if fast_of(axis).mode == "cubic"
         ]
+    return reasons
+
+
+def _slow_parts(scan: PreparedScan, info: DeviceInfo) -> list[str]:
+    """Return why a device does not play the slow parts of a scan; empty if there are none, or it does."""
+    axes = [(name, axis) for name, axis, _ in scan.axes if isinstance(axis, FrameProgram)]
+    if not axes:
+        return []
+    if More.SLOW_PARTS not in info.more:
+        return [
+            "the scan is at an angle, on coupled axes or drifts, and the device plays one table for each axis alone: "
+            "build its firmware with DAC_SLOW_PART=1 and memory for slow parts, or set angle_deg = 0 (FPGAs have none)"
+        ]
+    reasons = []
+    for name, axis in axes:
+        knots, length = len(axis.gains.words), len(axis.slow.words)
+        if knots > info.slow_knots:
+            reasons.append(
+                f"{name}: {knots} knots; the device has memory for {info.slow_knots}: raise slow_knots in it"
+            )
+        if index_bits_of(length) > info.slow_index_bits:
+            most = 1 << info.slow_index_bits
+            reasons.append(
+                f"{name}: a slow table of {length} words; the device holds {most}: raise its slow_index_bits"
+            )
     return reasons
 
 
@@ -187,16 +244,15 @@ def _rate(scan: PreparedScan, info: DeviceInfo) -> list[str]:
     ]
 
 
-def _axis(axis: Program, shape: AxisShape, theirs: AxisShape) -> list[str]:
+def _axis(axis: AxisProgram, shape: AxisShape, theirs: AxisShape) -> list[str]:
     reasons = []
+    length = len(fast_of(axis).words)
     if shape.word_bits != theirs.word_bits:
         reasons.append(f"table words of {shape.word_bits} bits; the device has {theirs.word_bits}: set table.bits")
     if shape.dac_bits != theirs.dac_bits:
         reasons.append(f"codes of {shape.dac_bits} bits; the device has {theirs.dac_bits}: set dac.bits")
-    if len(axis.words) > 1 << theirs.index_bits:
-        reasons.append(
-            f"a table of {len(axis.words)} words; the device holds {1 << theirs.index_bits}: set table.length"
-        )
+    if length > 1 << theirs.index_bits:
+        reasons.append(f"a table of {length} words; the device holds {1 << theirs.index_bits}: set table.length")
     ours = _converter(axis.output)
     if theirs.converter and ours != _converter_of(theirs):
         reasons.append(

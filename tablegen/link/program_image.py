@@ -1,12 +1,23 @@
 """The image of a program: the bytes that an upload sends and a readback returns (docs/protocol.md)."""
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from tablegen.device.dual_program import DualProgram
-from tablegen.device.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS, program_words
+from tablegen.device.dual_program import AxisProgram, ScanProgram
+from tablegen.device.registers import (
+    AXIS_WORDS,
+    OFFSET_LOW_BITS,
+    PAGE_WORDS,
+    SCAN_WORDS,
+    SLOW_INDEX_SHIFT,
+    SLOW_WORDS,
+    program_words,
+)
+from tablegen.fixedpoint.frame_program import FrameProgram, Knots, SlowTable
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
@@ -19,7 +30,13 @@ from tablegen.numerics.arrays import Ints
 PROGRAM_WORDS = 3 * PAGE_WORDS
 PROGRAM_BYTES = 4 * PROGRAM_WORDS
 FOURIER_BYTES = 4  # bytes per Fourier word
-_HARMONICS_WORD = AXIS_WORDS.index("harmonics")
+SECOND_BYTES, GAIN_BYTES, RATIO_BYTES = (
+    1,
+    3,
+    2,
+)  # bytes per word of a slow part; the slow table's are as wide as a table's
+_NAMES = (*AXIS_WORDS, *SLOW_WORDS)
+_KNOTS = 127  # mask of slow_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +47,16 @@ class ProgramImage:
     data: bytes
 
 
+class AxisPart(NamedTuple):
+    """A part of the words of an axis in an image: what they are, how many, and the bytes of one."""
+
+    name: str
+    length: int
+    size: int
+
+
 def make_image(
-    program: DualProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
+    program: ScanProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
 ) -> ProgramImage:
     """Make the image of a program.
 
@@ -46,19 +71,37 @@ def make_image(
     -------
     ProgramImage
         What an upload sends.
+
+    Raises
+    ------
+    ValueError
+        If the gains and the ratios of a slow part are at different lines.
     """
     harmonics = [0 if words is None else len(words) // 2 for words in (x_fourier, y_fourier)]
     words = program_words(program.schedule, program.x, program.y, (harmonics[0], harmonics[1]))
     data = np.array(words, dtype="<u4").tobytes()
     for axis, fourier in ((program.x, x_fourier), (program.y, y_fourier)):
-        data += _bytes(axis.words, shape_of(axis).word_bytes) if fourier is None else _bytes(fourier, FOURIER_BYTES)
+        if fourier is not None:
+            data += _bytes(fourier, FOURIER_BYTES)
+            continue
+        size = shape_of(axis).word_bytes
+        data += _bytes(fast_of(axis).words, size)
+        if isinstance(axis, FrameProgram):
+            data += _bytes(axis.second, SECOND_BYTES) + _bytes(axis.slow.words, size)
+            data += _bytes(axis.gains.words, GAIN_BYTES) + _bytes(axis.ratios.words, RATIO_BYTES)
     shapes = shape_of(program.x), shape_of(program.y)
     info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), *shapes)
     return ProgramImage(info, data)
 
 
-def shape_of(axis: Program) -> AxisShape:
+def fast_of(axis: AxisProgram) -> Program:
+    """Return the program of an axis over a line: the fast part where it has a slow one."""
+    return axis.fast if isinstance(axis, FrameProgram) else axis
+
+
+def shape_of(axis: AxisProgram) -> AxisShape:
     """Return the shape of the table of an axis."""
+    axis = fast_of(axis)
     index_bits = axis.index_bits + (CUBIC if axis.mode == "cubic" else 0)
     return AxisShape(index_bits, axis.bits, axis.output.dac_bits)
 
@@ -77,6 +120,16 @@ def _words(data: bytes, size: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
+class SlowWords:
+    """The words of the slow part of an axis, signed: those of an image behind its table, in their order."""
+
+    second: Ints
+    table: Ints
+    gains: Ints
+    ratios: Ints
+
+
+@dataclass(frozen=True, eq=False)
 class Contents:
     """The parts of an image: the program words, unsigned, and the words of both axes, signed."""
 
@@ -85,14 +138,28 @@ class Contents:
     y_shape: AxisShape
     x: Ints
     y: Ints
+    x_slow: SlowWords | None = None
+    y_slow: SlowWords | None = None
 
     def scan(self, name: str) -> int:
         """Return a word of the page of the scan by its name in ``tablegen.device.registers.SCAN_WORDS``."""
         return self.words[SCAN_WORDS.index(name)]
 
     def axis(self, page: int, name: str) -> int:
-        """Return a word of the page of x (1) or y (2) by its name in ``AXIS_WORDS``."""
-        return self.words[page * PAGE_WORDS + AXIS_WORDS.index(name)]
+        """Return a word of the page of x (1) or y (2) by its name in ``AXIS_WORDS`` or ``SLOW_WORDS``."""
+        return self.words[page * PAGE_WORDS + _NAMES.index(name)]
+
+    def slow(self, page: int) -> SlowWords | None:
+        """Return the slow part of x (1) or y (2); None if it has none."""
+        return self.x_slow if page == 1 else self.y_slow
+
+    def table(self, page: int) -> Ints:
+        """Return the words of the table of x (1) or y (2), or its Fourier words."""
+        return self.x if page == 1 else self.y
+
+    def shape(self, page: int) -> AxisShape:
+        """Return the shape of the table of x (1) or y (2)."""
+        return self.x_shape if page == 1 else self.y_shape
 
     def signed(self, page: int, name: str) -> int:
         """Return the word of ``axis`` as a signed number."""
@@ -112,26 +179,17 @@ class Contents:
         """
         return Shaping.of_word(self.axis(page, "shaping"))
 
-    def program(self, page: int) -> Program:
-        """Return the program of x (1) or y (2), with tables rendered from Fourier words. Its converter is a plain one.
+    def output(self, page: int) -> Output:
+        """Return the output stage of x (1) or y (2). Its converter is a plain one.
 
-        Its output is not shaped where the word of shaping defines none.
-
-        Raises
-        ------
-        ValueError
-            If it could not be played at all.
+        It is not shaped where the word of shaping defines none. With a slow part, gain and offset are the slow table's.
         """
-        shape, words = (self.x_shape, self.x) if page == 1 else (self.y_shape, self.y)
-        if self.axis(page, "harmonics"):
-            half = len(words) // 2
-            fourier = FourierWords(int(words[0]), words[1 : half + 1], words[half + 1 :])
-            words = synthesize(fourier, 1 << shape.length_bits, shape.word_bits)
+        shape = self.shape(page)
         try:
             shaping = self.shaping(page)
         except ValueError:
             shaping = OFF
-        output = Output(
+        return Output(
             gain_word=self.signed(page, "gain"),
             gain_q=UNIT_GAIN_BITS + shape.word_bits + guard_bits(shape.word_bits) - shape.dac_bits,
             offset_word=self.offset_word(page),
@@ -145,28 +203,82 @@ class Contents:
             word_bits=shape.dac_bits,
             shaping=shaping,
         )
+
+    def fast(self, page: int) -> Program:
+        """Return the program of the table of x (1) or y (2), rendered from Fourier words if those were sent.
+
+        Raises
+        ------
+        ValueError
+            If it could not be played at all.
+        """
+        shape, words = self.shape(page), self.table(page)
+        if self.axis(page, "harmonics"):
+            half = len(words) // 2
+            fourier = FourierWords(int(words[0]), words[1 : half + 1], words[half + 1 :])
+            words = synthesize(fourier, 1 << shape.length_bits, shape.word_bits)
         hold = self.scan("line_ticks") if page == 2 and self.scan("y_steps") else 1
         phase = RationalPhase(self.axis(page, "phase_period"))
-        return Program(phase, hold, shape.mode, shape.word_bits, words, output)
+        return Program(phase, hold, shape.mode, shape.word_bits, words, self.output(page))
+
+    def program(self, page: int) -> AxisProgram:
+        """Return the program of x (1) or y (2).
+
+        Raises
+        ------
+        ValueError, OverflowError
+            If it could not be played at all.
+        """
+        fast, slow, spacing = self.fast(page), self.slow(page), self.axis(page, "knot_spacing")
+        if slow is None:
+            return fast
+        gains, ratios = Knots(slow.gains, spacing), Knots(slow.ratios, spacing)
+        table = SlowTable(slow.table, fast.output.gain_word, fast.output.offset_word)
+        return FrameProgram(fast, self.scan("frame_lines"), gains, ratios, slow.second, table)
 
 
 def _signed(word: int) -> int:
     return word - (1 << 32) if word >> 31 else word
 
 
-def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int]:
-    """Return the bytes that follow the program words for x and for y."""
-    sizes = []
-    for page, shape in ((1, x), (2, y)):
-        harmonics = words[page * PAGE_WORDS + _HARMONICS_WORD]
-        period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
-        length = 1 << shape.length_bits if shape.index_bits else period
-        sizes.append(FOURIER_BYTES * (2 * harmonics + 1) if harmonics else shape.word_bytes * length)
-    return sizes[0], sizes[1]
+def parts_of(words: Sequence[int], page: int, shape: AxisShape, slow_parts: bool = True) -> list[AxisPart]:
+    """Return the parts of the words of x (1) or y (2), in the order of an image.
+
+    Parameters
+    ----------
+    words
+        Program words.
+    slow_parts
+        False for a device that has none: it ignores the words of a slow part.
+    """
+    word = dict(zip(_NAMES, words[page * PAGE_WORDS : (page + 1) * PAGE_WORDS], strict=True))
+    if harmonics := word["harmonics"]:
+        return [AxisPart("Fourier", 2 * harmonics + 1, FOURIER_BYTES)]
+    length, size = 1 << shape.length_bits if shape.index_bits else word["phase_period"], shape.word_bytes
+    table, slow = AxisPart("table", length, size), word["slow_part"]
+    if not (slow and slow_parts):
+        return [table]
+    knots = slow & _KNOTS
+    return [
+        table,
+        AxisPart("second table", length, SECOND_BYTES),
+        AxisPart("slow table", 1 << (slow >> SLOW_INDEX_SHIFT & 31), size),
+        AxisPart("gain", knots, GAIN_BYTES),
+        AxisPart("ratio", knots, RATIO_BYTES),
+    ]
 
 
-def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
-    """Take apart an image of tables of these shapes.
+def layout(words: Sequence[int], x: AxisShape, y: AxisShape, slow_parts: bool = True) -> tuple[int, int]:
+    """Return the bytes that follow the program words for x and for y; ``slow_parts`` as in ``parts_of``."""
+    x_bytes, y_bytes = (
+        sum(part.length * part.size for part in parts_of(words, page, shape, slow_parts))
+        for page, shape in ((1, x), (2, y))
+    )
+    return x_bytes, y_bytes
+
+
+def take_apart(data: bytes, x: AxisShape, y: AxisShape, slow_parts: bool = True) -> Contents:
+    """Take apart an image of tables of these shapes; ``slow_parts`` as in ``parts_of``.
 
     Raises
     ------
@@ -176,13 +288,16 @@ def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
     if len(data) < PROGRAM_BYTES:
         raise ValueError(f"an image of {len(data)} bytes; the program words alone have {PROGRAM_BYTES}")
     words = tuple(int(word) for word in np.frombuffer(data, dtype="<u4", count=PROGRAM_WORDS))
-    x_bytes, y_bytes = layout(words, x, y)
-    if len(data) != PROGRAM_BYTES + x_bytes + y_bytes:
-        raise ValueError(f"an image of {len(data)} bytes; it says {PROGRAM_BYTES + x_bytes + y_bytes} of itself")
-    parts = []
+    size = PROGRAM_BYTES + sum(layout(words, x, y, slow_parts))
+    if len(data) != size:
+        raise ValueError(f"an image of {len(data)} bytes; it says {size} of itself")
+    tables, slow = [], []
     at = PROGRAM_BYTES
-    for page, shape, size in ((1, x, x_bytes), (2, y, y_bytes)):
-        harmonics = words[page * PAGE_WORDS + _HARMONICS_WORD]
-        parts.append(_words(data[at : at + size], FOURIER_BYTES if harmonics else shape.word_bytes))
-        at += size
-    return Contents(words, x, y, *parts)
+    for page, shape in ((1, x), (2, y)):
+        values = []
+        for part in parts_of(words, page, shape, slow_parts):
+            values.append(_words(data[at : at + part.length * part.size], part.size))
+            at += part.length * part.size
+        tables.append(values[0])
+        slow.append(SlowWords(*values[1:]) if len(values) > 1 else None)
+    return Contents(words, x, y, tables[0], tables[1], slow[0], slow[1])

@@ -8,7 +8,6 @@ from tablegen.link.errors import Refused
 from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Feature, More, Reason, Request
 
 if TYPE_CHECKING:
-    from tablegen.link.messages import AxisShape
     from tablegen.link.program_image import Contents
 
 _AXES = "xy"
@@ -191,23 +190,30 @@ def _step(page: int, index: int, contents: "Contents | None", limits: AxisLimits
 
 def _word(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
     value = _value(page, index, contents)
-    bits = "the table's width" if contents is None else f"{_shape(page, contents).word_bits} bits"
+    if contents is not None and index >= len(contents.table(page)):
+        return f"word {index} of its words, which is one of its slow part, is out of range; build it again"
+    bits = "the table's width" if contents is None else f"{contents.shape(page).word_bits} bits"
     return f"word {index} of its table{value} does not fit {bits}; build it again"
 
 
 def _range(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
-    value = _value(page, index, contents)
     ends = "code_min..code_max"
     if contents is not None:
         ends = f"codes {contents.axis(page, 'code_min')}..{contents.axis(page, 'code_max')}"
-    return f"word {index} of its table{value} leads outside {ends}; build it again"
+    return f"{_place(page, index, contents)}{_value(page, index, contents)} leads outside {ends}; build it again"
 
 
 def _slew(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
     step = "its max_step" if contents is None else f"its max_step of {contents.axis(page, 'max_step')} codes a tick"
-    return (
-        f"at word {index} of its table it moves faster than {step}; scan slower or smaller, or raise max_slew_v_per_s"
-    )
+    place = _place(page, index, contents)
+    return f"at {place} it moves faster than {step}; scan slower or smaller, or raise max_slew_v_per_s"
+
+
+def _place(page: int, index: int, contents: "Contents | None") -> str:
+    """Name what a check of the table is about: a word, or with a slow part a line."""
+    if contents is not None and contents.slow(page):
+        return f"line {index} of its frame"
+    return f"word {index} of its table"
 
 
 def _jump(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
@@ -228,13 +234,9 @@ _CHECKS: dict[Reason, Callable[[int, int, "Contents | None", AxisLimits | None],
 }
 
 
-def _shape(page: int, contents: "Contents") -> "AxisShape":
-    return contents.x_shape if page == 1 else contents.y_shape
-
-
 def _value(page: int, index: int, contents: "Contents | None") -> str:
     """Return the word itself, where it was sent as it is."""
-    if contents is None or contents.axis(page, "harmonics"):
+    if contents is None or contents.axis(page, "harmonics") or contents.slow(page):
         return ""
-    words = contents.x if page == 1 else contents.y
+    words = contents.table(page)
     return f" ({int(words[index])})" if index < len(words) else ""

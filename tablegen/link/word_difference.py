@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
-from tablegen.link.messages import AxisShape
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
 from tablegen.link.prepare import PreparedScan
-from tablegen.link.program_image import PROGRAM_BYTES, Contents, take_apart
+from tablegen.link.program_image import PROGRAM_BYTES, parts_of
 
 _SIGNED = {"gain", "offset_high"}
 
@@ -33,7 +32,6 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
     Each axis is compared in the form in which the device holds it, words or Fourier words.
     """
     image_expected = scan.like(image)
-    expected = take_apart(image_expected.data, image_expected.info.x, image_expected.info.y)
     differing = []
     ours, theirs = _words(image_expected.data), _words(image)
     for index, word in enumerate(ours):
@@ -46,15 +44,17 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
                 )
             )
     at = PROGRAM_BYTES
-    for axis, page, words, shape in (("x", 1, expected.x, expected.x_shape), ("y", 2, expected.y, expected.y_shape)):
-        size = _size(expected, page, shape)
-        there_words = _signed(image[at : at + size * len(words)], size)
-        what = "Fourier" if expected.axis(page, "harmonics") else "table"
-        for index, word in enumerate(words.tolist()):
-            other = there_words[index] if index < len(there_words) else None
-            if other != word:
-                differing.append(Difference(f"{axis}: {what} word {index}", at + size * index, word, other))
-        at += size * len(words)
+    data, info = image_expected.data, image_expected.info
+    for axis, page, shape in (("x", 1, info.x), ("y", 2, info.y)):
+        for part in parts_of(ours, page, shape):
+            end = at + part.length * part.size
+            there_words = _signed(image[at:end], part.size)
+            for index, word in enumerate(_signed(data[at:end], part.size)):
+                other = there_words[index] if index < len(there_words) else None
+                if other != word:
+                    name = f"{axis}: {part.name} word {index}"
+                    differing.append(Difference(name, at + part.size * index, word, other))
+            at = end
     if len(image) > at:
         differing.append(Difference("after the last word", at, 0, len(image) - at))
     return differing
@@ -67,16 +67,12 @@ def _words(data: bytes) -> list[int]:
 
 def _name(index: int) -> str:
     page, word = divmod(index, PAGE_WORDS)
-    names = AXIS_WORDS if page else SCAN_WORDS
+    names = (*AXIS_WORDS, *SLOW_WORDS) if page else SCAN_WORDS
     return f"{('scan', 'x', 'y')[page]}: {names[word] if word < len(names) else f'unused word {word}'}"
 
 
 def _signed_word(name: str, word: int) -> int:
     return word - (1 << 32) if name[3:] in _SIGNED and word >> 31 else word
-
-
-def _size(contents: Contents, page: int, shape: AxisShape) -> int:
-    return 4 if contents.axis(page, "harmonics") else shape.word_bytes
 
 
 def _signed(data: bytes, size: int) -> list[int]:

@@ -118,7 +118,8 @@ def read_build(folder: str | Path) -> StoredBuild:
         stored = parse_manifest(content)
     except AngleManifest:
         raise NotABuild(
-            f"{path}: is of a scan at an angle; of the commands that read a build `tablegen verify` alone takes it"
+            f"{path}: is of a scan at an angle; of the commands that read a build `tablegen verify`, `upload` and "
+            "`readback` take it"
         ) from None
     except ForeignManifest:
         raise NotABuild(f"{path}: is not a manifest of tablegen") from None

@@ -18,12 +18,14 @@ from limits import PATIENCE_S
 from link_programs import INFO, SmallScan, make_scan
 from replacing import replace
 
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.device import Device
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature, Request
+from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, AxisShape, DeviceInfo, Feature, More, Request
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import LinePlayer
 from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, PreparedScan
+from tablegen.link.program_image import fast_of
 
 BOOT = make_scan(1)
 KEY = bytes(range(16))
@@ -56,8 +58,9 @@ def info_for(scan: PreparedScan, **changes: object) -> DeviceInfo:
         converter = output.word_bits
         converter |= TWOS_COMPLEMENT if output.coding == "twos-complement" else 0
         converter |= LEFT_ALIGNED if output.align == "left" else 0
-        index_bits = (len(axis.words) - 1).bit_length()
-        shapes.append(AxisShape(index_bits, axis.bits, output.dac_bits, converter))
+        table = fast_of(axis)
+        index_bits = (len(table.words) - 1).bit_length()
+        shapes.append(AxisShape(index_bits, table.bits, output.dac_bits, converter))
         limits.append(AxisLimits(output.code_min, output.code_max, output.max_step, 1 << output.dac_bits))
     info = replace(
         INFO,
@@ -69,6 +72,8 @@ def info_for(scan: PreparedScan, **changes: object) -> DeviceInfo:
         y_limits=limits[1],
         update_rate_hz=round(scan.program.schedule.update_rate_hz),
     )
+    if isinstance(scan.program.x, FrameProgram):
+        info = replace(info, more=More.SLOW_PARTS, slow_knots=17, slow_index_bits=6, degree=SPLINE_DEGREE)
     return replace(info, **changes)  # type: ignore[arg-type]
 
 
@@ -123,12 +128,13 @@ class Bench:
 
 
 class Served:
-    """A model that plays in real time in a thread, on a pty or a TCP port; ``url`` is for pyserial.
+    """A model, or a compiled device, that plays in real time in a thread, on a pty or a TCP port.
 
-    ``dies_after``: so many bytes from the host, and it hangs up, once; on TCP it can be called again.
+    ``url`` is for pyserial. ``dies_after``: so many bytes from the host, and it hangs up, once; on TCP it can be
+    called again.
     """
 
-    def __init__(self, device: ModelDevice, kind: str, tick_hz: int = 20000, dies_after: int | None = None) -> None:
+    def __init__(self, device: Any, kind: str, tick_hz: int = 20000, dies_after: int | None = None) -> None:
         self.device = device
         self.calls = 0
         self._tick_hz, self._dies_after = tick_hz, dies_after

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.played_lines import LineTicks, play_line
 from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.numerics.arrays import Ints
@@ -59,7 +59,7 @@ class _Ticks:
         return self.sums[ticks]
 
 
-def _record(program: DualProgram, x: Ints, y: Ints, markers: Ints) -> _Ticks:
+def _record(program: ScanProgram, x: Ints, y: Ints, markers: Ints) -> _Ticks:
     records = np.empty(len(x), dtype=_RECORD)
     for name, axis, codes in (("x", program.x, x), ("y", program.y, y)):
         records[name] = axis.output.word(codes)  # type: ignore[arg-type]
@@ -67,7 +67,7 @@ def _record(program: DualProgram, x: Ints, y: Ints, markers: Ints) -> _Ticks:
     return _Ticks(records, np.stack([x, y], axis=1))
 
 
-def _steady(program: DualProgram, line: int, settled: bool) -> _Ticks:
+def _steady(program: ScanProgram, line: int, settled: bool) -> _Ticks:
     ticks: LineTicks = play_line(program, line, settled)
     markers = np.full(program.schedule.ticks, _BIT["playing"])
     for name in ("line", "frame", "pixel", "backward", "valid"):
@@ -75,7 +75,7 @@ def _steady(program: DualProgram, line: int, settled: bool) -> _Ticks:
     return _record(program, ticks.x, ticks.y, markers)
 
 
-def _stepped(program: DualProgram, ticks: list[Tick]) -> _Ticks:
+def _stepped(program: ScanProgram, ticks: list[Tick]) -> _Ticks:
     markers = [sum(bit for name, bit in _BIT.items() if getattr(tick, name)) for tick in ticks]
     return _record(program, np.array([t.x for t in ticks]), np.array([t.y for t in ticks]), np.array(markers))
 
@@ -83,7 +83,7 @@ def _stepped(program: DualProgram, ticks: list[Tick]) -> _Ticks:
 class _Play:
     """A program that plays from some line on, in one of the ways in which it may have come to that."""
 
-    def __init__(self, check: "LineCheck", sequencer: Sequencer, program: DualProgram, after_park: bool) -> None:
+    def __init__(self, check: "LineCheck", sequencer: Sequencer, program: ScanProgram, after_park: bool) -> None:
         self.program, self.after_park = program, after_park
         self._check = check
         self._sequencer: Sequencer | None = sequencer
@@ -127,10 +127,10 @@ class LineCheck:
 
     BOOT = "boot"
 
-    def __init__(self, boot: DualProgram, codes: tuple[int, int] = (0, 0)) -> None:
+    def __init__(self, boot: ScanProgram, codes: tuple[int, int] = (0, 0)) -> None:
         self._boot, self._power_up = boot, codes
-        self._offered: dict[str, DualProgram] = {self.BOOT: boot}
-        self._steady: dict[tuple[DualProgram, int, bool], _Ticks] = {}
+        self._offered: dict[str, ScanProgram] = {self.BOOT: boot}
+        self._steady: dict[tuple[ScanProgram, int, bool], _Ticks] = {}
         self.lines = 0
         self.reboot()
 
@@ -142,11 +142,11 @@ class LineCheck:
         self._whole = False  # the last line
         self._codes = self._power_up
 
-    def offer(self, name: str, program: DualProgram) -> None:
+    def offer(self, name: str, program: ScanProgram) -> None:
         """It may come into force from now on."""
         self._offered[name] = program
 
-    def steady(self, program: DualProgram, line: int, settled: bool) -> _Ticks:
+    def steady(self, program: ScanProgram, line: int, settled: bool) -> _Ticks:
         """A line that nothing disturbs."""
         key = program, line, settled
         if key not in self._steady:
@@ -208,23 +208,23 @@ class LineCheck:
                 for name, program in self._offered.items():
                     yield name, self._swapped(between, program, codes)
 
-    def _program(self, name: str) -> DualProgram:
+    def _program(self, name: str) -> ScanProgram:
         if self._play is not None and self.taken[self._generation] == name:
             return self._play.program
         return self._offered[name]
 
-    def _swapped(self, old: DualProgram, new: DualProgram, codes: tuple[int, int]) -> _Play:
+    def _swapped(self, old: ScanProgram, new: ScanProgram, codes: tuple[int, int]) -> _Play:
         """Taken at the start of a line."""
         sequencer = self._running(old, codes)
         sequencer.commit(new)
         return _Play(self, sequencer, new, after_park=False)
 
-    def _started(self, program: DualProgram, codes: tuple[int, int]) -> _Play:
+    def _started(self, program: ScanProgram, codes: tuple[int, int]) -> _Play:
         """Triggered, from codes on the way to its park codes."""
         return _Play(self, self._running(program, codes), program, after_park=True)
 
     @staticmethod
-    def _running(program: DualProgram, codes: tuple[int, int]) -> Sequencer:
+    def _running(program: ScanProgram, codes: tuple[int, int]) -> Sequencer:
         sequencer = Sequencer(program)
         sequencer.codes = codes
         sequencer.arm()
@@ -232,7 +232,7 @@ class LineCheck:
         return sequencer
 
     @staticmethod
-    def _ramp(program: DualProgram, codes: tuple[int, int]) -> list[tuple[int, int]]:
+    def _ramp(program: ScanProgram, codes: tuple[int, int]) -> list[tuple[int, int]]:
         """Codes on the way to the park codes, from the last backwards."""
         sequencer = Sequencer(program)
         sequencer.codes = codes

@@ -47,6 +47,15 @@ static void furnish(dac_link_axis *axis, const dac_converter *converter, const u
     for (unsigned i = 0; i < 2; i++)
         axis->table[i] = place(DAC_TABLE_ROOM(index_bits), sizeof(dac_word));
     axis->fourier = place(2u * harmonics + 1, sizeof(int32_t));
+#if DAC_SLOW_PART
+    for (unsigned i = 0; i < 2; i++) {
+        axis->slow[i].second = place((size_t)1 << index_bits, 1);
+        axis->slow[i].table = place(DAC_LINK_SLOW_ROOM(SLOW_INDEX_BITS), sizeof(dac_word));
+        axis->slow[i].gains = place(SLOW_KNOTS, sizeof(int32_t));
+        axis->slow[i].ratios = place(SLOW_KNOTS, sizeof(int16_t));
+    }
+    axis->mixed = place(DAC_TABLE_ROOM(index_bits), sizeof(dac_word));
+#endif
 }
 
 device *device_new(const device_setup *setup, uint32_t boot)
@@ -57,6 +66,10 @@ device *device_new(const device_setup *setup, uint32_t boot)
     d->setup = *setup;
     furnish(&c->x, &setup->x_converter, setup->x_limits, setup->x_word_bits, setup->x_index_bits, setup->harmonics);
     furnish(&c->y, &setup->y_converter, setup->y_limits, setup->y_word_bits, setup->y_index_bits, setup->harmonics);
+#if DAC_SLOW_PART
+    c->slow_knots = SLOW_KNOTS;
+    c->slow_index_bits = SLOW_INDEX_BITS;
+#endif
     c->harmonics = setup->harmonics;
     c->sine = setup->sine;
     c->sine_index_bits = setup->sine_index_bits;
@@ -76,12 +89,29 @@ device *device_new(const device_setup *setup, uint32_t boot)
     return d;
 }
 
+#if DAC_SLOW_PART
+static void free_slow(const dac_link_axis *axis)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        free(axis->slow[i].second);
+        free(axis->slow[i].table);
+        free(axis->slow[i].gains);
+        free(axis->slow[i].ratios);
+    }
+    free(axis->mixed);
+}
+#endif
+
 void device_delete(device *d)
 {
     for (unsigned i = 0; i < 2; i++) {
         free(d->config.x.table[i]);
         free(d->config.y.table[i]);
     }
+#if DAC_SLOW_PART
+    free_slow(&d->config.x);
+    free_slow(&d->config.y);
+#endif
     free(d->config.x.fourier);
     free(d->config.y.fourier);
     free(d->record);
@@ -210,7 +240,7 @@ size_t device_records(device *d, line_record *records)
 /* Damage to the memory of the upload in hand. */
 void device_poke(device *d, unsigned axis, uint32_t word, int32_t value)
 {
-    const dac_link_part *const part = axis == 0 ? &d->link.x_part : &d->link.y_part;
+    const dac_link_part *const part = axis == 0 ? d->link.x_part : d->link.y_part;
     const dac_link_axis *const here = dac_link_axis_of(&d->link, axis);
     if (part->harmonics != 0)
         here->fourier[word] = value;
@@ -275,6 +305,19 @@ dac_link_started device_refusal(const device *d, unsigned fault)
     case 9: c.identity_bytes = 33; break;
     case 10: c.random = NULL; c.boot_persists = false; break;
     case 11: c.milliseconds = NULL; break;
+#if DAC_SLOW_PART
+    case 12: c.slow_knots = 1; break;
+    case 13: c.slow_knots = 66; break;
+    case 14: c.slow_index_bits = 2; break;
+    case 15: c.slow_index_bits = 15; break;
+    case 16: c.x.slow[0].second = NULL; break;
+    case 17: c.x.slow[1].table = NULL; break;
+    case 18: c.y.slow[0].gains = NULL; break;
+    case 19: c.y.slow[1].ratios = NULL; break;
+    case 20: c.x.mixed = NULL; break;
+    case 21: c.y.mixed = NULL; break;
+    case 22: c.y.mixed = c.x.mixed; break;
+#endif
     default: break;
     }
     const dac_link_started started = dac_link_init(&link, &c, (dac_sequencer *)&d->sequencer, 0);

@@ -6,6 +6,9 @@
 #include "lines.h"
 
 enum { OUT = 1 << 20 };
+#if DAC_SLOW_PART
+enum { SLOW_KNOTS = 65, SLOW_INDEX_BITS = 7 }; /* of every device; tests/link_device.py has them too */
+#endif
 enum { AXIS_FAULTS = 20, FAULTS = 2 * AXIS_FAULTS + 11 }; /* of a configuration */
 
 typedef struct {

@@ -23,16 +23,17 @@ from cut_flash import CutFlash
 from link_talk import IDENTITY, Talk, derived_nonce
 
 from tablegen.base.resources import c_link, c_runtime, c_store
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.link.messages import AxisLimits
-from tablegen.link.program_image import make_image
+from tablegen.link.program_image import fast_of, make_image
 from tablegen.link.store import Layout
 
 HERE = Path(__file__).parent
 LINES = REPOSITORY / "examples" / "firmware" / "cortex_m"
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+SLOW_KNOTS, SLOW_INDEX_BITS = 65, 7  # of every device with slow parts
 _UNTIL_IDLE = 0xFFFFFFFF
 
 
@@ -57,6 +58,7 @@ class Started(IntEnum):
     NO_IDENTITY = 4
     NO_RANDOM = 5
     NO_CLOCK = 6
+    BAD_SLOW = 7
 
 
 class _Record(Structure):
@@ -140,11 +142,12 @@ def device_library(
     modes: bool = False,
     store: bool = False,
     moves: bool = False,
+    slow: bool = False,
 ) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
-    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept; one that
-    ``moves`` takes MOVE.
+    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept, with
+    ``slow`` they may have slow parts; one that ``moves`` takes MOVE.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -153,6 +156,7 @@ def device_library(
     more += ["-DDAC_COMMIT_MODES=1"] if modes or moves else []
     more += ["-DDAC_MOVE=1"] if moves else []
     more += ["-DDAC_STORE=1"] if store else []
+    more += ["-DDAC_SLOW_PART=1"] if slow else []
     sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
     return DeviceLibrary(compile_device(folder / "device.so", bits, sources=sources, more=more))
 
@@ -166,16 +170,16 @@ class HostDevice:
     """A device whose converters are those of ``like`` and which boots into ``boot``, if that is not None.
 
     ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
-    can do, ``library`` to that of ``device_library`` with the order ``shaping``, and with ``modes`` of a COMMIT, or
-    ``moves``. Nonces are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``; ``started`` is
-    why the link was not.
+    can do, ``library`` to that of ``device_library`` with the order ``shaping``, ``modes`` of a COMMIT, or ``moves``,
+    and ``slow`` parts. Nonces are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``;
+    ``started`` is why the link was not.
     ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout.
     """
 
     def __init__(
         self,
-        like: DualProgram,
-        boot: DualProgram | None = None,
+        like: ScanProgram,
+        boot: ScanProgram | None = None,
         *,
         library: DeviceLibrary | None = None,
         limits: tuple[AxisLimits, AxisLimits] | None = None,
@@ -195,19 +199,21 @@ class HostDevice:
         shaping: int = 0,
         modes: bool = False,
         moves: bool = False,
+        slow: bool = False,
         flash: tuple[CutFlash, Layout] | None = None,
         stores_while_playing: bool = False,
     ) -> None:
-        bits = 16 if max(like.x.bits, like.y.bits, like.x.output.word_bits, like.y.output.word_bits) <= 16 else 32
-        spline, store = "cubic" in (like.x.mode, like.y.mode), flash is not None
-        self.library = library or device_library(bits, shaping, spline, modes, store, moves)
+        x, y = fast_of(like.x), fast_of(like.y)
+        bits = 16 if max(x.bits, y.bits, x.output.word_bits, y.output.word_bits) <= 16 else 32
+        spline, store = "cubic" in (x.mode, y.mode), flash is not None
+        self.library = library or device_library(bits, shaping, spline, modes, store, moves, slow)
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True
         self._boot = boot
         self.notes: list[str] | None = None
         x_limits, y_limits = limits or (widest(like.x.output), widest(like.y.output))
-        x_index, y_index = index_bits or (like.x.index_bits, like.y.index_bits)
+        x_index, y_index = index_bits or (x.index_bits, y.index_bits)
         sine_bits = max(x_index, y_index, 3)
         sine = sine_periods(sine_bits)
         self._sine = (c_int32 * len(sine))(*sine.tolist())
@@ -216,9 +222,9 @@ class HostDevice:
             y_converter=converter_of(like.y.output, power_up[1]),
             x_limits=_four(x_limits),
             y_limits=_four(y_limits),
-            x_word_bits=like.x.bits,
+            x_word_bits=x.bits,
             x_index_bits=x_index,
-            y_word_bits=like.y.bits,
+            y_word_bits=y.bits,
             y_index_bits=y_index,
             harmonics=harmonics,
             sine_index_bits=sine_bits,

@@ -4,14 +4,16 @@ import zlib
 
 import numpy as np
 from c_scripts import shaped
+from frame_programs import common_knots, scan_program
 from numpy.random import Generator
-from programs import Kind, random_dual, random_fourier, rendered
+from programs import Kind, random_dual, random_fourier, random_schedule, rendered
 from replacing import replace
 
-from tablegen.device.dual_program import DualProgram
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.device.dual_program import AxisProgram, DualProgram, ScanProgram
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
+from tablegen.fixedpoint.frame_program import FrameProgram, frame_extremes
 from tablegen.link.messages import AxisLimits
-from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image
+from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image, parts_of
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
@@ -19,6 +21,9 @@ SCAN_PLACES = [SCAN_WORDS.index(name) for name in SCAN_WORDS]
 AXIS_PLACES = [
     page * PAGE_WORDS + AXIS_WORDS.index(name) for page in (1, 2) for name in AXIS_WORDS if name != "harmonics"
 ]
+
+
+SLOW_PLACES = [page * PAGE_WORDS + len(AXIS_WORDS) + at for page in (1, 2) for at in range(1, len(SLOW_WORDS))]
 
 
 def digest(rng: Generator) -> str:
@@ -49,6 +54,36 @@ def random_image(
             output = replace(output, max_step=max(output.max_step + room, 1))
             program = replace(program, **{axis: replace(getattr(program, axis), output=output)})
     return make_image(program, digest(rng), words["x"], words["y"]), program
+
+
+def random_slow_program(rng: Generator, shape: SequencerShape) -> ScanProgram:
+    """A small program with a slow part of one axis or of both; in two of three its limits are those of its codes."""
+    schedule = replace(random_schedule(rng, int(rng.choice([1, 9, 40, 90])), 1), lines=int(rng.choice([1, 2, 5, 12])))
+    slow, kind = str(rng.choice(["xy", "xy", "x", "y"])), str(rng.choice(["smooth", "smooth", "wild"]))
+    program = common_knots(rng, scan_program(rng, shape, schedule, slow, kind))
+    if rng.random() < 0.3:
+        return program
+    return replace(program, x=_fitted(rng, program.x), y=_fitted(rng, program.y))
+
+
+def _fitted(rng: Generator, axis: AxisProgram) -> AxisProgram:
+    """The axis with the range and the step of its codes, or a little more or less."""
+    if not isinstance(axis, FrameProgram):
+        return replace(axis, output=_guarded(axis).output)
+    top = (1 << axis.output.dac_bits) - 1
+    small = replace(axis.gains, words=axis.gains.words // 4), replace(axis.ratios, words=axis.ratios.words // 8)
+    axis = replace(axis, gains=small[0], ratios=small[1])
+    least, most, step = frame_extremes(axis)
+    slack = int(rng.choice([0, 0, 0, 1, 50, -1]))
+    code_min, code_max = min(max(least - slack, 0), top), max(min(most + slack, top), 0)
+    output = replace(
+        axis.output,
+        code_min=min(code_min, code_max),
+        code_max=code_max,
+        park_code=code_max,
+        max_step=max(min(step + slack, (1 << 24) - 1), 1),
+    )
+    return replace(axis, fast=replace(axis.fast, output=output))
 
 
 def _guarded(program):  # type: ignore[no-untyped-def]
@@ -96,7 +131,25 @@ def damaged(rng: Generator, image: ProgramImage) -> ProgramImage:
     return resealed(image, bytes(data))
 
 
-def random_limits(rng: Generator, program: DualProgram) -> tuple[AxisLimits, AxisLimits]:
+def damaged_slow(rng: Generator, image: ProgramImage) -> ProgramImage:
+    """An image with a slow part and some words changed, half of them those of the slow part; of the same length."""
+    if rng.random() < 0.5:
+        return damaged(rng, image)
+    data, words = bytearray(image.data), np.frombuffer(image.data, "<u4", PROGRAM_BYTES // 4).tolist()
+    at, size = 4 * int(rng.choice(SLOW_PLACES)), 4
+    if rng.random() < 0.6:
+        x, y = (parts_of(words, page, shape) for page, shape in ((1, image.info.x), (2, image.info.y)))
+        parts, at = [*x, *y], PROGRAM_BYTES
+        number = int(rng.choice([at for at, part in enumerate(parts) if part.name in ("slow table", "gain")]))
+        at += sum(part.length * part.size for part in parts[:number])
+        size = parts[number].size
+        at += size * int(rng.integers(0, parts[number].length))
+    word = int.from_bytes(data[at : at + size], "little")
+    data[at : at + size] = _other_word(rng, word, 8 * size).to_bytes(size, "little")
+    return resealed(image, bytes(data))
+
+
+def random_limits(rng: Generator, program: ScanProgram) -> tuple[AxisLimits, AxisLimits]:
     """Limits around what a program needs, now and then less."""
     limits = []
     for axis in (program.x, program.y):

@@ -257,17 +257,17 @@ MUTANTS = [
         "pixels are not checked", CHECK, "        && dac_link_program_word(image, 0, DAC_LINK_PIXELS) <= ticks\n", ""
     ),
     Mutant("steps are not checked", CHECK, "\n        && dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) <= 1;", ";"),
-    Mutant("periods are not checked", CHECK, "        if (!good_period(image, axis))\n", "        if (false)\n"),
+    Mutant("periods are not checked", CHECK, "        if (!good_period(l, image, axis))\n", "        if (false)\n"),
     Mutant(
         "the phase step is not checked",
         CHECK,
-        "        && dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_STEP) == step\n",
-        "",
+        "    return dac_link_program_word(image, axis + 1, word) == step\n",
+        "    return true\n",
     ),
     Mutant(
         "the remainder is not checked",
         CHECK,
-        "\n        && dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_REMAINDER) == remainder;",
+        "\n        && dac_link_program_word(image, axis + 1, word + 1) == remainder;",
         ";",
     ),
     Mutant("outputs are not checked", CHECK, "        if (!good_output(l, image, axis))\n", "        if (false)\n"),
@@ -343,7 +343,7 @@ MUTANTS = [
         "if (true)",
     ),
     Mutant(
-        "an axis is checked only", CHECK, "if (c->axis == 0 && c->stage != CRC &&", "if (false && c->stage != CRC &&"
+        "an axis is checked only", CHECK, "if (c->axis == 0 && BY_AXIS(c->stage))", "if (false && BY_AXIS(c->stage))"
     ),
     Mutant("the offset of DATA is ignored", UPLOAD, "dac_link_get(payload) == l->received && ", ""),
     Mutant("DATA beyond the image", UPLOAD, " && count <= bytes - l->received)", ")"),
@@ -372,8 +372,8 @@ MUTANTS = [
     Mutant(
         "the length of direct tables is not checked",
         IMAGE,
-        "return dac_link_because(DAC_LINK_SHAPE, axis);",
-        "continue;",
+        "if (dac_link_table_words(image, axis) > UINT32_C(1) << dac_link_axis_of(l, axis)->index_bits)",
+        "if (false)",
     ),
     Mutant(
         "the length of an image is not checked",

@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 from cut_flash import MODES, CutFlash
-from link_device import HostDevice, Started, widest
-from link_images import damaged, random_image, random_limits, resealed
+from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, HostDevice, Started, widest
+from link_images import damaged, damaged_slow, digest, random_image, random_limits, random_slow_program, resealed
 from link_talk import IDENTITY, Talk
 from programs import random_dual
 
 from tablegen.device.commit_mode import CommitMode
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.link.acceptance import first_objection
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
     SPLINE_DEGREE,
@@ -29,7 +31,7 @@ from tablegen.link.messages import (
 )
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
-from tablegen.link.program_image import ProgramImage
+from tablegen.link.program_image import ProgramImage, fast_of, make_image, take_apart
 from tablegen.link.store import Layout
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
@@ -57,11 +59,13 @@ class Dialogue:
         notes: bool = False,
         order: int = 0,
         store: bool = False,
+        slow: bool = False,
         **how: Any,
     ) -> None:
+        self.slow = slow
         self.rng = np.random.default_rng(seed)
         self.shape, self.key, self.order = shape, key, order
-        boot = random_dual(self.rng, shape, kind="smooth") if self.rng.random() < 0.9 else None
+        boot = self._some_boot(slow) if self.rng.random() < 0.9 else None
         like = boot or random_dual(self.rng, shape, kind="smooth")
         limits = (widest(like.x.output), widest(like.y.output))
         if self.rng.random() < 0.2:
@@ -87,6 +91,7 @@ class Dialogue:
             boot_count=int(self.rng.integers(0, 1 << 32)),
             update_rate_hz=20000,
             shaping=order,
+            slow=slow,
             **how,
         )
         assert self.device.started is Started.STARTED, self.device.started
@@ -97,11 +102,19 @@ class Dialogue:
         self._modes = bool(how.get("modes")) or self._moves
         features |= Feature.COMMIT_MODES if self._modes else Feature(0)
         features |= Feature.STORE if store else Feature(0)
-        shapes = [AxisShape(index[0], like.x.bits, shape.dac_bits, shape.dac_bits)]
-        shapes += [AxisShape(index[1], like.y.bits, shape.dac_bits, shape.dac_bits)]
-        most = 192 + sum(max(each.word_bytes << each.index_bits, 4 * (2 * HARMONICS + 1)) for each in shapes)
+        x, y = fast_of(like.x), fast_of(like.y)
+        shapes = [AxisShape(index[0], x.bits, shape.dac_bits, shape.dac_bits)]
+        shapes += [AxisShape(index[1], y.bits, shape.dac_bits, shape.dac_bits)]
+        sizes = [each.word_bytes << each.index_bits for each in shapes]
+        if slow:
+            knots = 5 * SLOW_KNOTS
+            sizes = [
+                size + (1 << each.index_bits) + (each.word_bytes << SLOW_INDEX_BITS) + knots
+                for size, each in zip(sizes, shapes, strict=True)
+            ]
+        most = 192 + sum(max(size, 4 * (2 * HARMONICS + 1)) for size in sizes)
         ring = self.device.library.ring // 256
-        degree = SPLINE_DEGREE if "cubic" in (like.x.mode, like.y.mode) else 0
+        degree = SPLINE_DEGREE if "cubic" in (x.mode, y.mode) else 0
         info = DeviceInfo(
             VERSION,
             features | (Feature.KEY if key else 0),
@@ -114,7 +127,8 @@ class Dialogue:
             20000,
             order,
             degree,
-            More.MOVE if self._moves else More(0),
+            More.MOVE * self._moves | More.SLOW_PARTS * slow,
+            *((SLOW_KNOTS, SLOW_INDEX_BITS) if slow else ()),
         )
         self._clock = 0
         self.device.set_clock(0)
@@ -137,7 +151,19 @@ class Dialogue:
         self.heard = bytearray()
         self._received = 0
 
+    def _some_boot(self, slow: bool) -> ScanProgram:
+        """A program that a device can load: of a slow part one that its specification has no objection to."""
+        while slow and self.rng.random() < 0.5:
+            program = random_slow_program(self.rng, self.shape)
+            image = make_image(program, "00" * 32)
+            limits = widest(program.x.output), widest(program.y.output)
+            if first_objection(take_apart(image.data, image.info.x, image.info.y), *limits, None) is None:
+                return program
+        return random_dual(self.rng, self.shape, kind="smooth")
+
     def _some_image(self) -> ProgramImage:
+        if self.slow and self.rng.random() < 0.7:
+            return self._some_slow_image()
         kind = str(self.rng.choice(["smooth", "smooth", "tame", "wild"]))
         image, _ = random_image(self.rng, self.shape, HARMONICS, kind, self.order)  # type: ignore[arg-type]
         if self.rng.random() < 0.05:
@@ -145,6 +171,16 @@ class Dialogue:
             data[4 * (PAGE_WORDS * int(self.rng.integers(1, 3)) + AXIS_WORDS.index("harmonics"))] ^= 9
             return resealed(image, bytes(data))
         return damaged(self.rng, image) if self.rng.random() < 0.3 else image
+
+    def _some_slow_image(self) -> ProgramImage:
+        image = make_image(random_slow_program(self.rng, self.shape), digest(self.rng))
+        if self.rng.random() < 0.1:  # form of the slow part
+            data = bytearray(image.data)
+            data[4 * (PAGE_WORDS * int(self.rng.integers(1, 3)) + 12) + int(self.rng.integers(0, 3))] ^= 1 << int(
+                self.rng.integers(0, 8)
+            )
+            return resealed(image, bytes(data))
+        return damaged_slow(self.rng, image) if self.rng.random() < 0.3 else image
 
     # What is said
 

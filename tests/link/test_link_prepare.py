@@ -317,7 +317,7 @@ def test_an_image_of_another_length_is_told(scan: PreparedScan) -> None:
     assert str(differences(scan, image + b"12")[0]) == "after the last word (byte 8384) is 2, not 0"
     assert len(differences(scan, image[:-100])) == 50
     assert str(differences(scan, b"")[0]) == "its image ends before scan: line_ticks (byte 0)"
-    assert str(differences(scan, image[:190])[0]) == "its image ends before y: unused word 15 (byte 188)"
+    assert str(differences(scan, image[:190])[0]) == "its image ends before y: slow_remainder (byte 188)"
 
 
 def test_the_example_is_what_these_numbers_are_of(scan: PreparedScan) -> None:

@@ -13,7 +13,7 @@ from link_programs import make_scan
 from link_talk import Talk, is_answer
 from replacing import replace
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import ScanProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
 from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
@@ -49,15 +49,18 @@ class Bench:
 
     def __init__(
         self,
-        program: DualProgram,
+        program: ScanProgram,
         state: str,
         limits: tuple[AxisLimits, AxisLimits],
         shape: SequencerShape,
         order: int = 0,
+        slow: bool = False,
     ) -> None:
         boot = None if state == "nothing plays" else program
         bits = max(shape.x_index_bits, 3), max(shape.y_index_bits, 3)
-        self.device = HostDevice(program, boot, limits=limits, index_bits=bits, harmonics=HARMONICS, shaping=order)
+        self.device = HostDevice(
+            program, boot, limits=limits, index_bits=bits, harmonics=HARMONICS, shaping=order, slow=slow
+        )
         self.talk = Talk()
         self.ask(self.talk.hello())
         self.device.tick(3)

@@ -437,7 +437,7 @@ def unmixed(axis: FrameProgram) -> FrameProgram:
 DUE = "    s->line_due = true;\n    if (bank"
 SAME_KIND = "    if ((now->y.slow == NULL) != (next->y.slow == NULL))\n        return false;\n"
 NO_PLACE = "    if (bank->y.slow != NULL) /* it is at the start of a line in both programs */\n        return;\n"
-AFTER = "line + 1 == bank->lines ? "
+AFTER = "line + 1 == lines ? "
 RUN_RAMP = "bank->run_ramp = bank->ramp * ((int64_t)1 << left)"
 WINDOW = """        if (out_of_window >> bank->run_bits != 0)
             break;
@@ -463,14 +463,14 @@ MUTANTS = {
     "a ramp is rounded downwards": ("return distance < 0 ? -ramp : ramp;", "return distance < 0 ? -ramp - 1 : ramp;"),
     "a ramp loses its upper bits": ("(way >> 32) * step + ", ""),
     "the step of a ramp is rounded up": ("UINT32_MAX % ticks == ticks - 1 ? 1u : 0u", "1u"),
-    "words are not saturated": ("if ((uint32_t)(word - least) > range)", "if (false)"),
+    "words are not saturated": ("if ((uint32_t)(word - least) > (uint32_t)-least * 2u - 1u)", "if (false)"),
     "words saturate at the wrong end": ("word < 0 ? least : -least - 1", "word < 0 ? -least - 1 : least"),
-    "ratios are cut off": ("((ratio * second[i] + (1 << 11)) >> 12)", "(ratio * second[i] >> 12)"),
+    "ratios are cut off": ("((ratio * second + (1 << 11)) >> 12)", "(ratio * second >> 12)"),
     "the first words of the program stand behind": ("mixed[length + i] = mixed[i];", "mixed[length + i] = fast[i];"),
     "knots rise to the nearest word below": ("way.rest + half >= spacing ? 1u : 0u", "0u"),
     "ties of falling knots go down": ("way.rest > half ? 1u : 0u", "way.rest >= half ? 1u : 0u"),
-    "the gain is that of the axis": ("    bank->gain = gain_of(slow, line);\n", ""),
-    "offsets are cut off": ("here + ((int64_t)1 << (bank->gain_q - 1u))", "here"),
+    "the gain is that of the axis": ("    bank->gain = at.gain;\n", ""),
+    "offsets are cut off": ("at.offset + ((int64_t)1 << (bank->gain_q - 1u))", "at.offset"),
     "runs have the gain of the axis": ("    bank->run_gain = bank->gain * (INT32_C(1) << left);\n", ""),
     "runs have half of the ramp": (RUN_RAMP, f"{RUN_RAMP} / 2"),
     "a chunk begins with the ramp of the last one": ("        rise += CHUNK * bank->ramp;\n", ""),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from tablegen.base.reading import KEY, read_text
-from tablegen.cli.shared.common import fail, planned
+from tablegen.cli.shared.common import fail, planned_at_any_angle
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def read_scan(source: Path) -> "PreparedScan":
     from tablegen.manifest.read import NotABuild
 
     if not source.is_dir():
-        return planned(source).prepared
+        return planned_at_any_angle(source).prepared
     try:
         return PreparedScan.of_build(source)
     except NotABuild as error:
