@@ -267,12 +267,12 @@ static uint32_t zero_of(const dac_link_image *image, unsigned axis)
     return dac_link_program_word(image, axis + 1, DAC_LINK_SHAPING_WORD) >> 8;
 }
 
-static bool good_shaping(const dac_link *l, const dac_link_image *image, unsigned axis)
+static bool good_shaping(const dac_link_image *image, unsigned axis)
 {
     const uint32_t order = order_of(image, axis), zero = zero_of(image, axis);
     const uint32_t most_zero = order == 3 ? 128 : 0;
 
-    if (order > DAC_SHAPING || zero > most_zero || (order != 0 && dac_link_slow_word(l, image, axis) != 0))
+    if (order > DAC_SHAPING || zero > most_zero)
         return false;
     return dac_link_program_word(image, axis + 1, DAC_LINK_SHAPING_WORD) == (order | zero << 8);
 }
@@ -303,7 +303,7 @@ static dac_link_finding check_program(const dac_link *l)
         if (!good_output(l, image, axis))
             return finding(DAC_LINK_OUTPUT, axis, 0);
     for (unsigned axis = 0; axis < 2; axis++)
-        if (!good_shaping(l, image, axis))
+        if (!good_shaping(image, axis))
             return finding(DAC_LINK_SHAPING, axis, 0);
     for (unsigned axis = 0; axis < 2; axis++) {
         const dac_link_limits *const limits = axis == 0 ? &l->x_limits : &l->y_limits;
@@ -448,12 +448,15 @@ static dac_link_finding check_lines(dac_link *l, unsigned axis, uint8_t reason, 
     const uint32_t ticks = dac_link_program_word(image, 0, DAC_LINK_LINE_TICKS);
     const uint32_t step = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_STEP);
     const uint32_t remainder = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_REMAINDER);
-    const uint32_t max_step = dac_link_program_word(image, axis + 1, DAC_LINK_MAX_STEP);
+    const uint32_t limit = dac_link_program_word(image, axis + 1, DAC_LINK_MAX_STEP);
+    const uint32_t excess = step_excess(image, axis), max_step = limit - excess;
     const bool slew = reason == DAC_LINK_SLEW;
     const struct output o = output_of(l, axis);
     dac_link_check *const c = &l->check;
     const struct line line = line_of(&o, c->line);
 
+    if (slew && limit < excess)
+        return finding(reason, axis, 0);
     if (c->at == 0 && !c->exact) {
         const int32_t now = line_code(&o, &line, 0, 0);
         if (c->line == 0)

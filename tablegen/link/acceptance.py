@@ -132,7 +132,7 @@ def _reach(contents: Contents, page: int) -> int:
 
 def _shaping_is_good(contents: Contents, page: int, order: int) -> bool:
     try:
-        return contents.shaping(page).order <= (0 if contents.slow(page) else order)
+        return contents.shaping(page).order <= order
     except ValueError:
         return False
 
@@ -204,10 +204,11 @@ def _lines_out_of_range(program: FrameProgram, page: int) -> Finding | None:
 
 def _steep_lines(program: FrameProgram, page: int) -> Finding | None:
     output = program.output
+    max_step = output.max_step - output.shaping.step_excess
     first = codes = output.clamp(program.unclamped(0)[0])
     for line in range(program.lines):
         after = output.clamp(program.unclamped(line + 1)[0]) if line + 1 < program.lines else first
-        if int(np.max(np.abs(np.diff(codes, append=after[0])))) > output.max_step:
+        if int(np.max(np.abs(np.diff(codes, append=after[0])))) > max_step:
             return Reason.SLEW, page - 1 + 2 * line
         codes = after
     return None

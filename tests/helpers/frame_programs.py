@@ -82,13 +82,13 @@ def scan_program(
     return ScanProgram(axis("x"), axis("y"), schedule)
 
 
-def shaped_scan(rng: Generator, program: ScanProgram) -> ScanProgram:
-    """The program with any shaping of both axes, off too."""
+def shaped_scan(rng: Generator, program: ScanProgram, order: int = 3) -> ScanProgram:
+    """The program with any shaping of both axes up to an order, off too."""
 
     def one(axis: AxisProgram) -> AxisProgram:
         if isinstance(axis, FrameProgram):
             return replace(axis, fast=one(axis.fast))
-        return replace(axis, output=any_shaping(rng, axis.output))
+        return replace(axis, output=any_shaping(rng, axis.output, order))
 
     return replace(program, x=one(program.x), y=one(program.y))
 

@@ -4,14 +4,14 @@ import zlib
 
 import numpy as np
 from c_scripts import shaped
-from frame_programs import common_knots, scan_program
+from frame_programs import common_knots, scan_program, shaped_scan
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, random_schedule, rendered
 from replacing import replace
 
 from tablegen.device.dual_program import AxisProgram, DualProgram, ScanProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
-from tablegen.fixedpoint.frame_program import FrameProgram, frame_extremes
+from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.link.messages import AxisLimits
 from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image, parts_of
 from tablegen.numerics.arrays import Ints
@@ -56,11 +56,16 @@ def random_image(
     return make_image(program, digest(rng), words["x"], words["y"]), program
 
 
-def random_slow_program(rng: Generator, shape: SequencerShape) -> ScanProgram:
-    """A small program with a slow part of one axis or of both; in two of three its limits are those of its codes."""
+def random_slow_program(rng: Generator, shape: SequencerShape, order: int = 0) -> ScanProgram:
+    """A small program with a slow part of one axis or of both; in two of three its limits are those of its codes.
+
+    With an ``order`` both axes are shaped up to it.
+    """
     schedule = replace(random_schedule(rng, int(rng.choice([1, 9, 40, 90])), 1), lines=int(rng.choice([1, 2, 5, 12])))
     slow, kind = str(rng.choice(["xy", "xy", "x", "y"])), str(rng.choice(["smooth", "smooth", "wild"]))
     program = common_knots(rng, scan_program(rng, shape, schedule, slow, kind))
+    if order:
+        program = shaped_scan(rng, program, order)
     if rng.random() < 0.3:
         return program
     return replace(program, x=_fitted(rng, program.x), y=_fitted(rng, program.y))
@@ -73,7 +78,7 @@ def _fitted(rng: Generator, axis: AxisProgram) -> AxisProgram:
     top = (1 << axis.output.dac_bits) - 1
     small = replace(axis.gains, words=axis.gains.words // 4), replace(axis.ratios, words=axis.ratios.words // 8)
     axis = replace(axis, gains=small[0], ratios=small[1])
-    least, most, step = frame_extremes(axis)
+    least, most, step = played_extremes(axis)
     slack = int(rng.choice([0, 0, 0, 1, 50, -1]))
     code_min, code_max = min(max(least - slack, 0), top), max(min(most + slack, top), 0)
     output = replace(
@@ -92,8 +97,8 @@ def _guarded(program):  # type: ignore[no-untyped-def]
     top = (1 << output.dac_bits) - 1
     output = replace(output, gain_word=1 << 14, offset_word=(top // 2) << output.gain_q, code_min=0, code_max=top)
     program = replace(program, output=replace(output, park_code=min(max(output.park_code, 0), top)))
-    codes = program.codes(np.arange(program.ticks))
-    largest = int(np.max(np.abs(codes - np.roll(codes, 1))))
+    codes = program.rounded.codes(np.arange(program.ticks))
+    largest = int(np.max(np.abs(codes - np.roll(codes, 1)))) + output.shaping.step_excess
     return replace(program, output=replace(program.output, max_step=max(largest, 1)))
 
 

@@ -127,7 +127,7 @@ class Dialogue:
             20000,
             order,
             degree,
-            More.MOVE * self._moves | More.SLOW_PARTS * slow,
+            (More.MOVE if self._moves else More(0)) | (More.SLOW_PARTS if slow else More(0)),
             *((SLOW_KNOTS, SLOW_INDEX_BITS) if slow else ()),
         )
         self._clock = 0

@@ -48,7 +48,9 @@ def test_it_knows_the_device_after_hello() -> None:
 def test_further_features_follow_the_status() -> None:
     """Bits that only a later version knows are no error; without any, the answer has its old length."""
     further = More.SLOW_PARTS | More.MOVE | More(1 << 31)
-    with client(VirtualLine(model(replace(INFO, more=further, slow_knots=17, slow_index_bits=6)))) as device:
+    features = INFO.features | Feature.COMMIT_MODES
+    info = replace(INFO, features=features, more=further, slow_knots=17, slow_index_bits=6)
+    with client(VirtualLine(model(info))) as device:
         assert device.info.more == further
         hello = device.info.hello(device.hello)
         assert hello[132:] == further.to_bytes(4, "little") + bytes([17, 6])

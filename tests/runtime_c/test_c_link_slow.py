@@ -47,6 +47,7 @@ SHAPES = {
 }
 SLOW = "-DDAC_SLOW_PART=1"
 STATES = ("nothing plays", "parked", "playing")
+ORDERS = {"cubic": 0, "lines": 3, "21 bits": 1}  # of shaping, of the device and of its programs
 PROGRAMS = int(os.environ.get("SLOW_LINK_PROGRAMS", "120"))  # of each shape and state
 CHECKED = {reason for reason in Reason if Reason.SCHEDULE <= reason <= Reason.JUMP} - {Reason.FOURIER}
 
@@ -61,11 +62,11 @@ def compare(name: str, state: str, count: int, seed: int) -> Counter[Reason | No
     for at in range(count):
         if at % 20 == 0:
             bench = None
-        program = random_slow_program(rng, shape)
+        program = random_slow_program(rng, shape, ORDERS[name])
         image = make_image(program, digest(rng))
         contents = take_apart(image.data, image.info.x, image.info.y)
         if bench is None:
-            if first_objection(contents, everything, everything, None) is not None:
+            if first_objection(contents, everything, everything, None, ORDERS[name]) is not None:
                 continue
             limits = everything, everything
             if rng.random() < 0.2:
@@ -73,11 +74,11 @@ def compare(name: str, state: str, count: int, seed: int) -> Counter[Reason | No
             elif rng.random() < 0.5:
                 x, y = (replace(everything, max_step=axis.output.max_step) for axis in (program.x, program.y))
                 limits = replace(x, max_jump=x.code_max // 16), replace(y, max_jump=y.code_max // 4)
-            bench = Bench(program, state, limits, shape, slow=True)
+            bench = Bench(program, state, limits, shape, ORDERS[name], slow=True)
         if rng.random() < 0.4:
             image = damaged_slow(rng, image)
             contents = take_apart(image.data, image.info.x, image.info.y)
-        expected = first_objection(contents, *limits, bench.playing)
+        expected = first_objection(contents, *limits, bench.playing, ORDERS[name])
         got = bench.objection(image)
         assert got == (None if expected is None else (int(expected[0]), expected[1])), (at, expected, got)
         seen[None if expected is None else expected[0]] += 1
@@ -91,7 +92,7 @@ def test_a_device_objects_to_what_its_specification_objects_to(name: str, state:
 
 
 def test_rare_words_are_refused() -> None:
-    """A y that steps once a line, an offset that the words of the slow table carry too far, and a shaped output."""
+    """A y that steps once a line, an offset that the words of the slow table carry too far, and an order too high."""
     rng, shape = np.random.default_rng(4), SHAPES["cubic"]
     schedule = replace(random_schedule(rng, 40, 1), lines=5)
     program = common_knots(rng, scan_program(rng, shape, schedule, "xy"))
@@ -101,7 +102,7 @@ def test_rare_words_are_refused() -> None:
     low, high = (1 << OFFSET_LOW_BITS) - 1, (2 << (16 + program.x.output.gain_q) >> OFFSET_LOW_BITS) - 1
     for words, reason in (
         ({SCAN_WORDS.index("y_steps"): 1}, Reason.PERIOD),
-        ({PAGE_WORDS + 11: 1}, Reason.SHAPING),
+        ({PAGE_WORDS + 11: 2}, Reason.SHAPING),
         ({PAGE_WORDS + 3: 1, PAGE_WORDS + 4: low, PAGE_WORDS + 5: high}, Reason.WORD),
     ):
         data = bytearray(image.data)
