@@ -88,8 +88,8 @@ def calibrate_coupling(
 
     Examples
     --------
-    >>> moved = np.tile(np.linspace(-500.0, 500.0, 200), 4)
-    >>> fit = tablegen.calibrate_coupling({"x_nm": moved, "y_nm": 0.02 * moved})
+    >>> moved = [5.0 * (step % 200) for step in range(800)]
+    >>> fit = tablegen.calibrate_coupling({"x_nm": moved, "y_nm": [0.02 * x for x in moved]})
     >>> round(fit.values["y_per_x"].value, 6)
     0.02
     """
