@@ -18,6 +18,7 @@ from tablegen.api.calibrate import (
     calibrate_images as calibrate_images,
 )
 from tablegen.api.calibrate_operator import calibrate_operator as calibrate_operator
+from tablegen.api.calibrate_coupling import calibrate_coupling as calibrate_coupling
 from tablegen.api.read_image import (
     channels as channels,
     read_image as read_image,
@@ -56,6 +57,7 @@ from tablegen.api.result import (
 from tablegen.api.calibrate import Calibrated as Calibrated
 from tablegen.api.calibrated_operator import CalibratedOperator as CalibratedOperator
 from tablegen.api.calibrated_records import CalibratedRecords as CalibratedRecords
+from tablegen.api.calibrate_coupling import CalibratedCoupling as CalibratedCoupling
 from tablegen.api.read_image import (
     Image as Image,
     Channels as Channels,

@@ -27,7 +27,7 @@ _FILE_MARK = re.compile(r"# (from .*, sha256 [0-9a-f]{16}|standard errors: .*)$"
 
 @dataclass(frozen=True)
 class Change:
-    """Changes that one calibration makes in ``[AXIS.KIND]``.
+    """Changes that one calibration makes in ``[AXIS.KIND]``, or in ``[KIND]`` of both axes.
 
     ``values`` replace keys or add them, ``removed`` keys are deleted since they would contradict. ``branches`` are for
     ``[[AXIS.hysteresis.branches]]``: an entry of the same turn is updated, another one added. ``provenance`` holds the
@@ -56,7 +56,7 @@ def new_file(name: str, driver: Driver | float) -> str:
 
 
 def updated(text: str, name: str, axis: str, change: Change) -> str:
-    """Put a calibration into the text of a scanner file; messages call the file ``name``.
+    """Put a calibration into the text of a scanner file; messages call the file ``name``, ``axis`` is "" for both.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def updated(text: str, name: str, axis: str, change: Change) -> str:
         changed, faithful = text, False
     if not faithful:
         why = "its layout is too unusual to be edited in place; write the values by hand, or one table below the other"
-        raise Rejected([Problem(name, 0, axis, why)])
+        raise Rejected([Problem(name, 0, axis or change.kind, why)])
     _check(text, changed, name)
     return changed.replace("\n", "\r\n") if windows else changed
 
@@ -110,14 +110,14 @@ def with_own_hysteresis(text: str, name: str) -> str:
 
 def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, change: Change, name: str) -> None:
     """Put the values into the parsed document."""
-    outer = before.get(axis, {})
-    inner = outer.get(change.kind, {}) if isinstance(outer, dict) else {}
-    for path, value in ((axis, outer), (f"{axis}.{change.kind}", inner)):
-        if not isinstance(value, dict):
+    outer = before.get(axis, {}) if axis else before
+    inner = outer.get(change.kind, {}) if isinstance(outer, Mapping) else {}
+    for path, value in ((axis, outer), (_path(axis, change), inner)):
+        if not isinstance(value, Mapping):
             raise Rejected([Problem(name, 0, path, "is not a table")])
-    if axis not in document:
+    if axis and axis not in document:
         document[axis] = tomlkit.table(is_super_table=True)
-    parent: Any = document[axis]
+    parent: Any = document[axis] if axis else document
     if change.kind not in parent:
         parent[change.kind] = tomlkit.inline_table() if isinstance(parent, InlineTable) else tomlkit.table()
     table: Any = parent[change.kind]
@@ -129,6 +129,10 @@ def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, c
         _set(table, key, _rows_of_tables(value) if isinstance(value, list) else value)
     if change.branches:
         _put_branches(table, change.branches)
+
+
+def _path(axis: str, change: Change) -> str:
+    return f"{axis}.{change.kind}" if axis else change.kind
 
 
 def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
@@ -185,7 +189,7 @@ def _set(table: Any, key: str, value: Any) -> None:
 def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
     """Replace the comments above the tables, those of an earlier calibration, by the new ones."""
     for index, lines in enumerate(change.provenance):
-        key, turn = f"{axis}.{change.kind}", None
+        key, turn = _path(axis, change), None
         if change.branches:
             turn = change.branches[index]["turn"]
             key = _entry(text, key, turn)

@@ -87,3 +87,6 @@ FREQUENCY = Column("frequency", _HERTZ, _SMALLEST, 1e12, ("frequency", "freq", "
 GAIN = Column("gain", _GAIN, _SMALLEST, 1e12, ("gain", "magnitude", "mag"), ("ratio",))
 PHASE = Column("phase", _DEGREES, -1e6, 1e6, ("phase",), ("shift", "angle"))
 TRACE = Column("trace", _NUMBER, -1e9, 1e9)
+_POSITION = ("position", "pos", "displacement", "sensor", "stage", "axis", "piezo", "measured", "actual", "signal")
+POSITION_X = Column("x", _NANOMETRES, -1e12, 1e12, ("x",), _POSITION)
+POSITION_Y = Column("y", _NANOMETRES, -1e12, 1e12, ("y",), _POSITION)

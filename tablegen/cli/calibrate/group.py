@@ -2,6 +2,7 @@
 
 import click
 
+from tablegen.cli.calibrate.coupling import coupling
 from tablegen.cli.calibrate.frequency import frequency
 from tablegen.cli.calibrate.hysteresis import hysteresis
 from tablegen.cli.calibrate.images import images
@@ -36,5 +37,5 @@ def calibrate() -> None:
     """
 
 
-for command in (offset, size, hysteresis, operator, images, frequency, resonance):
+for command in (offset, size, hysteresis, operator, images, frequency, resonance, coupling):
     calibrate.add_command(command)
