@@ -37,6 +37,8 @@ MUTANTS = {
     "flash is written at any time": (KEPT, "l->config->store_while_playing || s.swaps == 0", "true"),
     "flash is written only when parked": (KEPT, "l->config->store_while_playing || s.swaps == 0", "false"),
     "a kept program has no checks": (KEPT, "        found = check_all(l);", "        found = dac_link_fine();"),
+    "checks of a second program at a start go on where the first ones ended": (
+        KEPT, "    dac_link_start_check(&l->check);\n    l->loading", "    l->loading"),
     "a kept program needs a tag": (KEPT, "    l->loading = true;\n", ""),
     "no upload needs a tag any more": (KEPT, "    l->loading = false;\n", ""),
     "a kept program cannot be read back": (KEPT, "    l->uploaded = true;\n", ""),
@@ -139,15 +141,20 @@ def check_refused_start(library: DeviceLibrary | None = None) -> None:
 
 
 def check_two_refused_programs(library: DeviceLibrary | None = None) -> None:
-    """The selected program has all checks too where a trial failed late ones."""
+    """The selected program has all checks too where a trial failed late ones.
+
+    Both have the same tables: with other first words the sequencer would refuse the second table, whose first word is
+    repeated behind the last by one of the checks, and hide that the checks were not made.
+    """
     flash = new_flash()
     store = Store(flash, LAYOUT)
     image = SCANS[1].image(False)
-    words = bytearray(image.data)
-    park, most = (4 * (2 * PAGE_WORDS + AXIS_WORDS.index(name)) for name in ("park_code", "code_max"))
-    words[most : most + 4] = words[park : park + 4]  # of y, so that its last check fails
-    store.save(0, SCANS[2].image(False))
-    store.save(1, resealed(image, bytes(words)))
+    late, fast = bytearray(image.data), bytearray(image.data)
+    park, most, step = (4 * (2 * PAGE_WORDS + AXIS_WORDS.index(name)) for name in ("park_code", "code_max", "max_step"))
+    late[most : most + 4] = late[park : park + 4]  # of y, so that its last check fails
+    fast[step : step + 4] = struct.pack("<I", NARROW[1].max_step + 1)
+    store.save(0, resealed(image, bytes(fast)))
+    store.save(1, resealed(image, bytes(late)))
     store.select(0)
     store.select(1, trial=True)
     flash.power_up()
