@@ -107,6 +107,12 @@
 #define DAC_STORE 0 /* 1: dac_store.c has code, and the link has requests that need it */
 #endif
 
+/* A library of programs. */
+
+#ifndef DAC_LIBRARY
+#define DAC_LIBRARY 0 /* 1: the link plays programs of the device by number, compiled ones and kept ones */
+#endif
+
 /* Moves. */
 
 #ifndef DAC_MOVE
@@ -124,12 +130,12 @@
 #define DAC_CONFIG_VALUE(option) "(" DAC_CONFIG_TEXT(option) ")"
 #define DAC_CONFIG_SYMBOL(name, value) __asm__(".hidden " name "\n.globl " name "\n" name " = " value "\n");
 DAC_CONFIG_SYMBOL("dac_objects_need_the_same_options",
-                  "((((((((((" DAC_CONFIG_VALUE(DAC_MOVE) "*2+" DAC_CONFIG_VALUE(DAC_SLOW_PART) ")*4+" DAC_CONFIG_VALUE(
+                  "(((((((((((" DAC_CONFIG_VALUE(DAC_MOVE) "*2+" DAC_CONFIG_VALUE(DAC_SLOW_PART) ")*4+" DAC_CONFIG_VALUE(
                       DAC_TABLE_STORAGE_BITS) "/16)*4+" DAC_CONFIG_VALUE(
                       DAC_OUTPUT_STORAGE_BITS) "/16)*256+" DAC_CONFIG_VALUE(DAC_STRIDE) ")*4+" DAC_CONFIG_VALUE(
                       DAC_SHAPING) ")*2+" DAC_CONFIG_VALUE(DAC_SPLINE) ")*256+" DAC_CONFIG_VALUE(
                       DAC_REQUESTS) ")*2+" DAC_CONFIG_VALUE(DAC_LONG_MULTIPLY) ")*2+" DAC_CONFIG_VALUE(
-                      DAC_COMMIT_MODES) ")*2+" DAC_CONFIG_VALUE(DAC_STORE) ")")
+                      DAC_COMMIT_MODES) ")*2+" DAC_CONFIG_VALUE(DAC_STORE) ")*2+" DAC_CONFIG_VALUE(DAC_LIBRARY) ")")
 DAC_CONFIG_SYMBOL("dac_objects_need_the_same_link_ring", DAC_CONFIG_VALUE(DAC_LINK_RING))
 #endif
 

@@ -98,6 +98,10 @@ typedef struct {
     dac_store *store;         /* opened by dac_store_open() as DAC_STORE_DONE; NULL: no programs are kept */
     bool store_while_playing; /* flash can be written while a scan plays; otherwise the scan is to be parked first */
 #endif
+#if DAC_LIBRARY
+    const dac_library_entry *library; /* compiled programs, as LIBRARY_library of LIBRARY_library.h */
+    uint32_t library_programs;        /* how many; 0: none */
+#endif
 } dac_link_config;
 
 /* Why a link was not started. */
@@ -209,8 +213,10 @@ typedef struct {
     uint8_t upload_before; /* `upload` without the MOVE */
 #endif
 
+#if DAC_STORE || DAC_LIBRARY
+    bool loading; /* a program of the device is checked or waits: it has no tag, and no COMMIT to be answered */
+#endif
 #if DAC_STORE
-    bool loading;               /* a kept program is checked or waits: it has no tag, and no COMMIT to be answered */
     uint8_t kept, kept_refused; /* slot of this start, or DAC_STORE_NONE; why it is not the one that was due */
 #endif
 
@@ -235,11 +241,31 @@ dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_s
 /* Loads and commits the kept program that is due, if it passes the checks of an upload. Call it after dac_link_init(),
  * in place of loading the program of the firmware; if it returns false, load that one. */
 bool dac_link_load_kept(dac_link *l);
+#endif
 
-/* Plays a kept program as if a host uploaded it: it is checked, and takes the place of the one that plays at a line.
- * False: the slot has no program that suits the device, the interlock is open, or an upload or another program is on
- * its way. Called where dac_link_work() is, which does the rest; STATUS has the hash of what plays. */
-bool dac_link_play_kept(dac_link *l, uint8_t slot);
+#if DAC_LIBRARY
+/* The programs of the device under one number: the compiled ones from 0 on, as in LIBRARY_library.h, then the slots of
+ * the store. Called where dac_link_work() is. */
+
+typedef struct {
+    const char *name; /* of a compiled program; NULL: a kept one, which has none */
+    uint8_t hash[32]; /* of its plan, as STATUS has that of what plays */
+} dac_link_listing;
+
+/* Numbers of compiled programs and slots. */
+uint32_t dac_link_numbers(const dac_link *l);
+
+/* Describes a program. False: there is no such number, or nothing good in this slot. */
+bool dac_link_list(const dac_link *l, uint32_t number, dac_link_listing *listing);
+
+/* The number of the first program that has this name, or a hash that begins with these 12 to 64 digits, a to f in lower
+ * case; or -1. */
+int32_t dac_link_find(const dac_link *l, const char *name);
+
+/* Plays a program as if a host uploaded it: it is checked, and takes the place of the one that plays at a line. False:
+ * the number has no program that suits the device, the interlock is open, or an upload or another program is on its
+ * way. dac_link_work() does the rest; STATUS has the hash of what plays. */
+bool dac_link_play(dac_link *l, uint32_t number);
 #endif
 
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */

@@ -709,7 +709,7 @@ static bool good_tag(dac_link *l)
 
     if (l->config->key_bytes == 0)
         return true;
-#if DAC_STORE
+#if DAC_STORE || DAC_LIBRARY
     if (l->loading)
         return true;
 #endif

@@ -87,25 +87,11 @@ bool dac_link_load_kept(dac_link *l)
     return start_with(l, slot) || (slot != store->state.selected && start_with(l, store->state.selected));
 }
 
-bool dac_link_play_kept(dac_link *l, uint8_t slot)
+bool dac_link_load_slot(dac_link *l, uint8_t slot)
 {
     uint8_t info[DAC_LINK_INFO];
 
-    if (l->config == NULL || l->config->store == NULL || l->upload != DAC_LINK_NONE || !dac_link_permits(l)
-        || !dac_store_info(l->config->store, slot, info))
-        return false;
-    if (load_bytes(l, slot, info).reason != DAC_LINK_NO_REASON) {
-        l->upload = DAC_LINK_NONE;
-        return false;
-    }
-    l->upload = DAC_LINK_CHECKING;
-    l->committing = l->loading = true;
-    l->commit_is_last = false;
-#if DAC_COMMIT_MODES
-    l->commit_mode = DAC_COMMIT_LINE;
-#endif
-    dac_link_start_check(&l->check);
-    return true;
+    return dac_store_info(l->config->store, slot, info) && load_bytes(l, slot, info).reason == DAC_LINK_NO_REASON;
 }
 
 /* Requests. */

@@ -249,6 +249,10 @@ void dac_link_end_move(dac_link *l, bool withdrawn);
 
 #if DAC_STORE
 /* dac_link_kept.c */
+
+/* Puts the image of a slot where an upload goes. */
+bool dac_link_load_slot(dac_link *l, uint8_t slot);
+
 dac_link_finding dac_link_slot(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
 dac_link_finding dac_link_save(dac_link *l, const uint8_t *payload);
 dac_link_finding dac_link_select(dac_link *l, const uint8_t *payload);

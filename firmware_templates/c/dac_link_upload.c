@@ -120,7 +120,7 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
 /* The COMMIT in progress has an answer; the upload is kept or discarded. */
 static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *payload, uint8_t length)
 {
-#if DAC_STORE
+#if DAC_LIBRARY
     if (l->loading) { /* no host waits for this */
         l->upload = DAC_LINK_NONE;
         l->committing = l->loading = false;

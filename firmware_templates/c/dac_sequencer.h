@@ -126,6 +126,13 @@ typedef struct {
     dac_axis_program x, y;
 } dac_program;
 
+/* A program of a library: LIBRARY_library.h has an array of them. */
+typedef struct {
+    const char *name;    /* of the scan */
+    const char *hash;    /* of its plan, as in manifest.json: 64 hexadecimal digits */
+    dac_program program; /* for dac_sequencer_load() */
+} dac_library_entry;
+
 /* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). The names may be macros,
  * as of -DUP=ANNEXIN_200NM -Dlow=annexin_200nm: DAC_PROGRAM(UP, low). NAME_program.c of a build has it as an object. */
 #define DAC_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name)

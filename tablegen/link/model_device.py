@@ -3,7 +3,7 @@
 import hashlib
 import hmac
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tablegen.device.commit_mode import CommitMode
@@ -33,6 +33,7 @@ from tablegen.link.messages import (
 from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused
 from tablegen.link.model_store import ModelStore
 from tablegen.link.players import Player
+from tablegen.link.program_image import ProgramImage
 from tablegen.link.store import Flash, Layout, Store
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
@@ -91,7 +92,8 @@ class ModelDevice:
     counter, or from ``nonces``, and may be used for ``CHALLENGE_MS`` of the clock ``milliseconds``. ``reboot`` counts
     ``boot`` on, as a device does that keeps its count without power. ``staged``: the image is kept, as in Verilog, and
     not its tables. ``checking``: ticks that the checks take.
-    ``flash`` with its layout, for the feature STORE, keeps programs, ``stores_while_playing`` even while a scan plays.
+    ``flash`` with its layout, for the feature STORE, keeps programs, ``stores_while_playing`` even while a scan plays;
+    ``compiled`` are images of the programs that come with the firmware.
     ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
     """
 
@@ -111,6 +113,7 @@ class ModelDevice:
         most_frames: int = _MAX_FRAMES,
         flash: tuple[Flash, Layout] | None = None,
         stores_while_playing: bool = False,
+        compiled: Sequence[ProgramImage] = (),
     ) -> None:
         if bool(key) != (Feature.KEY in info.features):
             raise ValueError("a key and the feature go together")
@@ -157,6 +160,7 @@ class ModelDevice:
         if More.MOVE in info.more:
             self._requests[Request.MOVE] = self._move
         self._flash, self._stores_while_playing = flash, stores_while_playing
+        self._compiled = compiled
         self._store: ModelStore
         self._power_up()
         if flash is not None:
@@ -192,9 +196,15 @@ class ModelDevice:
         """Return True if a slot has a program."""
         return self._store.image(slot) is not None
 
-    def play_kept(self, slot: int) -> bool:
-        """Play a kept program as if a host uploaded it; return False if it does not suit the device, or not now."""
-        image = self._store.image(slot) if self.permits else None
+    def play(self, number: int) -> bool:
+        """Play a program of the device as if a host uploaded it: compiled ones have the first numbers, then slots.
+
+        Returns
+        -------
+        bool
+            False if no program has this number, or it does not suit the device, or not now.
+        """
+        image = self._program(number) if self.permits else None
         incoming = None if image is None else self._bank.put(image)
         if incoming is None:
             return False
@@ -202,6 +212,13 @@ class ModelDevice:
         if self._checking == 0:
             self._check(self._pending, incoming)
         return True
+
+    def _program(self, number: int) -> ProgramImage | None:
+        """Return the image of a compiled or kept program."""
+        slot = number - len(self._compiled)
+        if slot < 0:
+            return self._compiled[number]
+        return None if self._flash is None else self._store.image(slot)
 
     @property
     def memory(self) -> bytearray:

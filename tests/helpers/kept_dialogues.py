@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cut_flash import MODES, CutFlash
-from link_device import DeviceLibrary, HostDevice
+from link_device import CompiledProgram, DeviceLibrary, HostDevice
 from link_programs import SmallScan, make_scan
 from link_talk import Talk
 from store_cuts import Kept, Step
@@ -24,6 +24,9 @@ from tablegen.link.store import Layout
 LAYOUT = Layout(base=0, sector_bytes=256, place_sectors=3, slots=3)
 FIRMWARE = make_scan(1)
 SCANS = {number: make_scan(number + 1) for number in range(1, 6)}  # by the number of ``Kept``
+COMPILED = tuple(
+    CompiledProgram(f"scan_{number}".encode(), scan.digest.encode(), scan.program) for number, scan in SCANS.items()
+)
 HASHES = {bytes.fromhex(scan.digest): number for number, scan in SCANS.items()}
 REQUESTS = {"save": Request.SAVE, "select": Request.SELECT, "try": Request.SELECT, "delete": Request.DELETE}
 # Before each step the device starts.
@@ -46,6 +49,7 @@ class StoreDevice:
     limits: tuple[AxisLimits, AxisLimits] | None = None
     key: bytes = b""
     while_playing: bool = False
+    compiled: tuple[CompiledProgram, ...] = ()
 
     def __post_init__(self) -> None:
         program = FIRMWARE.program
@@ -58,6 +62,7 @@ class StoreDevice:
             key=self.key,
             flash=(self.flash, LAYOUT),
             stores_while_playing=self.while_playing,
+            compiled=self.compiled,
         )
         self._begin()
 

@@ -149,11 +149,40 @@ void device_keep(device *d, const dac_store_flash *flash, bool while_playing)
 }
 #endif
 
-#if DAC_STORE
-bool device_play(device *d, uint8_t slot)
+#if DAC_LIBRARY
+/* From now on the device has one compiled program more; all that it points to stays where it is. */
+void device_compile(device *d, const char *name, const char *hash, const dac_program *program)
+{
+    dac_library_entry *const entry = &d->compiled[d->config.library_programs];
+
+    if (d->config.library_programs == COMPILED)
+        abort();
+    entry->name = name;
+    entry->hash = hash;
+    entry->program = *program;
+    d->config.library = d->compiled;
+    d->config.library_programs++;
+}
+
+bool device_play(device *d, uint32_t number)
 {
     permits_now = d->permits;
-    return dac_link_play_kept(&d->link, slot);
+    return dac_link_play(&d->link, number);
+}
+
+uint32_t device_numbers(const device *d)
+{
+    return dac_link_numbers(&d->link);
+}
+
+bool device_list(const device *d, uint32_t number, dac_link_listing *listing)
+{
+    return dac_link_list(&d->link, number, listing);
+}
+
+int32_t device_find(const device *d, const char *name)
+{
+    return dac_link_find(&d->link, name);
 }
 #endif
 

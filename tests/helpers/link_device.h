@@ -5,7 +5,7 @@
 #include "dac_link_parts.h"
 #include "lines.h"
 
-enum { OUT = 1 << 20 };
+enum { OUT = 1 << 20, COMPILED = 4 };
 #if DAC_SLOW_PART
 enum { SLOW_KNOTS = 65, SLOW_INDEX_BITS = 7 }; /* of every device; tests/link_device.py has them too */
 #endif
@@ -37,6 +37,9 @@ typedef struct {
     dac_store store;
     dac_store_flash flash; /* of no slot: none */
 #endif
+#if DAC_LIBRARY
+    dac_library_entry compiled[COMPILED];
+#endif
     uint32_t boot;
     dac_link_started started;
     bool permits, stalled;
@@ -48,7 +51,13 @@ typedef struct {
 device *device_new(const device_setup *setup, uint32_t boot);
 #if DAC_STORE
 void device_keep(device *d, const dac_store_flash *flash, bool while_playing);
-bool device_play(device *d, uint8_t slot);
+#endif
+#if DAC_LIBRARY
+void device_compile(device *d, const char *name, const char *hash, const dac_program *program);
+bool device_play(device *d, uint32_t number);
+uint32_t device_numbers(const device *d);
+bool device_list(const device *d, uint32_t number, dac_link_listing *listing);
+int32_t device_find(const device *d, const char *name);
 #endif
 void device_delete(device *d);
 void device_start(device *d, uint32_t boot);

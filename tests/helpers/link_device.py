@@ -8,7 +8,19 @@ import ctypes
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
-from ctypes import CFUNCTYPE, POINTER, Structure, c_bool, c_int32, c_size_t, c_uint8, c_uint16, c_uint32, c_void_p
+from ctypes import (
+    CFUNCTYPE,
+    POINTER,
+    Structure,
+    c_bool,
+    c_char_p,
+    c_int32,
+    c_size_t,
+    c_uint8,
+    c_uint16,
+    c_uint32,
+    c_void_p,
+)
 from enum import IntEnum
 from functools import cache
 from itertools import count
@@ -23,7 +35,7 @@ from cut_flash import CutFlash
 from link_talk import IDENTITY, Talk, derived_nonce
 
 from tablegen.base.resources import c_link, c_runtime, c_store
-from tablegen.device.dual_program import ScanProgram
+from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.link.messages import AxisLimits
@@ -48,6 +60,12 @@ class Line(NamedTuple):
     faults: int
 
 
+class Listing(Structure):
+    """A program of a device: ``dac_link_listing``."""
+
+    _fields_ = (("name", c_char_p), ("hash", c_uint8 * 32))
+
+
 class Started(IntEnum):
     """Why a link was not started: ``dac_link_started``."""
 
@@ -66,6 +84,14 @@ class _Record(Structure):
         *((name, c_uint32) for name in ("generation", "line", "ticks", "crc")),
         *((name, c_uint8) for name in ("markers", "faults")),
     )
+
+
+class CompiledProgram(NamedTuple):
+    """A program that comes with the firmware: its name and the digits of its hash."""
+
+    name: bytes
+    hash: bytes
+    program: DualProgram
 
 
 _Random = CFUNCTYPE(None, POINTER(c_uint8))
@@ -125,6 +151,9 @@ class DeviceLibrary(Library):
             getattr(self.dll, name).restype = c_size_t
         self.dll.device_run.restype = self.dll.device_lost.restype = c_uint32
         self.dll.device_table.restype = c_int32
+        if hasattr(self.dll, "device_play"):
+            self.dll.device_play.restype = self.dll.device_list.restype = c_bool
+            self.dll.device_numbers.restype, self.dll.device_find.restype = c_uint32, c_int32
         assert self.dll.device_sizes(0) == ctypes.sizeof(_Record)
         assert self.dll.device_sizes(1) == ctypes.sizeof(_Setup)
 
@@ -146,8 +175,8 @@ def device_library(
 ) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
-    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept, with
-    ``slow`` they may have slow parts; one that ``moves`` takes MOVE.
+    ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept and played
+    by number, with ``slow`` they may have slow parts; one that ``moves`` takes MOVE.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -155,7 +184,7 @@ def device_library(
     more += ["-DDAC_SPLINE=1"] if spline else []
     more += ["-DDAC_COMMIT_MODES=1"] if modes or moves else []
     more += ["-DDAC_MOVE=1"] if moves else []
-    more += ["-DDAC_STORE=1"] if store else []
+    more += ["-DDAC_STORE=1", "-DDAC_LIBRARY=1"] if store else []
     more += ["-DDAC_SLOW_PART=1"] if slow else []
     sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
     return DeviceLibrary(compile_device(folder / "device.so", bits, sources=sources, more=more))
@@ -173,7 +202,8 @@ class HostDevice:
     can do, ``library`` to that of ``device_library`` with the order ``shaping``, ``modes`` of a COMMIT, or ``moves``,
     and ``slow`` parts. Nonces are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``;
     ``started`` is why the link was not.
-    ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout.
+    ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout; its library
+    has the programs ``compiled``.
     """
 
     def __init__(
@@ -202,6 +232,7 @@ class HostDevice:
         slow: bool = False,
         flash: tuple[CutFlash, Layout] | None = None,
         stores_while_playing: bool = False,
+        compiled: Sequence[CompiledProgram] = (),
     ) -> None:
         x, y = fast_of(like.x), fast_of(like.y)
         bits = 16 if max(x.bits, y.bits, x.output.word_bits, y.output.word_bits) <= 16 else 32
@@ -259,6 +290,9 @@ class HostDevice:
             self._flash = c_flash(*flash)
             self._dll.device_keep(self._device, ctypes.byref(self._flash), c_bool(stores_while_playing))
         self.started = Started(self._dll.device_started(self._device))
+        self._compiled = [(*each, self.library.program(each.program)) for each in compiled]
+        for name, digest, _, (program, _) in self._compiled:
+            self._dll.device_compile(self._device, c_char_p(name), c_char_p(digest), ctypes.byref(program))
 
     def __del__(self) -> None:
         if hasattr(self, "_device"):
@@ -309,6 +343,11 @@ class HostDevice:
             " ".join(map(str, ["S", *map(int, numbers), self.boot_count])),
             " ".join(map(str, ["Q", *self._sine])),
         ]
+        # In front of the program of the boot, while nothing waits for a tick.
+        for _, digest, program, _ in self._compiled:
+            talk = Talk()
+            upload = b"".join([talk.hello(), *talk.upload(make_image(program, digest.decode()))])
+            self.notes.append(f"L {upload.hex()}")
         if self._boot is not None:
             talk = Talk()
             upload = b"".join([talk.hello(), *talk.upload(make_image(self._boot, bytes(32).hex()))])
@@ -367,12 +406,27 @@ class HostDevice:
         self._note(f"p {int(permits)}")
         self._dll.device_permit(self._device, c_bool(permits))
 
-    def play_kept(self, slot: int) -> bool:
-        """The application plays a kept program; whether it is on its way."""
-        begun = bool(self._dll.device_play(self._device, c_uint8(slot)))
+    def play(self, number: int) -> bool:
+        """The application plays a program of the device; whether it is on its way."""
+        begun = bool(self._dll.device_play(self._device, c_uint32(number)))
         self._work()
-        self._note(f"P {slot}")
+        self._note(f"P {number}")
         return begun
+
+    def numbers(self) -> int:
+        """How many compiled programs and slots there are."""
+        return int(self._dll.device_numbers(self._device))
+
+    def listing(self, number: int) -> tuple[str | None, str] | None:
+        """Name and hash of a program; None for a number without one."""
+        listing = Listing()
+        if not self._dll.device_list(self._device, c_uint32(number), ctypes.byref(listing)):
+            return None
+        return None if listing.name is None else listing.name.decode(), bytes(listing.hash).hex()
+
+    def find(self, name: str) -> int:
+        """The number of a program by its name, or by the first digits of its hash; -1 for none."""
+        return int(self._dll.device_find(self._device, c_char_p(name.encode())))
 
     def report(self, fault: int) -> None:
         """A fault that the driver of the converters saw."""

@@ -82,6 +82,13 @@ class LinkMachine:
         """Pull the processor's reset."""
         self._monitor.sendall(b"system_reset\n")
 
+    def press_up(self) -> None:
+        """Press the button "up" of lm3s6965evb, and return when it is released: bit 0 of port E is high again."""
+        self._monitor.sendall(b"sendkey up 20\n")
+        until = time.monotonic() + PATIENCE_S
+        while self._word(0x400243FC) & 1 == 0:
+            assert time.monotonic() < until, "the button is not released"
+
     def reset_while_receiving(self, data: bytes, status: int, raised: int, when: Callable[[int, int], bool]) -> None:
         """The same in the middle of bytes: when the registers at two addresses are so, as the monitor reads them."""
         until = time.monotonic() + PATIENCE_S

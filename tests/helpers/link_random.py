@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from cut_flash import MODES, CutFlash
-from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, HostDevice, Started, widest
+from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, CompiledProgram, HostDevice, Started, widest
 from link_images import damaged, damaged_slow, digest, random_image, random_limits, random_slow_program, resealed
 from link_talk import IDENTITY, Talk
 from programs import random_dual
@@ -38,7 +38,7 @@ from tablegen.verification.play.sequencer_shape import SequencerShape
 HARMONICS = 4
 KEY = bytes(range(32))
 BOOT_HASH = bytes(range(100, 132))
-SLOTS = 3
+SLOTS, COMPILED = 3, 2
 KEEPING = (Request.SLOT, Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE)
 CERTAIN_MODES = tuple(mode for mode in MODES if mode != "unstable")  # whatever is read, and how often
 TAGGED = (Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS)
@@ -79,6 +79,13 @@ class Dialogue:
             kept = {"stores_while_playing": bool(self.rng.random() < 0.5)}
             how |= {"flash": (self.flashes[0], layout), **kept}
             kept |= {"flash": (self.flashes[1], layout)}
+            compiled = [random_image(self.rng, shape, 0, "smooth", order) for _ in range(COMPILED)]
+            kept |= {"compiled": [image for image, _ in compiled]}
+            how |= {
+                "compiled": [
+                    CompiledProgram(b"program", image.info.hash.hex().encode(), program) for image, program in compiled
+                ]
+            }
         self.device = HostDevice(
             like,
             boot,
@@ -392,16 +399,16 @@ class Dialogue:
         self._send(self.talk.request(kind, payload) if kind == Request.SLOT else self._tagged(kind, payload))
 
     def _play(self) -> None:
-        """The application plays a kept program, and goes on at once or after some ticks."""
+        """The application plays a program of the device, and goes on at once or after some ticks."""
         if self.rng.random() < 0.7:
             self._send(self.talk.acting(Request.ABORT))
             self._tick(1)
         held = [slot for slot in range(SLOTS) if self.model.keeps(slot)]
-        slot = int(self.rng.choice([*held, *held, *held, *range(SLOTS + 1), 255]))
-        begun = self.device.play_kept(slot)
-        if begun != self.model.play_kept(slot):
-            raise Differs(f"a kept program {'begins' if begun else 'does not begin'}")
-        self.seen["played" if begun else "not played"] += 1
+        slot = int(self.rng.choice([*held, *held, *held, *range(-COMPILED, SLOTS + 1), 255]))
+        begun = self.device.play(COMPILED + slot)
+        if begun != self.model.play(COMPILED + slot):
+            raise Differs(f"program {slot} {'begins' if begun else 'does not begin'}")
+        self.seen["played" if begun else "not played", "compiled" if slot < 0 else "kept"] += 1
         self._hear()
         self._tick(int(self.rng.choice([0, 0, 1, 20])))
 

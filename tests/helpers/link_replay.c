@@ -6,7 +6,8 @@
  *     r hex        bytes from the line; f hex  the same, and the main loop does not go round
  *     w n, t n k   the main loop n times; n ticks, after each the main loop at most k times
  *     F numbers    it has a flash from now on, which is empty: the layout, and whether it is written while a scan plays
- *     P slot       the application plays a kept program
+ *     L bytes      an upload whose program is one more of the library
+ *     P number     the application plays a program of the device
  *     p, s, b, k, c   interlock, line stalled, reset with a boot count, a damaged word, the clock
  */
 #include <inttypes.h>
@@ -21,7 +22,6 @@ enum { LONGEST = 1 << 18, SINES = 5 << 14 };
 static char line[LONGEST];
 static uint8_t bytes[LONGEST];
 static int32_t sine[SINES];
-static dac_word boot_x[(1 << 16) + 1], boot_y[(1 << 16) + 1];
 static dac_program boot;
 static char *at;
 
@@ -80,24 +80,55 @@ static uint32_t read_setup(device_setup *s)
     return (uint32_t)strtoul(at, &at, 10);
 }
 
-/* The program that an upload brings becomes that of the firmware. */
-static void keep_boot(device *d, size_t count)
+static const dac_word *copy_table(const dac_axis_program *axis)
 {
+    dac_word *const table = calloc(axis->length + DAC_WORDS_BEHIND, sizeof(dac_word));
+
+    if (table == NULL)
+        exit(1);
+    memcpy(table, axis->table, axis->length * sizeof(dac_word));
+    for (unsigned i = 0; i < DAC_WORDS_BEHIND; i++)
+        table[axis->length + i] = table[i];
+    return table;
+}
+
+/* The program that an upload brings, in memory of its own; the device starts anew. */
+static dac_program read_program(device *d, size_t count)
+{
+    dac_program program;
+
     for (size_t i = 0; i < count; i += 256) {
         device_feed(d, bytes + i, count - i < 256 ? count - i : 256);
         device_run(d, UINT32_MAX);
     }
     device_take(d, bytes);
-    dac_link_program_of(&d->link, &boot);
-    memcpy(boot_x, boot.x.table, boot.x.length * sizeof(dac_word));
-    memcpy(boot_y, boot.y.table, boot.y.length * sizeof(dac_word));
-    boot_x[boot.x.length] = boot_x[0];
-    boot_y[boot.y.length] = boot_y[0];
-    boot.x.table = boot_x;
-    boot.y.table = boot_y;
+    dac_link_program_of(&d->link, &program);
+    program.x.table = copy_table(&program.x);
+    program.y.table = copy_table(&program.y);
+    return program;
+}
+
+static void keep_boot(device *d, size_t count)
+{
+    boot = read_program(d, count);
     d->setup.boot_program = &boot;
     device_start(d, d->boot);
 }
+
+#if DAC_LIBRARY
+static void add_program(device *d, size_t count)
+{
+    static dac_program programs[COMPILED];
+    static char hashes[COMPILED][65];
+    const uint32_t number = d->config.library_programs;
+
+    programs[number] = read_program(d, count);
+    for (unsigned i = 0; i < 32; i++)
+        (void)sprintf(hashes[number] + 2 * i, "%02x", d->link.image[d->link.idle].info[i]);
+    device_compile(d, "program", hashes[number], &programs[number]);
+    device_start(d, d->boot);
+}
+#endif
 
 #if DAC_STORE
 static uint8_t cells[1 << 14];
@@ -158,9 +189,13 @@ int main(void)
 #if DAC_STORE
         } else if (what == 'F') {
             give_flash(d);
+#endif
+#if DAC_LIBRARY
         } else if (what == 'P') {
-            (void)device_play(d, (uint8_t)number());
+            (void)device_play(d, (uint32_t)number());
             device_run(d, UINT32_MAX);
+        } else if (what == 'L') {
+            add_program(d, hexadecimal());
 #endif
         } else if (what == 'B') {
             keep_boot(d, hexadecimal());

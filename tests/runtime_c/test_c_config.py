@@ -21,6 +21,7 @@ OTHER_VALUES = {
     "DAC_SLOW_PART": 1,
     "DAC_STORE": 1,
     "DAC_MOVE": 1,
+    "DAC_LIBRARY": 1,
     "DAC_REQUESTS": 128,
     "DAC_LONG_MULTIPLY": 0,
     "DAC_LINK_RING": 512,

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.rest
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 MODES = "-DDAC_COMMIT_MODES=1"
 MOVES = "-DDAC_MOVE=1"
-STORE = "-DDAC_STORE=1"
+STORE = ("-DDAC_STORE=1", "-DDAC_LIBRARY=1")
 WAYS = {
     "gcc": (("gcc",), SANITIZED),
     "clang": (("clang",), SANITIZED),
@@ -82,7 +82,7 @@ def test_sanitizers_with_moves(compiler: str, replays_with_moves: list[Replay], 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_sanitizers_with_kept_programs(compiler: str, replays_with_a_store: list[Replay], tmp_path: Path) -> None:
-    hold(replays_with_a_store, tmp_path, compiler=(compiler,), options=(*SANITIZED, STORE))
+    hold(replays_with_a_store, tmp_path, compiler=(compiler,), options=(*SANITIZED, *STORE))
 
 
 def test_the_other_byte_order(
@@ -93,4 +93,4 @@ def test_the_other_byte_order(
     hold(replays, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=options)
     assert (tmp_path / "replay_16").read_bytes()[4:6] == b"\1\2"
     hold(replays_with_modes, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=(*options, MODES))
-    hold(replays_with_a_store, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=(*options, STORE))
+    hold(replays_with_a_store, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=(*options, *STORE))

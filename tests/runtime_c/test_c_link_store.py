@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kept_dialogues import FIRMWARE, LAYOUT, SCANS, StoreDevice, faults, new_flash
-from link_device import DeviceLibrary, HostDevice, compile_device, widest
+from kept_dialogues import COMPILED, FIRMWARE, LAYOUT, SCANS, StoreDevice, faults, new_flash
+from link_device import CompiledProgram, DeviceLibrary, HostDevice, compile_device, widest
 from link_images import resealed
+from link_programs import make_scan
 from link_random import KEY, Dialogue, Differs
 from replacing import replace
 from test_c_link import SHAPES, STEPS
@@ -28,8 +29,8 @@ from tablegen.link.messages import (
 )
 from tablegen.link.store import Store
 
-KEPT, LINK, UPLOAD, REQUESTS, STORE = (
-    "dac_link_kept.c", "dac_link.c", "dac_link_upload.c", "dac_link_requests.c", "dac_store.c"
+KEPT, LIBRARY, LINK, UPLOAD, REQUESTS, STORE = (
+    "dac_link_kept.c", "dac_link_library.c", "dac_link.c", "dac_link_upload.c", "dac_link_requests.c", "dac_store.c"
 )  # fmt: skip
 MUTANTS = {
     "another generation is saved": (KEPT, "dac_link_get(payload + 1) != generation", "false"),
@@ -37,6 +38,8 @@ MUTANTS = {
     "flash is written at any time": (KEPT, "l->config->store_while_playing || s.swaps == 0", "true"),
     "flash is written only when parked": (KEPT, "l->config->store_while_playing || s.swaps == 0", "false"),
     "a kept program has no checks": (KEPT, "        found = check_all(l);", "        found = dac_link_fine();"),
+    "checks of a second program at a start go on where the first ones ended": (
+        KEPT, "    dac_link_start_check(&l->check);\n    l->loading", "    l->loading"),
     "a kept program needs a tag": (KEPT, "    l->loading = true;\n", ""),
     "no upload needs a tag any more": (KEPT, "    l->loading = false;\n", ""),
     "a kept program cannot be read back": (KEPT, "    l->uploaded = true;\n", ""),
@@ -53,12 +56,32 @@ MUTANTS = {
     "SELECT has any trial": (LINK, "good = payload[1] <= 1;", "good = true;"),
     "SAVE needs no tag": (LINK, "UINT32_C(1) << DAC_LINK_SAVE | ", ""),
     "DELETE needs no tag": (LINK, " | UINT32_C(1) << DAC_LINK_DELETE)", ")"),
-    "a kept program ends an upload": (KEPT, "|| l->upload != DAC_LINK_NONE || !dac", "|| !dac"),
-    "a kept program ignores the interlock": (KEPT, " || !dac_link_permits(l)\n", "\n"),
-    "a host hears of a kept program": (UPLOAD, "if (l->loading) {", "if (false) {"),
-    "a kept program is not checked against what plays": (
-        KEPT, "    dac_link_start_check(&l->check);\n    return true;",
+    "a program of the device ends an upload": (LIBRARY, "|| l->upload != DAC_LINK_NONE || !dac", "|| !dac"),
+    "a program of the device ignores the interlock": (LIBRARY, " || !dac_link_permits(l))\n", ")\n"),
+    "a host hears of a program of the device": (UPLOAD, "if (l->loading) {", "if (false) {"),
+    "a program of the device is not checked against what plays": (
+        LIBRARY, "    dac_link_start_check(&l->check);\n    return true;",
         "    dac_link_start_check(&l->check);\n    l->check.stage = 7;\n    return true;"),
+    "a compiled program for another converter plays": (
+        LIBRARY, "|| dac_sequencer_load(l->sequencer, &entry->program) != DAC_LOADED", ""),
+    "a compiled program of another shape plays": (
+        LIBRARY, "dac_link_begin(l, info, &a).reason != DAC_LINK_NO_REASON", "(dac_link_begin(l, info, &a), false)"),
+    "a compiled program that was refused is an upload": (
+        LIBRARY, "        l->upload = DAC_LINK_NONE;\n        return false;", "        return false;"),
+    "a compiled program has no CRC": (LIBRARY, "    put_crc(l);\n", ""),
+    "the y of a compiled program never steps": (
+        LIBRARY, "DAC_LINK_Y_STEPS, p->y.hold_ticks != 1", "DAC_LINK_Y_STEPS, 0"),
+    "offsets of compiled programs have 16 low bits": (LIBRARY, "a->offset_word & 0x3FFFF", "a->offset_word & 0xFFFF"),
+    "the y of a compiled program is its x": (LIBRARY, "e(l, &entry->program.y);", "e(l, &entry->program.x);"),
+    "compiled programs have no settling lines": (
+        LIBRARY, "    put_word(page, DAC_LINK_SETTLE_LINES, s->settle_lines);\n", ""),
+    "slots have the first numbers": (LIBRARY, "number - l->config->library_programs;", "number;"),
+    "slots have no numbers": (LIBRARY, "        return l->config->library_programs + l->", "        return 0 * l->"),
+    "an empty slot is listed": (LIBRARY, "    if (dac_store_info(l->con", "    if (true || dac_store_info(l->con"),
+    "a name finds what begins with it": (LIBRARY, "    return a[at] == b[at];", "    return a[at] == '\\0';"),
+    "few digits of a hash are enough": (LIBRARY, "at >= SHORTEST && ", ""),
+    "more digits than a hash has name it": (LIBRARY, " && text[at] == '\\0';", ";"),
+    "the first digit of a byte is the low one": (LIBRARY, "at % 2 == 0 ? hash", "at % 2 != 0 ? hash"),
     "the feature is not announced": (REQUESTS, "c->store != NULL ? KEEPS_PROGRAMS : 0", "false ? KEEPS_PROGRAMS : 0"),
 }  # fmt: skip
 CUT_MUTANTS = {  # these need a cut
@@ -86,7 +109,9 @@ def compile_with(folder: Path, change: tuple[str, str, str]) -> DeviceLibrary:
             text = text.replace(old, new)
         (folder / source.name).write_text(text, "utf-8")
         sources.append(folder / source.name)
-    return DeviceLibrary(compile_device(folder / "device.so", sources=sources, more=["-DDAC_STORE=1"]))
+    return DeviceLibrary(
+        compile_device(folder / "device.so", sources=sources, more=["-DDAC_STORE=1", "-DDAC_LIBRARY=1"])
+    )
 
 
 # Starts
@@ -139,15 +164,20 @@ def check_refused_start(library: DeviceLibrary | None = None) -> None:
 
 
 def check_two_refused_programs(library: DeviceLibrary | None = None) -> None:
-    """The selected program has all checks too where a trial failed late ones."""
+    """The selected program has all checks too where a trial failed late ones.
+
+    Both have the same tables: with other first words the sequencer would refuse the second table, whose first word is
+    repeated behind the last by one of the checks, and hide that the checks were not made.
+    """
     flash = new_flash()
     store = Store(flash, LAYOUT)
     image = SCANS[1].image(False)
-    words = bytearray(image.data)
-    park, most = (4 * (2 * PAGE_WORDS + AXIS_WORDS.index(name)) for name in ("park_code", "code_max"))
-    words[most : most + 4] = words[park : park + 4]  # of y, so that its last check fails
-    store.save(0, SCANS[2].image(False))
-    store.save(1, resealed(image, bytes(words)))
+    late, fast = bytearray(image.data), bytearray(image.data)
+    park, most, step = (4 * (2 * PAGE_WORDS + AXIS_WORDS.index(name)) for name in ("park_code", "code_max", "max_step"))
+    late[most : most + 4] = late[park : park + 4]  # of y, so that its last check fails
+    fast[step : step + 4] = struct.pack("<I", NARROW[1].max_step + 1)
+    store.save(0, resealed(image, bytes(fast)))
+    store.save(1, resealed(image, bytes(late)))
     store.select(0)
     store.select(1, trial=True)
     flash.power_up()
@@ -198,6 +228,113 @@ def check_changed_slot(library: DeviceLibrary | None = None) -> None:
     assert device.act(Request.CONFIRM) == Reason.TRIAL
 
 
+def check_index(library: DeviceLibrary | None = None) -> None:
+    """Compiled programs have the first numbers, slots those behind; names and first digits of hashes find both."""
+    flash = new_flash()
+    device = StoreDevice(flash, library, compiled=COMPILED[:3])
+    device.upload(SCANS[5])
+    assert device.save(1) == 0
+    device.upload(SCANS[2])
+    assert device.save(2) == 0
+    line = device.device
+    listed = [line.listing(number) for number in range(line.numbers() + 1)]
+    assert listed == [
+        ("scan_1", SCANS[1].digest),
+        ("scan_2", SCANS[2].digest),
+        ("scan_3", SCANS[3].digest),
+        None,
+        (None, SCANS[5].digest),
+        (None, SCANS[2].digest),
+        None,
+    ]
+    assert [line.find(name) for name in ("scan_1", "scan_3", "scan_", "scan_33", "scan_5", "")] == [
+        0,
+        2,
+        -1,
+        -1,
+        -1,
+        -1,
+    ]
+    # The hashes of small scans differ in the last digit alone.
+    assert line.find(SCANS[2].digest) == 1, "the first of two that have it"
+    assert [line.find(SCANS[5].digest[:digits]) for digits in (11, 12, 64)] == [-1, 0, 4]
+    assert line.find(SCANS[5].digest + "0") == line.find(SCANS[5].digest[:63] + "g") == -1
+    flash.cells[LAYOUT.place(1) + 200] ^= 1
+    assert line.listing(5) is None or line.listing(4) is None, "damaged"
+
+
+def check_compiled(library: DeviceLibrary | None = None) -> None:
+    """A compiled program plays as an upload of it does: checks, readback, hash, and a slot that keeps it."""
+    for key in (b"", KEY):
+        flash = new_flash()
+        device = StoreDevice(flash, library, key=key, while_playing=True, compiled=COMPILED[:3])
+        assert (device.act(Request.ARM, bytes(4)), device.act(Request.TRIGGER)) == (0, 0)
+        device.device.tick(200)
+        device.device.lines()
+        for number in range(3):
+            assert device.device.play(number)
+            assert not device.device.play(number), "one is on its way"
+            device.device.tick(200)
+            assert device.device.transmit() == b""
+            assert (device.plays(), device.status().generation) == (number + 1, number + 2)
+        assert next(line.line for line in device.device.lines() if line.generation == 4) == 0
+        image = SCANS[3].image(False)
+        device.device.receive(device.talk.commit(image, device.ask(Request.CHALLENGE) if key else b""))
+        assert [answer.type for answer in device.talk.answers(device.device.transmit())] == [Request.COMMIT | 0x80]
+        assert device.save(0) == 0
+        assert device.device.play(0)
+        device.device.tick(200)
+        assert device.device.play(3)
+        device.device.tick(200)
+        assert device.plays() == 3
+        device.device.permits = True
+
+
+def check_compiled_is_refused(library: DeviceLibrary | None = None) -> None:
+    """Limits, another converter, another table and an upload in hand are reasons not to play; the old one goes on."""
+    narrow = StoreDevice(new_flash(), library, NARROW, compiled=COMPILED[:3])
+    assert narrow.device.play(1), "its steps are found by the checks"
+    narrow.device.tick(200)
+    assert (narrow.plays(), narrow.status().upload) == (0, Upload.NONE)
+    assert narrow.device.play(0)
+    narrow.device.tick(200)
+    assert narrow.plays() == 1
+
+    program = SCANS[2].program
+    coded = replace(program, y=replace(program.y, output=replace(program.y.output, coding="twos-complement")))
+    longer = make_scan(3, index_bits=(8, 6)).program
+    others = tuple(CompiledProgram(b"other", SCANS[2].digest.encode(), each) for each in (coded, longer))
+    device = StoreDevice(new_flash(), library, compiled=(*COMPILED[:2], *others))
+    assert not device.device.play(2), "another converter"
+    assert not device.device.play(3), "a longer table"
+    assert not device.device.play(7), "behind the last slot"
+    assert not device.device.play(0xFFFFFFFF)
+    device.device.receive(device.talk.request(Request.BEGIN, SCANS[4].image(False).info.pack()))
+    device.device.transmit()
+    assert not device.device.play(0), "an upload is on its way"
+    assert device.status().upload == Upload.RECEIVING
+    device.device.receive(device.talk.acting(Request.ABORT))
+    device.device.tick(10)
+    device.device.transmit()
+    assert device.device.play(0)
+    device.device.tick(200)
+    assert device.plays() == 1
+    assert not device.device.play(3), "a longer table, behind a program that has played"
+
+
+def check_words_of_no_program(library: DeviceLibrary | None = None) -> None:
+    """A slot whose program words make no image of its length is refused at once, and leaves no upload behind."""
+    flash = new_flash()
+    image = SCANS[1].image(False)
+    words = bytearray(image.data)
+    words[4 * (PAGE_WORDS + AXIS_WORDS.index("harmonics"))] = 9
+    Store(flash, LAYOUT).save(0, resealed(image, bytes(words)))
+    device = StoreDevice(flash, library, compiled=COMPILED[:1])
+    assert not device.device.play(1)
+    assert device.status().upload == Upload.NONE
+    assert device.device.play(0)
+
+
 def check_play(library: DeviceLibrary | None = None) -> None:
     """The application plays kept programs: at a line, without a word on the line, after the checks of an upload."""
     for key in (b"", KEY):
@@ -209,25 +346,29 @@ def check_play(library: DeviceLibrary | None = None) -> None:
         assert (device.act(Request.ARM, bytes(4)), device.act(Request.TRIGGER)) == (0, 0)
         device.device.tick(200)
         device.device.lines()
-        assert device.device.play_kept(0)
-        assert not device.device.play_kept(1), "one is on its way"
+        assert device.device.play(0)
+        assert not device.device.play(1), "one is on its way"
         device.device.tick(200)
         assert device.device.transmit() == b""
         assert (device.plays(), device.status().generation) == (1, 4)
         assert next(line.line for line in device.device.lines() if line.generation == 4) == 0
-        assert not device.device.play_kept(2), "an empty slot"
+        assert not device.device.play(2), "an empty slot"
         flash.power_up()
         narrow = StoreDevice(flash, library, NARROW, key)
-        assert narrow.device.play_kept(1)
+        assert narrow.device.play(1)
         narrow.device.tick(200)
         assert (narrow.plays(), narrow.status().upload) == (0, Upload.NONE)
-        assert narrow.device.play_kept(0)
+        assert narrow.device.play(0)
         narrow.device.tick(200)
         assert narrow.plays() == 1
 
 
 CHECKS = (
     check_play,
+    check_index,
+    check_compiled,
+    check_compiled_is_refused,
+    check_words_of_no_program,
     check_start,
     check_refused_start,
     check_two_refused_programs,
@@ -287,6 +428,7 @@ def test_random_dialogues_about_kept_programs_are_those_of_the_model() -> None:
     reasons = (Reason.SLOT, Reason.ROOM, Reason.PLAYING, Reason.GENERATION, Reason.TRIAL, Reason.FLASH)
     for reason in reasons:
         assert sum(count for each, count in seen.items() if isinstance(each, tuple) and each[1] == reason), reason
+    assert min(seen[what, kind] for what in ("played", "not played") for kind in ("compiled", "kept")) > 5
     assert seen[Request.SAVE, Reason.READBACK]
     assert seen[Request.SAVE, Reason.KEY]
 

@@ -25,7 +25,8 @@ CHOICES = {
     "narrow_words_wide_codes": ["-DDAC_OUTPUT_STORAGE_BITS=32", "-DDAC_REQUESTS=128"],
     "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"],
     "small": ["-DDAC_SMALL=1", "-Os"],
-    "spline": ["-DDAC_SPLINE=1", "-DDAC_STORE=1"],
+    "spline": ["-DDAC_SPLINE=1", "-DDAC_STORE=1", "-DDAC_LIBRARY=1"],
+    "library": ["-DDAC_LIBRARY=1", "-DDAC_COMMIT_MODES=1"],
     "spline_wide": ["-DDAC_SPLINE=1", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
     "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
@@ -137,7 +138,8 @@ def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     assert run([*ANALYSERS[analyser], source]).returncode != 0
 
 
-ALL_FUNCTIONS = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", "-DDAC_STORE=1", "-DDAC_MOVE=1")
+OF_THE_LINK = ("-DDAC_STORE=1", "-DDAC_LIBRARY=1", "-DDAC_MOVE=1")
+ALL_FUNCTIONS = ("-DDAC_SHAPING=3", "-DDAC_COMMIT_MODES=1", *OF_THE_LINK)
 
 
 def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
@@ -150,6 +152,7 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
         ("DAC_SLOW_PART", "-DDAC_SLOW_PART=1"),
         ("DAC_STORE", "-DDAC_STORE=1"),
         ("DAC_MOVE", "-DDAC_MOVE=1"),
+        ("DAC_LIBRARY", "-DDAC_LIBRARY=1"),
     ):
         if given not in options:
             text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
@@ -170,13 +173,13 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
     """Exported is what headers declare, asked for are their own functions, memcpy and memset; no variables."""
-    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", "-DDAC_STORE=1", *options, "-c", *SOURCES], tmp_path)
+    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *OF_THE_LINK, *options, "-c", *SOURCES], tmp_path)
     found: dict[str, set[str]] = {}
     for path in sorted(tmp_path.glob("*.o")):
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    own = declared(*HEADERS, options=[*options, "-DDAC_STORE=1"])
+    own = declared(*HEADERS, options=[*options, *OF_THE_LINK])
     assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
     assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     # Of absolute value, for the linker to compare: they are in no memory.
@@ -190,7 +193,7 @@ def test_public_names_have_the_prefix_of_the_sequencer() -> None:
     assert {name for name in public if not name.startswith("dac_sequencer_")} == {"dac_synthesize"}
     assert all(name.startswith("dac_axis_") for name in declared("dac_axis.h"))
     link = [name for name in HEADERS if name.startswith("dac_link")]
-    assert len(declared("dac_link.h")) == 6
+    assert len(declared("dac_link.h")) == 9
     assert all(name.startswith("dac_link_") for name in declared(*link))
 
 

@@ -41,8 +41,27 @@ void control_received(uint8_t byte)
     dac_link_receive(&link, byte);
 }
 
+#if DAC_LIBRARY
+/* Plays the next program of the library and of the slots that this device plays. */
+static void play_next(void)
+{
+    static uint32_t number;
+
+    for (uint32_t left = dac_link_numbers(&link); left != 0; left--) {
+        const uint32_t now = number;
+        number = (number + 1) % dac_link_numbers(&link);
+        if (dac_link_play(&link, now))
+            return;
+    }
+}
+#endif
+
 void control_work(void)
 {
+#if DAC_LIBRARY
+    if (board_pressed())
+        play_next();
+#endif
     dac_link_work(&link);
     while (board_can_put()) {
         const int byte = dac_link_transmit(&link);

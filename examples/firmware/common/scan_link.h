@@ -6,6 +6,10 @@
 
 const dac_link_config *scan_link(void);
 
+#if DAC_LIBRARY
+bool board_pressed(void); /* in the port: whether the button has been pressed since the last call */
+#endif
+
 #if DAC_STORE
 extern dac_store scan_store;
 extern const dac_store_flash scan_flash; /* in the port */

@@ -13,7 +13,9 @@ enum { RECEIVE_INTERRUPT = 1 << 4, RECEIVE_TIMEOUT = 1 << 6 };   /* UARTIM, UART
 #define RCGC1 REGISTER(0x400FE104)
 #define RCGC2 REGISTER(0x400FE108)
 #define GPIO_AFSEL(port) REGISTER((port) + 0x420)
+#define GPIO_PUR(port) REGISTER((port) + 0x510)
 #define GPIO_DEN(port) REGISTER((port) + 0x51C)
+#define GPIO_DATA(port) REGISTER((port) + 0x3FC)
 #define UART_DR(uart) REGISTER((uart) + 0x00)
 #define UART_FR(uart) REGISTER((uart) + 0x18)
 #define UART_IBRD(uart) REGISTER((uart) + 0x24)
@@ -29,6 +31,7 @@ enum { RECEIVE_INTERRUPT = 1 << 4, RECEIVE_TIMEOUT = 1 << 6 };   /* UARTIM, UART
 
 #define PORT_A UINT32_C(0x40004000) /* 0 and 1: UART 0 */
 #define PORT_D UINT32_C(0x40007000) /* 2 and 3: UART 1 */
+#define PORT_E UINT32_C(0x40024000) /* 0: the button "up", low when pressed */
 #define CONSOLE UINT32_C(0x4000C000)
 #define LOG UINT32_C(0x4000D000)
 
@@ -46,13 +49,15 @@ static void start_uart(uint32_t uart)
 void board_start(void)
 {
     RCGC1 |= 3;
-    RCGC2 |= 1u << 3 | 1u;
+    RCGC2 |= 1u << 4 | 1u << 3 | 1u;
     (void)RCGC2; /* clocks take three cycles to arrive */
     (void)RCGC2;
     GPIO_AFSEL(PORT_A) |= 3;
     GPIO_DEN(PORT_A) |= 3;
     GPIO_AFSEL(PORT_D) |= 3u << 2;
     GPIO_DEN(PORT_D) |= 3u << 2;
+    GPIO_PUR(PORT_E) |= 1;
+    GPIO_DEN(PORT_E) |= 1;
     start_uart(CONSOLE);
     start_uart(LOG);
     /* Read what was received before: the interrupt comes only when the FIFO fills to its level. */
@@ -80,6 +85,15 @@ void board_uart_interrupt(void)
     UART_ICR(CONSOLE) = RECEIVE_INTERRUPT | RECEIVE_TIMEOUT; /* clear first: a later character sets it again */
     while ((UART_FR(CONSOLE) & RECEIVE_EMPTY) == 0)
         control_received((uint8_t)UART_DR(CONSOLE));
+}
+
+bool board_pressed(void)
+{
+    static bool before = true; /* a button that is held over a start is not pressed anew */
+    const bool down = (GPIO_DATA(PORT_E) & 1) == 0, pressed = down && !before;
+
+    before = down;
+    return pressed;
 }
 
 bool board_can_put(void)

@@ -1,0 +1,260 @@
+/* The programs of a device under one number: those that were compiled, then those that are kept (docs/c.md, "A library
+ * of programs"). */
+#include "dac_link_parts.h"
+
+#if DAC_LIBRARY
+
+enum { SHORTEST = 12 }; /* digits of a hash that name a program */
+
+static const char digits[] = "0123456789abcdef";
+
+/* A program as an image: the inverse of dac_link_program_of(). */
+
+static void put_word(uint8_t *page, unsigned word, uint32_t value)
+{
+    dac_link_put(page + 4 * word, value);
+}
+
+static void put_scan(uint8_t *page, const dac_program *p)
+{
+    const dac_schedule *const s = &p->schedule;
+    const dac_window *const windows[] = {&s->forward, &s->backward, &s->up, &s->down};
+
+    put_word(page, DAC_LINK_LINE_TICKS, s->line_ticks);
+    put_word(page, DAC_LINK_FRAME_LINES, s->frame_lines);
+    put_word(page, DAC_LINK_SETTLE_LINES, s->settle_lines);
+    put_word(page, DAC_LINK_TURN_TICK, s->turn_tick);
+    for (unsigned i = 0; i < 4; i++) {
+        put_word(page, DAC_LINK_FORWARD + 2 * i, windows[i]->first);
+        put_word(page, DAC_LINK_FORWARD + 2 * i + 1, windows[i]->count);
+    }
+    put_word(page, DAC_LINK_PIXELS, s->pixels);
+    put_word(page, DAC_LINK_Y_STEPS, p->y.hold_ticks != 1);
+}
+
+static void put_axis(uint8_t *page, const dac_axis_program *a)
+{
+    put_word(page, DAC_LINK_PHASE_STEP, (uint32_t)((UINT64_C(1) << 32) / a->phase_period));
+    put_word(page, DAC_LINK_PHASE_REMAINDER, (uint32_t)((UINT64_C(1) << 32) % a->phase_period));
+    put_word(page, DAC_LINK_PHASE_PERIOD, a->phase_period);
+    put_word(page, DAC_LINK_GAIN, (uint32_t)a->gain_word);
+    put_word(page, DAC_LINK_OFFSET_LOW, (uint32_t)a->offset_word & 0x3FFFF);
+    put_word(page, DAC_LINK_OFFSET_HIGH, (uint32_t)(a->offset_word >> 18));
+    put_word(page, DAC_LINK_CODE_MIN, (uint32_t)a->code_min);
+    put_word(page, DAC_LINK_CODE_MAX, (uint32_t)a->code_max);
+    put_word(page, DAC_LINK_MAX_STEP, (uint32_t)a->max_step);
+    put_word(page, DAC_LINK_PARK_CODE, (uint32_t)a->park_code);
+#if DAC_SHAPING
+    put_word(page, DAC_LINK_SHAPING_WORD, a->shaping_order | (uint32_t)a->shaping_zero << 8);
+#endif
+}
+
+static unsigned table_bytes(const dac_axis_program *a)
+{
+    return a->bits <= 16 ? 2 : 3; /* of a word */
+}
+
+static uint8_t value_of(char digit)
+{
+    uint8_t value = 0;
+
+    while (digits[value] != digit && value < 15)
+        value++;
+    return value;
+}
+
+static void put_hash(uint8_t *to, const char *hash)
+{
+    for (unsigned i = 0; i < DAC_LINK_BYTES; i++)
+        to[i] = (uint8_t)(value_of(hash[2 * i]) << 4 | value_of(hash[2 * i + 1]));
+}
+
+static void announce(const dac_library_entry *entry, uint8_t *info)
+{
+    const dac_axis_program *const axes[] = {&entry->program.x, &entry->program.y};
+    uint32_t bytes = DAC_LINK_PROGRAM;
+
+    put_hash(info + DAC_LINK_HASH, entry->hash);
+    for (unsigned axis = 0; axis < 2; axis++) {
+        uint8_t *const shape = info + DAC_LINK_SHAPES + 4 * axis;
+        shape[0] = axes[axis]->index_bits;
+        shape[1] = axes[axis]->bits;
+        shape[2] = axes[axis]->dac_bits;
+        shape[3] = 0;
+        bytes += axes[axis]->length * table_bytes(axes[axis]);
+    }
+    dac_link_put(info + DAC_LINK_BYTES, bytes);
+    dac_link_put(info + DAC_LINK_IMAGE_CRC, 0); /* computed when the image is in memory */
+}
+
+static dac_link_finding store_program(dac_link *l, const dac_program *program)
+{
+    uint8_t words[DAC_LINK_PROGRAM] = {0};
+    dac_link_finding found = dac_link_fine();
+
+    put_scan(words, program);
+    put_axis(words + 64, &program->x);
+    put_axis(words + 128, &program->y);
+    for (unsigned i = 0; i < DAC_LINK_PROGRAM; i++)
+        found = dac_link_store(l, words[i]);
+    return found; /* that of the last byte */
+}
+
+static void store_table(dac_link *l, const dac_axis_program *a)
+{
+    for (uint32_t word = 0; word < a->length; word++)
+        for (unsigned byte = 0; byte < table_bytes(a); byte++)
+            (void)dac_link_store(l, (uint8_t)((uint32_t)a->table[word] >> 8 * byte));
+}
+
+static void put_crc(dac_link *l)
+{
+    dac_link_place at = {0, 0, 0, 0};
+    uint32_t crc = DAC_LINK_CRC;
+
+    while (at.part != 3)
+        crc = dac_link_crc(crc, dac_link_load_byte(l, &at));
+    dac_link_put(l->image[l->idle].info + DAC_LINK_IMAGE_CRC, ~crc);
+}
+
+static bool has_slow_part(const dac_program *program)
+{
+#if DAC_SLOW_PART
+    return program->x.slow != NULL || program->y.slow != NULL;
+#else
+    (void)program;
+    return false;
+#endif
+}
+
+/* A compiled program goes the way of an upload too. The sequencer checks what an image does not have: the coding of the
+ * converter, and the table in flash. */
+static bool load_compiled(dac_link *l, const dac_library_entry *entry)
+{
+    uint8_t info[DAC_LINK_INFO], payload[4];
+    dac_link_answer a = {0, 0, 0, 0, payload};
+
+    if (has_slow_part(&entry->program) || dac_sequencer_load(l->sequencer, &entry->program) != DAC_LOADED)
+        return false;
+    announce(entry, info);
+    if (dac_link_begin(l, info, &a).reason != DAC_LINK_NO_REASON
+        || store_program(l, &entry->program).reason != DAC_LINK_NO_REASON)
+        return false;
+    store_table(l, &entry->program.x);
+    store_table(l, &entry->program.y);
+    put_crc(l);
+    return true;
+}
+
+/* The index. */
+
+static const dac_library_entry *compiled(const dac_link *l, uint32_t number)
+{
+    return number < l->config->library_programs ? &l->config->library[number] : NULL;
+}
+
+#if DAC_STORE
+/* The slot of a number behind those of the compiled programs, or DAC_STORE_NONE. */
+static uint8_t slot_of(const dac_link *l, uint32_t number)
+{
+    const uint32_t slot = number - l->config->library_programs;
+
+    return number < dac_link_numbers(l) ? (uint8_t)slot : DAC_STORE_NONE;
+}
+#endif
+
+uint32_t dac_link_numbers(const dac_link *l)
+{
+    if (l->config == NULL)
+        return 0;
+#if DAC_STORE
+    if (l->config->store != NULL)
+        return l->config->library_programs + l->config->store->flash->slots;
+#endif
+    return l->config->library_programs;
+}
+
+bool dac_link_list(const dac_link *l, uint32_t number, dac_link_listing *listing)
+{
+    if (number >= dac_link_numbers(l))
+        return false;
+    const dac_library_entry *const entry = compiled(l, number);
+    listing->name = NULL;
+    if (entry != NULL) {
+        listing->name = entry->name;
+        put_hash(listing->hash, entry->hash);
+        return true;
+    }
+#if DAC_STORE
+    uint8_t info[DAC_LINK_INFO];
+    if (dac_store_info(l->config->store, slot_of(l, number), info)) {
+        dac_link_copy(listing->hash, info + DAC_LINK_HASH, sizeof listing->hash);
+        return true;
+    }
+#endif
+    return false;
+}
+
+static bool same_text(const char *a, const char *b)
+{
+    unsigned at = 0;
+
+    while (a[at] != '\0' && a[at] == b[at])
+        at++;
+    return a[at] == b[at];
+}
+
+/* Whether a text is the first digits of a hash. */
+static bool begins(const char *text, const uint8_t *hash)
+{
+    unsigned at = 0;
+
+    for (; at < 2 * DAC_LINK_BYTES && text[at] != '\0'; at++)
+        if (text[at] != digits[at % 2 == 0 ? hash[at / 2] >> 4 : hash[at / 2] & 15])
+            return false;
+    return at >= SHORTEST && text[at] == '\0';
+}
+
+int32_t dac_link_find(const dac_link *l, const char *name)
+{
+    dac_link_listing listing;
+
+    for (uint32_t number = 0; number < dac_link_numbers(l); number++)
+        if (dac_link_list(l, number, &listing)
+            && ((listing.name != NULL && same_text(name, listing.name)) || begins(name, listing.hash)))
+            return (int32_t)number;
+    return -1;
+}
+
+static bool load(dac_link *l, uint32_t number)
+{
+    const dac_library_entry *const entry = compiled(l, number);
+
+    if (entry != NULL)
+        return load_compiled(l, entry);
+#if DAC_STORE
+    return l->config->store != NULL && dac_link_load_slot(l, slot_of(l, number));
+#else
+    return false;
+#endif
+}
+
+bool dac_link_play(dac_link *l, uint32_t number)
+{
+    if (l->config == NULL || l->upload != DAC_LINK_NONE || !dac_link_permits(l))
+        return false;
+    if (!load(l, number)) {
+        l->upload = DAC_LINK_NONE;
+        return false;
+    }
+    l->upload = DAC_LINK_CHECKING;
+    l->committing = l->loading = true;
+    l->commit_is_last = false;
+#if DAC_COMMIT_MODES
+    l->commit_mode = DAC_COMMIT_LINE;
+#endif
+    dac_link_start_check(&l->check);
+    return true;
+}
+
+#endif
