@@ -50,7 +50,14 @@ def program_words(schedule: Schedule, x: Program, y: Program, harmonics: tuple[i
     ----------
     harmonics
         Those of x and y where the device renders the table from Fourier words, 0 where it is uploaded.
+
+    Raises
+    ------
+    ValueError
+        If the schedule has a table of pixels.
     """
+    if schedule.pixel_table is not None:
+        raise ValueError("a program with a table of pixels plays in C alone, neither over the link nor in Verilog")
     pages = [
         _scan(schedule, steps=y.hold != 1),
         _axis(x, harmonics[0]),

@@ -31,6 +31,7 @@ CHOICES = {
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
     "commit_modes": ["-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1"],
+    "pixel_table": ["-DDAC_PIXEL_TABLE=1"],
     "slow_part_wide": [
         "-DDAC_SLOW_PART=1",
         "-DDAC_SPLINE=1",
