@@ -34,12 +34,12 @@ def sine_scan(folder: Path, operator: bytes, response: str, *edits: str) -> Setu
 
 
 def response_csv(plant: ForeignPlant, highest_hz: float) -> str:
-    """The response of a plant behind its hysteresis as measured, with a thousandth of noise."""
+    """The response of a plant behind its hysteresis as measured, with a thousandth of noise of its gain."""
     f = np.geomspace(50.0, highest_hz, 600)
     response = plant.dynamics(f)
     random = np.random.default_rng(5)
     gain = np.abs(response) * (1.0 + 1e-3 * random.standard_normal(len(f)))
-    phase = np.unwrap(np.angle(response, deg=True), period=360.0) + 0.05 * random.standard_normal(len(f))
+    phase = np.unwrap(np.angle(response, deg=True), period=360.0)
     rows = "\n".join(f"{one:.6g},{g:.6g},{p:.6g}" for one, g, p in zip(f, gain, phase, strict=True))
     return f"hz,gain,phase_deg\n{rows}\n"
 
@@ -68,15 +68,29 @@ def pixels_on_the_piezo(plan: Plan, plant: ForeignPlant) -> tuple[Floats, Floats
 
 
 def image_errors(trace: Floats, retrace: Floats, window: tuple[float, float]) -> dict[str, float]:
-    """Errors of an image in percent of the line: about the common best straight line of both directions."""
+    """Errors of an image in percent of the line, about the common best straight line of both directions."""
     low, high = window
     grid = low + (high - low) * (np.arange(len(trace)) + 0.5) / len(trace)
-    slope, start = np.polyfit(np.tile(grid, 2), np.concatenate([trace, retrace]), 1)
-    sides = [100.0 * ((one - start) / slope - grid) for one in (trace, retrace)]
+    return _errors(grid, (trace, retrace), (grid, grid))
+
+
+def predicted_errors(plan: Plan, trace: Floats, retrace: Floats) -> dict[str, float]:
+    """The same where each pixel of a sine is at the place that its certificate states, and not on the grid."""
+    errors, window = plan.pixel_errors, plan.x.imaged
+    assert errors is not None
+    assert window is not None
+    grid = window[0] + (window[1] - window[0]) * (np.arange(len(trace)) + 0.5) / len(trace)
+    places = tuple(grid + 0.01 * errors.errors[side] for side in ("forward", "backward"))
+    return _errors(grid, (trace, retrace), places)
+
+
+def _errors(grid: Floats, sides: tuple[Floats, Floats], places: tuple[Floats, ...]) -> dict[str, float]:
+    slope, start = np.polyfit(np.concatenate(places), np.concatenate(sides), 1)
+    errors = [100.0 * ((one - start) / slope - at) for one, at in zip(sides, places, strict=True)]
     step = round(CHORD / (grid[1] - grid[0]))
     return {
-        "rms": max(float(np.sqrt(np.mean(one * one))) for one in sides),
-        "scaling": max(float(np.ptp(one[step:] - one[:-step])) / (grid[step] - grid[0]) for one in sides),
-        "mismatch": float(np.max(np.abs(sides[0] - sides[1]))),
-        "size": 100.0 * (slope / SIZE_NM - 1.0),
+        "rms": max(float(np.sqrt(np.mean(one * one))) for one in errors),
+        "scaling": max(float(np.ptp(one[step:] - one[:-step])) / float(grid[step] - grid[0]) for one in errors),
+        "mismatch": float(np.max(np.abs(errors[0] - errors[1]))),
+        "size": float(100.0 * (slope / SIZE_NM - 1.0)),
     }

@@ -110,3 +110,11 @@ def test_auto_takes_what_leaves_less(tmp_path: Path) -> None:
     )
     assert many.pixel_errors is None
     assert many.x.series.harmonics == 3
+
+
+def test_the_peaks_of_a_sine_are_not_cut_off(tmp_path: Path) -> None:
+    """Between the points of a coarse grid they would be beyond the table's largest word."""
+    line = make_plan(setup(tmp_path, *SINE), sines=True).x
+    ticks = line.program.ticks
+    exact = line.float_codes(line.series.on_grid(ticks))
+    assert np.max(np.abs(line.codes(0, ticks) - exact)) < 1.0
