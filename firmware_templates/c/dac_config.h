@@ -46,6 +46,10 @@
 #define DAC_SLOW_PART 0 /* 1: plays programs with a slow part */
 #endif
 
+#ifndef DAC_PIXEL_TABLE
+#define DAC_PIXEL_TABLE 0 /* 1: plays programs with a table of the ticks of each pixel */
+#endif
+
 #ifndef DAC_REQUESTS
 #define DAC_REQUESTS 8 /* requests that may wait for a tick: a power of two, at most 128 */
 #endif
@@ -130,7 +134,8 @@
 #define DAC_CONFIG_VALUE(option) "(" DAC_CONFIG_TEXT(option) ")"
 #define DAC_CONFIG_SYMBOL(name, value) __asm__(".hidden " name "\n.globl " name "\n" name " = " value "\n");
 DAC_CONFIG_SYMBOL("dac_objects_need_the_same_options",
-                  "(((((((((((" DAC_CONFIG_VALUE(DAC_MOVE) "*2+" DAC_CONFIG_VALUE(DAC_SLOW_PART) ")*4+" DAC_CONFIG_VALUE(
+                  "((((((((((((" DAC_CONFIG_VALUE(DAC_PIXEL_TABLE) "*2+" DAC_CONFIG_VALUE(
+                      DAC_MOVE) ")*2+" DAC_CONFIG_VALUE(DAC_SLOW_PART) ")*4+" DAC_CONFIG_VALUE(
                       DAC_TABLE_STORAGE_BITS) "/16)*4+" DAC_CONFIG_VALUE(
                       DAC_OUTPUT_STORAGE_BITS) "/16)*256+" DAC_CONFIG_VALUE(DAC_STRIDE) ")*4+" DAC_CONFIG_VALUE(
                       DAC_SHAPING) ")*2+" DAC_CONFIG_VALUE(DAC_SPLINE) ")*256+" DAC_CONFIG_VALUE(

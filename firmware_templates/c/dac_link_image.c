@@ -318,6 +318,9 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
     s->settle_lines = dac_link_program_word(image, 0, DAC_LINK_SETTLE_LINES);
     s->turn_tick = dac_link_program_word(image, 0, DAC_LINK_TURN_TICK);
     s->pixels = dac_link_program_word(image, 0, DAC_LINK_PIXELS);
+#if DAC_PIXEL_TABLE
+    s->pixel_table = NULL;
+#endif
     for (unsigned i = 0; i < 4; i++) {
         windows[i]->first = dac_link_program_word(image, 0, DAC_LINK_FORWARD + 2 * i);
         windows[i]->count = dac_link_program_word(image, 0, DAC_LINK_FORWARD + 2 * i + 1);

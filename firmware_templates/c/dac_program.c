@@ -6,6 +6,26 @@ static bool inside(const dac_window *window, uint32_t length)
     return window->first <= length && window->count <= length - window->first;
 }
 
+#if DAC_PIXEL_TABLE
+/* Whether pixels of at least a tick fill a window of so many ticks. */
+static bool fill_window(const uint16_t *counts, uint32_t pixels, uint32_t ticks)
+{
+    for (; pixels != 0; pixels--, counts++) {
+        if (*counts == 0 || *counts > ticks)
+            return false;
+        ticks -= *counts;
+    }
+    return ticks == 0;
+}
+
+static bool good_pixels(const dac_schedule *p)
+{
+    return p->pixel_table == NULL
+        || (fill_window(p->pixel_table, p->pixels, p->forward.count)
+            && fill_window(p->pixel_table + p->pixels, p->pixels, p->backward.count));
+}
+#endif
+
 static bool good_schedule(const dac_schedule *p)
 {
     return p->line_ticks - 1 < UINT32_C(1) << 24 && p->frame_lines != 0 && p->frame_lines <= INT32_MAX / p->line_ticks
@@ -326,6 +346,10 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
         return DAC_BUSY;
     if (!good_schedule(&p->schedule))
         return DAC_BAD_SCHEDULE;
+#if DAC_PIXEL_TABLE
+    if (!good_pixels(&p->schedule))
+        return DAC_BAD_SCHEDULE;
+#endif
     const dac_loaded x = judge_axis(&p->x, &s->x), y = judge_axis(&p->y, &s->y);
     if (x != DAC_LOADED || y != DAC_LOADED)
         return x != DAC_LOADED ? x : y;

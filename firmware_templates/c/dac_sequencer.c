@@ -351,6 +351,28 @@ DAC_CODE_ATTR static uint32_t until_edge(const dac_schedule *plan, uint32_t tick
     return most;
 }
 
+#if DAC_PIXEL_TABLE
+/* Marks the pixels of ticks in a window of a schedule with a table of them. */
+DAC_CODE_ATTR static void mark_table(dac_sequencer *s, const dac_window *window, uint8_t *markers, uint32_t ticks)
+{
+    const dac_schedule *const plan = &s->now->schedule;
+
+    if (s->tick == window->first) {
+        s->next_pixel = plan->pixel_table + (window == &plan->forward ? 0 : plan->pixels);
+        s->pixel_rest = 0;
+    }
+    if (s->pixel_rest == UNKNOWN)
+        return;
+    for (uint32_t i = 0; i < ticks; i++) {
+        if (s->pixel_rest == 0) {
+            s->pixel_rest = *s->next_pixel++;
+            markers[i] |= DAC_PIXEL;
+        }
+        s->pixel_rest--;
+    }
+}
+#endif
+
 /* Of the ticks from s->tick on, up to `most` of them and to the next at which more than pixels changes; returns how
  * many. `clean`: nothing that this tick or an earlier one did spoils the image. */
 DAC_CODE_ATTR static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *markers, uint32_t most)
@@ -373,6 +395,12 @@ DAC_CODE_ATTR static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *marker
         markers[0] = (uint8_t)(all | DAC_LINE | (s->line == 0 ? DAC_FRAME : 0));
     if (window == NULL)
         return most;
+#if DAC_PIXEL_TABLE
+    if (plan->pixel_table != NULL) {
+        mark_table(s, window, markers, most);
+        return most;
+    }
+#endif
     if (tick == window->first)
         s->pixel_rest = window->count;
     if (s->pixel_rest == UNKNOWN)

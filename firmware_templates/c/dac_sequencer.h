@@ -119,6 +119,11 @@ typedef struct {
     uint32_t turn_tick;           /* first tick of the backward sweep */
     dac_window forward, backward; /* ticks of a line */
     dac_window up, down;          /* lines of a frame */
+#if DAC_PIXEL_TABLE
+    /* Ticks of each pixel, at least 1: `pixels` of the forward window, then as many of the backward one; each add up to
+     * the window's count. It stays where it is until the bank is idle again. NULL: pixels of equal length. */
+    const uint16_t *pixel_table;
+#endif
 } dac_schedule;
 
 typedef struct {
@@ -135,12 +140,21 @@ typedef struct {
 
 /* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). The names may be macros,
  * as of -DUP=ANNEXIN_200NM -Dlow=annexin_200nm: DAC_PROGRAM(UP, low). NAME_program.c of a build has it as an object. */
-#define DAC_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name)
-#define DAC_PROGRAM_OF(NAME, name)                                                                                    \
+#define DAC_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name, NULL)
+#if DAC_PIXEL_TABLE
+/* The same for a header that has a table of the ticks of each pixel. */
+#define DAC_PIXEL_PROGRAM(NAME, name) DAC_PIXEL_PROGRAM_OF(NAME, name)
+#define DAC_PIXEL_PROGRAM_OF(NAME, name) DAC_PROGRAM_OF(NAME, name, name##_pixel_table)
+#define DAC_PIXEL_MEMBER(counts) , counts
+#else
+#define DAC_PIXEL_MEMBER(counts)
+#endif
+#define DAC_PROGRAM_OF(NAME, name, counts)                                                                            \
     {                                                                                                                 \
         {NAME##_LINE_TICKS, NAME##_FRAME_LINES, NAME##_PIXELS, NAME##_SETTLE_LINES, NAME##_TURN_TICK,                 \
          {NAME##_FORWARD_FIRST_TICK, NAME##_FORWARD_TICKS}, {NAME##_BACKWARD_FIRST_TICK, NAME##_BACKWARD_TICKS},      \
-         {NAME##_UP_FIRST_LINE, NAME##_UP_LINES}, {NAME##_DOWN_FIRST_LINE, NAME##_DOWN_LINES}},                       \
+         {NAME##_UP_FIRST_LINE, NAME##_UP_LINES}, {NAME##_DOWN_FIRST_LINE, NAME##_DOWN_LINES}                         \
+         DAC_PIXEL_MEMBER(counts)},                                                                                   \
         DAC_AXIS_PROGRAM(NAME##_X, name##_x_table), DAC_AXIS_PROGRAM(NAME##_Y, name##_y_table)                        \
     }
 /* Initialiser for one axis of a program, with the emitted table or your own. */
@@ -238,7 +252,7 @@ typedef enum {
     DAC_LOADED = 0,
     DAC_BUSY,            /* a committed program has not been taken yet */
     DAC_OTHER_CONVERTER, /* made for other bits, coding or alignment, or too wide for DAC_OUTPUT_STORAGE_BITS */
-    DAC_BAD_SCHEDULE,    /* empty, too long, or a window that is not inside its line or frame */
+    DAC_BAD_SCHEDULE,    /* empty, too long, a window outside its line or frame, or pixels that do not fill it */
     DAC_BAD_TABLE,       /* missing, length or width out of range, or the word behind the last one is not the first */
     DAC_BAD_PERIOD,      /* the period does not fit the schedule */
     DAC_BAD_OUTPUT,      /* gain, offset, codes or step out of range */
@@ -349,6 +363,9 @@ typedef struct {
     /* the consumer's own */
     const dac_bank *now; /* the active bank, or NULL */
     uint32_t tick, frames_left, armed_frames, settle_left, pixel_rest;
+#if DAC_PIXEL_TABLE
+    const uint16_t *next_pixel; /* ticks of the next pixel; pixel_rest are those left of this one */
+#endif
     /* shared: the consumer writes them */
     volatile uint32_t swaps, line, fault_counts[DAC_FAULTS];
     dac_axis x, y;

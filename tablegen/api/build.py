@@ -18,13 +18,13 @@ from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import summary as summary_of
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
-from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import format_rejected, render_scan, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
 from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.planning.sine_setup import default_formats
 
 if TYPE_CHECKING:
     from tablegen.api.samples import Samples
@@ -368,6 +368,6 @@ def setup_of(source: Source | None, scan: Mapping[str, Any] | None, scanner: Map
 
 def _formats(setup: Setup, names: Sequence[str] | None) -> list[Format]:
     try:
-        return chosen(setup.scan.emit.formats or DEFAULT_FORMATS if names is None else names)
+        return chosen(default_formats(setup.scan) if names is None else names)
     except UnknownFormat as error:
         raise format_rejected(setup, str(error), explicit=names is not None) from None

@@ -100,7 +100,7 @@ IN_TEXT: dict[FindingCode, str] = {
     "operator-distance": "record a trace there",
     "poor-fit": "correct the measurement, or use another law",
     "resonance": "`dac.shaping`, a higher update rate, or more `dac.bits`",
-    "rounded-pixels": "another line rate",
+    "rounded-pixels": "another line rate, or more updates a second",
     "scaling-error": _BY_CAUSE,
     "scan-angle": "`--axis` with the axis that was fast",
     "sensor-delay": "`--delay-s`",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.base.input_errors import Document, Problem
 from tablegen.base.remedies import CAUSE_REMEDIES, REMEDIES, FindingCode
@@ -23,6 +24,7 @@ from tablegen.certificate.shaped_periods import largest_and_rms
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.pixel_errors import PixelErrors
 
 if TYPE_CHECKING:
     from tablegen.certificate.position_errors import ArrivingErrors
@@ -37,7 +39,8 @@ class Certificate(Struct, frozen=True):
     ``peak_acceleration`` is that of the target, of the line a period squared, where the waveform was made for the
     least; ``optimum`` the least of any, where ``certificate.optimum`` has worked it out.
     Errors of an axis with a ``shaped`` part are those of the position, and its codes and largest step are bounds: no
-    two of its periods are the same. ``position`` has those of an unshaped axis whose scanner has a response.
+    two of its periods are the same. ``position`` has those of an unshaped axis whose scanner has a response,
+    ``pixels`` those of pixels that are taken where the piezo is.
     """
 
     ticks: int
@@ -59,6 +62,7 @@ class Certificate(Struct, frozen=True):
     optimum: float | None = None
     shaped: ShapedErrors | None = None
     position: "ArrivingErrors | None" = None
+    pixels: PixelErrors | None = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -86,7 +90,23 @@ class Certificate(Struct, frozen=True):
 
 def certify(plan: Plan) -> dict[str, Certificate]:
     """Measure the certificates of both axes."""
-    return {line.axis: _certify(line) for line in plan.lines}
+    certificates: dict[str, Certificate] = {line.axis: _certify(line) for line in plan.lines}
+    if (pixels := plan.pixel_errors) is not None:
+        certificates["x"] = _with_pixels(certificates["x"], pixels)
+    return certificates
+
+
+def _with_pixels(certificate: Certificate, pixels: PixelErrors) -> Certificate:
+    """Add the errors of pixels to a certificate: they are what the image of a sine has, where the position is known."""
+    expected = certificate.expected
+    if expected is not None:
+        assert expected.mismatch is not None
+        expected = replace(
+            expected,
+            rms={side: replace(figure, value=pixels.rms[side]) for side, figure in expected.rms.items()},
+            mismatch=replace(expected.mismatch, value=pixels.mismatch),
+        )
+    return replace(certificate, pixels=pixels, expected=expected)
 
 
 def broken_limits(
@@ -126,6 +146,12 @@ def broken_limits(
             why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
             code: FindingCode = "scaling-error" if worst > limit else "size-error"
             problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
+        elif certificate.pixels is not None and (worst := max(certificate.pixels.scaling.values())) > limit:
+            why = (
+                f"the pixels of {axis} begin on whole ticks, which is a scaling error of {worst:.4g} %, above "
+                f"{limit:g} %; {REMEDIES['rounded-pixels']}"
+            )
+            problems.append(file.problem("limits.max_scaling_error_percent", why).coded("rounded-pixels", axis))
         elif expected := _expected_excess(certificate, limit):
             code, excess = expected
             why = f"on the scanner the {axis} axis is expected to have a {excess}"

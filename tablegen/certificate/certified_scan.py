@@ -22,7 +22,7 @@ class CertifiedScan(Struct, frozen=True, eq=False):
 
 
 def certify_scan(
-    setup: Setup, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True
+    setup: Setup, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True, sines: bool = True
 ) -> CertifiedScan:
     """Plan and certify a scan.
 
@@ -34,6 +34,8 @@ def certify_scan(
         Called with each stage, in words.
     remedies
         Plan and measure remedies for a limit that is exceeded, and name them in its problem.
+    sines
+        False where the fast axis has to be straight in time.
 
     Raises
     ------
@@ -41,7 +43,7 @@ def certify_scan(
         With every contradiction between the scan, the scanner and the hardware.
     """
     progress("shaping the waveforms")
-    plan = make_plan(setup)
+    plan = make_plan(setup, sines)
     progress("measuring every tick of a line and a frame")
     certificates = certify(plan)
     advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice

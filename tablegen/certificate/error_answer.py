@@ -151,6 +151,9 @@ def _answer(line: LinePlan, schedule: Schedule, certificate: Certificate, refine
         if figure.uncertainty is not None:
             source += f" +- {short(figure.uncertainty)} % for {LEVEL_PERCENT} % of scans"
         answer = _with_figures(line, count, "rms", figure.value, basis="predicted", source=source)
+        if certificate.pixels is not None:
+            code: FindingCode = "rounded-pixels"
+            return replace(answer, limit="the whole ticks of pixels", code=code, next_step=REMEDIES[code])
         return _limited(answer, line, certificate)
     if not line.drive.hysteresis.compensates:
         source = "hysteresis is not corrected, typically some 10 % of the line"

@@ -10,13 +10,15 @@ _MAX_MISMATCH_PIXELS = 0.25  # of a pixel; more is a warning
 
 def pixel_mismatch_percent(plan: Plan) -> float:
     """Return the largest distance of a pixel's two places, in percent of the line; 0 where one direction images."""
+    if (pixels := plan.pixel_errors) is not None:
+        return pixels.mismatch
     return 100.0 * retrace_mismatch(plan.schedule, plan.x.drive.turn)
 
 
 def pixel_mismatch_note(plan: Plan) -> str:
     """Return a sentence on the distance, with the lines that have none; "" where there is no distance."""
     mismatch = pixel_mismatch_percent(plan)
-    if not mismatch:
+    if not mismatch or plan.schedule.pixel_table is not None:  # the errors of its pixels say it
         return ""
     schedule, (low, high) = plan.schedule, plan.x.band_limit.window
     requested = exact(plan.x.drive.turn), exact(low), exact(high)

@@ -163,7 +163,7 @@ def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float
 
 def _planned(setup: Setup, change: Change) -> Plan | None:
     try:
-        return make_plan(changed(setup, change))
+        return make_plan(changed(setup, change), sines=True)
     except Rejected:
         return None
 

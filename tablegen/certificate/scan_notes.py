@@ -54,7 +54,7 @@ def note_findings(plan: Plan) -> list[Finding]:
     """List the findings that follow from the plan alone, the worst first."""
     schedule, findings, resting = plan.schedule, [], plan.y.drive.resting
     per_pixel = schedule.pixel_ticks
-    if per_pixel.denominator != 1:
+    if per_pixel.denominator != 1 and schedule.pixel_table is None:
         whole = [n for n in (int(per_pixel), int(per_pixel) + 1) if n > 0]
         rates = [f"{float(schedule.line_rate) * float(per_pixel) / n:.6g} Hz" for n in whole]
         text = (

@@ -32,6 +32,7 @@ def _rows(plan: Plan, line: LinePlan, certificate: Certificate) -> list[tuple[st
     speed = drive.window_nm * float(line.rate) / max(_imaged_share(line), 1e-12)
     rows = [
         ("image", f"{drive.window_nm:.6g} nm in {count} {what} of {short(drive.window_nm / count)} nm"),
+        *([("motion", "a sine: pixels are at equal steps of the position, not of time")] if line.imaged else []),
         ("whole way", f"{drive.size_nm:.6g} nm from turn to turn, about {drive.position_nm:.6g} nm"),
         ("speed", f"{short(1e-3 * speed)} um/s" if speed >= 100.0 else f"{short(speed)} nm/s"),
         ("drive at the piezo", f"{drive.v_amplitude:.4g} V peak to peak about {drive.v_offset:.4g} V"),

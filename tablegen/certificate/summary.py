@@ -14,6 +14,7 @@ from tablegen.compensation.expectation import LEVEL_PERCENT, Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.pixel_errors import PixelErrors
 from tablegen.planning.settling import settling, settling_text
 
 _GRID = 32  # points per period of the highest harmonic
@@ -28,6 +29,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
             ("offset", f"code {output.offset_code}"),
         ]
     rows = [
+        *([("motion", "a sine, pixels where the operator says that the piezo is")] if line.imaged else []),
         (
             "scan",
             f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm window, at {drive.position_nm:.6g} nm",
@@ -123,6 +125,8 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     for side, r in (c.refinement or {}).items():
         moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
         rows.append(("refined " + side, moves))
+    if c.pixels is not None:
+        rows += [("pixels" if not i else "", text) for i, text in enumerate(_pixel_texts(c.pixels))]
     expected = [] if c.expected is None else expected_lines(c.expected)
     rows += [("" if i else "on the scanner", text) for i, text in enumerate(expected)]
     rows += [
@@ -175,6 +179,15 @@ def shaping_text(shaping: Shaping) -> str:
     if shaping.order == 3:
         return f"third order, zeros at 0 Hz and at 2 cos = {shaping.zero}/64"
     return {0: "off", 1: "first order", 2: "second order"}[shaping.order]
+
+
+def _pixel_texts(pixels: PixelErrors) -> list[str]:
+    """Describe the errors that the rounding of pixels to whole ticks leaves."""
+    sides = ", ".join(
+        f"{side} rms {_percent(pixels.rms[side])} %, at most {_percent(pixels.worst[side])} %" for side in pixels.rms
+    )
+    scaling = ", ".join(f"{side} {_percent(value)} %" for side, value in pixels.scaling.items())
+    return [f"{sides} of the line", f"scaling {scaling}; trace and retrace {_percent(pixels.mismatch)} % apart"]
 
 
 def _lsb(value: float) -> str:

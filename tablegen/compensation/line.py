@@ -358,6 +358,15 @@ class WholeLine(LineShape, frozen=True, kw_only=True):
         return self.series.value(t, 1)
 
 
+class SineLine(WholeLine, frozen=True, kw_only=True):
+    """A line whose drive is a sine: it is not straight in time, but the model knows where the piezo is.
+
+    ``place`` is the position over a period, as a share of the line: from 0, where it turns, to 1 and back.
+    """
+
+    place: FourierSeries
+
+
 class LineRequest(Struct, frozen=True):
     """The request of a scan to the model of one axis.
 
@@ -367,7 +376,8 @@ class LineRequest(Struct, frozen=True):
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
     at an offset as a share of the driver's range, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None
     where it is not calibrated. ``allowed`` is the scaling error in the window that may be left for the sake of
-    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None. ``v`` and
+    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None. ``sine`` asks for a
+    ``SineLine``; a model that does not know where the piezo is at each time makes its own line all the same. ``v`` and
     ``v_amplitude`` are 0 where the size law refuses the size, and ``size_nm`` is where nothing gives one; the model is
     called all the same, so that its own faults are reported in the same run.
     """
@@ -389,6 +399,7 @@ class LineRequest(Struct, frozen=True):
     rate_gain: Callable[[float], float] | None
     folder: Path
     allowed: AllowedError | None = None
+    sine: bool = False
 
     @property
     def v_share(self) -> float:

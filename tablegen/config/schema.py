@@ -194,6 +194,18 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     refinement: Refinement | None = None
 
 
+class LineAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The fast axis of a scan, with the motion of its line."""
+
+    motion: Annotated[
+        Literal["line", "sine", "auto"],
+        Meta(
+            description="line: straight in time; sine: one harmonic, with pixels at equal steps of the position that "
+            "the operator of the axis predicts; auto: what leaves the smaller error at this rate"
+        ),
+    ] = "line"
+
+
 class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The axis that moves once a frame."""
 
@@ -462,7 +474,7 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         Amplifier, Meta(description="The amplifier of both axes; keys that the scanner file has can be left out.")
     ] = Amplifier()
     timing: WrittenTiming
-    x: FastAxis
+    x: LineAxis
     y: SlowAxis
     limits: Limits = Limits()
     emit: Emit = Emit()

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablegen.device.dual_program import ScanProgram
-from tablegen.device.schedule import pixel_starts
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Bools, Ints
@@ -114,9 +113,9 @@ class PlayedLines:
         k = np.arange(schedule.ticks, dtype=np.int64)
         pixel = np.zeros(schedule.ticks, dtype=np.bool_)
         inside = np.zeros(schedule.ticks, dtype=np.bool_)
-        for window in (schedule.forward, schedule.backward):
+        for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
             if window.count:
-                pixel[pixel_starts(window, schedule.pixels)] = True
+                pixel[starts] = True
                 inside[window.first : window.stop] = True
         return k == 0, pixel, k >= schedule.turn_tick, inside
 

@@ -59,8 +59,11 @@ def program_words(schedule: Schedule, x: AxisProgram, y: AxisProgram, harmonics:
     Raises
     ------
     ValueError
-        If the gains and the ratios of a slow part are at different lines, for which there are no words.
+        If the gains and the ratios of a slow part are at different lines, for which there are no words, or the schedule
+        has a table of pixels.
     """
+    if schedule.pixel_table is not None:
+        raise ValueError("a program with a table of pixels plays in C alone, neither over the link nor in Verilog")
     steps = not isinstance(y, FrameProgram) and y.hold != 1
     pages = [
         _scan(schedule, steps),

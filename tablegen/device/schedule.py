@@ -32,6 +32,7 @@ class Schedule(Struct, frozen=True):
 
     ``forward`` and ``backward`` are in ticks of the line, ``up`` and ``down`` in lines of the frame (y forward and
     backward). ``turn_tick`` is the first tick of the backward sweep, ``turn_line`` the first line that starts in it.
+    ``pixel_table`` has the ticks of each pixel of both windows, in order of time; None for pixels of equal length.
     """
 
     ticks: int
@@ -46,6 +47,17 @@ class Schedule(Struct, frozen=True):
     turn_line: int
     up: Window
     down: Window
+    pixel_table: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+
+    def __post_init__(self) -> None:
+        if self.pixel_table is None:
+            return
+        for window, counts in zip((self.forward, self.backward), self.pixel_table, strict=True):
+            if len(counts) != self.pixels or sum(counts) != window.count or not all(0 < n < 1 << 16 for n in counts):
+                raise ValueError(
+                    f"{len(counts)} pixels of {sum(counts)} ticks in all do not fit {self.pixels} pixels, "
+                    f"each of 1 to 65535 ticks, in a window of {window.count}"
+                )
 
     @property
     def update_rate_millihz(self) -> int:
@@ -89,6 +101,14 @@ class Schedule(Struct, frozen=True):
     def pixel_ticks(self) -> Fraction:
         """The ticks per pixel of the forward sweep; pixel p starts at the tick ceil(p pixel_ticks) of the window."""
         return Fraction(self.forward.count, self.pixels)
+
+    @property
+    def pixel_starts(self) -> tuple[Ints, Ints]:
+        """The ticks at which the pixels of the forward and of the backward window start, ascending."""
+        if self.pixel_table is None:
+            return pixel_starts(self.forward, self.pixels), pixel_starts(self.backward, self.pixels)
+        forward, backward = (np.cumsum([0, *counts[:-1]]) for counts in self.pixel_table)
+        return self.forward.first + forward, self.backward.first + backward
 
 
 def pixel_starts(window: Window, pixels: int) -> Ints:

@@ -20,6 +20,7 @@ from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifest_file, require_readable
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.sine_setup import PIXEL_FORMATS
 from tablegen.version import __version__
 
 # Names of plain files that manifests can list; only a file in a sub-folder has a name without a suffix.
@@ -57,6 +58,8 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     files: dict[str, bytes] = {}
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in chosen_formats:
+        if plan.schedule.pixel_table is not None and each.name not in PIXEL_FORMATS:
+            raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take the format c")
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each)

@@ -38,7 +38,7 @@ def planned_scan(
     Rejected
         For wrong input.
     """
-    certified = certify_scan(load(scan), progress, remedies=remedies)
+    certified = certify_scan(load(scan), progress, remedies=remedies, sines=False)
     setup, plan, certificates = certified.setup, certified.plan, certified.certificates
     warnings = []
     if remedies:

@@ -23,6 +23,8 @@ Code = Annotated[int, Meta(ge=0, lt=1 << 24)]
 Word = Annotated[int, Meta(ge=-(1 << 31), lt=1 << 31)]
 Bits = Annotated[int, Meta(ge=8, le=24)]
 Pair = tuple[Natural, Natural]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+PixelTicks = Annotated[int, Meta(ge=1, le=65535)]
 Digest = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
 # A name of a file never leads outside the directory.
 MAXIMUM_FILE_NAME = 200
@@ -112,6 +114,8 @@ class ManifestFourier(Struct):
     target: ManifestSeries | None = None
     refinement: ManifestSeries | None = None
     max_scaling_error_percent: Annotated[float, Meta(gt=0.0, le=10.0)] | None = None
+    place: ManifestSeries | None = None
+    imaged: tuple[Share, Share] | None = None
 
 
 class ManifestAskedTable(Struct):
@@ -271,6 +275,16 @@ class ManifestPosition(Struct):
     scaling_error_percent: dict[str, float]
 
 
+class ManifestPixels(Struct):
+    """The errors of pixels that are taken where the piezo is, in percent of the line."""
+
+    rms_percent: dict[str, float]
+    worst_percent: dict[str, float]
+    scaling_percent: dict[str, float]
+    mismatch_percent: float
+    errors_percent: dict[str, list[float]]
+
+
 class ManifestCertificate(Struct):
     """The certificate of an axis."""
 
@@ -292,6 +306,7 @@ class ManifestCertificate(Struct):
     peak_acceleration: float | None = None
     shaped: ManifestShaped | None = None
     position: ManifestPosition | None = None
+    pixels: ManifestPixels | None = None
 
 
 class ManifestAxis(Struct):
@@ -397,6 +412,7 @@ class ManifestSequence(Struct):
     backward_ticks: Pair
     up_lines: Pair
     down_lines: Pair
+    pixel_table: tuple[list[PixelTicks], list[PixelTicks]] | None = None
 
     @property
     def schedule(self) -> Schedule:
@@ -414,6 +430,7 @@ class ManifestSequence(Struct):
             turn_line=self.turn_line,
             up=Window(*self.up_lines),
             down=Window(*self.down_lines),
+            pixel_table=None if self.pixel_table is None else (tuple(self.pixel_table[0]), tuple(self.pixel_table[1])),
         )
 
 

@@ -13,6 +13,7 @@ from tablegen.certificate.shaped_errors import ShapedErrors
 from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
+from tablegen.compensation.line import SineLine
 from tablegen.device.schedule import Schedule, Window
 from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.output import Output
@@ -20,6 +21,11 @@ from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.pixel_errors import PixelErrors
+
+_WRITTEN_APART = frozenset(
+    {"scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped", "position", "pixels"}
+)
 
 
 def plan_record(plan: Plan) -> dict[str, Any]:
@@ -36,7 +42,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__struct_fields__
-        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped", "position")
+        if name not in _WRITTEN_APART
     }
     if certificate.peak_acceleration is not None:
         record["peak_acceleration"] = _bound(certificate.peak_acceleration)
@@ -48,6 +54,8 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         record["expected"] = _expected(certificate.expected)
     if certificate.shaped is not None:
         record["shaped"] = _shaped(certificate.shaped)
+    if certificate.pixels is not None:
+        record["pixels"] = _pixels(certificate.pixels)
     if certificate.position is not None:
         position = certificate.position
         record["position"] = {
@@ -86,6 +94,16 @@ def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
             "changes": {key: _figure(value) for key, value in asdict(rounded.changes).items()},
         },
     }
+
+
+def _pixels(pixels: PixelErrors) -> dict[str, Any]:
+    """Return the errors of pixels, of all together and of each in the order of its direction's image."""
+    sides: dict[str, Any] = {
+        f"{name}_percent": {side: _figure(value) for side, value in getattr(pixels, name).items()}
+        for name in ("rms", "worst", "scaling")
+    }
+    errors = {side: [_figure(float(value)) for value in values] for side, values in pixels.errors.items()}
+    return {**sides, "mismatch_percent": _figure(pixels.mismatch), "errors_percent": errors}
 
 
 def _expected(expectation: Expectation) -> dict[str, Any]:
@@ -148,6 +166,7 @@ def sequence_record(schedule: Schedule) -> dict[str, Any]:
         "turn_line": schedule.turn_line,
         "up_lines": _window(schedule.up),
         "down_lines": _window(schedule.down),
+        **({} if schedule.pixel_table is None else {"pixel_table": [list(counts) for counts in schedule.pixel_table]}),
     }
 
 
@@ -156,6 +175,16 @@ def _layer(line: LinePlan) -> dict[str, Any]:
     if line.layer is None:
         return {}
     return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
+
+
+def _place(line: LinePlan) -> dict[str, Any]:
+    """Return the position of a sine over a period, and the part of the line that is imaged; nothing of a line."""
+    shape = line.drive.shape
+    if not isinstance(shape, SineLine):
+        return {}
+    place = shape.place
+    imaged = None if line.imaged is None else list(line.imaged)
+    return {"place": {"a0": place.a0, "a": place.a.tolist(), "b": place.b.tolist()}, "imaged": imaged}
 
 
 def _followed(line: LinePlan) -> dict[str, Any]:
@@ -242,6 +271,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             **({} if line.kept_percent is None else {"max_scaling_error_percent": line.kept_percent}),
             **_followed(line),
             **_layer(line),
+            **_place(line),
         },
         "table": {
             "mode": program.mode,

@@ -11,7 +11,7 @@ from tablegen.base.input_errors import Problems
 from tablegen.compensation import models
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape
+from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape, SineLine
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.offset import OffsetLaw
@@ -116,11 +116,20 @@ def make_drive(
         rate_gain=None if law is None else partial(frequency_gain, alpha=law.alpha, reference_hz=law.reference_hz),
         folder=setup.scanner_folder,
         allowed=voltages.allowed,
+        sine=getattr(scan, "motion", "line") == "sine",
     )
     before = len(problems.entries)
     places = ModelProblems(axis, setup.scan_file, setup.scanner_file, problems)
     shape = models.line_of(hysteresis, request, places)
     if len(problems.entries) > before or shape is None:
+        return None
+    if request.sine and not isinstance(shape, SineLine):
+        why = (
+            f"a sine needs an operator, which says where the piezo is, and {axis} has the model {hysteresis.model()!r}"
+        )
+        problems.add(
+            setup.scan_file, f"{axis}.motion", f"{why}; `tablegen calibrate operator` makes one, or take 'line'"
+        )
         return None
     return Drive(
         driver=driver,

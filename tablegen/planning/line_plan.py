@@ -1,12 +1,15 @@
 """Build the plan: quantise a validated configuration into the immutable integers that everything downstream reads."""
 
 from fractions import Fraction
+from math import hypot, inf
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from tablegen.base.input_errors import Document, Problems
+from tablegen.base.input_errors import Document, Problems, Rejected
+from tablegen.compensation.line import SineLine
 from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, Limits
 from tablegen.device.dual_program import DualProgram
@@ -20,7 +23,10 @@ from tablegen.planning.clock import clocks_per_tick
 from tablegen.planning.drive import Drive, make_drive
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.harmonic_choice import HarmonicChoice
+from tablegen.planning.pixel_errors import PixelErrors, pixel_errors
+from tablegen.planning.pixel_table import passages, with_pixel_table
 from tablegen.planning.settling import settle_lines
+from tablegen.planning.sine_setup import SINE, default_formats, sine_setup, with_motion
 from tablegen.planning.table_choice import TableRequest
 from tablegen.planning.timing import AxisTiming, make_schedule
 from tablegen.planning.voltages import axis_voltages
@@ -42,7 +48,8 @@ class LinePlan(Struct, frozen=True, eq=False):
     advance k of N is that of ``series`` at k / N. ``layer`` is the part of the target that was learnt from a
     measurement, added to the model's shape. ``kept_percent`` is the scaling error for which the target has minimum
     acceleration, None where it has another band limit. ``table_request`` is the request for a
-    table that the build chose, None where the scan file gives the table.
+    table that the build chose, None where the scan file gives the table. ``imaged`` is the part of the line that the
+    pixels of a sine are in; the window of its ``band_limit`` is then in shares of the time of a sweep.
     """
 
     axis: Literal["x", "y"]
@@ -61,6 +68,7 @@ class LinePlan(Struct, frozen=True, eq=False):
     layer: FourierSeries | None = None
     kept_percent: float | None = None
     table_request: TableRequest | None = None
+    imaged: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
@@ -133,22 +141,42 @@ class Plan(Struct, frozen=True, eq=False):
         return tuple(line for line in self.lines if not line.drive.resting)
 
     @property
+    def pixel_errors(self) -> PixelErrors | None:
+        """The errors of pixels that are taken where the piezo is; None where they have equal lengths."""
+        shape, imaged = self.x.drive.shape, self.x.imaged
+        if imaged is None or not isinstance(shape, SineLine):
+            return None
+        return pixel_errors(shape.place, self.schedule, imaged)
+
+    @property
     def program(self) -> DualProgram:
         """The content of a bank of the device: the programs of both axes and their schedule."""
         return DualProgram(self.x.program, self.y.program, self.schedule)
 
 
-def make_plan(setup: Setup) -> Plan:
+def make_plan(setup: Setup, sines: bool = False) -> Plan:
     """Compensate, shape and quantise a scan.
+
+    Parameters
+    ----------
+    sines
+        True where the fast axis may have another motion than a straight line.
 
     Raises
     ------
     Rejected
         With every contradiction on both axes.
     """
+    if sines and setup.scan.x.motion == "auto":
+        return _better_motion(setup)
     problems = Problems()
     if setup.mixes_motions:
         problems.add(*mixing_key(setup), MIXED)
+    if setup.scan.x.motion != "line":
+        if not sines:
+            problems.add(setup.scan_file, "x.motion", SINE)
+            problems.stop_if_any()
+        setup = sine_setup(setup, problems)
     schedule = make_schedule(setup, problems)
     if schedule is None:
         line_rate = setup.scan.timing.line_rate_hz
@@ -161,6 +189,10 @@ def make_plan(setup: Setup) -> Plan:
     problems.stop_if_any()
     assert x is not None
     assert y is not None
+    if isinstance(x.drive.shape, SineLine) and x.imaged is not None:
+        with problems.at(setup.scan_file, "timing.pixels"):
+            schedule = with_pixel_table(schedule, x.drive.shape, x.imaged)
+        problems.stop_if_any()
     schedule = replace(schedule, settle_lines=settle_lines(setup, {"x": x.drive, "y": y.drive}, schedule, problems))
     clocks = clocks_per_tick(setup, schedule, (x.program, y.program), problems)
     problems.stop_if_any()
@@ -173,9 +205,41 @@ def make_plan(setup: Setup) -> Plan:
         y,
         scan.limits,
         scan.emit.header_only,
-        tuple(scan.emit.formats or DEFAULT_FORMATS),
+        default_formats(scan),
         clocks,
     )
+
+
+def _better_motion(setup: Setup) -> Plan:
+    """Plan a line and a sine; return what leaves less by the operator, the line where both leave the same.
+
+    Raises
+    ------
+    Rejected
+        If neither can be planned; with the contradictions of the line.
+    """
+    line, sine = (_planned_or_fault(with_motion(setup, motion)) for motion in ("line", "sine"))
+    if isinstance(line, Rejected):
+        if isinstance(sine, Rejected):
+            raise line
+        return sine
+    return line if isinstance(sine, Rejected) or _left(line) <= _left(sine) else sine
+
+
+def _planned_or_fault(setup: Setup) -> Plan | Rejected:
+    try:
+        return make_plan(setup, sines=True)
+    except Rejected as rejected:
+        return rejected
+
+
+def _left(plan: Plan) -> float:
+    """Return the rms error of the fast axis that its operator expects, with its uncertainty, in percent of the line."""
+    expectation, pixels = plan.x.drive.shape.identification.expectation, plan.pixel_errors
+    if expectation is None:
+        return inf
+    rounding = 0.0 if pixels is None else max(pixels.rms.values())
+    return max(hypot(one.value, one.uncertainty or 0.0, rounding) for one in expectation.rms.values())
 
 
 def mixing_key(setup: Setup) -> tuple[Document, str]:
@@ -211,7 +275,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         requested_hz=timing.requested_hz,
         drive=drive,
         converter=table.converter,
-        band_limit=getattr(setup.scan, axis).band_limit,
+        band_limit=_judged(getattr(setup.scan, axis).band_limit, drive),
         target=waveforms.target,
         drive_series=waveforms.drive_series,
         series=waveforms.series,
@@ -222,10 +286,22 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         layer=waveforms.layer,
         kept_percent=waveforms.kept_percent,
         table_request=table.request,
+        imaged=getattr(setup.scan, axis).band_limit.window if isinstance(drive.shape, SineLine) else None,
     )
+
+
+def _judged(limit: BandLimit, drive: Drive) -> BandLimit:
+    """Return the limit with the window of a line in shares of the time of a sweep, in which a sine is judged."""
+    if not isinstance(drive.shape, SineLine):
+        return limit
+    rising, falling = passages(drive.shape.place, np.array(limit.window))
+    low = min(2.0 * float(rising[0]), 2.0 - 2.0 * float(falling[0]))
+    high = max(2.0 * float(rising[1]), 2.0 - 2.0 * float(falling[1]))
+    return replace(limit, window=(max(low, 0.0), min(high, 1.0)))
 
 
 def _examine(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> None:
     """Check one axis at the requested rate where there is no schedule, to report its problems in the same run."""
     voltages = axis_voltages(setup, axis, rate_hz, problems)
-    make_drive(setup, axis, rate_hz, voltages, DEFAULT_HARMONICS, problems)
+    sine = getattr(getattr(setup.scan, axis), "motion", "line") == "sine"
+    make_drive(setup, axis, rate_hz, voltages, 1 if sine else DEFAULT_HARMONICS, problems)

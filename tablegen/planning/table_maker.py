@@ -1,7 +1,7 @@
 """Quantise a waveform into the integers of a table of given shape."""
 
 from functools import cached_property
-from math import ceil
+from math import ceil, sqrt
 
 import numpy as np
 from msgspec import Struct, field
@@ -36,6 +36,10 @@ class StoredWave(Struct, frozen=True, eq=False, dict=True):
     @cached_property
     def reach(self) -> tuple[float, float]:
         """The least and the greatest value of the waveform."""
+        if self.series.harmonics == 1:  # a grid of so few points misses the peaks of a sine by up to half a percent
+            a, b = float(self.series.a[0]), float(self.series.b[0])
+            peak = sqrt(a * a + b * b)
+            return self.series.a0 - peak, self.series.a0 + peak
         w = self.series.on_grid(32 * self.series.harmonics)
         return float(np.min(w)), float(np.max(w))
 

@@ -16,7 +16,6 @@ from tablegen.base.reading import BUILD_FILE, file_sha256, holds, read_bytes
 from tablegen.base.workers import results
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.names import of_the_runtime
-from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.config.variants import Variant
 from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.write import CannotWrite, names_of_build, remove_files, write_files
@@ -24,6 +23,7 @@ from tablegen.library.entry import Entry, changed_files, is_whole, parse_entry, 
 from tablegen.library.index import is_indexed, listed_files, make_index
 from tablegen.manifest.format import INDEX, MANIFEST, RECORD
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
+from tablegen.planning.sine_setup import default_formats
 from tablegen.sweeping.inputs import Inputs
 from tablegen.sweeping.job import BuiltProgram, Job, StrictWarnings, build_program
 from tablegen.sweeping.written_records import WrittenRecords
@@ -156,7 +156,7 @@ def state(
 def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> tuple[Any, str]:
     """Load the setup of a scan, and compute the digest of its inputs."""
     setup = variant.setup
-    names = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
+    names = list(formats or default_formats(setup.scan))
     try:
         return setup, inputs.digest(setup, variant.values, names)
     except UnknownFormat as error:

@@ -271,9 +271,14 @@ KEYS = [
     ),
     case(
         "x.motion = 'step'",
+        says="scan.toml:23: x.motion: 'step' is not one of 'auto', 'line', 'sine'",
+    ),
+    case(
+        "x.motion = 'sine'",
+        "- x.band_limit.harmonics",
         says=(
-            "scan.toml:23: x.motion: unknown key; known here: band_limit, offset_nm, offset_um, offset_v, "
-            "park_v, refinement, size_nm, size_of, size_um, size_v, table, turn"
+            "scan.toml:23: x.motion: a sine needs an operator, which says where the piezo is, and x has the model "
+            "'harmonic'; `tablegen calibrate operator` makes one, or take 'line'"
         ),
     ),
     case(

@@ -1,5 +1,8 @@
 """The model of the device: undisturbed lines, swaps, settling, the slew guard, park, faults."""
 
+from fractions import Fraction
+from random import Random
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +11,8 @@ from variants import plan_of
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.played_lines import play_line
-from tablegen.device.schedule import Window, pixel_starts
+from tablegen.device.registers import program_words
+from tablegen.device.schedule import Schedule, Window, pixel_starts
 from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick
 
 SMALL = {
@@ -93,6 +97,29 @@ def test_pixels_start_evenly_and_by_an_accumulator(pixels: int, extra: int) -> N
     assert starts == walked
     assert len(starts) == pixels
     assert max(np.diff([*starts, window.stop])) - min(np.diff([*starts, window.stop])) <= 1
+
+
+@given(st.lists(st.integers(1, 300), min_size=1, max_size=60), st.randoms(use_true_random=False))
+def test_pixels_of_a_table_start_where_the_counts_before_them_end(counts: list[int], random: Random) -> None:
+    """As a device does it: a count down, and the next count at 0."""
+    back = random.sample(counts, len(counts))
+    whole = sum(counts)
+    schedule = Schedule(
+        2 * whole + 9, 1, Fraction(1000), 1.0, len(counts), 0, whole + 6,
+        Window(3, whole), Window(whole + 6, whole), 1, Window(0, 1), Window(1, 0), (tuple(counts), tuple(back)),
+    )  # fmt: skip
+    for window, table, starts in zip(
+        (schedule.forward, schedule.backward), (counts, back), schedule.pixel_starts, strict=True
+    ):
+        remaining, rest, walked = 0, list(table), []
+        for tick in range(window.first, window.stop):
+            if remaining == 0:
+                remaining = rest.pop(0)
+                walked.append(tick)
+            remaining -= 1
+        assert starts.tolist() == walked
+    with pytest.raises(ValueError, match="neither over the link nor in Verilog"):
+        program_words(schedule, None, None)  # type: ignore[arg-type]
 
 
 @pytest.mark.common

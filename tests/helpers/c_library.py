@@ -2,7 +2,7 @@
 
 import ctypes
 from collections.abc import Sequence
-from ctypes import Structure, byref, c_bool, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_void_p
+from ctypes import Structure, byref, c_bool, c_int32, c_int64, c_size_t, c_uint8, c_uint16, c_uint32, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,6 +107,12 @@ class CSchedule(Structure):
     )
 
 
+class PixelCSchedule(CSchedule):
+    """With DAC_PIXEL_TABLE."""
+
+    _fields_ = (("pixel_table", c_void_p),)
+
+
 class CProgram(Structure):
     _fields_ = (("schedule", CSchedule), ("x", AxisProgram), ("y", AxisProgram))
 
@@ -123,7 +129,13 @@ class ShapedSlowCProgram(Structure):
     _fields_ = (("schedule", CSchedule), ("x", ShapedSlowAxisProgram), ("y", ShapedSlowAxisProgram))
 
 
-AnyCProgram = CProgram | ShapedCProgram | SlowCProgram | ShapedSlowCProgram
+class PixelCProgram(Structure):
+    """With DAC_PIXEL_TABLE alone."""
+
+    _fields_ = (("schedule", PixelCSchedule), ("x", AxisProgram), ("y", AxisProgram))
+
+
+AnyCProgram = CProgram | ShapedCProgram | SlowCProgram | ShapedSlowCProgram | PixelCProgram
 # By whether the runtime has DAC_SHAPING, and DAC_SLOW_PART.
 AXES: dict[tuple[bool, bool], Any] = {
     (False, False): AxisProgram,
@@ -227,6 +239,7 @@ class Library:
         self.stride, self.shaping = int(self.dll.probe_size(8)), int(self.dll.probe_size(9))
         self.slow_part = bool(self.dll.probe_size(10))
         self.words_behind = int(self.dll.probe_size(11))
+        self.pixel_table = bool(self.dll.probe_size(12))
         self.word = np.dtype(f"i{self.word_bytes}")
         self.output = np.dtype(f"u{self.output_bytes}")
 
@@ -304,16 +317,22 @@ class Library:
         )
         return part, words
 
-    def program(self, program: ScanProgram) -> tuple[AnyCProgram, tuple[CAxis, CAxis]]:
-        """A program as C has it, and its axes, which have to live as long as it plays."""
+    def program(self, program: ScanProgram) -> tuple[AnyCProgram, tuple[Any, ...]]:
+        """A program as C has it, and its axes and pixels, which have to live as long as it plays."""
         schedule, axes = program.schedule, (self.axis(program.x), self.axis(program.y))
         windows = (
             Window(each.first, each.count)
             for each in (schedule.forward, schedule.backward, schedule.up, schedule.down)
         )  # fmt: skip
         times = schedule.ticks, schedule.lines, schedule.pixels, schedule.settle_lines, schedule.turn_tick
-        kind = PROGRAMS[bool(self.shaping), self.slow_part]
-        return kind(CSchedule(*times, *windows), axes[0].program, axes[1].program), axes
+        if not self.pixel_table:
+            assert schedule.pixel_table is None, "this runtime plays no table of pixels"
+            kind = PROGRAMS[bool(self.shaping), self.slow_part]
+            return kind(CSchedule(*times, *windows), axes[0].program, axes[1].program), axes
+        counts = schedule.pixel_table and self.array(c_uint16, [*schedule.pixel_table[0], *schedule.pixel_table[1]])
+        table = None if counts is None else ctypes.addressof(counts)
+        planned = PixelCSchedule(*times, *windows, pixel_table=table)
+        return PixelCProgram(planned, axes[0].program, axes[1].program), (*axes, counts)
 
 
 def converter_of(output: Output, power_up_code: int = 0) -> Converter:

@@ -8,7 +8,7 @@ size_t probe_size(unsigned which)
     const size_t sizes[] = {sizeof(dac_sequencer), sizeof(dac_program), sizeof(dac_axis_program), sizeof(dac_converter),
                             sizeof(dac_tick),      sizeof(dac_status),  sizeof(dac_word),         sizeof(dac_output),
                             DAC_STRIDE,            DAC_SHAPING,            DAC_SLOW_PART,
-                            DAC_WORDS_BEHIND};
+                            DAC_WORDS_BEHIND,      DAC_PIXEL_TABLE};
     return sizes[which];
 }
 

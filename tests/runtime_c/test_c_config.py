@@ -19,6 +19,7 @@ OTHER_VALUES = {
     "DAC_SPLINE": 1,
     "DAC_COMMIT_MODES": 1,
     "DAC_SLOW_PART": 1,
+    "DAC_PIXEL_TABLE": 1,
     "DAC_STORE": 1,
     "DAC_MOVE": 1,
     "DAC_LIBRARY": 1,
@@ -123,7 +124,7 @@ def test_tables_and_the_functions_of_the_consumer_go_where_the_firmware_wants_th
         *(FOLDER / f"dac_{name}.c" for name in ("axis", "shaping", "slow", "sequencer")),
     ):
         for order, slow in ((0, 0), (3, 0), (0, 1)):
-            chosen = [f"-DDAC_SHAPING={order}", f"-DDAC_SLOW_PART={slow}"]
+            chosen = [f"-DDAC_SHAPING={order}", f"-DDAC_SLOW_PART={slow}", f"-DDAC_PIXEL_TABLE={slow}"]
             run_clean([*CC, *options, *chosen, "-c", source, "-o", "unit.o"], tmp_path)
             symbols = run_clean(["objdump", "--syms", "unit.o"], tmp_path)
             sections |= {

@@ -33,6 +33,7 @@ CHOICES = {
     "commit_modes": ["-DDAC_COMMIT_MODES=1"],
     "moves": ["-DDAC_MOVE=1", "-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1"],
+    "pixel_table": ["-DDAC_PIXEL_TABLE=1"],
     "slow_part_wide": [
         "-DDAC_SLOW_PART=1",
         "-DDAC_SPLINE=1",

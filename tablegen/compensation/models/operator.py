@@ -16,7 +16,7 @@ from tablegen.compensation.dynamics import Response, capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.identification import Identification
-from tablegen.compensation.line import AccelerationTrade, LineRequest, LineShape, WholeLine
+from tablegen.compensation.line import AccelerationTrade, LineRequest, LineShape, SineLine, WholeLine
 from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
@@ -24,7 +24,13 @@ from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.minimum_acceleration_line import minimum_acceleration_waveform
 from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, Operator
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
-from tablegen.compensation.operator.scan_line import ExpectedErrors, LearntWaveform, TargetLine, learn_waveform
+from tablegen.compensation.operator.scan_line import (
+    ExpectedErrors,
+    LearntWaveform,
+    TargetLine,
+    learn_waveform,
+    size_sine,
+)
 from tablegen.compensation.operator.transient import SLOWEST_HZ, after_offset, after_size
 from tablegen.compensation.operator.uncertainty import possible_errors, size_uncertainty
 from tablegen.compensation.transient import Transient
@@ -169,6 +175,9 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
         def through(series: FourierSeries) -> FourierSeries:
             return series.times(real, imaginary)
 
+    if request.sine:
+        solution, place = size_sine(operator, line, through, dynamics)
+        return _made(operator, request, factor * with_mean(solution.mean), solution, None, place)
     straight = LineShape(request.turn, BranchShape(), BranchShape())
     start = fit_window(straight, request.harmonics, request.window, request.both)
     solution = learn_waveform(operator, line, start, through, dynamics)
@@ -182,7 +191,21 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
             if request.allowed.firm:
                 problems.add_to_scan("band_limit.max_scaling_error_percent", str(reason))
                 return None
-    factor *= with_mean(solution.mean)
+    return _made(operator, request, factor * with_mean(solution.mean), solution, trade)
+
+
+def _made(
+    operator: Operator,
+    request: LineRequest,
+    factor: float,
+    solution: LearntWaveform,
+    trade: AccelerationTrade | None,
+    place: FourierSeries | None = None,
+) -> WholeLine:
+    """Return the line of a waveform in the units of the laws, with what the operator knows of it; of a sine by place.
+
+    ``factor`` is that of the operator's loops at the mean of the drive.
+    """
     between = _BEND_UNKNOWN * solution.grown
     _check_reach(operator, solution.stroke, solution.centre, request.driver)
     if not request.v_amplitude > 0.0:
@@ -210,6 +233,8 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
         factor=factor,
         between=between,
     )
+    if place is not None:
+        return SineLine.of(series, request.turn, place=place, identification=identification)
     return WholeLine.of(series, request.turn, trade=trade, identification=identification)
 
 

@@ -34,6 +34,8 @@ _SMOOTHNESS = 1e-8  # of the penalty on n^4, against the mean square of the erro
 _SLOPE_STEPS = 4  # points of the loop over which its slope is taken
 _FIRST_ROUNDS = 4
 _BEYOND = 0.01  # of v_max: what a round may leave the driver's range by
+_SINE_CONVERGED = 1e-9  # of the size
+_PLACE_HARMONICS = 64  # of the position of a sine: what is above them moves it by less than 1e-6 of the line
 _ROUNDING = 2.0**40  # coefficients are multiples of its inverse: the last bits of a round do not matter then
 
 Factor = Callable[[float], float]
@@ -153,6 +155,63 @@ def learn_waveform(
         f"the waveform did not settle within {_ROUNDS} rounds on the operator; a smaller scan, a lower line rate or "
         "fewer harmonics may help"
     )
+
+
+def size_sine(
+    operator: Operator, target: TargetLine, inverse: ThroughInverse, dynamics: Response | None
+) -> tuple[LearntWaveform, FourierSeries]:
+    """Adapt the amplitude of a sine whose position spans the target's size from turn to turn.
+
+    Returns
+    -------
+    waveform, place
+        The sine, whose expected errors are 0 where the position is known; and the position, 0..1 of the size, over a
+        period, in more harmonics than the drive has: the loop makes them, and creep and dynamics act on each.
+
+    Raises
+    ------
+    Unphysical
+        If it does not converge, or is larger than the driver or the operator reach.
+    """
+    series = FourierSeries(0.5, np.array([-0.5]), np.zeros(1))
+    learner = _Learner(operator, target, 1, inverse, dynamics)
+    amplitude = learner.first_amplitude()
+    for turn in range(1, _ROUNDS + 1):
+        due = amplitude
+        if turn <= _FIRST_ROUNDS:
+            amplitude = min(amplitude, learner.most_amplitude(series))
+        played = learner.play(series, amplitude)
+        extent = float(np.ptp(played.position))
+        if abs(extent / target.size_nm - 1.0) < _SINE_CONVERGED and amplitude == due:
+            break
+        amplitude *= target.size_nm / extent
+    else:
+        raise Unphysical(f"the amplitude of a sine did not settle within {_ROUNDS} rounds on the operator")
+    place = (played.position - float(np.min(played.position))) / extent
+    unmeasured = [by / extent for by in learner.unmeasured(played)]
+    stroke = played.loop.high - played.loop.low
+    waveform = LearntWaveform(
+        _rounded(series),
+        amplitude,
+        ExpectedErrors((0.0, 0.0), (0.0, 0.0), 0.0, 0.0),
+        learner.displaced(place, unmeasured),
+        100.0 * max((float(np.std(by)) for by in unmeasured), default=0.0) / 2.0,
+        stroke,
+        0.5 * (played.loop.low + played.loop.high),
+        played.mean,
+        played.loop.grown(played.mean),
+        turn,
+    )
+    return waveform, _rounded(_series_of(place))
+
+
+def _series_of(values: Floats) -> FourierSeries:
+    """Return the first harmonics of one period on a grid."""
+    times = np.arange(len(values)) / len(values)
+    sines, cosines = sine_and_cosine(times)
+    at = (np.arange(1, _PLACE_HARMONICS + 1)[:, None] * np.arange(len(values))) % len(values)
+    a, b = (tree_sum(wave[at] * values) * (2.0 / len(values)) for wave in (cosines, sines))
+    return FourierSeries(float(tree_sum(values)) / len(values), np.asarray(a), np.asarray(b))
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,6 +382,30 @@ class _Learner:
         return ExpectedErrors(
             (rms[0], rms[1]), (scaling[0], scaling[1]), mismatch, 100.0 * (slope / self._target.size_nm - 1.0)
         )
+
+    def displaced(self, place: Floats, others: list[Floats]) -> ExpectedErrors:
+        """Return the largest errors of a sine's image where the position is other than ``place``, in percent.
+
+        Parameters
+        ----------
+        place
+            Positions that the pixels are taken at, 0..1 of the line, at the times of the grid, shape (count,).
+        others
+            Displacements in the same unit and shape; errors are 0 without any.
+        """
+        rows = []
+        grid = np.linspace(*self._target.window, 401)
+        step = max(1, min(round(CHORD / (grid[1] - grid[0])), 400))
+        for other in others:
+            sides = []
+            for going in (self._going, ~self._going):
+                order = np.argsort(place[going], kind="stable")
+                sides.append(100.0 * np.interp(grid, place[going][order], other[going][order]))
+            rms = [float(np.std(one)) for one in sides]
+            scaling = [float(np.ptp((one[step:] - one[:-step]) / (grid[step] - grid[0]))) for one in sides]
+            rows.append([*rms, *scaling, float(np.max(np.abs(sides[0] - sides[1]))), float(np.ptp(other)) * 100.0])
+        a, b, c, d, mismatch, size = np.max(rows, axis=0).tolist() if rows else [0.0] * 6
+        return ExpectedErrors((a, b), (c, d), mismatch, size)
 
     def unmeasured(self, played: _Played) -> list[Floats]:
         """Return what the position may differ by, in nm, since the response is not measured at its highest harmonics.

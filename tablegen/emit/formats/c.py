@@ -182,6 +182,7 @@ def _context(content: Content) -> dict[str, Any]:
         "word_type": f"int{storage['TABLE_STORAGE_BITS']}_t",
         "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
         "axes": [_axis(content, axis) for axis in content.axes],
+        "pixel_rows": rows(_pixel_ticks(content)),
     }
 
 
@@ -201,6 +202,11 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
     }
 
 
+def _pixel_ticks(content: Content) -> Ints:
+    """Return the ticks of each pixel, of trace and retrace; empty where pixels have equal lengths."""
+    return np.array(content.schedule.pixel_table or ((), ()), dtype=np.int64).ravel()
+
+
 def _table(axis: AxisContent) -> Ints:
     """Return the array of a table: its words, and behind the last the first ones again, for indices beyond it."""
     words = np.asarray(axis.program.words)
@@ -213,12 +219,13 @@ def words_behind(program: Program) -> int:
 
 
 def _storage(content: Content) -> dict[str, int]:
-    """Return what the runtime is compiled for: bits of words of tables and converters in memory; splines."""
+    """Return what the runtime is compiled for: bits of words of tables and converters in memory; splines; pixels."""
     programs = [axis.program for axis in content.axes]
     return {
         "TABLE_STORAGE_BITS": storage_bits(max(program.bits for program in programs)),
         "OUTPUT_STORAGE_BITS": storage_bits(max(program.output.word_bits for program in programs)),
         **({"SPLINE": 1} if any(program.mode == "cubic" for program in programs) else {}),
+        **({} if content.schedule.pixel_table is None else {"PIXEL_TABLE": 1}),
     }
 
 
@@ -251,6 +258,8 @@ def _arrays(content: Content) -> dict[str, Ints]:
         arrays[f"{axis.axis}_fourier"] = axis.fourier_words
     if content.sine_index_bits:
         arrays["sine"] = _sine(content)
+    if content.schedule.pixel_table is not None:
+        arrays["pixel_table"] = _pixel_ticks(content)
     return {f"{content.name}_{key}": words for key, words in arrays.items()}
 
 

@@ -75,6 +75,7 @@ def _choices(stored: StoredBuild) -> dict[str, int]:
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),
         "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(axis.output.word_bits for axis in axes)),
         **({"DAC_SPLINE": 1} if any(axis.table.mode == "cubic" for axis in axes) else {}),
+        **({} if stored.program.schedule.pixel_table is None else {"DAC_PIXEL_TABLE": 1}),
         **({"DAC_SHAPING": order} if order else {}),
     }
 
@@ -88,6 +89,11 @@ def _bench_choices(stored: StoredBuild, fourier: bool) -> dict[str, int]:
         "BENCH_TABLE_WORDS": max([*rendered, *map(_variation_words, (stored.program.x, stored.program.y))]),
         "BENCH_CONSTANTS": len(scan_constants(stored_content(stored))),
     }
+
+
+def _macro(stored: StoredBuild) -> str:
+    """Return the macro that makes the program of a build from its header."""
+    return "DAC_PROGRAM" if stored.program.schedule.pixel_table is None else "DAC_PIXEL_PROGRAM"
 
 
 def _variation_words(own: Program) -> int:
@@ -109,7 +115,7 @@ def _bench_program(stored: StoredBuild, fourier: bool) -> str:
             [f'#include "{name}_program.h"']
             if f"{name}_program.h" in stored.manifest.files
             else [
-                f"static const dac_program {name}_program = DAC_PROGRAM({capital}, {name});",
+                f"static const dac_program {name}_program = {_macro(stored)}({capital}, {name});",
                 f"static const dac_converter {name}_x_converter = DAC_CONVERTER({capital}_X, 0);",
                 f"static const dac_converter {name}_y_converter = DAC_CONVERTER({capital}_Y, 0);",
             ]

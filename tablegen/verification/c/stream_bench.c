@@ -208,6 +208,9 @@ static void written(dac_program *p, unsigned idle)
     p->schedule.up = window(8);
     p->schedule.down = window(10);
     p->schedule.pixels = registers[12];
+#if DAC_PIXEL_TABLE
+    p->schedule.pixel_table = NULL;
+#endif
     bench_check(DAC_SHAPING || (registers[X + 11] == 0 && registers[Y + 11] == 0), "a runtime that shapes");
     p->x = axis(X, x_table[idle], &x_converter, x_bits, x_index_bits);
     p->y = axis(Y, y_table[idle], &y_converter, y_bits, y_index_bits);

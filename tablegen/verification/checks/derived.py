@@ -14,6 +14,7 @@ from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
 from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.manifest.read import StoredBuild
+from tablegen.verification.checks.pixels import wrong_edges
 
 _RELATIVE = 1e-9  # relative error of floats after JSON and a few operations
 _WINDOW_TICKS = 2  # ticks by which a window may be off the requested place
@@ -66,6 +67,8 @@ def _sequence(manifest: Manifest) -> Results:
         ("down_lines", y, lines, 1),
     ):
         stated = getattr(sequence, key)
+        if key.endswith("ticks") and sequence.pixel_table is not None:
+            continue
         begin, end = _requested_window(axis, backward=key in ("backward_ticks", "down_lines"))
         if begin == end:
             results.append((f"sequence.{key}", stated[1] == 0, f"{stated}, nothing of it is imaged"))
@@ -78,6 +81,9 @@ def _sequence(manifest: Manifest) -> Results:
         if key.endswith("ticks"):
             enough = stated[1] >= sequence.pixels
             results.append(("sequence.pixels", enough, f"{sequence.pixels}, more than the ticks of a window"))
+    if sequence.pixel_table is not None:
+        fault = wrong_edges(sequence, x)
+        results.append(("sequence.pixel_table", fault is None, fault or ""))
     return results
 
 
@@ -97,7 +103,7 @@ def _exact(value: float) -> Fraction:
 
 def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Results:
     drive, line, fourier, table, output = axis.drive, axis.line, axis.fourier, axis.table, axis.output
-    low, high = fourier.window
+    low, high = fourier.window if fourier.imaged is None else fourier.imaged
     rate = Fraction(*manifest.sequence.update_rate_hz) / line.ticks
     amplitude = 0.5 * drive.v_amplitude / output.v_per_code
     unit = sample_gain(table.mode) * abs(amplitude) * 2.0 ** (UNIT_GAIN_BITS + 1 - output.dac_bits)
