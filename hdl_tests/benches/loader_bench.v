@@ -206,7 +206,8 @@ module loader_bench #(
         .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(word),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(arm),
+        .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0), .withdraw(withdraw),
+        .committed(committed), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick), .underrun(underrun), .busy(busy), .strobe(strobe), .x_code(x_code), .y_code(y_code),
         .line_marker(line_marker), .frame_marker(frame_marker), .pixel_marker(pixel_marker),
