@@ -80,6 +80,7 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"Y_WORD_BITS": 25}, "Y_WORD_BITS_is_not_8_to_24"),
         ({"TICK_BITS": 31}, "TICK_BITS_is_not_3_to_30"),
         ({"LINE_BITS": 17}, "LINE_BITS_is_not_1_to_16"),
+        ({"COMMIT_MODES": 2}, "COMMIT_MODES_is_not_0_to_1"),
         ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
         ({"HARMONICS": 0}, "HARMONICS_is_not_1_to_512"),
         ({"SHAPING": 4}, "SHAPING_is_not_0_to_3"),

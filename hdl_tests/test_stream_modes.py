@@ -107,7 +107,7 @@ def test_a_program_is_rendered_before_its_frame_goes_on(tmp_path: Path) -> None:
 def pair(seed: int) -> tuple[DualProgram, DualProgram]:
     """Two programs of one frame, which image other lines of it."""
     rng = np.random.default_rng(seed)
-    programs = []
+    programs: list[DualProgram] = []
     while len(programs) < 2:
         program = random_dual(rng, SMALL, (TICKS, TICKS), kind="smooth", lines=(LINES, LINES))
         first = len(programs)
