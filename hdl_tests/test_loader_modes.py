@@ -3,13 +3,15 @@
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dialogues import boot_program
+from link_images import random_image
 from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader, LoaderDevice, limited
 from loader_dialogues import Dialogue
-from test_loader import BOOT_IMAGE, MADE, TOLD, other_word
+from test_loader import MADE, TOLD, other_word
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
@@ -17,7 +19,6 @@ from tablegen.link.messages import ANSWER, AxisLimits, DeviceInfo, Feature, Reas
 from tablegen.link.program_image import ProgramImage
 
 TOP = (1 << 16) - 1
-PARK_CODE = PAGE_WORDS + AXIS_WORDS.index("park_code")
 SETTLE_LINES = SCAN_WORDS.index("settle_lines")
 
 
@@ -72,7 +73,19 @@ def test_a_frame_goes_on_or_says_that_it_cannot(loader: Loader) -> None:
         simulation.ticks(schedule.frame_ticks)
         (answer,) = talk.answers(simulation.talk())
         assert struct.unpack("<II", answer.payload) == (3, schedule.lines - 1)
-    assert BOOT_IMAGE.data != other.data
+
+
+@pytest.mark.rest
+def test_another_frame_cannot_go_on_and_its_upload_stays(loader: Loader) -> None:
+    image, program = random_image(np.random.default_rng(1), loader.shape, loader.info.harmonics, "smooth")
+    assert program.schedule.ticks != loader.boot.schedule.ticks
+    wide = AxisLimits(0, TOP, TOP, TOP)
+    with Simulation(loader.compiled, [], limited(loader.info, wide, wide)[1]) as simulation:
+        talk = scanning(simulation, loader)
+        assert talk.refusals(sent(simulation, talk, image, CommitMode.KEEP)) == [(Reason.KEEP, 0)]
+        assert talk.refusals(simulation.talk(commit(talk, image, CommitMode.LINE))) == []
+        simulation.ticks(loader.boot.schedule.ticks)
+        assert struct.unpack("<II", talk.answers(simulation.talk())[0].payload)[0] == 2
 
 
 @pytest.mark.rest
