@@ -45,7 +45,7 @@ module play_alone;
         .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS), .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .PLAIN_MULTIPLIER(1)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(), .commit(commit), .withdraw(1'b0), .committed(), .arm(start),
+        .writable(writable), .refused(), .commit(commit), .commit_mode(2'd0), .withdraw(1'b0), .committed(), .arm(start),
         .arm_frames(16'd0), .trigger(start), .park(1'b0), .clear_faults(1'b0), .armed(), .running(), .tick(1'b1),
         .underrun(1'b0), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(), .frame_marker(),
         .pixel_marker(), .backward_marker(), .valid_marker(), .swapped_marker(swapped), .playing(), .parked(), .faults()

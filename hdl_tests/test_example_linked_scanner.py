@@ -40,7 +40,9 @@ def test_it_says_what_it_is(tmp_path: Path) -> None:
     assert answer.type == Request.HELLO | 0x80
     info, status = DeviceInfo.unpack(answer.payload), DeviceStatus.unpack(answer.payload[56:])
     plan = built.plan
-    assert info.features == Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK
+    assert info.features == (
+        Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.COMMIT_MODES
+    )
     assert info.update_rate_hz == 500_000
     for told, limits, line in ((info.x, info.x_limits, plan.x), (info.y, info.y_limits, plan.y)):
         program_of_axis = line.program

@@ -216,7 +216,7 @@ MUTANTS = {
     "swap_a_tick_early": ("scan", "dac_scan", "(!running || first)", "(!running || last)"),
     "swap_without_commit": ("scan", "dac_scan", "tick && committed &&", "tick &&"),
     "swap_only_at_rest": ("scan", "dac_scan", "(!running || first)", "!running"),
-    "line_a_tick_longer": ("scan", "dac_scan", "idle_ticks - 2", "idle_ticks - 1"),
+    "line_a_tick_longer": ("scan", "dac_scan", "[TICK_BITS-1:0] - 2", "[TICK_BITS-1:0] - 1"),
     # b. both axes, and all stages, change on the same tick
     "y_loads_a_clock_late": (
         "sequencer", "dac_sequencer", f".loads(loads_now{AT_Y}", f".loads(loads{AT_Y}"
@@ -296,7 +296,10 @@ MUTANTS = {
     "count_of_the_last_arm": ("requests", "dac_scan", "frames_left <= arm ? arm_frames : ", "frames_left <= "),
     "count_is_endless_where_armed_before": ("requests", "dac_scan", ": armed_frames == 0;", ": arm_frames == 0;"),
     "line_number_does_not_wrap": ("requests", "dac_scan", "bottom ? {LINE_BITS{1'b0}} : at_line + 1", "at_line + 1"),
-    "frame_a_line_longer": ("requests", "dac_scan", "idle_lines - 1", "idle_lines"),
+    "frame_a_line_longer": ("requests", "dac_scan", "[LINE_BITS-1:0] - 1;", "[LINE_BITS-1:0];"),
+    "keep_goes_on_in_any_frame": ("requests", "dac_scan", "!(keep && can_keep)", "!keep"),
+    "frame_goes_on_in_every_mode": ("requests", "dac_scan", "!(keep && can_keep)", "!can_keep"),
+    "frame_does_not_wait": ("requests", "dac_scan", "running && at_frame && !top && !starts", "1'b0"),
     "scan_begins_where_it_was_parked": ("requests", "dac_scan", "            at_tick <= 0;\n", ""),
     "park_not_connected": ("play_pipelined", "dac_sequencer", ".park(park),", ".park(park && !trigger),"),
     "reset_not_connected": (
@@ -315,7 +318,7 @@ MUTANTS = {
     "window_a_tick_shorter": ("windows", "dac_window", "idle_first + idle_count;", "idle_first + idle_count - 1;"),
     "window_a_tick_long": ("windows", "dac_window", "idle_first + idle_count;", "idle_first + 1;"),
     "window_without_end": ("windows", "dac_window", "imaging <= !is_stop && (", "imaging <= ("),
-    "window_into_the_next_line": ("windows", "dac_window", "(imaging && !is_zero)", "imaging"),
+    "window_into_the_next_line": ("windows", "dac_window", "imaging && !is_zero)", "imaging)"),
     "window_of_the_last_program": ("windows", "dac_window", "if (load) begin", "if (load && valid) begin"),
     "backward_window_not_seen": (
         "windows", "dac_markers", "settled_2 && (forward_imaging || backward_imaging)", "settled_2 && forward_imaging"

@@ -22,6 +22,8 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
     "low_area": {"LOW_AREA": 1},
     "fourier": {"FOURIER": 1},
     "low_area_fourier": {"LOW_AREA": 1, "FOURIER": 1},
+    "commit_modes": {"COMMIT_MODES": 1},
+    "low_area_commit_modes": {"LOW_AREA": 1, "COMMIT_MODES": 1},
     "direct": {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0},
     "direct_x": {"X_INTERPOLATED": 0, "X_INDEX_BITS": 16, "Y_INDEX_BITS": 8},
     "direct_low_area": {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "LOW_AREA": 1},

@@ -58,6 +58,8 @@ module linked_scanner #(
     wire [2:0] host_region, region;
     wire [15:0] host_address, address, arm_frames;
     wire [31:0] host_data, data;
+    wire [1:0] commit_mode;
+    wire can_keep;
     wire strobe, swapped, playing, parked, missed, missing, refused;
     wire [ANNEXIN_200NM_X_DAC_BITS-1:0] x_code, y_code;
     wire [ANNEXIN_200NM_X_DAC_WORD_BITS-1:0] x_word, y_word;
@@ -69,7 +71,7 @@ module linked_scanner #(
         .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
         .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS), .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED),
         .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS),
-        .FOURIER(1), .HARMONICS(HARMONICS), .SHAPING(SHAPING),
+        .COMMIT_MODES(1), .FOURIER(1), .HARMONICS(HARMONICS), .SHAPING(SHAPING),
         .CONVERTER(ANNEXIN_200NM_X_DAC_WORD_BITS + 64 * ANNEXIN_200NM_X_DAC_TWOS_COMPLEMENT +
                    128 * ANNEXIN_200NM_X_DAC_LEFT_ALIGNED),
         .X_CODE_MIN(ANNEXIN_200NM_X_CODE_MIN), .X_CODE_MAX(ANNEXIN_200NM_X_CODE_MAX),
@@ -80,8 +82,9 @@ module linked_scanner #(
     ) loader (
         .clock(clock), .reset(starting), .line_in(line_in), .line_out(line_out), .permit(permit), .boot(32'd0),
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
-        .write_data(host_data), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
-        .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
+        .write_data(host_data), .writable(writable), .refused(refused), .commit(host_commit),
+        .commit_mode(commit_mode), .can_keep(can_keep), .withdraw(withdraw), .arm(arm), .arm_frames(arm_frames),
+        .trigger(trigger), .park(park), .clear_faults(clear_faults),
         .strobe(strobe), .line_marker(line), .frame_marker(frame), .swapped_marker(swapped), .playing(playing),
         .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
@@ -105,10 +108,12 @@ module linked_scanner #(
         .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS),
         .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED), .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS),
         .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS),
-        .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE), .SHAPING(SHAPING)
+        .LOW_AREA(1), .COMMIT_MODES(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE),
+        .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(booting ? missing : withdraw),
+        .writable(writable), .refused(refused), .commit(commit), .commit_mode(commit_mode), .can_keep(can_keep),
+        .withdraw(booting ? missing : withdraw),
         .committed(), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick && !booting), .underrun(missed), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code),

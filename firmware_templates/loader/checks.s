@@ -60,11 +60,9 @@ one:    st4 detail
         jz period
         sub #1
         jz output
-        sub #1
-        jz codes
-        sub #1
-        jz codes
-        sub #1
+        cmp #3
+        jnc codes               ; 1 or 2
+        sub #3
         jz fourier
         sub #1
         jz words

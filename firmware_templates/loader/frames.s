@@ -5,9 +5,8 @@ start:
         st1 has_session
         st1 last_type
         st1 aborting
-        ld #WITHDRAW
+        ld #WITHDRAW            ; 2, as the high byte of FRAME
         request
-        ld #2
         st1 frame_at+1
         ld1 IN_RING
         st1 ring
@@ -85,6 +84,7 @@ bad:    inc4 bad_frames
 good:   ld #0
         st1 frame_at
         st1 acts
+        st1 mode
         st4 detail
         st1 reason
         ldp FRAME

@@ -19,6 +19,9 @@
 .equ x_page, 0x58         ; PAGE_X
 .equ x_word_bytes, 0x5a
 .equ y_word_bytes, 0x5b
+.equ commit_now, 0x6c     ; 1, the request of a commit, with the mode behind it
+.equ mode, 0x6d           ; of the COMMIT
+.equ with_mode, 0x6e      ; bytes of a COMMIT with a mode; 255: this device has none
 .equ lengths, 0x5c        ; of payloads by type; + 0x80: acts, 0x7f: not of this device
 
 ; Inputs
@@ -33,16 +36,13 @@
 .equ IN_SWAPPED, 0xf4     ; a program was taken, and the processor has not seen it
 .equ IN_WRITABLE, 0xf5
 .equ IN_STATE, 0xf6       ; state as in STATUS, except 0
-.equ IN_GONE, 0xf7        ; the reason why a program that waited is gone: withdrawn or refused
+.equ IN_NO_KEEP, 0xf7     ; 1 while a scan plays whose frame the written program cannot continue, else 3
+.equ IN_GONE, 0xf8        ; the reason why a program that waited is gone: withdrawn or refused
 
-; Requests
-.equ COMMIT, 1
+; Requests; PARK to CLEAR are types of the link less 5
 .equ WITHDRAW, 2
 .equ ARM, 4
-.equ TRIGGER, 8
-.equ PARK, 16
-.equ CLEAR, 32
-.equ SEEN, 64
+.equ SEEN, 7
 
 .equ DEVICE, 0x100        ; as HELLO tells it, 56 bytes
 .equ LIMITS_X, 0x114
@@ -61,6 +61,8 @@
 .at 0x6a
 .var has_session 1
 .var ring 1               ; the next byte that is read
+.at 0x6f
+.var stop 1               ; number of checks
 .var session 4            ; session of the host
 .var asker 4              ; session of the request
 .var pending_asker 4      ; session of the COMMIT in progress
@@ -105,4 +107,3 @@
 .var pending_acts 1       ; its answer will be stored
 .var aborting 1
 .var check 1
-.var stop 1               ; number of checks

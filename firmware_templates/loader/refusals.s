@@ -43,8 +43,12 @@ no_type:
         inc1 reason
 refuse: call refusal
         jmp replied
+no_keep:
+        ld #30
+        jmp other_reason
 not_readable:
         ld #26
+other_reason:
         st1 reason
         jmp refuse
 refusal:

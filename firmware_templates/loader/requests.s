@@ -1,9 +1,8 @@
 ; The checks of a request, and requests that change no program.
 
 asked:  ld1 type                ; of an answer that came back nothing is said
-        and #0x80
-        jnz main
-        ld1 type
+        cmp #0x80
+        jc main
         cmp #1
         jz hello
         ld1 has_session
@@ -24,7 +23,19 @@ asked:  ld1 type                ; of an answer that came back nothing is said
         st1 check
         and #0x7f
         cmp1 length
+        jz of_length
+        ld1 length
+        cmp1 with_mode
         jnz no_payload
+        ld1 type
+        cmp #4
+        jnz no_payload
+        ldp PAYLOAD+4
+        ld1 [p]
+        cmp #3
+        jc no_payload
+        st1 mode
+of_length:
         ld1 type
         cmp #9
         jnz in_order
@@ -57,20 +68,26 @@ as_asked:
         jz commit
         sub #1
         jz abort
-        sub #1
+        cmp #1
         jz status
-        sub #1
+        cmp #2
         jz readback
-        sub #1
-        jz park
-        sub #1
-        jz arm
-        sub #1
-        jz trigger
-        sub #1
-        jz clear
+        cmp #8
+        jz limits
+        cmp #ARM
+        jnz requested           ; PARK, TRIGGER or CLEAR
+        ldp PAYLOAD
+        ld2 [p]
+        st2 t0+2
+        ld #ARM
+        st2 t0
+        ld4 t0
+requested:
+        request
+        ld #0
+        jmp answered
 
-        ldp PAYLOAD             ; LIMITS
+limits: ldp PAYLOAD
         saveq
         ldp LIMITS_X
         call copy_8
@@ -164,24 +181,6 @@ state:  st1 [p]
         call copy_8
         ld1 answer_length
         jmp long_answer
-
-park:   ld #PARK
-        jmp requested
-trigger:
-        ld #TRIGGER
-        jmp requested
-clear:  ld #CLEAR
-        jmp requested
-arm:    ldp PAYLOAD
-        ld2 [p]
-        st2 t0+2
-        ld #ARM
-        st2 t0
-        ld4 t0
-requested:
-        request
-        ld #0
-        jmp answered
 
 readback:
         ldp PAYLOAD

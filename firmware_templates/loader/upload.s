@@ -25,15 +25,11 @@ begin:  call is_free
         ld4 [p]
         cmp #192
         jnc no_length
-        ld4 most_bytes
-        ldp PAYLOAD+32
-        cmp4 [p]
-        jnc no_length
-
-        ldp INFO                ; is it the upload in progress?
-        saveq
-        ldp PAYLOAD
-        ld #0xf4
+        cmp4 most_bytes
+        jz in_room
+        jc no_length
+in_room:
+        call announced          ; is it the upload in progress?
         st1 count
         ld1 upload
         jz another
@@ -47,10 +43,7 @@ compare:
         jnc compare
         jmp begun
 another:
-        ldp INFO
-        saveq
-        ldp PAYLOAD
-        ld #0xf4
+        call announced
         call copy
         ld #0
         st4 received
@@ -61,6 +54,14 @@ begun:  ld4 received
 number: st4 answer
         ld #4
         jmp answered
+
+; q is where the announced upload is kept, p where it has come, and a less its words.
+announced:
+        ldp INFO
+        saveq
+        ldp PAYLOAD
+        ld #0xf4
+        ret
 
 data:   ld1 length
         sub #5
@@ -148,7 +149,10 @@ accepted:
         st4 detail
         ld1 IN_PERMIT
         jz not_permitted
-        ld #COMMIT
+        ld1 IN_NO_KEEP
+        cmp1 mode
+        jz no_keep
+        ld2 commit_now
         request
         ld #3
         st1 upload

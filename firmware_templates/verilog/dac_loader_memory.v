@@ -4,7 +4,7 @@
 
 module dac_loader_memory #(
     parameter ADDRESS_BITS = 11,
-    parameter [8*60-1:0] NUMBERS = 0,   // 60 bytes from 0x30 on, the lowest first
+    parameter [8*64-1:0] NUMBERS = 0,   // 64 bytes from 0x30 on, the lowest first
     parameter [8*128-1:0] DEVICE = 0    // 128 bytes from 0x100 on
 ) (
     input  wire                    clock,
@@ -20,7 +20,7 @@ module dac_loader_memory #(
     integer i;
     initial begin
         for (i = 0; i < 1 << ADDRESS_BITS; i = i + 1) bytes[i] = 8'd0;
-        for (i = 0; i < 60; i = i + 1) bytes[NUMBERS_AT+i] = NUMBERS[8*i +: 8];
+        for (i = 0; i < 64; i = i + 1) bytes[NUMBERS_AT+i] = NUMBERS[8*i +: 8];
         for (i = 0; i < 128; i = i + 1) bytes[DEVICE_AT+i] = DEVICE[8*i +: 8];
     end
 

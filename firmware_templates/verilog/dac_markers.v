@@ -6,7 +6,8 @@
 
 module dac_markers #(
     parameter TICK_BITS = 24,
-    parameter LINE_BITS = 16
+    parameter LINE_BITS = 16,
+    parameter COMMIT_MODES = 0  // 1: a new program may begin with any line
 ) (
     input  wire                 clock,
     input  wire                 write,
@@ -75,13 +76,13 @@ module dac_markers #(
         .valid(tick), .restart(line), .position(tick_number), .opens(backward_opens), .imaging(backward_imaging),
         .idle_count(backward_count)
     );
-    dac_window #(.BITS(LINE_BITS)) up (
+    dac_window #(.BITS(LINE_BITS), .JUMPS(COMMIT_MODES)) up (
         .clock(clock), .write_first(write && write_address == UP_FIRST),
         .write_count(write && write_address == UP_COUNT), .data(write_data[LINE_BITS:0]), .load(take),
         .valid(tick && line), .restart(frame), .position(line_number), .opens(unused_up), .imaging(up_imaging),
         .idle_count(unused_up_count)
     );
-    dac_window #(.BITS(LINE_BITS)) down (
+    dac_window #(.BITS(LINE_BITS), .JUMPS(COMMIT_MODES)) down (
         .clock(clock), .write_first(write && write_address == DOWN_FIRST),
         .write_count(write && write_address == DOWN_COUNT), .data(write_data[LINE_BITS:0]), .load(take),
         .valid(tick && line), .restart(frame), .position(line_number), .opens(unused_down), .imaging(down_imaging),

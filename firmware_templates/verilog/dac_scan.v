@@ -23,7 +23,10 @@ module dac_scan #(
     input  wire                  park,
     input  wire                  committed,   // a program waits to be taken
     input  wire                  withdraw,    // it does not after this clock
+    input  wire                  keep,        // it continues the frame that plays, if it can
+    input  wire                  at_frame,    // it is taken at the start of a frame
     input  wire                  loaded,      // there is a program to play
+    output wire                  can_keep,    // the idle program can continue the frame of the one that plays
     output wire                  take,        // the tick of this clock takes the program
     output reg                   armed,
     output reg                   running,     // the next tick will play
@@ -41,29 +44,31 @@ module dac_scan #(
     localparam [3:0] LINE_TICKS = 4'd0, FRAME_LINES = 4'd1, Y_STEPS = 4'd13;
 
     // The program. Numbers of ticks and lines are kept as what the counters are compared with.
-    reg [TICK_BITS:0] idle_ticks;
-    initial idle_ticks = 0;
-    reg [LINE_BITS:0] idle_lines;
-    initial idle_lines = 0;
-    reg [TICK_BITS-1:0] next_to_last_tick;
-    initial next_to_last_tick = 1;  // tick 0 of the first program, which is being loaded, is not the last but one
-    reg [LINE_BITS-1:0] last_line_number;
-    initial last_line_number = 0;
-    wire [TICK_BITS:0] less_two = idle_ticks - 2;
-    wire [LINE_BITS:0] less_one = idle_lines - 1;
-    wire unused = &{less_two[TICK_BITS], less_one[LINE_BITS], write_data};
-    wire y_steps;
-    dac_register #(.BITS(1)) y_steps_word (
-        .clock(clock), .write(write && write_address == Y_STEPS), .data(write_data[0]), .load(take), .value(y_steps)
-    );
+    reg [TICK_BITS-1:0] idle_next_to_last, next_to_last_tick;
+    reg [LINE_BITS-1:0] idle_last_line, last_line_number;
+    reg idle_y_steps, y_steps;
+    initial begin
+        idle_next_to_last = 0;
+        next_to_last_tick = 1;  // tick 0 of the first program, which is being loaded, is not the last but one
+        idle_last_line = 0;
+        last_line_number = 0;
+        idle_y_steps = 1'b0;
+        y_steps = 1'b0;
+    end
+    wire unused = &write_data;
     always @(posedge clock) begin
-        if (write && write_address == LINE_TICKS) idle_ticks <= write_data[TICK_BITS:0];
-        if (write && write_address == FRAME_LINES) idle_lines <= write_data[LINE_BITS:0];
+        if (write && write_address == LINE_TICKS) idle_next_to_last <= write_data[TICK_BITS-1:0] - 2;
+        if (write && write_address == FRAME_LINES) idle_last_line <= write_data[LINE_BITS-1:0] - 1;
+        if (write && write_address == Y_STEPS) idle_y_steps <= write_data[0];
         if (take) begin
-            next_to_last_tick <= less_two[TICK_BITS-1:0];
-            last_line_number <= less_one[LINE_BITS-1:0];
+            next_to_last_tick <= idle_next_to_last;
+            last_line_number <= idle_last_line;
+            y_steps <= idle_y_steps;
         end
     end
+    // The advances of y follow from these.
+    assign can_keep = idle_next_to_last == next_to_last_tick && idle_last_line == last_line_number &&
+                      idle_y_steps == y_steps;
 
     // The next tick.
     reg [TICK_BITS-1:0] at_tick;
@@ -92,9 +97,10 @@ module dac_scan #(
         armed_frames = 0;
     end
 
-    assign take = tick && committed && (!running || first);
+    wire waits = running && at_frame && !top && !starts;
+    assign take = tick && committed && (!running || first) && !waits;
     wire plays = tick && running;
-    wire fresh = starts || take;
+    wire fresh = starts || (take && !(keep && can_keep));
     wire frame_ends = plays && last && bottom;  // a line that is fresh does not end with its first tick
     wire unloads = withdraw && !loaded && !take;  // the first program is withdrawn: there is none to play
     wire still_running = running && !(frame_ends && last_frame) && !unloads;
@@ -112,7 +118,7 @@ module dac_scan #(
         tick_out <= tick;
         load <= take;
         runs <= plays;
-        begins <= plays && fresh;
+        begins <= plays && (starts || take);
         line <= plays && first;
         frame <= plays && first && (fresh || top);
         tick_number <= at_tick;

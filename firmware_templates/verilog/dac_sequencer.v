@@ -2,7 +2,7 @@
 //
 //   host    writes the idle program (`write`, while `writable`), then pulses `commit`. Both axes change to the new
 //           program at the first tick of a line, or at the next tick while nothing plays. docs/verilog.md has the map
-//           of the program words.
+//           of the program words. With COMMIT_MODES `commit_mode` says, on the clock of the commit, which line.
 //   scan    `arm` and `trigger` start frames, `park` and `reset` end them. The slew guard limits every step.
 //   tick    is one clock long, at the update rate of the converter. `strobe` comes with the codes and markers of a
 //           tick: 36 clocks after it, 24 with PLAIN_MULTIPLIER = 1, 41 with LOW_AREA = 1 (`busy` is high until then).
@@ -29,6 +29,7 @@ module dac_sequencer #(
     parameter COUNT_BITS = 16,       // bits of a fault counter
     parameter PLAIN_MULTIPLIER = 0,  // 1: multiplies with `*`, in multiplier blocks; 0: in look-up tables
     parameter LOW_AREA = 0,          // 1: 41 clocks per sample, less area, no multiplier blocks
+    parameter COMMIT_MODES = 0,      // 1: a commit has a mode
     parameter FOURIER = 0,           // 1: computes tables from Fourier words
     parameter HARMONICS = 64,        // with FOURIER: largest number of harmonics
     parameter SINE_FILE = "",        // with FOURIER: file with a quarter sine for the longer table
@@ -46,8 +47,10 @@ module dac_sequencer #(
     output wire                    writable,       // low: a write is refused
     output reg                     refused,        // a write or a commit was refused; holds until clear_faults or reset
     input  wire                    commit,
+    input  wire [1:0]              commit_mode,    // with COMMIT_MODES: 0 line, 1 keep, 2 frame
     input  wire                    withdraw,
     output wire                    committed,
+    output wire                    can_keep,       // the idle program can continue the frame of the one that plays
     // requests
     input  wire                    arm,
     input  wire [15:0]             arm_frames,     // 0: endless
@@ -129,6 +132,9 @@ module dac_sequencer #(
         end
         if (LOW_AREA < 0 || LOW_AREA > 1) begin : guard_12
             dac_sequencer_LOW_AREA_is_not_0_to_1 stop ();
+        end
+        if (COMMIT_MODES < 0 || COMMIT_MODES > 1) begin : guard_30
+            dac_sequencer_COMMIT_MODES_is_not_0_to_1 stop ();
         end
         if (FOURIER < 0 || FOURIER > 1) begin : guard_13
             dac_sequencer_FOURIER_is_not_0_to_1 stop ();
@@ -244,6 +250,23 @@ module dac_sequencer #(
         .take(take), .whole(whole)
     );
 
+    // The mode of a commit, for its program to be taken by.
+    wire keep, at_frame, same_frame;
+    assign can_keep = COMMIT_MODES != 0 && same_frame;
+    generate
+        if (COMMIT_MODES) begin : modes
+            localparam [1:0] KEEP = 2'd1, FRAME = 2'd2;
+            reg [1:0] mode;
+            initial mode = 2'd0;
+            always @(posedge clock) if (commit && writable) mode <= commit_mode;
+            assign keep = mode == KEEP;
+            assign at_frame = mode == FRAME;
+        end else begin : one_mode
+            assign {keep, at_frame} = 2'b00;
+            wire unused_mode = &commit_mode;
+        end
+    endgenerate
+
     wire accepted_tick = tick && !busy;
     wire tick_0, load_0, runs_0, begins_0, line_0, frame_0, y_advance_0;
     wire [TICK_BITS-1:0] tick_number;
@@ -251,7 +274,8 @@ module dac_sequencer #(
     dac_scan #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .FRAME_BITS(16)) scan (
         .clock(clock), .reset(reset), .write(scan_write), .write_address(address[3:0]), .write_data(data),
         .tick(accepted_tick), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park),
-        .committed(committed), .withdraw(withdraw), .loaded(loaded), .take(take), .armed(armed), .running(running),
+        .committed(committed), .withdraw(withdraw), .keep(keep), .at_frame(at_frame), .loaded(loaded),
+        .can_keep(same_frame), .take(take), .armed(armed), .running(running),
         .tick_out(tick_0), .load(load_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0),
         .y_advance(y_advance_0), .tick_number(tick_number), .line_number(line_number)
     );
@@ -268,7 +292,7 @@ module dac_sequencer #(
     end
 
     wire line_3, frame_3, pixel_3, backward_3, images_3;
-    dac_markers #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS)) markers (
+    dac_markers #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .COMMIT_MODES(COMMIT_MODES)) markers (
         .clock(clock), .write(scan_write), .write_address(address[3:0]), .write_data(data), .take(take), .load(load_0),
         .tick(tick_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0), .tick_number(tick_number),
         .line_number(line_number), .line_marker(line_3), .frame_marker(frame_3), .pixel_marker(pixel_3),

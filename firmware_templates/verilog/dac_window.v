@@ -1,12 +1,13 @@
 // An imaging window of a program, [first, first + count): whether a position is inside, for positions that count up
-// from 0.
+// from 0; with JUMPS also where a new program begins at any other one.
 //
 // The window may be empty. `imaging` and `opens` belong to the position two clocks ago.
 
 `default_nettype none
 
 module dac_window #(
-    parameter BITS = 24  // bits of a position
+    parameter BITS = 24,  // bits of a position
+    parameter JUMPS = 0
 ) (
     input  wire          clock,
     input  wire          write_first,
@@ -20,7 +21,13 @@ module dac_window #(
     output reg           imaging,
     output reg  [BITS:0] idle_count  // length of the window in the idle program
 );
+    // Where positions jump they are compared by the sign of a difference, with both ends stored inverted.
+    localparam [BITS:0] INVERTED = {BITS+1{JUMPS != 0}};
     reg [BITS:0] idle_first, first, stop;
+    wire [BITS:0] idle_stop = idle_first + idle_count;
+    wire [BITS+1:0] behind_first = {2'b00, position} + {1'b1, first} + 1;
+    wire [BITS+1:0] behind_stop = {2'b00, position} + {1'b1, stop} + 1;
+    wire unused = &{behind_first, behind_stop};
     initial begin
         idle_first = 0;
         first = 0;
@@ -44,18 +51,18 @@ module dac_window #(
         if (write_first) idle_first <= data;
         if (write_count) idle_count <= data;
         if (load) begin
-            first <= idle_first;
-            stop <= idle_first + idle_count;
+            first <= idle_first ^ INVERTED;
+            stop <= idle_stop ^ INVERTED;
         end
 
         is_valid <= valid;
-        is_first <= {1'b0, position} == first;
-        is_stop <= {1'b0, position} == stop;
+        is_first <= JUMPS != 0 ? !behind_first[BITS+1] : {1'b0, position} == first;
+        is_stop <= JUMPS != 0 ? !behind_stop[BITS+1] : {1'b0, position} == stop;
         is_zero <= restart;
 
         if (is_valid) begin
             opens <= is_first && !is_stop;
-            imaging <= !is_stop && (is_first || (imaging && !is_zero));
+            imaging <= !is_stop && (is_first || (JUMPS == 0 && imaging && !is_zero));
         end
     end
 endmodule

@@ -26,6 +26,7 @@ module program_loader #(
     parameter Y_WORD_BITS = 16,
     parameter TICK_BITS = 24,
     parameter LINE_BITS = 16,            // at most 16
+    parameter COMMIT_MODES = 0,          // 1: the sequencer has them too
     parameter FOURIER = 0,
     parameter HARMONICS = 64,
     parameter SHAPING = 0,               // highest order of shaped output
@@ -54,6 +55,8 @@ module program_loader #(
     input  wire        writable,
     input  wire        refused,
     output wire        commit,
+    output wire [1:0]  commit_mode,
+    input  wire        can_keep,
     output wire        withdraw,
     output wire        arm,
     output wire [15:0] arm_frames,
@@ -97,14 +100,16 @@ module program_loader #(
     localparam [7:0] Y_INDEX_WANTED =
         Y_INTERPOLATED == 3 ? CUBIC | Y_INDEX[7:0] : Y_INTERPOLATED != 0 ? Y_INDEX[7:0] : 8'd0;
     localparam [7:0] X_WORD_BYTES = X_WORD_BITS <= 16 ? 8'd2 : 8'd3, Y_WORD_BYTES = Y_WORD_BITS <= 16 ? 8'd2 : 8'd3;
-    localparam [7:0] FEATURES = FOURIER ? 8'd27 : 8'd25;  // tables, Fourier words, read back, interlock
+    localparam [7:0] FEATURES = 8'd25 + (FOURIER ? 8'd2 : 8'd0) + (COMMIT_MODES ? 8'd64 : 8'd0);
+    localparam [7:0] WITH_MODE = COMMIT_MODES ? 8'd5 : 8'd255;  // bytes of a COMMIT
 
     // Bytes of a payload by its type, 13 first; 128: acts, 127: not of this device.
     localparam [14*8-1:0] LENGTHS = {
         8'd0, 8'd127, 8'd128, 8'd128, 8'd132, 8'd128, 8'd5, 8'd0, 8'd128, 8'd132, 8'd0, 8'd48, 8'd0, 8'd127
     };
-    localparam [60*8-1:0] NUMBERS = {
-        16'd0, LENGTHS, Y_WORD_BYTES, X_WORD_BYTES, PAGE_AT[15:0], RING_AT[15:0], IMAGE_AT[15:0],
+    localparam [64*8-1:0] NUMBERS = {
+        8'd0, WITH_MODE, 8'd0, 8'd1, 16'd0,
+        LENGTHS, Y_WORD_BYTES, X_WORD_BYTES, PAGE_AT[15:0], RING_AT[15:0], IMAGE_AT[15:0],
         8'd0, DAC[7:0], Y_WORD[7:0], Y_INDEX_WANTED, 8'd0, DAC[7:0], X_WORD[7:0], X_INDEX_WANTED, 32'hffffffff,
         32'h01000000, TOP_CODE, 32'h00020000, IMAGE_BYTES, MOST_LINES, MOST_TICKS
     };
@@ -163,6 +168,9 @@ module program_loader #(
         end
         if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_11
             program_loader_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (COMMIT_MODES < 0 || COMMIT_MODES > 1) begin : guard_30
+            program_loader_COMMIT_MODES_is_not_0_to_1 stop ();
         end
         if (FOURIER < 0 || FOURIER > 1) begin : guard_12
             program_loader_FOURIER_is_not_0_to_1 stop ();
@@ -238,7 +246,7 @@ module program_loader #(
     reg swapped;  // and the processor has not seen it
     wire [31:0] a;
     wire request, ready, send;
-    wire seen = request && a[6];
+    wire seen = request && a[2:0] == 3'd7;
     initial begin
         line = 16'd0;
         swap_line = 16'd0;
@@ -289,6 +297,7 @@ module program_loader #(
             5'd20: in <= {7'd0, swapped};
             5'd21: in <= {7'd0, may_write};
             5'd22: in <= {6'd0, playing ? 2'd3 : parked ? 2'd1 : 2'd2};
+            5'd23: in <= playing && !can_keep ? 8'd1 : 8'd3;
             default: in <= refused ? REFUSED : WITHDRAWN;
         endcase
     end
@@ -306,15 +315,16 @@ module program_loader #(
 
     // To the sequencer. The interlock is in the way of the commit itself, whatever the processor thinks of it.
     wire [ADDRESS_BITS+15:0] p_wide = {16'd0, p};
-    wire unused_bits = &{p_wide, a[7]};
+    wire unused_bits = &p_wide;
     assign write_address = p_wide[15:0];
     assign write_data = a;
-    assign commit = request && a[0] && permit_2;
-    assign withdraw = request && a[1];
-    assign arm = request && a[2];
-    assign trigger = request && a[3];
-    assign park = request && a[4];
-    assign clear_faults = request && a[5];
+    assign commit = request && a[2:0] == 3'd1 && permit_2;
+    assign commit_mode = a[9:8];
+    assign withdraw = request && a[2:0] == 3'd2;
+    assign park = request && a[2:0] == 3'd3;
+    assign arm = request && a[2:0] == 3'd4;
+    assign trigger = request && a[2:0] == 3'd5;
+    assign clear_faults = request && a[2:0] == 3'd6;
     assign arm_frames = a[31:16];
 endmodule
 

@@ -101,7 +101,8 @@ module bus_bench #(
         .SINE_FILE(SINE_FILE), .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(arm),
+        .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0), .withdraw(withdraw),
+        .committed(committed), .arm(arm),
         .arm_frames(frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
         .running(running), .tick(tick), .underrun(underrun), .busy(busy), .strobe(strobe), .x_code(x_code),
         .y_code(y_code), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),

@@ -63,7 +63,8 @@ module library_bench #(
         .HARMONICS(LINES_LIBRARY_HARMONICS), .SINE_FILE(LINES_LIBRARY_SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(start),
+        .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0), .withdraw(withdraw),
+        .committed(committed), .arm(start),
         .arm_frames(16'd0), .trigger(start), .park(1'b0), .clear_faults(1'b0), .armed(), .running(), .tick(tick),
         .underrun(1'b0), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(), .frame_marker(),
         .pixel_marker(), .backward_marker(), .valid_marker(), .swapped_marker(swapped), .playing(playing), .parked(),

@@ -23,6 +23,7 @@ module loader_bench #(
     parameter DAC_BITS = 16,
     parameter LOW_AREA = 0,
     parameter PLAIN_MULTIPLIER = 0,
+    parameter COMMIT_MODES = 0,
     parameter FOURIER = 1,
     parameter HARMONICS = 16,
     parameter SINE_FILE = "",
@@ -144,6 +145,8 @@ module loader_bench #(
     end
 
     wire host_write, write, host_commit, commit, withdraw, arm, trigger, park, clear_faults;
+    wire [1:0] commit_mode;
+    wire can_keep;
     wire [2:0] host_region, region;
     wire [15:0] host_address, address, arm_frames;
     wire [31:0] host_word, word;
@@ -168,15 +171,15 @@ module loader_bench #(
     program_loader #(
         .CLOCKS_PER_BIT(CLOCKS_PER_BIT), .MEMORY_BYTES(MEMORY_BYTES), .DAC_BITS(DAC_BITS),
         .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
-        .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .FOURIER(FOURIER),
+        .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .COMMIT_MODES(COMMIT_MODES), .FOURIER(FOURIER),
         .HARMONICS(HARMONICS), .X_CODE_MIN(X_CODE_MIN), .X_CODE_MAX(X_CODE_MAX), .X_MAX_STEP(X_MAX_STEP),
         .Y_CODE_MIN(Y_CODE_MIN), .Y_CODE_MAX(Y_CODE_MAX), .Y_MAX_STEP(Y_MAX_STEP), .UPDATE_RATE(UPDATE_RATE), .SHAPING(SHAPING),
         .BOOT_HASH(BOOT_PROGRAM == "" ? 256'd0 : BOOT_HASH)
     ) loader (
         .clock(clock), .reset(reset), .line_in(host_line), .line_out(device_line), .permit(permit), .boot(boot_count),
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
-        .write_data(host_word), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
-        .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
+        .write_data(host_word), .writable(writable), .refused(refused), .commit(host_commit), .commit_mode(commit_mode), .can_keep(can_keep),
+        .withdraw(withdraw), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
         .strobe(strobe), .line_marker(line_marker), .frame_marker(frame_marker), .swapped_marker(swapped_marker),
         .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
@@ -202,11 +205,12 @@ module loader_bench #(
     dac_sequencer #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .LOW_AREA(LOW_AREA),
-        .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE),
+        .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .COMMIT_MODES(COMMIT_MODES), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE),
         .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(word),
-        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(arm),
+        .writable(writable), .refused(refused), .commit(commit), .commit_mode(commit_mode), .can_keep(can_keep), .withdraw(withdraw),
+        .committed(committed), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick), .underrun(underrun), .busy(busy), .strobe(strobe), .x_code(x_code), .y_code(y_code),
         .line_marker(line_marker), .frame_marker(frame_marker), .pixel_marker(pixel_marker),

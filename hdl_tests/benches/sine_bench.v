@@ -44,6 +44,7 @@ module sine_bench #(
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(clocks >= 12'd1 && clocks < 12'd80 && clocks != 12'd49), .write_region(region),
         .write_address({4'd0, address}), .write_data(word), .writable(), .refused(refused), .commit(clocks == 12'd80),
+        .commit_mode(2'd0),
         .withdraw(1'b0), .committed(committed), .arm(1'b0), .arm_frames(16'd0), .trigger(1'b0), .park(1'b0),
         .clear_faults(1'b0), .armed(), .running(), .tick(1'b0), .underrun(1'b0), .busy(), .strobe(), .x_code(),
         .y_code(), .line_marker(), .frame_marker(), .pixel_marker(), .backward_marker(), .valid_marker(),

@@ -15,7 +15,8 @@ module timing_bench;
     integer i;
     dac_sequencer #(.X_INDEX_BITS(3), .Y_INDEX_BITS(2), .TICK_BITS(8)) sequencer (
         .clock(clock), .reset(now[63]), .write(now[56]), .write_region(now[50:48]), .write_address(now[47:32]),
-        .write_data(now[31:0]), .writable(writable), .refused(refused), .commit(now[58]), .withdraw(now[62]),
+        .write_data(now[31:0]), .writable(writable), .refused(refused), .commit(now[58]), .commit_mode(2'd0),
+        .withdraw(now[62]),
         .committed(committed), .arm(now[59]), .arm_frames(16'd0), .trigger(now[60]), .park(now[61]),
         .clear_faults(1'b0), .armed(armed), .running(running), .tick(now[57]), .underrun(1'b0), .busy(busy),
         .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line), .frame_marker(frame),

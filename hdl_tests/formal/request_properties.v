@@ -1,5 +1,6 @@
 // What requests do to a scan: `park` and `reset` stop it whatever else comes on their clock, a trigger starts it only if
-// it was armed, a counted scan plays its frames and no tick more, and lines are counted round a frame.
+// it was armed, a counted scan plays its frames and no tick more, and lines are counted round a frame, also where a
+// program continues it. In the mode `frame` a program is taken by the first tick of a frame alone.
 //
 // dac_scan and dac_bank as dac_sequencer wires them. The host may do anything on any clock; of a program that it commits
 // is asked what dac_fit asks of it: lines of at least 8 ticks, at least one line, and both within their counters. The
@@ -40,8 +41,22 @@ module request_properties
         wanted = 0;
         asked = 0;
     end
-    wire takes = tick && committed && (!plays || k == 0);
-    wire [LINE_BITS:0] this_j = takes ? 0 : j;  // of the tick of this clock
+    wire takes = tick && committed && (!plays || (k == 0 && (mode != 2'd2 || j == 0)));
+    // A program continues the frame of the last one if it has the same lines, and the same steps of y.
+    reg written_steps, steps, had_program;
+    initial begin
+        written_steps = 0;
+        steps = 0;
+        had_program = 0;
+    end
+    wire continues = mode == 2'd1 && had_program && written_ticks == ticks && written_lines == lines &&
+                     written_steps == steps;
+    always @(posedge clock) begin
+        if (write && writable && write_address == 4'd13) written_steps <= write_data[0];
+        if (takes) steps <= written_steps;
+        had_program <= had_program || takes;
+    end
+    wire [LINE_BITS:0] this_j = takes && !continues ? 0 : j;  // of the tick of this clock
     wire line_ends = k + 1 == ticks;            // a line of 8 ticks or more ends with another tick than it begins with
     wire frame_ends = line_ends && this_j + 1 == lines;
     wire ends = tick && plays && frame_ends && wanted != 0 && frames + 1 == wanted;
@@ -122,12 +137,17 @@ module request_properties
     // What makes it inductive.
     wire scan__first, scan__last, scan__top, scan__bottom, scan__last_frame, scan__endless, scan__starts;
     wire [TICK_BITS-1:0] scan__at_tick, scan__next_to_last_tick;
-    wire [TICK_BITS:0] scan__idle_ticks;
+    wire [TICK_BITS-1:0] scan__idle_next_to_last;
+    wire [TICK_BITS:0] written_less_two = written_ticks - 2;
+    wire scan__y_steps, scan__idle_y_steps;
     wire [LINE_BITS-1:0] scan__at_line, scan__last_line_number;
-    wire [LINE_BITS:0] scan__idle_lines;
+    wire [LINE_BITS-1:0] scan__idle_last_line;
+    wire [LINE_BITS:0] written_less_one = written_lines - 1;
     wire [FRAME_BITS-1:0] scan__frames_left, scan__armed_frames;
     always @* begin
-        assert (scan__idle_ticks == written_ticks && scan__idle_lines == written_lines);
+        assert (scan__idle_next_to_last == written_less_two[TICK_BITS-1:0] || written_ticks == 0);
+        assert (scan__idle_last_line == written_less_one[LINE_BITS-1:0] || written_lines == 0);
+        assert (scan__idle_y_steps == written_steps && scan__y_steps == steps && had_program == loaded);
         if (committed) assert (written_ticks >= 8 && written_ticks <= (1 << TICK_BITS));
         if (committed) assert (written_lines >= 1 && written_lines <= (1 << LINE_BITS));
         if (loaded) begin

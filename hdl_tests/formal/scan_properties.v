@@ -1,4 +1,5 @@
-// When a program is taken: by the first tick of a line, or by a tick while nothing plays, and only if it was committed.
+// When a program is taken: by the first tick of a line, or by a tick while nothing plays, and only if it was committed;
+// in the mode `frame` by the first tick of a frame.
 //
 // dac_scan and dac_bank as dac_sequencer wires them; the last sample of the old program may have left at any time. The
 // host may do anything on any clock; of a line that it commits is asked only that it has at least 8 ticks (as dac_scan
@@ -43,7 +44,7 @@ module scan_properties
         if (take) assert (tick && committed);
         if (take && running) assert (number == 0);
         // and then it does not wait
-        if (tick && committed && (!running || number == 0)) assert (take);
+        if (tick && committed && (!running || (number == 0 && mode != 2'd2))) assert (take);
         if (before) begin
             assert ((bank != was_bank) == taken);
             assert (load == taken);
@@ -57,18 +58,19 @@ module scan_properties
     always @* cover (take && running && loaded);
 
     // What makes it inductive.
-    wire scan__first, scan__last;
+    wire scan__first, scan__last, scan__starts;
     wire [TICK_BITS-1:0] scan__at_tick, scan__next_to_last_tick;
-    wire [TICK_BITS:0] scan__idle_ticks;
+    wire [TICK_BITS-1:0] scan__idle_next_to_last;
+    wire [TICK_BITS:0] written_less_two = written_ticks - 2;
     always @* begin
-        assert (scan__idle_ticks == written_ticks);
+        assert (scan__idle_next_to_last == written_less_two[TICK_BITS-1:0] || written_ticks == 0);
         if (committed) assert (written_ticks >= 8 && written_ticks <= (1 << TICK_BITS));
         if (loaded) assert ({1'b0, scan__next_to_last_tick} + 2 == line_ticks && line_ticks >= 8);
         if (!loaded) assert (scan__next_to_last_tick == 1 && line_ticks == 8);
         if (loaded) assert (line_ticks <= (1 << TICK_BITS));
         if (running) begin
             assert (loaded || committed);
-            if (!loaded) assert (number == 0);
+            if (!loaded) assert (number == 0 && scan__starts);
             assert (number == {1'b0, scan__at_tick} && number < line_ticks);
             assert (scan__first == (number == 0));
             assert (scan__last == (number == line_ticks - 1));

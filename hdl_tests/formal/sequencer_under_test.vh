@@ -37,7 +37,8 @@
         .FOURIER(FOURIER), .SHAPING(SHAPING), .X_INTERPOLATED(CUBIC ? 3 : 1), .Y_INTERPOLATED(CUBIC ? 3 : 1)
     ) uut (
         .clock(clock), .reset(reset), .write(write), .write_region(write_region), .write_address(write_address),
-        .write_data(write_data), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
+        .write_data(write_data), .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0),
+        .withdraw(withdraw),
         .committed(committed), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park),
         .clear_faults(clear_faults), .armed(armed), .running(running), .tick(tick), .underrun(underrun), .busy(busy),
         .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker), .frame_marker(frame_marker),

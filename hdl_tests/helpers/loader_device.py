@@ -43,7 +43,11 @@ class Loader:
         top = (1 << x.output.dac_bits) - 1
         self.info = DeviceInfo(
             version=1,
-            features=Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK,
+            features=Feature.TABLES
+            | Feature.FOURIER
+            | Feature.READBACK
+            | Feature.INTERLOCK
+            | (Feature.COMMIT_MODES if parameters.get("COMMIT_MODES") else Feature(0)),
             window=8,
             data_bytes=240,
             harmonics=harmonics,

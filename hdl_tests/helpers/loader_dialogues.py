@@ -19,7 +19,7 @@ from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link import model_bank
 from tablegen.link.acceptance import Finding, first_objection
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.messages import ANSWER, DeviceInfo, Reason, Refusal, Request
+from tablegen.link.messages import ANSWER, DeviceInfo, Feature, Reason, Refusal, Request
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
 from tablegen.link.program_image import Contents, ProgramImage
@@ -201,7 +201,10 @@ class Dialogue:
     def _commit(self) -> None:
         wrong = self.rng.random() < 0.05
         crc = self._image.info.image_crc ^ wrong
-        self._send(self.talk.acting(Request.COMMIT, struct.pack("<I", crc)))
+        mode = b""
+        if self.info.features & Feature.COMMIT_MODES and self.rng.random() < 0.8:
+            mode = bytes([int(self.rng.integers(4))])
+        self._send(self.talk.acting(Request.COMMIT, struct.pack("<I", crc) + mode))
 
     def _ticks(self) -> None:
         self._advance(int(self.rng.choice([1, 2, 20, 60, 200])))

@@ -53,7 +53,7 @@ MUTANTS = (
         "complete: / ld1 IN_PERMIT / jz not_permitted",
         "complete:",
         INTERLOCK,
-        ("ld1 IN_PERMIT / jz not_permitted / ld #COMMIT", "ld #COMMIT"),
+        ("ld1 IN_PERMIT / jz not_permitted / ld1 IN_NO_KEEP", "ld1 IN_NO_KEEP"),
     ),
     Mutant(
         "a request that comes again acts again",
@@ -101,7 +101,7 @@ MUTANTS = (
         "random",
     ),
     Mutant("a shape of y is not looked at", _UPLOAD, "cmp4 y_shape / jnz no_shape", "cmp4 y_shape", BEGIN),
-    Mutant("an image may be too long", _UPLOAD, "cmp4 [p] / jnc no_length", "cmp4 [p]", BEGIN),
+    Mutant("an image may be too long", _UPLOAD, "jz in_room / jc no_length", "jz in_room", BEGIN),
     Mutant(
         "the length is not that of the program",
         _UPLOAD,

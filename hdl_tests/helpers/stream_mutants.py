@@ -21,6 +21,7 @@ from stream_scripts import (
     counted_frames,
     counts_after_a_clear,
     imaging_program,
+    modes,
     play,
     random_play,
     random_renderings,
@@ -54,6 +55,7 @@ SHAPES = {
     "low area scanner": SequencerShape(16, 1, 3, 16, 0, 4, 12),
     "cubic": SequencerShape(20, 3, 3, 14, 1, 3, 16),
     "cubic low area": SequencerShape(24, 3, 3, 12, 1, 3, 12),
+    "modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
 }
 SHAPED = {  # parameters, paces, samples
     "second": ({"SHAPING": 2}, (1, 3), 5000),
@@ -92,6 +94,9 @@ def script_of(bench: str) -> Script:
         _, placement, samples = SPLINES[bench]
         script = Script(drain=placement.drain_clocks)
         random_play(rng, script, shape, samples, (placement.tick_clocks, placement.tick_clocks + 9), (8, 20))
+    elif bench == "modes":
+        script.tick_every(1)
+        modes(rng, script, shape)
     elif bench == "low area":
         script.tick_every(LEAST_PACE)
         tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
@@ -129,6 +134,7 @@ def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[l
         sources[sources.index(mutant.path)] = changed
     parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
     parameters["LOW_AREA"] = int(bench == "low area")
+    parameters["COMMIT_MODES"] = int(bench == "modes")
     if bench in SHAPED:
         parameters |= SHAPED[bench][0]
     if bench in SPLINES:
@@ -420,13 +426,18 @@ def _scan() -> Iterator[Mutant]:
         f".loads(loads_now[LATENCY-4:0]),{Y_AXIS_AFTER_LOADS}",
         f".loads({{LATENCY-3{{1'b0}}}}),{Y_AXIS_AFTER_LOADS}",
     )
-    yield Mutant("a line is a tick longer", "dac_scan", "idle_ticks - 2", "idle_ticks - 1")
-    yield Mutant("a line is a tick shorter", "dac_scan", "idle_ticks - 2", "idle_ticks - 3")
-    yield Mutant("a frame is a line longer", "dac_scan", "idle_lines - 1", "idle_lines")
-    yield Mutant("a swap does not begin", "dac_scan", "begins <= plays && fresh", "begins <= plays && starts")
+    yield Mutant("a line is a tick longer", "dac_scan", "[TICK_BITS-1:0] - 2", "[TICK_BITS-1:0] - 1")
+    yield Mutant("a line is a tick shorter", "dac_scan", "[TICK_BITS-1:0] - 2", "[TICK_BITS-1:0] - 3")
+    yield Mutant("a frame is a line longer", "dac_scan", "[LINE_BITS-1:0] - 1;", "[LINE_BITS-1:0];")
+    yield Mutant(
+        "a swap does not begin", "dac_scan", "begins <= plays && (starts || take)", "begins <= plays && starts"
+    )
     yield Mutant("a swap does not begin a frame", "dac_scan", "first && (fresh || top)", "first && (starts || top)")
     yield Mutant(
-        "a swap goes on in the line it met", "dac_scan", "wire fresh = starts || take;", "wire fresh = starts;"
+        "a swap goes on in the line it met",
+        "dac_scan",
+        "wire fresh = starts || (take && !(keep && can_keep));",
+        "wire fresh = starts;",
     )
     yield Mutant(
         "the windows of y see the line before",
@@ -531,6 +542,33 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant("y's words go to x as well", "dac_sequencer", "address[15:4] == X_PAGE", "address[15:4] != SCAN_PAGE")
 
 
+def _modes() -> Iterator[Mutant]:
+    """What a mode of a commit says of the swap."""
+    for breaks, file, old, new in (
+        ("keep begins", "dac_scan", "!(keep && can_keep)", "1'b1"),
+        ("keep goes on in any frame", "dac_scan", "!(keep && can_keep)", "!keep"),
+        ("every mode goes on", "dac_scan", "!(keep && can_keep)", "!can_keep"),
+        ("keep goes on in other lines", "dac_scan", "idle_next_to_last == next_to_last_tick && ", ""),
+        ("keep goes on in another frame", "dac_scan", "idle_last_line == last_line_number &&", ""),
+        ("keep goes on with other steps of y", "dac_scan", " &&\n                      idle_y_steps == y_steps;", ";"),
+        ("frame does not wait", "dac_scan", "running && at_frame && !top && !starts", "1'b0"),
+        ("every mode waits for a frame", "dac_scan", "at_frame && !top", "!top"),
+        ("frame waits for ever where a scan begins", "dac_scan", "!top && !starts;", "1'b1;"),
+        ("a frame that goes on does not settle", "dac_scan", "plays && (starts || take)", "plays && fresh"),
+        ("keep is frame", "dac_sequencer", "keep = mode == KEEP", "keep = mode == FRAME"),
+        ("frame is keep", "dac_sequencer", "at_frame = mode == FRAME", "at_frame = mode == KEEP"),
+        ("the mode is that of the last clock", "dac_sequencer", "if (commit && writable) mode", "mode"),
+        ("the mode of the first commit holds", "dac_sequencer", "commit && writable) mode", "commit && !loaded) mode"),
+        ("a window is not compared in a frame that goes on", "dac_markers",
+         ".JUMPS(COMMIT_MODES)) up", ".JUMPS(0)) up"),
+        ("nor is the one on the way down", "dac_markers", ".JUMPS(COMMIT_MODES)) down", ".JUMPS(0)) down"),
+        ("a window of lines begins a line late", "dac_window", "{1'b1, first} + 1;", "{1'b1, first};"),
+        ("a window of lines ends a line late", "dac_window", "{1'b1, stop} + 1;", "{1'b1, stop};"),
+        ("a window of the last program goes on", "dac_window", "(JUMPS == 0 && imaging", "(imaging"),
+    ):  # fmt: skip
+        yield Mutant(breaks, file, old, new, "modes")
+
+
 def _markers() -> Iterator[Mutant]:
     """Windows, pixels, settling."""
     yield Mutant("markers are a tick late", "dac_sequencer", "LATENCY - MARKERS_AT", "LATENCY - MARKERS_AT + 1")
@@ -542,8 +580,8 @@ def _markers() -> Iterator[Mutant]:
         "assign swapped_done = loads_now[LATENCY-1]",
     )
     yield Mutant("a window ends a tick late", "dac_window", "idle_first + idle_count", "idle_first + idle_count + 1")
-    yield Mutant("a window begins a tick late", "dac_window", "first <= idle_first;", "first <= idle_first + 1;")
-    yield Mutant("a window does not end with its line", "dac_window", "(imaging && !is_zero)", "imaging")
+    yield Mutant("a window begins a tick late", "dac_window", "first <= idle_first ^", "first <= (idle_first + 1) ^")
+    yield Mutant("a window does not end with its line", "dac_window", "imaging && !is_zero)", "imaging)")
     yield Mutant(
         "an empty window opens", "dac_window", "imaging <= !is_stop && (", "imaging <= (is_first || !is_stop) && ("
     )
@@ -904,7 +942,8 @@ def _cubic() -> Iterator[Mutant]:
 
 
 MUTANTS: tuple[Mutant, ...] = (
-    *_axis(), *_output(), *_scan(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(), *_cubic(),
+    *_axis(), *_output(), *_scan(), *_modes(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(),
+    *_cubic(),
 )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered, shaped
 from replacing import replace
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import PAGE_WORDS, program_words
 from tablegen.device.schedule import Window
@@ -204,6 +205,28 @@ def swaps_at_every_tick(script: Script, programs: tuple[DualProgram, DualProgram
         script.request("commit", program=other)
         script.wait_ticks(length + other.schedule.ticks)
         now, other = other, now
+
+
+def modes(rng: Generator, script: Script, shape: SequencerShape) -> None:
+    """Commits of every mode at all places of a frame, of programs of the same frame and of some others."""
+    frames = [((9, 9), (4, 4))] * 9 + [((10, 10), (4, 4)), ((9, 9), (5, 5)), ((12, 12), (3, 3))]
+    for number in range(120):
+        ticks, lines = frames[int(rng.integers(len(frames)))]
+        program = random_dual(rng, shape, ticks, kind="tame", lines=lines)
+        while number % 5 and program.y.hold != 1:
+            program = random_dual(rng, shape, ticks, kind="tame", lines=lines)
+        first = int(rng.integers(3))
+        images = Window(first, 3 - first if first else 2)
+        schedule = replace(program.schedule, settle_lines=number % 5 // 4, up=images, turn_line=3, down=Window(0, 0))
+        schedule = replace(schedule, up=Window(0, 0), down=images) if rng.random() < 0.5 else schedule
+        program = replace(program, schedule=schedule)
+        script.load(program)
+        script.request("commit", program=program, mode=CommitMode(int(rng.choice([0, 1, 1, 1, 1, 2]))))
+        script.wait(2)
+        if not script.model.running or number % 20 == 7:
+            script.request("park")
+            script.request("arm", "trigger")
+        script.wait_ticks(int(rng.integers(30, 60)))
 
 
 def counted_frames(script: Script, program: DualProgram) -> None:

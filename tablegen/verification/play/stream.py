@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram, require_dual
 from tablegen.device.played_lines import LineTicks
 from tablegen.device.registers import program_words
@@ -32,6 +33,7 @@ _flags_of = attrgetter(*FLAGS)
 _VALID = 1 << 48 + FLAGS.index("valid")
 _FAULTS_AT = 56
 _WITH_COMMIT = 1 << 52  # of a write: a commit on the same clock
+_MODE_AT = 54  # in a request: the mode of its commit, two bits
 _WRITTEN = 1  # as the argument of a commit: the program is what was written
 _UNFIT = 1 << 24  # of a request: its commit has to be refused
 STATES = ("writable", "refused", "committed", "armed", "running", "busy")
@@ -128,6 +130,7 @@ class Script:
         self.clocks = 0
         self._period = self._until = self._ticked_at = 0
         self._commits: DualProgram | None = None
+        self._mode = CommitMode.LINE
         self._commits_at = self._writable_at = 0
         self._faulty_after = -1  # so many ticks: what the last of them imaged is not valid any more
         self._reported = {"overrun": 0, "underrun": 0}  # the model has no clock, and no faults of it
@@ -243,10 +246,20 @@ class Script:
         """True if a committed program waits to be swapped in."""
         return self.model.idle is not None or self._commits is not None
 
-    def request(self, *names: str, program: DualProgram | None = None, frames: int = 0, commit_clocks: int = 0) -> None:
-        """Play one clock with requests; ``program`` is what a commit commits, after ``commit_clocks`` or as always."""
+    def request(
+        self,
+        *names: str,
+        program: DualProgram | None = None,
+        frames: int = 0,
+        commit_clocks: int = 0,
+        mode: CommitMode = CommitMode.LINE,
+    ) -> None:
+        """Play one clock with requests.
+
+        A commit commits ``program`` in ``mode``, after ``commit_clocks`` or as always.
+        """
         mask = sum(1 << _REQUESTS.index(name) for name in names)
-        self.commands.append(_REQUEST | mask << 16 | frames)
+        self.commands.append(_REQUEST | mode << _MODE_AT | mask << 16 | frames)
         self._pass(1)
         # In the order of their precedence; they act after a tick of the same clock, a commit one clock later or more.
         if {"clear_faults", "reset"} & set(names):
@@ -270,7 +283,7 @@ class Script:
             self._faulty_after = len(self.expected)
         if "commit" in names and not {"withdraw", "reset"} & set(names):
             assert program is not None, "a commit needs its program"
-            self._commits = program
+            self._commits, self._mode = program, mode
             self._commits_at = self.clocks + (commit_clocks or self.commit_clocks)
 
     def come_to_rest(self) -> None:
@@ -347,7 +360,7 @@ class Script:
             if self._commits is not None:
                 self._ticks(min(end, self._commits_at) - self.clocks)
                 if self.clocks == self._commits_at:
-                    self.model.commit(self._commits)
+                    self.model.commit(self._commits, self._mode)
                     self._commits = None
             else:
                 self._ticks(end - self.clocks)

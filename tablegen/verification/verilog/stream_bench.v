@@ -27,6 +27,7 @@ module stream_bench #(
     parameter COUNT_BITS = 32,
     parameter PLAIN_MULTIPLIER = 0,
     parameter LOW_AREA = 0,
+    parameter COMMIT_MODES = 0,
     parameter FOURIER = 0,
     parameter HARMONICS = 64,
     parameter SINE_FILE = "",
@@ -54,7 +55,7 @@ module stream_bench #(
     reg ticked = 0, strobed = 0;
     reg [31:0] alike;  // clocks with the same inputs
 
-    wire writable, refused, committed, armed, running, busy, strobe, playing, parked;
+    wire writable, refused, committed, can_keep, armed, running, busy, strobe, playing, parked;
     wire line_marker, frame_marker, pixel_marker, backward_marker, valid_marker, swapped_marker;
     wire [DAC_BITS-1:0] x_code, y_code;
     wire [3:0] faults;
@@ -67,12 +68,13 @@ module stream_bench #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
         .LINE_BITS(LINE_BITS), .PERIOD_BITS(PERIOD_BITS), .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER),
-        .LOW_AREA(LOW_AREA), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE),
-        .SHAPING(SHAPING), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+        .LOW_AREA(LOW_AREA), .COMMIT_MODES(COMMIT_MODES), .FOURIER(FOURIER), .HARMONICS(HARMONICS),
+        .SINE_FILE(SINE_FILE), .SHAPING(SHAPING), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
     ) sequencer (
         .clock(clock), .reset(requests[0]),
         .write(write), .write_region(command[50:48]), .write_address(command[47:32]), .write_data(command[31:0]),
-        .writable(writable), .refused(refused), .commit(requests[1]), .withdraw(requests[2]), .committed(committed),
+        .writable(writable), .refused(refused), .commit(requests[1]), .commit_mode(command[55:54]),
+        .withdraw(requests[2]), .committed(committed), .can_keep(can_keep),
         .arm(requests[3]), .arm_frames(command[15:0]), .trigger(requests[4]), .park(requests[5]),
         .clear_faults(requests[6]), .armed(armed), .running(running), .tick(tick || extra),
         .underrun(requests[7]), .busy(busy), .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker), .frame_marker(frame_marker),
