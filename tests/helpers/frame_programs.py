@@ -80,3 +80,16 @@ def scan_program(
         return frame_program(rng, long_program(rng, replace(shape, **as_x), "x", schedule), schedule.lines, kind)
 
     return ScanProgram(axis("x"), axis("y"), schedule)
+
+
+def common_knots(rng: Generator, program: ScanProgram) -> ScanProgram:
+    """The program with ratios at the lines of its gains, as a page of registers has them; the ratios are any words."""
+
+    def axis(each: AxisProgram) -> AxisProgram:
+        if not isinstance(each, FrameProgram):
+            return each
+        low, high = signed_limits(RATIO_BITS)
+        words = rng.integers(low, high, len(each.gains.words), endpoint=True)
+        return replace(each, ratios=replace(each.gains, words=words))
+
+    return replace(program, x=axis(program.x), y=axis(program.y))
