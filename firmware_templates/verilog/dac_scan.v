@@ -27,6 +27,7 @@ module dac_scan #(
     output wire                  take,        // the tick of this clock takes the program
     output reg                   armed,
     output reg                   running,     // the next tick will play
+    output wire                  due,         // it will begin a line
     // flags of the tick that tick_out announces
     output reg                   tick_out,
     output reg                   load,        // the first one of a new program
@@ -92,6 +93,7 @@ module dac_scan #(
         armed_frames = 0;
     end
 
+    assign due = running && first;
     assign take = tick && committed && (!running || first);
     wire plays = tick && running;
     wire fresh = starts || take;
