@@ -46,11 +46,14 @@ module dac_slow_fit #(
                   (write && (x_page || y_page) && address[1:0] == SPACING && !is_spacing);
 
     reg spoilt;
+    reg x_known, y_known;      // how long the parts of the idle program are
     reg [6:0] x_knots, y_knots;
     reg [4:0] x_bits, y_bits;  // of the index of a slow table
     reg [17:0] count;
     initial begin
         spoilt = 1'b0;
+        x_known = 1'b0;
+        y_known = 1'b0;
         x_knots = 7'd0;
         y_knots = 7'd0;
         x_bits = 5'd0;
@@ -62,6 +65,8 @@ module dac_slow_fit #(
             spoilt <= 1'b1;
         else if (discard)
             spoilt <= 1'b0;
+        x_known <= !take && (x_known || (writes_part && x_page));
+        y_known <= !take && (y_known || (writes_part && y_page));
         if (writes_part && x_page) {x_bits, x_knots} <= {data[12:8], data[6:0]};
         if (writes_part && y_page) {y_bits, y_knots} <= {data[12:8], data[6:0]};
         if (take)
@@ -72,7 +77,7 @@ module dac_slow_fit #(
     // Gains and ratios are as many.
     wire [7:0] knots = {1'b0, x_knots} + {1'b0, y_knots};
     wire [17:0] needed = WORDS[17:0] + {9'd0, knots, 1'b0} + (18'd1 << x_bits) + (18'd1 << y_bits);
-    assign fits = !spoilt && count >= needed;
+    assign fits = !spoilt && x_known && y_known && count >= needed;
 endmodule
 
 `default_nettype wire
