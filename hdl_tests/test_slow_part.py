@@ -19,7 +19,6 @@ from slow_scripts import (
     X_PARTS,
     Y_PARTS,
     SlowScript,
-    cells_of,
     least_ticks,
     line_clocks,
     random_scan,
@@ -396,11 +395,3 @@ def test_a_write_beyond_a_part_is_refused(cubic: SequencerBench) -> None:
         script.write(region, [0], address)
         script.refused = not exists
         assert not cubic.play(script).refused, (region, address)
-
-
-@pytest.mark.rest
-def test_the_cells_of_an_ice40_play_the_same(tmp_path: Path) -> None:
-    script = SlowScript(shape=CUBIC)
-    slow_play(np.random.default_rng(9), script, 300, 3)
-    bench = SequencerBench("verilator", CUBIC, tmp_path, SLOW_PART, cells_of(CUBIC, tmp_path))
-    equal(bench, script)

@@ -1,12 +1,10 @@
 """Scripts for a sequencer with SLOW_PART: programs with a slow part, and when it takes a commit or a trigger."""
 
-import re
-import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from building import REPOSITORY, tool
+from building import REPOSITORY
 from frame_programs import common_knots, scan_program
 from numpy.random import Generator
 from programs import random_schedule
@@ -153,27 +151,6 @@ def slow_play(rng: Generator, script: SlowScript, samples: int, most_lines: int)
                 script.park()
             if script.model.running and not script.endless:
                 script.wait_ticks(2 * program.schedule.frame_ticks)
-
-
-def cells_of(shape: SequencerShape, folder: Path) -> list[Path]:
-    """The cells of an iCE40 for a sequencer of this shape, behind the ports of the sequencer."""
-    values = {**shape.parameters(), **SLOW_PART}
-    given = " ".join(f"-set {name} {value}" for name, value in values.items())
-    cells, library, front = folder / "cells.v", folder / "library.v", folder / "dac_sequencer.v"
-    sources = " ".join(str(path) for path in slow_sources())
-    script = (
-        f"read_verilog -defer {sources}; chparam {given} dac_sequencer; synth_ice40 -top dac_sequencer; "
-        f"rename -top sequencer_cells; write_verilog -noattr {cells}"
-    )
-    subprocess.run([tool("yosys"), "-q", "-p", script], check=True)
-    share = Path(tool("yosys")).resolve().parents[1] / "share" / "yosys"
-    library.write_text((share / "ice40" / "cells_sim.v").read_text("utf-8"), "utf-8")
-    text = (REPOSITORY / "firmware_templates" / "verilog" / "dac_sequencer.v").read_text("utf-8")
-    head = text.partition("\n);\n")[0].replace("output reg ", "output wire")
-    ports = re.findall(r"^ +(?:in|out)put +wire +(?:\[\S+\] +)?(\w+)", head, re.MULTILINE)
-    connected = ", ".join(f".{port}({port})" for port in ports)
-    front.write_text(f"{head}\n);\n    sequencer_cells cells ({connected});\nendmodule\n", "utf-8")
-    return [front, cells, library]
 
 
 def _tame_ratios(program: ScanProgram) -> ScanProgram:
