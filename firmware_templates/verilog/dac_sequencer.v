@@ -8,7 +8,8 @@
 //           tick: 36 clocks after it, 24 with PLAIN_MULTIPLIER = 1, 41 with LOW_AREA = 1 (`busy` is high until then).
 //           With SHAPING it is a clock later, and two with LOW_AREA = 1. Where SHAPING is 3, ticks are at least 6
 //           clocks apart: `busy` is high on the five after a tick. Where a table is cubic, a strobe comes 64, 57 or 90
-//           clocks after its tick, and ticks are at least 11 clocks apart.
+//           clocks after its tick, and ticks are at least 11 clocks apart. With SLOW_PART it is 3 clocks later, and
+//           `busy` is high while the line that the next tick begins is not ready.
 //
 // docs/sequencer.md defines what happens on which tick, and every bit of every code. All inputs must be synchronous to
 // `clock`. The design relies on power-up values of its registers, as FPGAs have them: a reset must not move a code.
@@ -34,6 +35,8 @@ module dac_sequencer #(
     parameter HARMONICS = 64,        // with FOURIER: largest number of harmonics
     parameter SINE_FILE = "",        // with FOURIER: file with a quarter sine for the longer table
     parameter SHAPING = 0,           // highest order of shaping: 0 none, 1 first, 2 second, 3 scanner
+    parameter SLOW_PART = 0,         // 1: plays programs with a slow part on both axes, and no others
+    parameter SLOW_INDEX_BITS = 7,   // with SLOW_PART: a slow table has at most 2^SLOW_INDEX_BITS words
     parameter [63:0] X_POWER_UP_CODE = 0,  // output code before the first program
     parameter [63:0] Y_POWER_UP_CODE = 0
 ) (
@@ -41,7 +44,7 @@ module dac_sequencer #(
     input  wire                    reset,
     // writes to the idle program
     input  wire                    write,
-    input  wire [2:0]              write_region,   // 0 program, 1 x table, 2 y table, 3 x, 4 y Fourier words
+    input  wire [2:0]              write_region,   // 0 program, 1, 2 tables, 3, 4 Fourier words, 5, 6 slow parts; x, y
     input  wire [15:0]             write_address,
     input  wire [31:0]             write_data,
     output wire                    writable,       // low: a write is refused
@@ -133,7 +136,7 @@ module dac_sequencer #(
         if (LOW_AREA < 0 || LOW_AREA > 1) begin : guard_12
             dac_sequencer_LOW_AREA_is_not_0_to_1 stop ();
         end
-        if (COMMIT_MODES < 0 || COMMIT_MODES > 1) begin : guard_30
+        if (COMMIT_MODES < 0 || COMMIT_MODES > 1) begin : guard_31
             dac_sequencer_COMMIT_MODES_is_not_0_to_1 stop ();
         end
         if (FOURIER < 0 || FOURIER > 1) begin : guard_13
@@ -173,10 +176,28 @@ module dac_sequencer #(
         if (FOURIER != 0 && HARMONICS >= 1 << (LONGER_BITS - 1)) begin : guard_24
             dac_sequencer_HARMONICS_is_not_less_than_half_of_the_longer_table stop ();
         end
+        if (SLOW_PART < 0 || SLOW_PART > 1) begin : guard_25
+            dac_sequencer_SLOW_PART_is_not_0_to_1 stop ();
+        end
+        if (SLOW_PART != 0 && (LOW_AREA == 0 || FOURIER != 0 || SHAPING != 0 || COMMIT_MODES != 0)) begin : guard_26
+            dac_sequencer_SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_SHAPING_or_COMMIT_MODES stop ();
+        end
+        if (SLOW_PART != 0 && (X_INTERPOLATED == 0 || Y_INTERPOLATED == 0)) begin : guard_27
+            dac_sequencer_SLOW_PART_plays_no_direct_table stop ();
+        end
+        if (SLOW_PART != 0 && (X_WORD_BITS > 21 || Y_WORD_BITS > 21)) begin : guard_28
+            dac_sequencer_X_or_Y_WORD_BITS_with_SLOW_PART_are_not_8_to_21 stop ();
+        end
+        if (SLOW_PART != 0 && (X_INDEX_BITS > 14 || Y_INDEX_BITS > 14)) begin : guard_29
+            dac_sequencer_X_or_Y_INDEX_BITS_with_SLOW_PART_are_more_than_14 stop ();
+        end
+        if (SLOW_PART != 0 && (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14)) begin : guard_30
+            dac_sequencer_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
+        end
     endgenerate
 
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
-    wire idle_writable, rendered, rendering, unrendered;
+    wire idle_writable, rendered, rendering, unrendered, slow_exists, slow_fits;
     reg host_write, host_commit;
     initial begin
         host_write = 0;
@@ -187,7 +208,8 @@ module dac_sequencer #(
         write_region == PROGRAM ? write_address < PROGRAM_WORDS :
         write_region == X_TABLE ? write_address >> X_INDEX_BITS == 0 :
         write_region == Y_TABLE ? write_address >> Y_INDEX_BITS == 0 :
-        FOURIER != 0 && (write_region == X_FOURIER || write_region == Y_FOURIER) && write_address <= LAST_FOURIER;
+        slow_exists ||
+        (FOURIER != 0 && (write_region == X_FOURIER || write_region == Y_FOURIER) && write_address <= LAST_FOURIER);
     wire accepted_write = write && writable && exists;
     reg scan_write, x_write, y_write;
     initial begin
@@ -224,7 +246,7 @@ module dac_sequencer #(
 
     // A program with a word that does not fit its register is not committed, nor is a part of a program.
     wire words_fit, whole;
-    wire fits = words_fit && whole;
+    wire fits = words_fit && whole && slow_fits;
     wire sound_commit = host_commit && fits;
     dac_fit #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
@@ -266,16 +288,19 @@ module dac_sequencer #(
             wire unused_mode = &commit_mode;
         end
     endgenerate
+    // With SLOW_PART a trigger may wait for its line, and so may a commit; a tick that begins a line may be too early.
+    wire start, late, prepared, preparing;
 
     wire accepted_tick = tick && !busy;
+    wire due;
     wire tick_0, load_0, runs_0, begins_0, line_0, frame_0, y_advance_0;
     wire [TICK_BITS-1:0] tick_number;
     wire [LINE_BITS-1:0] line_number;
     dac_scan #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .FRAME_BITS(16)) scan (
         .clock(clock), .reset(reset), .write(scan_write), .write_address(address[3:0]), .write_data(data),
-        .tick(accepted_tick), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park),
+        .tick(accepted_tick), .arm(arm), .arm_frames(arm_frames), .trigger(start), .park(park),
         .committed(committed), .withdraw(withdraw), .keep(keep), .at_frame(at_frame), .loaded(loaded),
-        .can_keep(same_frame), .take(take), .armed(armed), .running(running),
+        .can_keep(same_frame), .take(take), .armed(armed), .running(running), .due(due),
         .tick_out(tick_0), .load(load_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0),
         .y_advance(y_advance_0), .tick_number(tick_number), .line_number(line_number)
     );
@@ -310,7 +335,7 @@ module dac_sequencer #(
             reg works;
             initial works = 1'b0;
             always @(posedge clock) works <= accepted_tick || (works && !done);
-            assign busy = works;
+            assign busy = works || late;
             assign overrun = tick && busy;
             assign done = Y_INTERPOLATED == 3 ? y_done : x_done;  // a spline takes longer, the others take the same
             assign drained = done;
@@ -330,26 +355,54 @@ module dac_sequencer #(
                 {line_3, frame_3, pixel_3, backward_3, images_3};
             wire unused = &{x_done, y_done};
 
-            dac_axis_serial #(
-                .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
-                .PERIOD_BITS(X_PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(X_POWER_UP_CODE)
-            ) x_axis (
-                .clock(clock), .write(x_write), .write_address(address[3:0]), .write_data(data),
-                .table_write(x_table_write), .table_address(table_address[X_INDEX_BITS-1:0]),
-                .table_data(table_data[X_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0), .restart(line_0),
-                .begins(begins_0), .advance(runs_0), .running(runs), .done(x_done), .code(x), .reached(x_reached),
-                .clamped(x_clamped)
-            );
-            dac_axis_serial #(
-                .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
-                .PERIOD_BITS(PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(Y_POWER_UP_CODE)
-            ) y_axis (
-                .clock(clock), .write(y_write), .write_address(address[3:0]), .write_data(data),
-                .table_write(y_table_write), .table_address(table_address[Y_INDEX_BITS-1:0]),
-                .table_data(table_data[Y_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0),
-                .restart(frame_0), .begins(begins_0),
-                .advance(y_advance_0), .running(runs), .done(y_done), .code(y), .reached(y_reached), .clamped(y_clamped)
-            );
+            if (SLOW_PART) begin : slow_part
+                dac_slow_fit #(
+                    .X_INDEX_BITS(X_INDEX_BITS), .Y_INDEX_BITS(Y_INDEX_BITS), .SLOW_INDEX_BITS(SLOW_INDEX_BITS),
+                    .LINE_BITS(LINE_BITS)
+                ) slow_words (
+                    .clock(clock), .write(accepted_write), .region(write_region), .address(write_address),
+                    .data(write_data), .discard(reset || withdraw), .take(take), .exists(slow_exists),
+                    .fits(slow_fits)
+                );
+                dac_slow_part #(
+                    .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS),
+                    .X_WORD_BITS(X_WORD_BITS), .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS),
+                    .Y_WORD_BITS(Y_WORD_BITS), .SLOW_INDEX_BITS(SLOW_INDEX_BITS), .LINE_BITS(LINE_BITS),
+                    .PERIOD_BITS(X_PERIOD_BITS), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+                ) axes (
+                    .clock(clock), .scan_write(scan_write), .x_write(x_write), .y_write(y_write),
+                    .word_write(host_write), .region(region), .address(address), .data(data), .commit(sound_commit),
+                    .discard(reset || withdraw), .take(take), .bank(bank), .loaded(loaded), .committed(committed),
+                    .prepared(prepared), .preparing(preparing), .arm(arm), .armed(armed), .trigger(trigger),
+                    .park(park || reset), .running(running), .first(due), .start(start), .late(late), .tick(tick_0),
+                    .load(load_0), .runs(runs_0), .begins(begins_0), .line(line_0), .line_number(line_number),
+                    .x_done(x_done), .x(x), .x_reached(x_reached), .x_clamped(x_clamped), .y_done(y_done), .y(y),
+                    .y_reached(y_reached), .y_clamped(y_clamped)
+                );
+                wire unused_here = &{x_table_write, y_table_write, y_advance_0, frame_0};
+            end else begin : tables
+                dac_axis_serial #(
+                    .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS),
+                    .DAC_BITS(DAC_BITS), .PERIOD_BITS(X_PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(X_POWER_UP_CODE)
+                ) x_axis (
+                    .clock(clock), .write(x_write), .write_address(address[3:0]), .write_data(data),
+                    .table_write(x_table_write), .table_address(table_address[X_INDEX_BITS-1:0]),
+                    .table_data(table_data[X_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0),
+                    .restart(line_0), .begins(begins_0), .advance(runs_0), .running(runs), .done(x_done), .code(x),
+                    .reached(x_reached), .clamped(x_clamped)
+                );
+                dac_axis_serial #(
+                    .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS),
+                    .DAC_BITS(DAC_BITS), .PERIOD_BITS(PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(Y_POWER_UP_CODE)
+                ) y_axis (
+                    .clock(clock), .write(y_write), .write_address(address[3:0]), .write_data(data),
+                    .table_write(y_table_write), .table_address(table_address[Y_INDEX_BITS-1:0]),
+                    .table_data(table_data[Y_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0),
+                    .restart(frame_0), .begins(begins_0),
+                    .advance(y_advance_0), .running(runs), .done(y_done), .code(y), .reached(y_reached),
+                    .clamped(y_clamped)
+                );
+            end
         end else begin : pipelined
             // Bit i is the flag of the tick i clocks ago.
             reg [LATENCY-1:0] ticks, loads, runnings;
@@ -427,6 +480,14 @@ module dac_sequencer #(
         end
     endgenerate
 
+    generate
+        if (SLOW_PART == 0) begin : straight
+            assign {start, late, prepared, preparing} = {trigger, 1'b0, sound_commit, 1'b0};
+            assign {slow_exists, slow_fits} = 2'b01;
+            wire unused = &{due, late};
+        end
+    endgenerate
+
     dac_verdict #(
         .DAC_BITS(DAC_BITS), .COUNT_BITS(COUNT_BITS), .X_POWER_UP_CODE(X_POWER_UP_CODE),
         .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
@@ -464,8 +525,8 @@ module dac_sequencer #(
             assign table_address = rendering ? rendered_address : address;
             assign table_data = rendering ? rendered_data : data[23:0];
         end else begin : uploaded
-            assign rendered = sound_commit;
-            assign rendering = 1'b0;
+            assign rendered = prepared;
+            assign rendering = preparing;
             assign unrendered = 1'b0;
             assign x_table_write = host_write && region == X_TABLE;
             assign y_table_write = host_write && region == Y_TABLE;

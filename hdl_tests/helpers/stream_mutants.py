@@ -16,6 +16,7 @@ from building import run_clean, tool
 from limits import ENDED, within
 from mutants import Verdict
 from programs import random_dual
+from slow_scripts import SLOW_PART, SlowScript, slow_play, slow_sources
 from stream_benches import with_sine
 from stream_scripts import (
     counted_frames,
@@ -56,6 +57,7 @@ SHAPES = {
     "cubic": SequencerShape(20, 3, 3, 14, 1, 3, 16),
     "cubic low area": SequencerShape(24, 3, 3, 12, 1, 3, 12),
     "modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
+    "slow": SequencerShape(24, 3, 3, 8, 1, 2, 9),
 }
 SHAPED = {  # parameters, paces, samples
     "second": ({"SHAPING": 2}, (1, 3), 5000),
@@ -77,7 +79,7 @@ class Mutant(mutants.Mutant):
 
     @property
     def path(self) -> Path:
-        return next(path for path in verilog_runtime() if path.stem == self.file)
+        return next(path for path in slow_sources() if path.stem == self.file)
 
 
 @cache
@@ -97,6 +99,9 @@ def script_of(bench: str) -> Script:
     elif bench == "modes":
         script.tick_every(1)
         modes(rng, script, shape)
+    elif bench == "slow":
+        script = SlowScript(shape=shape)
+        slow_play(rng, script, 400, 5)
     elif bench == "low area":
         script.tick_every(LEAST_PACE)
         tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
@@ -126,7 +131,7 @@ def script_of(bench: str) -> Script:
 
 def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[list[Path], dict[str, int | str]]:
     """Return the sources of the bench of this name, with a mutant in them or with none, and its parameters."""
-    sources = list(verilog_runtime())
+    sources = slow_sources() if bench == "slow" else list(verilog_runtime())
     folder.mkdir(parents=True, exist_ok=True)
     if mutant is not None:
         changed = folder / f"{mutant.file}.v"
@@ -139,6 +144,8 @@ def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[l
         parameters |= SHAPED[bench][0]
     if bench in SPLINES:
         parameters |= SPLINES[bench][0]
+    if bench == "slow":
+        parameters |= SLOW_PART
     if bench == "fourier":
         parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
     return sources, parameters
@@ -533,8 +540,8 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "a commit comes a clock early",
         "dac_sequencer",
-        "assign rendered = sound_commit;",
-        "assign rendered = commit && writable;",
+        "{trigger, 1'b0, sound_commit, 1'b0}",
+        "{trigger, 1'b0, commit && writable, 1'b0}",
     )
     yield Mutant(
         "a commit comes in spite of a withdrawal", "dac_sequencer", "writable && !withdraw && !reset", "writable"
@@ -941,9 +948,71 @@ def _cubic() -> Iterator[Mutant]:
         yield Mutant(breaks, "dac_axis_serial", old, new, "cubic low area")
 
 
+def _slow() -> Iterator[Mutant]:
+    """What is worked out for a line, and which line of which program it is."""
+    for file, faults in {
+        "dac_slow_engine": (
+            ("the ratio has no half", "fast_word, 12'h800}", "fast_word, 12'h000}"),
+            ("a word does not saturate", "beyond ? limits ^ sign_bit : mixed", "mixed"),
+            ("the second word has no sign",
+             "                    bits_left <= 6'd7;\n                    is_signed <= 1'b1;",
+             "                    bits_left <= 6'd7;\n                    is_signed <= 1'b0;"),
+            ("the last word is not mixed", "if (word_ends) begin", "if (index[0] && &index[1:0]) begin"),
+            ("the gain of the slow table has no sign", "bits_left <= 6'd17;\n                    is_signed <= 1'b1;",
+             "bits_left <= 6'd17;\n                    is_signed <= 1'b0;"),
+            ("a product of the spline is rounded down", "acc <= {{W-19{1'b0}}, 1'b1, 18'd0};", "acc <= {W{1'b0}};"),
+            ("the spline goes on from the last one", "PLACE: acc <= {W{1'b0}};", "PLACE: acc <= acc;"),
+            ("a ramp that falls is not cut off towards 0", "m[W-1] && q != 32'd0", "1'b0"),
+            ("the ramp is that of the last line", "state == PLACE && second_offset ? line_after : line",
+             "line"),
+            ("the offset is that of the next line", "state == SLOW_TAKE && !second_offset", "state == SLOW_TAKE"),
+            ("the ratio is the gain", "   here <= of_ratio ?", "   here <= 1'b0 ?"),
+            ("a word between knots is rounded down", "REDUCE: state <= count == 6'd17 ? HALF : DOUBLE;",
+             "REDUCE: state <= count == 6'd17 ? BETWEEN : DOUBLE;"),
+            ("there is one knot", "NEXT: begin\n                    knot <= knot + 1;", "NEXT: begin"),
+            ("the gain is that of the last line", "state == BETWEEN && !of_ratio", "state == BETWEEN && of_ratio"),
+            ("x is worked out twice", "axis <= 1'b1;", "axis <= axis;"),
+            ("the slow table is not shorter", "~({SLOW_INDEX_BITS{1'b1}} << slow_bits)", "{SLOW_INDEX_BITS{1'b1}}"),
+            ("the offset has no upper word", "SLOW_SUM: acc <= sum;", "SLOW_SUM: acc <= acc;"),
+            ("the ramp has no last bit", "bits_left <= 6'd31;", "bits_left <= 6'd30;"),
+        ),
+        "dac_slow_divide": (
+            ("a rest is not reduced after a sum", "else if (twice || reduce)", "else if (twice)"),
+            ("both bits add nothing", "(add && here && there) || (reduce && reduces)", "reduce && reduces"),
+            ("the words are swapped", "here ? whole_less_part : part", "here ? part : whole_less_part"),
+            ("the rest of the search goes on", "rest <= {REST_BITS{1'b0}};", "rest <= rest;"),
+        ),
+        "dac_slow_axis": (
+            ("the offset does not grow", "next_offset : at + by", "next_offset : at"),
+            ("the ramp is the first one", "if (next) by <= next_ramp;", "if (next && !running) by <= next_ramp;"),
+            ("the offset is written into the next line", "half ^ of_offset", "half"),
+            ("a line goes on with the phase", ".restart(restarts)", ".restart(1'b0)"),
+        ),
+        "dac_slow_part": (
+            ("the offset writes over the engine", "wire enable = ticks == 2'd0;", "wire enable = 1'b1;"),
+            ("halves do not change", "half <= half ^ changes;", "half <= half;"),
+            ("a program at rest leaves the half", "tick && (line || load)", "tick && line"),
+            ("the lines are those of the other program", "bank ? lines_1 : lines_0;", "bank ? lines_0 : lines_1;"),
+            ("the frame has no end", "line && after != playing_lines ?", "line ?"),
+            ("the line of a commit is of the program that plays", "is_idle <= changes ? preparing : needs_idle;",
+             "is_idle <= 1'b0;"),
+        ),
+        "dac_slow_store": (
+            ("the ratios are the gains", "part == RATIOS) ratios", "part == GAINS) ratios"),
+            ("a table is written where it plays",
+             "fast_words[{write_bank, write_axis,", "fast_words[{!write_bank, write_axis,"),
+            ("both axes have one second table", "second <= second_words[{bank, axis, index}];",
+             "second <= second_words[{bank, 1'b0, index}];"),
+            ("words change while all stands still", "if (enable) begin", "begin"),
+        ),
+    }.items():  # fmt: skip
+        for breaks, old, new in faults:
+            yield Mutant(breaks, file, old, new, "slow")
+
+
 MUTANTS: tuple[Mutant, ...] = (
     *_axis(), *_output(), *_scan(), *_modes(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(),
-    *_cubic(),
+    *_cubic(), *_slow(),
 )  # fmt: skip
 
 

@@ -386,14 +386,18 @@ class Script:
                 continue
             tick = self.model.step()
             if tick.swapped:
-                assert self.model.playing is not None
-                playing = require_dual(self.model.playing)
-                self.swapped_programs.append(playing)
-                self.programs.append((len(self.expected), playing))
+                self._swapped()
                 self._writable_at = self.clocks + self.drain
             self.expected.append(self._with_reported(pack(tick)))
         self._until -= end - self.clocks
         self.clocks = end
+
+    def _swapped(self) -> None:
+        """Add the program that the last tick swapped in."""
+        assert self.model.playing is not None
+        playing = require_dual(self.model.playing)
+        self.swapped_programs.append(playing)
+        self.programs.append((len(self.expected), playing))
 
     @property
     def swaps(self) -> int:

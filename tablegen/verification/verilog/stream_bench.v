@@ -32,6 +32,8 @@ module stream_bench #(
     parameter HARMONICS = 64,
     parameter SINE_FILE = "",
     parameter SHAPING = 0,
+    parameter SLOW_PART = 0,
+    parameter SLOW_INDEX_BITS = 7,
     parameter X_POWER_UP_CODE = 0,
     parameter Y_POWER_UP_CODE = 0
 );
@@ -69,7 +71,8 @@ module stream_bench #(
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
         .LINE_BITS(LINE_BITS), .PERIOD_BITS(PERIOD_BITS), .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER),
         .LOW_AREA(LOW_AREA), .COMMIT_MODES(COMMIT_MODES), .FOURIER(FOURIER), .HARMONICS(HARMONICS),
-        .SINE_FILE(SINE_FILE), .SHAPING(SHAPING), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+        .SINE_FILE(SINE_FILE), .SHAPING(SHAPING), .SLOW_PART(SLOW_PART), .SLOW_INDEX_BITS(SLOW_INDEX_BITS),
+        .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
     ) sequencer (
         .clock(clock), .reset(requests[0]),
         .write(write), .write_region(command[50:48]), .write_address(command[47:32]), .write_data(command[31:0]),

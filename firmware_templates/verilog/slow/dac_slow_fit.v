@@ -1,0 +1,83 @@
+// Whether the idle program has a slow part on both axes that fits the device, and all of its words.
+//
+// As in dac_fit, a word that does not fit spoils the program until a withdrawal or a reset. As in dac_whole, the words
+// since the last swap are counted, in any order: words 12 to 15 of both axes, and those of regions 5 and 6. The inputs
+// are those of the sequencer's port; `fits` is of the writes up to the last clock.
+
+`default_nettype none
+
+module dac_slow_fit #(
+    parameter X_INDEX_BITS = 6,
+    parameter Y_INDEX_BITS = 6,
+    parameter [31:0] SLOW_INDEX_BITS = 7,
+    parameter LINE_BITS = 16
+) (
+    input  wire        clock,
+    input  wire        write,    // one that is accepted
+    input  wire [2:0]  region,
+    input  wire [15:0] address,
+    input  wire [31:0] data,
+    input  wire        discard,
+    input  wire        take,
+    output wire        exists,   // the address is one of region 5 or 6
+    output wire        fits
+);
+    localparam [2:0] PROGRAM = 3'd0, X_PARTS = 3'd5, Y_PARTS = 3'd6;
+    localparam [11:0] X_PAGE = 12'd1, Y_PAGE = 12'd2;
+    localparam [1:0] PART = 2'd0, SPACING = 2'd1;  // words 12 and 13
+    localparam [6:0] MOST_KNOTS = 7'd65;
+    localparam [4:0] LEAST_BITS = 5'd3, MOST_BITS = SLOW_INDEX_BITS[4:0];
+    localparam [31:0] WORDS = (1 << X_INDEX_BITS) + (1 << Y_INDEX_BITS) + 8;
+
+    wire [13:0] place = address[13:0];
+    wire x_part = region == X_PARTS, y_part = region == Y_PARTS;
+    wire in_second = x_part ? place >> X_INDEX_BITS == 0 : place >> Y_INDEX_BITS == 0;
+    wire in_part = address[15] ? place < {7'd0, MOST_KNOTS} :
+                   address[14] ? place >> SLOW_INDEX_BITS == 0 : in_second;
+    assign exists = (x_part || y_part) && in_part;
+
+    wire x_page = region == PROGRAM && address[15:4] == X_PAGE && address[3:2] == 2'd3;
+    wire y_page = region == PROGRAM && address[15:4] == Y_PAGE && address[3:2] == 2'd3;
+    wire is_part = data[6:0] > 7'd1 && data[6:0] <= MOST_KNOTS && !data[7] && data[12:8] >= LEAST_BITS &&
+                   data[12:8] <= MOST_BITS && data[31:13] == 19'd0;
+    wire is_spacing = data != 32'd0 && data >> (LINE_BITS + 1) == 0;
+    wire writes_part = write && (x_page || y_page) && address[1:0] == PART;
+    wire spoils = (writes_part && !is_part) ||
+                  (write && (x_page || y_page) && address[1:0] == SPACING && !is_spacing);
+
+    reg spoilt;
+    reg x_known, y_known;      // how long the parts of the idle program are
+    reg [6:0] x_knots, y_knots;
+    reg [4:0] x_bits, y_bits;  // of the index of a slow table
+    reg [17:0] count;
+    initial begin
+        spoilt = 1'b0;
+        x_known = 1'b0;
+        y_known = 1'b0;
+        x_knots = 7'd0;
+        y_knots = 7'd0;
+        x_bits = 5'd0;
+        y_bits = 5'd0;
+        count = 18'd0;
+    end
+    always @(posedge clock) begin
+        if (spoils)
+            spoilt <= 1'b1;
+        else if (discard)
+            spoilt <= 1'b0;
+        x_known <= !take && (x_known || (writes_part && x_page));
+        y_known <= !take && (y_known || (writes_part && y_page));
+        if (writes_part && x_page) {x_bits, x_knots} <= {data[12:8], data[6:0]};
+        if (writes_part && y_page) {y_bits, y_knots} <= {data[12:8], data[6:0]};
+        if (take)
+            count <= 18'd0;
+        else if (write && (x_page || y_page || x_part || y_part) && !count[17])
+            count <= count + 1;
+    end
+    // Gains and ratios are as many.
+    wire [7:0] knots = {1'b0, x_knots} + {1'b0, y_knots};
+    wire [17:0] needed = WORDS[17:0] + {9'd0, knots, 1'b0} + (18'd1 << x_bits) + (18'd1 << y_bits);
+    assign fits = !spoilt && x_known && y_known && count >= needed;
+endmodule
+
+`default_nettype wire
