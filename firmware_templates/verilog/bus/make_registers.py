@@ -1,10 +1,13 @@
-"""Make the address decoder, the constants for Verilog and C, and the page of the registers from dac_registers.rdl.
+"""Make the address decoder, the constants for Verilog and C, IP-XACT, and the page of the registers.
+
+All are made of dac_registers.rdl.
 
 ``python firmware_templates/verilog/bus/make_registers.py`` names the files that are not up to date, ``--write`` writes
 them. SystemRDL is read by systemrdl-compiler, which is in the extra ``test``.
 """
 
 import sys
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +22,7 @@ BEGIN, END = "<!-- registers -->\n", "<!-- /registers -->\n"
 MADE = f"Made by make_registers.py from {SOURCE.name}: do not edit."
 ADDRESS_BITS = 20
 WORD_BYTES = 4
+IP_XACT = "http://www.accellera.org/XMLSchema/IPXACT/1685-2014"
 
 
 @dataclass(frozen=True)
@@ -300,6 +304,58 @@ def _value(register: Register) -> str:
     return f"{{\n                {upper},\n                {lower}\n            }}"
 
 
+def ip_xact(registers: Map) -> str:
+    """Return ``dac_registers.xml``: a component of IEEE 1685-2014 with the registers and the memories as its map."""
+    component = ET.Element("ipxact:component", {"xmlns:ipxact": IP_XACT})
+    _texts(component, vendor="piezo-tablegen", library="dac", name="dac_registers", version=_version(registers))
+    memory_map = ET.SubElement(ET.SubElement(component, "ipxact:memoryMaps"), "ipxact:memoryMap")
+    _texts(memory_map, name="dac_registers")
+    span = max(one.address for one in registers.registers) + WORD_BYTES
+    block = _block(memory_map, "registers", "Registers.", 0, span)
+    _texts(block, usage="register")
+    for register in registers.registers:
+        _ip_xact_register(block, register)
+    for memory in registers.memories:
+        block = _block(memory_map, memory.name, memory.text, memory.address, WORD_BYTES * memory.words)
+        _texts(block, usage="memory", access="write-only")
+    _texts(memory_map, addressUnitBits="8")
+    _texts(component, description=MADE)
+    ET.indent(component)
+    return ET.tostring(component, "unicode", xml_declaration=True) + "\n"
+
+
+def _texts(parent: ET.Element, **texts: str) -> None:
+    for name, text in texts.items():
+        ET.SubElement(parent, f"ipxact:{name}").text = text
+
+
+def _version(registers: Map) -> str:
+    (field,) = next(one.fields for one in registers.registers if one.name == "version")
+    return str(field.constant)
+
+
+def _block(parent: ET.Element, name: str, text: str, address: int, span: int) -> ET.Element:
+    block = ET.SubElement(parent, "ipxact:addressBlock")
+    _texts(block, name=name, description=text, baseAddress=f"'h{address:X}", range=f"'h{span:X}", width="32")
+    return block
+
+
+def _ip_xact_register(block: ET.Element, register: Register) -> None:
+    element = ET.SubElement(block, "ipxact:register")
+    _texts(element, name=register.name, description=register.text, addressOffset=f"'h{register.address:X}", size="32")
+    access = {(True, False): "read-only", (False, True): "write-only", (True, True): "read-write"}
+    _texts(element, access=access[register.readable, register.writable])
+    for field in register.fields:
+        own = ET.SubElement(element, "ipxact:field")
+        _texts(own, name=field.name, description=field.text, bitOffset=str(field.low))
+        if field.constant is not None:
+            reset = ET.SubElement(ET.SubElement(own, "ipxact:resets"), "ipxact:reset")
+            _texts(reset, value=f"'h{field.constant:X}")
+        _texts(own, bitWidth=str(field.bits))
+        if field.clears:
+            _texts(own, modifiedWriteValue="oneToClear")
+
+
 def page_tables(registers: Map) -> str:
     """Return the tables of the page."""
     lines = ["| address | register | access | purpose |", "|---|---|---|---|"]
@@ -329,6 +385,7 @@ def made_files(registers: Map) -> dict[Path, str]:
         HERE / "dac_bus_map.v": verilog_map(registers),
         HERE / "dac_registers.vh": verilog_header(registers),
         HERE / "dac_registers.h": c_header(registers),
+        HERE / "dac_registers.xml": ip_xact(registers),
         PAGE: f"{before}{begin}{page_tables(registers)}{end}{after}",
     }
 

@@ -1,24 +1,34 @@
-// Bench of examples/boards/icebreaker: sends +requests (a file of bytes; 100: wait for the end of an answer), writes what
-// comes back into +answers, a byte a line, and from the first frame marker on the levels of both converters' pins into
-// +pins, a hexadecimal byte a clock: x {sclk, load_n, data, select_n}, then y. It ends after +clocks of these, or +limit
-// in all.
+// Bench of a board of examples/boards, that of a macro: sends +requests (a file of bytes; 100: wait for the end of an
+// answer), writes what comes back into +answers, a byte a line, and from the first frame marker on the levels of both
+// converters' pins into +pins, a hexadecimal byte a clock: x {sclk, load_n, data, select_n}, then y. It ends after
+// +clocks of these, or +limit in all.
 
 `timescale 1ns / 1ps
 `default_nettype none
 
-module icebreaker_bench;
-    localparam CLOCKS_PER_BIT = 104, BIT = 10 * CLOCKS_PER_BIT, STARTED = 1000;
+module board_bench #(
+    parameter CLOCKS_PER_BIT = 104
+);
+    localparam BIT = 10 * CLOCKS_PER_BIT, STARTED = 1000;
     reg clock = 0, line_in = 1, begun = 0, finished = 0, answered = 0;
-    wire line_out, frame, fault_n, x_select_n, x_data, x_load_n, x_sclk, y_select_n, y_data, y_load_n, y_sclk;
+    wire line_out, frame, fault, x_select_n, x_data, x_load_n, x_sclk, y_select_n, y_data, y_load_n, y_sclk;
     reg [8:0] requests [0:255];
     reg [7:0] coming;
     reg [8*200-1:0] name;
     integer answers, pins, clocks, captured = 0, total = 0, limit, at, bit_number, k;
 
+`ifdef ICEBREAKER
+    wire fault_n;
+    assign fault = !fault_n;
     icebreaker dut (
-        .clock(clock), .line_in(line_in), .line_out(line_out), .button_n(1'b1), .fault_n(fault_n), .image_n(),
-        .x_select_n(x_select_n), .x_data(x_data), .x_load_n(x_load_n), .x_sclk(x_sclk), .y_select_n(y_select_n),
-        .y_data(y_data), .y_load_n(y_load_n), .y_sclk(y_sclk), .line(), .frame(frame), .pixel(), .backward(), .image()
+        .button_n(1'b1), .fault_n(fault_n), .image_n(),
+`else
+    ulx3s dut (
+        .button(1'b0), .fault_lamp(fault), .image_lamp(), .esp32_boot(),
+`endif
+        .clock(clock), .line_in(line_in), .line_out(line_out), .x_select_n(x_select_n), .x_data(x_data),
+        .x_load_n(x_load_n), .x_sclk(x_sclk), .y_select_n(y_select_n), .y_data(y_data), .y_load_n(y_load_n),
+        .y_sclk(y_sclk), .line(), .frame(frame), .pixel(), .backward(), .image()
     );
 
     initial begin
@@ -40,7 +50,7 @@ module icebreaker_bench;
         end
         $fclose(pins);
         $fclose(answers);
-        $display("fault_n %b", fault_n);
+        $display("fault %b", fault);
         $finish;
     end
 
