@@ -516,7 +516,7 @@ module dac_sequencer #(
                 .write_x_harmonics(x_write && address[3:0] == AXIS_HARMONICS),
                 .write_y_harmonics(y_write && address[3:0] == AXIS_HARMONICS),
                 .write_x_word(host_write && region == X_FOURIER), .write_y_word(host_write && region == Y_FOURIER),
-                .write_address(address[10:0]), .write_data(data), .commit(sound_commit), .rendered(rendered),
+                .write_address(address[10:0]), .write_data(data), .commit(prepared), .rendered(rendered),
                 .failed(unrendered), .rendering(rendering), .x_write(x_rendered), .y_write(y_rendered),
                 .address(rendered_address), .data(rendered_data)
             );
@@ -524,6 +524,7 @@ module dac_sequencer #(
             assign y_table_write = y_rendered || (host_write && region == Y_TABLE);
             assign table_address = rendering ? rendered_address : address;
             assign table_data = rendering ? rendered_data : data[23:0];
+            wire unused_preparing = preparing;
         end else begin : uploaded
             assign rendered = prepared;
             assign rendering = preparing;
