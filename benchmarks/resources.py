@@ -42,7 +42,10 @@ PRIMITIVES = {
 
 @dataclass(frozen=True)
 class Case:
-    """A module with parameters on a family, and the requirement it has to meet, if there is one."""
+    """A module with parameters on a family, and the requirement it has to meet, if there is one.
+
+    ``folder`` is that of further modules, below the one of the sequencer.
+    """
 
     what: str
     top: str
@@ -51,6 +54,7 @@ class Case:
     most_cells: int | None = None
     least_mhz: float | None = None
     most_multipliers: int | None = None
+    folder: str = ""
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,7 @@ class Result:
 _AXIS = {"INDEX_BITS": 10, "PERIOD_BITS": 25}
 _CUBIC = {"INTERPOLATED": 3, "INDEX_BITS": 7, "WORD_BITS": 14, "PERIOD_BITS": 25}
 _TOP = {"X_INDEX_BITS": 10, "Y_INDEX_BITS": 10}
+_TURNED = {"X_INTERPOLATED": 3, "X_INDEX_BITS": 6, "Y_INTERPOLATED": 3, "Y_INDEX_BITS": 6, "SLOW_INDEX_BITS": 6}
 CASES = {
     "axis": Case("one axis, a sample a clock", "dac_axis", "HX8K", _AXIS, most_cells=2500, least_mhz=120),
     "axis_serial": Case("one axis, low area", "dac_axis_serial", "HX8K", _AXIS, most_cells=900),
@@ -88,6 +93,20 @@ CASES = {
     "sequencer_low_area_fourier": Case(
         "two axes, low area, Fourier words", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1, "FOURIER": 1}
     ),
+    "sequencer_low_area_modes": Case(
+        "two axes, low area, modes of a commit",
+        "dac_sequencer",
+        "HX8K",
+        {**_TOP, "LOW_AREA": 1, "COMMIT_MODES": 1},
+    ),
+    "sequencer_slow_part": Case(
+        "two axes at an angle, low area",
+        "dac_sequencer",
+        "HX8K",
+        {**_TURNED, "LOW_AREA": 1, "SLOW_PART": 1},
+        folder="slow",
+    ),
+    "adc_pixels": Case("pixels of one channel of an ADC", "adc_pixels", "HX8K", folder="adc"),
     "renderer_63": Case("tables from Fourier words", "dac_fourier", "HX8K", {"HARMONICS": 63}),
     "renderer_127": Case("tables from Fourier words", "dac_fourier", "HX8K", {"HARMONICS": 127}),
     "spi": Case("SPI, two converters in parallel", "dac_spi", "HX8K"),
@@ -153,7 +172,7 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
             # Without contents the memory would be synthesised away.
             index_bits = max((value for name, value in case.parameters.items() if "INDEX" in name), default=11)
             Path(folder, "sine.mem").write_text(_quarter_sine(index_bits), "utf-8")
-        for path in modules.glob("*.v"):
+        for path in [*modules.glob("*.v"), *((modules / case.folder).glob("*.v") if case.folder else ())]:
             if path.stem in OF_THE_SEQUENCER and case.top != "dac_sequencer":
                 continue
             if path.stem == "dac_shaper" and not case.parameters.get("SHAPING"):
@@ -251,7 +270,8 @@ def digest(rows: str, modules: Path = MODULES) -> str:
 
     The page has it, so that a change of the Verilog or of a row is seen without a synthesis.
     """
-    sources = [*sorted(modules.glob("*.v")), FLAGS]
+    further = sorted({case.folder for case in CASES.values() if case.folder})
+    sources = [path for folder in (".", *further) for path in sorted((modules / folder).glob("*.v"))] + [FLAGS]
     code = [re.sub(r"//.*|\s+", "", path.read_text("utf-8")) for path in sources]
     how = [inspect.getsource(function) for function in (measure, _place, _counts)]
     content = repr((rows, code, how, CASES, SYNTHESIS, PRIMITIVES, SEEDS, OF_THE_SEQUENCER))
