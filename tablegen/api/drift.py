@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tablegen.api.build import Source, setup_of
 from tablegen.api.image_input import ImageSource, read_trace_and_perhaps_retrace
 from tablegen.api.result import Result
 from tablegen.base.blas_threads import one_blas_thread
@@ -18,6 +19,7 @@ from tablegen.images.files import ScanImage
 from tablegen.images.frame_drift import DriftInterval, drift_intervals, image_name, pixel_size
 from tablegen.images.scan_angle import is_turned
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.turns import sine_and_cosine_of
 
 _AXES = ("x", "y")
 
@@ -30,6 +32,7 @@ def drift(
     within_nm: float | None = None,
     channel: str | int | None = None,
     retrace_channel: str | int | None = None,
+    scan: Source | None = None,
 ) -> "ImageDrift":
     """Measure the drift between images of one place, by registration. Write nothing.
 
@@ -45,6 +48,9 @@ def drift(
         Largest shift from an image to the next, in nm: below half a cell it makes that of a lattice unambiguous.
     channel, retrace_channel : str or int, optional
         Title or number of the channel, and of its retrace.
+    scan : str, Path or Setup, optional
+        Scan that took the images, in frames that go up: the result has ``drift_nm_per_s``, which lets it follow the
+        sample.
 
     Returns
     -------
@@ -55,7 +61,7 @@ def drift(
     ------
     Rejected
         A file cannot be read, or the images do not show the same place, were not scanned alike, or have a shift that
-        is ambiguous; ``problems`` has the code.
+        is ambiguous; ``problems`` has the code. With ``scan`` also if it has an error, or the images no size in nm.
 
     Examples
     --------
@@ -76,12 +82,16 @@ def drift(
         scans = _movie(images, frames, how)
     if len(scans) < 2:
         raise Rejected([Problem(scans[0][0].file if scans else "images", 0, "", "drift needs two images or more")])
+    setup = None if scan is None else setup_of(scan, None, None)
+    if setup is not None and pixel_size(scans[0][0]) is None:
+        raise Rejected([Problem(scans[0][0].file, 0, "", "has no size in nm, which the drift of a scan file needs")])
     return ImageDrift(
         tuple(one[0] for one in scans),
         min(map(len, scans)),
         tuple(drift_intervals(scans, seconds_apart, within_nm)),
         seconds_apart is not None,
         within_nm,
+        None if setup is None else Followed(setup.scan.angle_deg, setup.scan.drift_nm_per_s),
     )
 
 
@@ -95,12 +105,21 @@ def _movie(images: Sequence[ImageSource], frames: tuple[int, int], how: dict[str
     return [read_trace_and_perhaps_retrace(images[0], None, {**how, "frame": one}) for one in range(first, stop)]
 
 
+@dataclass(frozen=True)
+class Followed:
+    """The angle of the scan that took the images, and the drift that it followed already."""
+
+    angle_deg: float
+    drift_nm_per_s: tuple[float, float]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ImageDrift(Result):
     """Drift of the sample in the images: x along the lines to the right, y along the slow axis in the order of rows.
 
     ``scans`` are the images, ``directions`` is 2 where trace and retrace count, ``intervals`` has the shift and the
     time from each image to the next. ``stated_time`` is true if the time was given, and not that of the file.
+    ``scan`` is known where the drift for a scan file was asked for.
     """
 
     scans: tuple[ScanImage, ...]
@@ -108,6 +127,17 @@ class ImageDrift(Result):
     intervals: tuple[DriftInterval, ...]
     stated_time: bool
     within_nm: float | None
+    scan: Followed | None = None
+
+    @property
+    def drift_nm_per_s(self) -> tuple[float, float] | None:
+        """Value of the key of the scan file: what the scan followed and what was left, along the scanner's x and y."""
+        if self.scan is None:
+            return None
+        sine, cosine = sine_and_cosine_of(self.scan.angle_deg / 360.0)
+        before_x, before_y = self.scan.drift_nm_per_s
+        along, across = self.x.value, self.y.value
+        return before_x + cosine * along - sine * across, before_y + sine * along + cosine * across
 
     @property
     def unit(self) -> str:
@@ -149,6 +179,7 @@ class ImageDrift(Result):
             "scan_angle_deg": self.scans[0].angle_deg,
             "unit": self.unit,
             "drift": {axis: _number(getattr(self, axis)) for axis in _AXES},
+            "drift_nm_per_s": self.drift_nm_per_s,
             "seconds": self.seconds,
             "time": "given" if self.stated_time else "file",
             "within_nm": self.within_nm,
@@ -179,6 +210,9 @@ class ImageDrift(Result):
             lines.append(f"{name}: {shift:.4g} pixels from the first image to the last")
         if is_turned(self.scans[0]):
             lines.append(f"scan angle {self.scans[0].angle_deg:.4g} degrees: x and y are those of the image")
+        if self.drift_nm_per_s is not None:
+            x, y = self.drift_nm_per_s
+            lines.append(f"for the scan file, if its frames went up: drift_nm_per_s = [{x:.4g}, {y:.4g}]")
         return "\n".join(lines)
 
     def charts(self) -> PlottedCharts:

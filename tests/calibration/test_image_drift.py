@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from editing import run
+from turned_scans import turned_setup
 
 import tablegen
 from tablegen.api.image_input import read_trace_and_perhaps_retrace
+from tablegen.api.read_image import Image
 from tablegen.base.input_errors import Rejected
 from tablegen.cli import cli
 from tablegen.images.frame_drift import drift_intervals
 from tablegen.images.image_shift import ImagePair, image_shift
+from tablegen.planning.turned_plan import FrameGeometry
 
 SIDE = 80
 NOISE = 0.2
@@ -174,3 +177,33 @@ def test_the_command_prints_it_and_asks_for_the_time(tmp_path: Path, monkeypatch
     record = json.loads(CliRunner().invoke(cli, [*timed, "--json"], catch_exceptions=False).output)
     assert len(record["intervals"]) == 2
     assert abs(record["drift"]["x"]["value"] - 1.0) < 3.0 * record["drift"]["x"]["standard_error"]
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 30.0, 200.0])
+def test_a_scan_that_follows_the_drift_sees_the_sample_at_rest(angle_deg: float, tmp_path: Path) -> None:
+    """Its own map from the axes to the sample takes the motion of the sample away, also where it followed some."""
+    before, along, across = (0.4, -0.2), 1.5, -0.7
+    setup = turned_setup(tmp_path, angle_deg, f"drift_nm_per_s = {list(before)}")
+    pair = [
+        Image(
+            replace(read_trace_and_perhaps_retrace(heights, None, {})[0], width_nm=float(SIDE), height_nm=float(SIDE))
+        )
+        for heights in images(sample(1), [(0.0, 0.0), (4.0 * along, 4.0 * across)], noise=0.0, jumps=0.0)
+    ]
+    drift = tablegen.drift(*pair, seconds_apart=4.0, scan=setup)
+    assert drift.drift_nm_per_s is not None
+    geometry = FrameGeometry(angle_deg, (100.0, 100.0), 0.0, 0.0, before, 1.0)
+    after = FrameGeometry(angle_deg, (100.0, 100.0), 0.0, 0.0, drift.drift_nm_per_s, 1.0)
+    for seconds in (0.0, 10.0):
+        at = np.array(3.0), np.array(5.0), np.array(seconds)
+        seen, rest = geometry.on_the_sample(*at), after.on_the_sample(*at)
+        # A feature moves in the image as much as the place of the axes moves back on the sample.
+        assert float(seen[0] - rest[0]) == pytest.approx(along * seconds, abs=0.3)
+        assert float(seen[1] - rest[1]) == pytest.approx(across * seconds, abs=0.3)
+    assert "drift_nm_per_s = [" in drift.summary()
+
+
+def test_images_without_a_size_have_no_drift_for_a_scan(tmp_path: Path) -> None:
+    pair = images(sample(1), [(0.0, 0.0), (2.0, 1.0)])
+    with pytest.raises(Rejected, match="has no size in nm, which the drift of a scan file needs"):
+        tablegen.drift(*pair, seconds_apart=1.0, scan=turned_setup(tmp_path, 30.0))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Examples:
   tablegen drift first.npy second.npy --seconds-apart 120
   tablegen drift movie.asd --channel TP --frames 0:8 --within 5 --plot drift.png
+  tablegen drift first.sxm second.sxm --scan scan.toml
 
 \b
 Exit status: 0 done, 2 wrong input or not the same place, 4 cannot write, 6 a library is missing.""",
@@ -41,6 +42,13 @@ Exit status: 0 done, 2 wrong input or not the same place, 4 cannot write, 6 a li
     callback=finite,
     metavar="NM",
     help="Largest shift from an image to the next, in nm; a lattice needs it, below half a cell.",
+)
+@click.option(
+    "--scan",
+    type=click.Path(path_type=Path),
+    metavar="SCAN.TOML",
+    help="Scan file with which the images were taken, in frames that go up: also print its drift_nm_per_s, with which "
+    "it follows the sample.",
 )
 @channel_option
 @retrace_channel_option
