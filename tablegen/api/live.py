@@ -8,10 +8,12 @@ from typing import Any
 
 from tablegen.api.build import Build, build
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, words_of
+from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.variants import Variant, other_settings, variants
 from tablegen.device.commit_mode import CommitMode
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import can_keep
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused, Unsuitable
@@ -20,7 +22,9 @@ from tablegen.link.outcome import UploadResult
 from tablegen.link.prepare import check
 from tablegen.link.program_image import ProgramImage
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.turned_plan import TurnedPlan
 
+AnyPlan = Plan | TurnedPlan
 _AXES = "xy"
 _START_WAIT_S = 5.0
 
@@ -36,16 +40,21 @@ class LiveAxis:
     amplitude_v: float
 
     @classmethod
-    def of_plan(cls, line: LinePlan) -> "LiveAxis":
-        """Return the place of a planned axis."""
-        drive = line.drive
-        return cls(
-            drive.position_nm,
-            drive.size_nm,
-            drive.window_nm,
-            drive.v_offset,
-            0.0 if drive.resting else drive.v_amplitude,
+    def of_build(cls, build: Build | TurnedBuild) -> "tuple[LiveAxis, LiveAxis]":
+        """Return the places of both axes; at an angle position and sizes are those of the scan at 0 degrees."""
+        if isinstance(build, Build):
+            x, y = (0.0 if line.drive.resting else line.drive.v_amplitude for line in build.plan.lines)
+            return cls._of(build.plan.x, x), cls._of(build.plan.y, y)
+        x, y = (
+            abs(axis.converter.v_per_code) * (codes.most - codes.least)
+            for axis, codes in zip(build.plan.axes, build.certificate.codes, strict=True)
         )
+        return cls._of(build.plan.straight.x, x), cls._of(build.plan.straight.y, y)
+
+    @classmethod
+    def _of(cls, line: LinePlan, amplitude_v: float) -> "LiveAxis":
+        drive = line.drive
+        return cls(drive.position_nm, drive.size_nm, drive.window_nm, drive.v_offset, amplitude_v)
 
 
 @dataclass(frozen=True)
@@ -63,6 +72,7 @@ class LiveScan:
     swap: str | None
     line_rate_hz: float
     lines: int
+    angle_deg: float
     x: LiveAxis
     y: LiveAxis
     preview: LivePreview | None = None
@@ -78,7 +88,12 @@ class _Scan:
 
     settings: dict[str, Any]
     variant: Variant
-    build: Build
+    build: Build | TurnedBuild
+
+    @property
+    def straight(self) -> Plan:
+        """The plan, of a scan at an angle that at 0 degrees."""
+        return self.build.plan.straight if isinstance(self.build, TurnedBuild) else self.build.plan
 
 
 @dataclass(frozen=True)
@@ -92,8 +107,8 @@ class _Playing:
     @classmethod
     def of_upload(cls, scan: _Scan, generation: int) -> "_Playing":
         """Return the state after an upload."""
-        x, y = scan.build.plan.lines
-        return cls(scan, (words_of(x.program.output), words_of(y.program.output)), generation)
+        program = scan.build.plan.program
+        return cls(scan, (words_of(program.x.output), words_of(program.y.output)), generation)
 
 
 class Live:
@@ -106,6 +121,8 @@ class Live:
     A change continues the frame if the device can (firmware with ``DAC_COMMIT_MODES``), and ticks and lines stay the
     same. Otherwise it waits for the next frame; a device without modes begins a frame at the next line.
 
+    A scan may be at an angle, if both axes have an operator: its plan takes seconds, and it has no preview.
+
     A device with ``DAC_MOVE`` plays a preview first where the schedule stays: the tables that it has, with the gain and
     the offset that come closest to the new plan. The plan follows at once.
     """
@@ -116,6 +133,7 @@ class Live:
         scan: str | Path,
         settings: Mapping[str, Any] | None = None,
         on_preview: Callable[[LivePreview], None] | None = None,
+        on_stage: Callable[[str], object] = lambda _: None,
     ) -> None:
         """Read a scan file; nothing is sent before ``start`` or a change.
 
@@ -129,13 +147,15 @@ class Live:
             Values by key of the scan file, such as ``{"x.size_nm": 500}``, in place of those of the file.
         on_preview
             Function that is called when a preview plays, before the upload of the plan.
+        on_stage
+            Function that is called with a text for each stage of a plan at an angle.
 
         Raises
         ------
         Rejected
             If the file cannot be read, has several scans, or the scan cannot be played or breaks one of its limits.
         """
-        self._device, self._path = device, Path(scan)
+        self._device, self._path, self._on_stage = device, Path(scan), on_stage
         self._limits = device.limits()
         self._scan = self._planned(dict(settings or {}))
         self._sent: _Scan | None = None  # by an upload whose end is not known
@@ -145,9 +165,19 @@ class Live:
         self._previewed: _Playing | None = None  # what plays if the device has taken the last MOVE
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> AnyPlan:
         """The plan of the last change that the device took, or of the scan file before the first."""
         return self._scan.build.plan
+
+    @property
+    def place(self) -> tuple[LinePlan, LinePlan]:
+        """Both axes of that plan; of one at an angle, those of the scan at 0 degrees with its sizes and place."""
+        return self._scan.straight.lines
+
+    @property
+    def angle_deg(self) -> float:
+        """The scan angle."""
+        return self._scan.variant.setup.scan.angle_deg
 
     def start(self) -> LiveScan:
         """Put the scan of the file into the device, and start it if the device is parked."""
@@ -159,12 +189,12 @@ class Live:
         return scan
 
     def move(self, x_nm: float = 0.0, y_nm: float = 0.0) -> LiveScan:
-        """Move the scan by distances in nm from where it is."""
+        """Move the scan by distances in nm from where it is, along the axes of the scanner."""
         self._settle()
         distances = {"x": x_nm, "y": y_nm}
         settings = {
             f"{line.axis}.offset_nm": line.drive.position_nm + distances[line.axis]
-            for line in self.plan.lines
+            for line in self.place
             if distances[line.axis] != 0.0
         }
         return self.set(settings)
@@ -173,6 +203,14 @@ class Live:
         """Make the scan larger by a factor, or smaller by one below 1, about its middle."""
         self._settle()
         return self.set(_zoomed(self._scan.variant, factor))
+
+    def rotate(self, by_deg: float) -> LiveScan:
+        """Turn the scan by an angle, counterclockwise, about its middle.
+
+        A scan at an angle needs an operator on both axes, and its plan takes seconds.
+        """
+        self._settle()
+        return self.set({"angle_deg": (self.angle_deg + by_deg + 180.0) % 360.0 - 180.0})
 
     def set(self, settings: Mapping[str, Any]) -> LiveScan:
         """Play the scan with other values of keys of the scan file; those of earlier changes stay.
@@ -190,7 +228,9 @@ class Live:
         if len(scans) != 1:
             why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
             raise Rejected([Problem(str(self._path), 0, "scans", why)])
-        return _Scan(settings, scans[0], build(scans[0].setup))
+        setup = scans[0].setup
+        built = build_turned(setup, progress=self._on_stage) if setup.mixes_motions else build(setup)
+        return _Scan(settings, scans[0], built)
 
     def _settle(self) -> None:
         """Find out whether the device took the scan of an upload that ended without an answer."""
@@ -218,6 +258,7 @@ class Live:
             raise
         self._scan, self._is_sent = live, True
         self._playing = _Playing.of_upload(live, result.generation)
+        x, y = LiveAxis.of_build(live.build)
         return LiveScan(
             name=scan.name,
             digest=scan.digest,
@@ -225,12 +266,13 @@ class Live:
             swap=None if result.already_running else swap.name.lower(),
             line_rate_hz=float(plan.schedule.line_rate),
             lines=plan.schedule.lines,
-            x=LiveAxis.of_plan(plan.x),
-            y=LiveAxis.of_plan(plan.y),
+            angle_deg=self.angle_deg,
+            x=x,
+            y=y,
             preview=preview,
         )
 
-    def _upload(self, image: ProgramImage, plan: Plan, swap: CommitMode) -> tuple[LivePreview | None, UploadResult]:
+    def _upload(self, image: ProgramImage, plan: AnyPlan, swap: CommitMode) -> tuple[LivePreview | None, UploadResult]:
         """Move to a preview where the device can, and upload the plan; what is refused leaves the scan that plays."""
         before = self._playing
         preview = self._move(plan)
@@ -243,7 +285,7 @@ class Live:
                     self._playing = replace(before, generation=moved_back.generation)
             raise
 
-    def _move(self, plan: Plan) -> LivePreview | None:
+    def _move(self, plan: AnyPlan) -> LivePreview | None:
         """Play the preview of a plan that is checked; None where there is none, or the device refuses it."""
         playing, self._previewed = self._playing, None
         words = None if playing is None else self._preview(playing, plan)
@@ -261,18 +303,19 @@ class Live:
             self._on_preview(preview)
         return preview
 
-    def _preview(self, playing: _Playing, plan: Plan) -> PreviewWords | None:
+    def _preview(self, playing: _Playing, plan: AnyPlan) -> PreviewWords | None:
         """Return the words of a preview, if the device takes moves, and accepts them and the plan behind them."""
-        info, limits, tables = self._device.info, self._limits, playing.tables.build.plan.program
-        if More.MOVE not in info.more:
+        info, limits = self._device.info, self._limits
+        tables, program = playing.tables.build.plan.program, plan.program
+        if More.MOVE not in info.more or not isinstance(tables, DualProgram) or not isinstance(program, DualProgram):
             return None
         now = PreviewWords(*playing.words, 0.0, 0.0).program(tables)
-        words = preview_words(tables, plan.program)
-        if words is None or not is_accepted(plan.program, limits, now, info.shaping):
+        words = preview_words(tables, program)
+        if words is None or not is_accepted(program, limits, now, info.shaping):
             return None
         return words if is_accepted(words.program(tables), limits, now, info.shaping) else None
 
-    def _swap(self, plan: Plan) -> CommitMode:
+    def _swap(self, plan: AnyPlan) -> CommitMode:
         """Return the mode that restarts no frame, if the device has one."""
         if Feature.COMMIT_MODES not in self._device.info.features:
             return CommitMode.LINE

@@ -112,7 +112,7 @@ class FrameGeometry(Struct, frozen=True):
 
 
 class TurnedPlan(Struct, frozen=True, eq=False):
-    """A scan at an angle: both axes and their schedule."""
+    """A scan at an angle: both axes and their schedule. ``straight`` is the same scan at 0 degrees."""
 
     name: str
     scanner: str
@@ -121,6 +121,7 @@ class TurnedPlan(Struct, frozen=True, eq=False):
     x: TurnedAxis
     y: TurnedAxis
     limits: Limits
+    straight: Plan
 
     @property
     def axes(self) -> tuple[TurnedAxis, TurnedAxis]:
@@ -178,7 +179,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     x, y = axes["x"], axes["y"]
     assert x is not None
     assert y is not None
-    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits)
+    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight)
 
 
 def _at_0_degrees(setup: Setup) -> Setup:

@@ -19,6 +19,7 @@ from client_line import Noise, VirtualLine, intact
 from client_rig import BOOT, Bench, client, info_for, model
 from replacing import replace
 from sets import LONG_TEST
+from turned_scans import write_turned
 
 import tablegen
 from tablegen.api.live import Live
@@ -30,11 +31,14 @@ from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
 from tablegen.link.errors import LinkLost, Refused
 from tablegen.link.frames import FrameReader
-from tablegen.link.messages import DeviceInfo, DeviceState, Feature, More, Reason, Request
+from tablegen.link.messages import SPLINE_DEGREE, DeviceInfo, DeviceState, Feature, More, Reason, Request
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
 from tablegen.link.prepare import PreparedScan
+from tablegen.manifest.format import content_hash
+from tablegen.manifest.turned_record import turned_record
 from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.planning.turned_plan import make_turned_plan
 
 SCAN = {"timing.lines": 40}
 MOST_JUMP = 12_000  # codes; the first scan begins by less from the park code
@@ -145,7 +149,7 @@ def test_a_device_without_modes_begins_a_frame(info: DeviceInfo, file: Path) -> 
     ("request_", "why"),
     [
         ("{", "the line is not JSON: "),
-        ("[1]", 'a request is an object with "do": move, zoom, set, park, trigger, status'),
+        ("[1]", 'a request is an object with "do": move, zoom, rotate, set, park, trigger, status'),
         ({"do": "jump"}, 'a request is an object with "do": move, '),
         ({"do": "move", "z_nm": 1}, "move: unknown z_nm; possible: x_nm, y_nm"),
         ({"do": "move", "x_nm": "far"}, 'x_nm is "far"; give a number'),
@@ -214,6 +218,73 @@ def test_a_zoom_that_is_none_changes_nothing(info: DeviceInfo, file: Path) -> No
         with pytest.raises(Rejected, match="cannot be zoomed by -1"):
             live.zoom(-1.0)
         assert live.plan.x.drive.size_nm == pytest.approx(200.0)
+
+
+# Angle
+
+
+TURNED = ("timing.lines = 16", "x.band_limit.harmonics = 24", "timing.line_rate_hz = 400")
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DeviceInfo]:
+    """A scan with operators on both axes, at 0 degrees, and a device that plays it at any angle."""
+    file = write_turned(tmp_path_factory.mktemp("turned"), 0.0, *TURNED)
+    info = info_for(PreparedScan.of_plan(make_plan(load(file))))
+    slow = {"more": More.SLOW_PARTS | More.MOVE, "slow_knots": 17, "slow_index_bits": 6, "degree": SPLINE_DEGREE}
+    # At an angle y is fast too.
+    steps = {f"{axis}_limits": replace(getattr(info, f"{axis}_limits"), max_step=1 << 16) for axis in "xy"}
+    return file, replace(info, features=info.features | Feature.COMMIT_MODES, **slow, **steps)  # type: ignore[arg-type]
+
+
+@pytest.mark.common
+def test_a_scan_is_turned(turned: tuple[Path, DeviceInfo], tmp_path: Path) -> None:
+    """From 0 degrees to an angle, on to another one, moved there, and back: each is the scan that a build makes."""
+    file, info = turned
+    start, at_30, again, moved, back, wrong, status = said(
+        Bench(model(info, boot=BOOT)),
+        file,
+        {"do": "rotate", "by_deg": 30},
+        {"do": "rotate", "by_deg": -190},
+        {"do": "move", "x_nm": 10},
+        {"do": "rotate", "by_deg": 160},
+        {"do": "rotate"},
+        {"do": "status"},
+    )
+    scans = [one["scan"] for one in (start, at_30, again, moved, back)]
+    assert [scan["angle_deg"] for scan in scans] == [0.0, 30.0, -160.0, -160.0, 0.0]
+    # The frame goes on where y has a slow part before and after.
+    assert [scan["swap"] for scan in scans] == ["frame", "frame", "keep", "keep", "frame"]
+    assert all(scan["preview"] is None for scan in scans)
+    assert moved["scan"]["x"]["position_nm"] - again["scan"]["x"]["position_nm"] == pytest.approx(10.0, abs=1e-6)
+    assert moved["scan"]["x"]["size_nm"] == pytest.approx(start["scan"]["x"]["size_nm"])
+    assert again["scan"]["y"]["amplitude_v"] != at_30["scan"]["y"]["amplitude_v"]
+    record = turned_record(make_turned_plan(load(write_turned(tmp_path, -160.0, *TURNED))))
+    assert again["scan"]["digest"] == content_hash(record | {"name": again["scan"]["name"]})
+    assert wrong["error"] == "by_deg is null; give a number"
+    assert status["status"]["digest"] == back["scan"]["digest"]
+
+
+@pytest.mark.common
+def test_keys_turn_and_move_along_the_lines(turned: tuple[Path, DeviceInfo]) -> None:
+    file, info = turned
+    _, start, *rest = pressed(Bench(model(info, boot=BOOT)), file, "[", "\x1b[C", "q")
+    assert "learning a frame of 16 lines on the operator of x ..." in rest
+    at_5, right = (text for text in rest if not text.endswith(" ..."))
+    assert at_5.splitlines()[-1] == "400 Hz, 16 lines, 5 degrees; from a new frame"
+    before, after = (
+        [float(row.split()[-2]) for row in text.splitlines() if " nm at " in row] for text in (at_5, right)
+    )
+    assert after[0] - before[0] == pytest.approx(30.0 * np.cos(np.radians(5.0)), abs=0.02)
+    assert after[1] - before[1] == pytest.approx(30.0 * np.sin(np.radians(5.0)), abs=0.02)
+    assert right.splitlines()[-1] == "400 Hz, 16 lines, 5 degrees; the frame goes on"
+    assert start.endswith("400 Hz, 16 lines; from a new frame")
+
+
+def test_an_axis_without_an_operator_is_not_turned(info: DeviceInfo, file: Path) -> None:
+    start, refused, status = said(Bench(model(info, boot=BOOT)), file, {"do": "rotate", "by_deg": 5}, {"do": "status"})
+    assert "is no operator" in refused["error"]
+    assert status["status"]["digest"] == start["scan"]["digest"]
 
 
 # The link

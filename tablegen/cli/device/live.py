@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tablegen.cli.device.connection import baud_option, connected, key_option, port_option
-from tablegen.cli.shared.common import fail, planned, scan_argument
+from tablegen.cli.shared.common import fail, planned_at_any_angle, scan_argument
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
@@ -27,19 +27,21 @@ _LONGEST_LINE = 65_536  # characters of a request
 def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
     """Put a scan into a running device and start it; then change it while it plays: by keys, or by another program.
 
-    In a terminal, keys move, zoom, change the line rate and park; the command shows where the scan is in the range of
-    the driver. Otherwise a request is a line of JSON on standard input, and has one line of JSON as its answer: "ok" is
-    true with the scan that plays now, or false with the "error". After an error the scan before plays on. At the end of
-    the input the device plays on.
+    In a terminal, keys move, zoom, turn, change the line rate and park; the command shows where the scan is in the
+    range of the driver. Otherwise a request is a line of JSON on standard input, and has one line of JSON as its
+    answer: "ok" is true with the scan that plays now, or false with the "error". After an error the scan before plays
+    on. At the end of the input the device plays on.
 
     \b
     {"do": "move", "x_nm": 50, "y_nm": 0}                move the scan by nm
     {"do": "zoom", "factor": 0.8}                        make it smaller or larger about its middle
+    {"do": "rotate", "by_deg": 15}                       turn it counterclockwise about its middle
     {"do": "set", "values": {"timing.line_rate_hz": 2}}  give keys of the scan file other values
     {"do": "park"}   {"do": "trigger"}   {"do": "status"}
 
     Every change is planned and checked as a build would be, and sent only if scanner, scan and device allow it. The
-    frame goes on if the firmware has DAC_COMMIT_MODES=1, and ticks and lines stay the same.
+    frame goes on if the firmware has DAC_COMMIT_MODES=1, and ticks and lines stay the same. With DAC_MOVE=1 a preview
+    plays before the exact scan. A scan at an angle needs an operator on both axes, and seconds for each change.
 
     \b
     Example:
@@ -52,13 +54,14 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
     """
     from tablegen.api.live import Live
     from tablegen.base.input_errors import Rejected
-    from tablegen.cli.device.live_keys import follow_keys, show_preview
+    from tablegen.cli.device.live_keys import follow_keys, show_preview, show_stage
 
-    planned(scan)  # what is wrong with it needs no device
+    planned_at_any_angle(scan)  # what is wrong with it needs no device
     with connected(port, baud, key_file, goes_on="with the scan that plays") as device:
         in_terminal = sys.stdin.isatty() and sys.stdout.isatty()
         try:
-            live_scan = Live(device, scan, on_preview=show_preview if in_terminal else None)
+            shown = {"on_preview": show_preview, "on_stage": show_stage} if in_terminal else {}
+            live_scan = Live(device, scan, **shown)
             first = live_scan.start()
         except Rejected as rejected:
             fail(rejected.problems, ExitStatus.WRONG_INPUT)
@@ -131,6 +134,10 @@ def _zoom(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dict[
     return {"scan": live_scan.zoom(_number(request, "factor", None)).as_dict()}
 
 
+def _rotate(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dict[str, Any]:
+    return {"scan": live_scan.rotate(_number(request, "by_deg", None)).as_dict()}
+
+
 def _set(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dict[str, Any]:
     values = request.get("values")
     if not isinstance(values, dict):
@@ -167,6 +174,7 @@ _Act = Callable[["Live", "Device", dict[str, Any]], dict[str, Any]]
 _REQUESTS: dict[str, tuple[tuple[str, ...], _Act]] = {
     "move": (("x_nm", "y_nm"), _move),
     "zoom": (("factor",), _zoom),
+    "rotate": (("by_deg",), _rotate),
     "set": (("values",), _set),
     "park": ((), _park),
     "trigger": ((), _trigger),

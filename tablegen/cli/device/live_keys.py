@@ -1,5 +1,6 @@
 """The terminal of ``tablegen live``: keys that move, zoom, speed up and park, and where the scan is."""
 
+from math import cos, radians, sin
 from typing import TYPE_CHECKING
 
 import click
@@ -7,15 +8,16 @@ import click
 from tablegen.cli.shared.terminal import ARROWS
 
 if TYPE_CHECKING:
-    from tablegen.api.live import Live, LiveScan
+    from tablegen.api.live import Live, LiveAxis, LiveScan
     from tablegen.api.live_preview import LivePreview
     from tablegen.link.device import Device
     from tablegen.planning.line_plan import LinePlan
 
-KEYS = "arrows move by a tenth, + - zoom, < > line rate, p park, t start, q quit (the scan plays on)"
+KEYS = "arrows move by a tenth, + - zoom, [ ] turn, < > line rate, p park, t start, q quit (the scan plays on)"
 _MOVES = {"up": (0, 1), "down": (0, -1), "right": (1, 0), "left": (-1, 0)}
 _SHARE = 0.1  # of the size, by which a key moves
 _ZOOMS = {"+": 0.8, "-": 1.25}
+_TURNS_DEG = {"[": 5.0, "]": -5.0}
 _RATES = {"<": 0.8, ">": 1.25}
 _BAR = 40  # characters
 
@@ -35,6 +37,11 @@ def show_preview(preview: "LivePreview") -> None:
     click.echo(f"preview plays, within {errors}; the exact scan follows")
 
 
+def show_stage(stage: str) -> None:
+    """Show the stage of a plan that takes seconds."""
+    click.echo(f"{stage} ...")
+
+
 def _key() -> str:
     """Return the next key; nothing at the end of the input."""
     try:
@@ -48,13 +55,13 @@ def _done(live: "Live", device: "Device", key: str) -> str:
     from tablegen.base.input_errors import Rejected
     from tablegen.link.errors import Refused, Unsuitable
 
-    x, y = live.plan.lines
     try:
         if key in ARROWS:
-            right, up = _MOVES[ARROWS[key]]
-            return _place(live, live.move(right * _SHARE * x.drive.size_nm, up * _SHARE * y.drive.size_nm))
+            return _place(live, live.move(*_distances(live, *_MOVES[ARROWS[key]])))
         if key in _ZOOMS:
             return _place(live, live.zoom(_ZOOMS[key]))
+        if key in _TURNS_DEG:
+            return _place(live, live.rotate(_TURNS_DEG[key]))
         if key in _RATES:
             rate_hz = float(live.plan.schedule.line_rate) * _RATES[key]
             return _place(live, live.set({"timing.line_rate_hz": rate_hz}))
@@ -72,16 +79,25 @@ def _done(live: "Live", device: "Device", key: str) -> str:
     return ""
 
 
+def _distances(live: "Live", right: int, up: int) -> tuple[float, float]:
+    """Return how far to move the axes of the scanner, in nm: along the lines to the right, and across them."""
+    x, y = live.place
+    along, across = right * _SHARE * x.drive.size_nm, up * _SHARE * y.drive.size_nm
+    angle = radians(live.angle_deg)
+    return cos(angle) * along - sin(angle) * across, sin(angle) * along + cos(angle) * across
+
+
 def _place(live: "Live", scan: "LiveScan") -> str:
     """Describe the scan that plays: a bar of the driver's range for each axis, rate, and how it began."""
-    rows = [_bar(line) for line in live.plan.lines]
+    rows = [_bar(line, axis) for line, axis in zip(live.place, (scan.x, scan.y), strict=True)]
     how = {"keep": "the frame goes on", "frame": "from a new frame", "line": "a frame begins", None: "played already"}
-    return "\n".join([*rows, f"{scan.line_rate_hz:.4g} Hz, {scan.lines} lines; {how[scan.swap]}"])
+    angle = f", {scan.angle_deg:.4g} degrees" if scan.angle_deg else ""
+    return "\n".join([*rows, f"{scan.line_rate_hz:.4g} Hz, {scan.lines} lines{angle}; {how[scan.swap]}"])
 
 
-def _bar(line: "LinePlan") -> str:
+def _bar(line: "LinePlan", axis: "LiveAxis") -> str:
     drive, driver = line.drive, line.drive.driver
-    half = 0.0 if drive.resting else 0.5 * drive.v_amplitude
+    half = 0.5 * axis.amplitude_v
     low, high = (driver.share(drive.v_offset + by) for by in (-half, half))
     first = min(max(int(low * _BAR), 0), _BAR - 1)
     last = min(max(int(high * _BAR), first), _BAR - 1)
