@@ -136,8 +136,10 @@ def test_the_page_is_of_this_verilog() -> None:
 
 @pytest.mark.parametrize("old", ["+ step", "reg ", "1'b1"])
 def test_a_change_of_the_verilog_changes_the_digest(tmp_path: Path, old: str) -> None:
-    for path in MODULES.glob("*.v"):
-        (tmp_path / path.name).write_text(path.read_text("utf-8"), "utf-8")
+    for path in MODULES.rglob("*.v"):
+        copy = tmp_path / path.relative_to(MODULES)
+        copy.parent.mkdir(exist_ok=True)
+        copy.write_text(path.read_text("utf-8"), "utf-8")
     assert resources.digest("", tmp_path) == resources.digest("") != resources.digest("a row")
     module = tmp_path / "dac_interpolator.v"
     text = module.read_text("utf-8")

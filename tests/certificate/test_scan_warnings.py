@@ -159,7 +159,7 @@ def test_two_causes_at_once_name_the_best_that_was_tried(tmp_path: Path) -> None
 def test_what_nothing_helps_ends_after_few_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No harmonics are left to take, and no window is narrow enough: a turn in the middle of the image."""
     trials = []
-    monkeypatch.setattr(remedies, "make_plan", lambda setup: trials.append(setup) or make_plan(setup))
+    monkeypatch.setattr(remedies, "make_plan", lambda setup, **how: trials.append(setup) or make_plan(setup, **how))
     edits = {"x.band_limit.harmonics": "1", "x.table.length": "4", "y.table.length": "4", "y.band_limit.harmonics": "1"}
     setup = setup_of(tmp_path, {**FREE, **edits})
     texts = warned(setup)

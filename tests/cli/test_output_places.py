@@ -37,6 +37,7 @@ WORDS = {
     "calibrate size": f"{_CALIBRATE} no.csv --plot {FILE}",
     "calibrate offset": f"{_CALIBRATE} no.csv --report {FILE}",
     "calibrate images": f"{_CALIBRATE} --pair 1 no.npy no.npy --report {FILE}",
+    "calibrate coupling": f"no.csv --plot {FILE}",
     "calibrate operator": f"{_CALIBRATE} no.csv --report {FILE}",
     "calibrate hysteresis": f"{_CALIBRATE} no.csv --write --scanner {FILE}",
     "verify --junit": f"no --junit {FILE}",

@@ -35,6 +35,7 @@ PLOTTING: dict[str, tuple[str, ...]] = {
     "calibrate size": ("calibrate", "size", *_AXIS, "size.csv"),
     "calibrate frequency": ("calibrate", "frequency", *_AXIS, "frequency.csv"),
     "calibrate resonance": ("calibrate", "resonance", *_AXIS, "resonance.csv"),
+    "calibrate coupling": ("calibrate", "coupling", "x_moves.csv"),
     "calibrate hysteresis": ("calibrate", "hysteresis", *_AXIS, *(f"trace{v:g}.csv" for v in AMPLITUDES)),
     "calibrate images": ("calibrate", "images", *_AXIS, *_PAIR),
     "calibrate operator": ("calibrate", "operator", *_AXIS, "o1.csv", "o3.csv", "o5.csv"),
@@ -62,6 +63,8 @@ def make_lab(folder: Path) -> None:
     write_csv(folder / "offset.csv", offset_v=OFFSETS, apparent_nm=apparent(OFFSETS, 0.93, 1.22, 17.7) * NOISE[:5])
     sizes = actual(DRIVES, 11.0, 0.6, 0.5, 200.0) * NOISE[:11]
     write_csv(folder / "size.csv", drive_v=DRIVES, actual_nm=sizes)
+    moves = np.linspace(0.0, 200.0, 100)
+    write_csv(folder / "x_moves.csv", x_nm=moves, y_nm=0.02 * moves + 50.0 * (NOISE - 1.0))
     gain = (1.0 - 0.025 * np.log10(FREQUENCIES / 100.0)) * NOISE[:15]
     write_csv(folder / "frequency.csv", frequency_hz=FREQUENCIES, gain=gain)
     r = RESPONSE / 41e3

@@ -79,7 +79,7 @@ def test_no_command_that_plots_is_left_out() -> None:
     found = {name for name, one in commands(cli) if any("--plot" in option.opts for option in one.params)}
     assert found == set(PLOTTING) - {"simulate own", "show of a line"}
     assert {"show", "build", "refine", "simulate", "correct"} < found
-    assert sum(name.startswith("calibrate") for name in found) == 7
+    assert sum(name.startswith("calibrate") for name in found) == 8
 
 
 X = np.linspace(0.0, 1.0, 50)

@@ -60,8 +60,10 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
     with connected(port, baud, key_file, goes_on="with the scan that plays") as device:
         in_terminal = sys.stdin.isatty() and sys.stdout.isatty()
         try:
-            shown = {"on_preview": show_preview, "on_stage": show_stage} if in_terminal else {}
-            live_scan = Live(device, scan, **shown)
+            if in_terminal:
+                live_scan = Live(device, scan, on_preview=show_preview, on_stage=show_stage)
+            else:
+                live_scan = Live(device, scan)
             first = live_scan.start()
         except Rejected as rejected:
             fail(rejected.problems, ExitStatus.WRONG_INPUT)
