@@ -71,6 +71,21 @@ def test_the_shear_is_told_from_drift(seed: int, others: list[tuple[float, str]]
     assert "drift along the lines looks like coupling" in one.summary()
 
 
+@pytest.mark.rest
+def test_the_standard_errors_are_those_of_the_scatter() -> None:
+    """Of frames up and down with drift and noise, ten samples."""
+    ratios = []
+    for seed in range(10):
+        lies, coupling, drift = trial(seed + 20)
+        images = [
+            (0.0, way, image(lies, coupling, 0.0, way, drift, 2 * seed + k)) for k, way in enumerate(("up", "down"))
+        ]
+        fit = tablegen.calibrate_coupling(images=images, lattice_nm=CELL_NM)  # type: ignore[arg-type]
+        shown = fit.values["x_per_y"]
+        ratios.append((shown.value - shear(coupling)) / shown.standard_error)
+    assert 0.3 < np.sqrt(np.mean(np.square(ratios))) < 1.5
+
+
 def test_a_known_direction_tells_both_values() -> None:
     lies, coupling, drift = trial(3)
     # The waves of the surface are at ``lies``, so the sides of its cell are 30 degrees further.
