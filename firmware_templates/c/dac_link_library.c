@@ -112,7 +112,7 @@ static void put_crc(dac_link *l)
     dac_link_place at = {0, 0, 0, 0};
     uint32_t crc = DAC_LINK_CRC;
 
-    while (at.part != 3)
+    while (at.part != DAC_LINK_END)
         crc = dac_link_crc(crc, dac_link_load_byte(l, &at));
     dac_link_put(l->image[l->idle].info + DAC_LINK_IMAGE_CRC, ~crc);
 }
