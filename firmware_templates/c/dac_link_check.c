@@ -230,14 +230,16 @@ static bool good_period(const dac_link *l, const dac_link_image *image, unsigned
     const uint32_t slow = dac_link_slow_word(l, image, axis);
     const uint32_t wanted = axis == 0 || slow != 0 ? ticks : steps ? lines : ticks * lines;
 
+#if DAC_SLOW_PART
     if (slow != 0) {
         const uint64_t spacing = dac_link_program_word(image, axis + 1, DAC_LINK_KNOT_SPACING);
         if ((axis == 1 && steps) || spacing * ((slow & 127u) - 1) < lines
             || !good_phase(image, axis, lines, DAC_LINK_SLOW_STEP))
             return false;
     }
-    return dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_PERIOD) == wanted
-        && good_phase(image, axis, wanted, DAC_LINK_PHASE_STEP);
+#endif
+    return good_phase(image, axis, wanted, DAC_LINK_PHASE_STEP)
+        && dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_PERIOD) == wanted;
 }
 
 static bool good_output(const dac_link *l, const dac_link_image *image, unsigned axis)

@@ -102,9 +102,9 @@ static void place_slow(dac_link *l, unsigned axis)
 
 static uint32_t bytes_of(const dac_link_part *parts)
 {
-    uint32_t bytes = parts[0].words * parts[0].bytes;
+    uint32_t bytes = 0;
 
-    for (unsigned i = 1; i < DAC_LINK_PARTS; i++)
+    for (unsigned i = 0; i < DAC_LINK_PARTS; i++)
         bytes += parts[i].words * parts[i].bytes;
     return bytes;
 }

@@ -67,19 +67,6 @@ one:    st4 detail
         sub #1
         jz words
         jmp load_axis
-checked:
-        ld1 detail
-        jnz next_check
-        ld #1
-        jmp one
-next_check:
-        inc1 check
-        ld1 check
-        cmp1 stop
-        jnz both
-        cmp #2
-        jz looked
-        jmp accepted
 
 ; p is where byte a of the page of the axis is, or of its constants.
 page:   add2 x_page
@@ -341,7 +328,19 @@ step:   ld4 [p]
         ld4 [p]
         cmp4 t2
         jnc no_step
-        jmp checked
+checked:
+        ld1 detail
+        jnz next_check
+        ld #1
+        jmp one
+next_check:
+        inc1 check
+        ld1 check
+        cmp1 stop
+        jnz both
+        cmp #2
+        jz looked
+        jmp accepted
 
 ; The magnitudes of Fourier words sum to less than 2^32.
 fourier:
