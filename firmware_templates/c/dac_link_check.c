@@ -143,7 +143,7 @@ static dac_word mixed_word(const struct output *o, const struct line *line, uint
 static int64_t line_sum(const struct output *o, const struct line *line, uint32_t phase, uint32_t tick)
 {
     unsigned index_bits = 3;
-    dac_word words[4];
+    dac_word words[4] = {0, 0, 0, 0}; /* gcc's analyser does not see that the loop fills it */
     int32_t sample;
 
     while (o->length >> index_bits != 1)

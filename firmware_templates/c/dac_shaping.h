@@ -12,10 +12,12 @@ int32_t dac_shaping_code(dac_axis *axis, const dac_bank_axis *bank, int32_t samp
 uint32_t dac_shaping_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                           uint32_t ticks);
 
-#if DAC_SLOW_PART && !DAC_LONG_MULTIPLY
+#if DAC_SLOW_PART
+#if !DAC_LONG_MULTIPLY
 /* The same on a line of a slow part. */
 uint32_t dac_shaping_ramp(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                           uint32_t ticks);
+#endif
 #endif
 #endif
 
