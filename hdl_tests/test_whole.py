@@ -189,7 +189,7 @@ class WholeMutant(Mutant):
 
 SEQUENCER, COUNTS, TABLE = "dac_sequencer", "dac_whole", "dac_whole_table"
 MUTANTS = [
-    WholeMutant("any part is whole", SEQUENCER, "words_fit && whole;", "words_fit;", "lines"),
+    WholeMutant("any part is whole", SEQUENCER, "words_fit && whole && ", "words_fit && ", "lines"),
     WholeMutant("registers are not counted", COUNTS, "count[6] && x_whole", "x_whole", "lines"),
     WholeMutant("x is not counted", COUNTS, "x_whole && y_whole", "y_whole", "lines"),
     WholeMutant("y is not counted", COUNTS, "x_whole && y_whole", "x_whole", "lines"),

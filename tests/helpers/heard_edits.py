@@ -253,7 +253,7 @@ SEQUENCER: tuple[Edit, ...] = (
         ("opens <= is_first;\n            imaging <= is_first || (!is_stop && JUMPS == 0 && imaging && !is_zero);"),
     ),
     Edit("a window goes on behind the line", "dac_window", "imaging && !is_zero)", "imaging)"),
-    Edit("a part of a program is committed", "dac_sequencer", "words_fit && whole;", "words_fit;"),
+    Edit("a part of a program is committed", "dac_sequencer", "words_fit && whole && ", "words_fit && "),
     Edit("a trigger does not see the program that waits", "dac_scan", "(loaded || committed)", "loaded"),
     Edit("a trigger on the last tick is lost", "dac_scan", "&& !still_running;", "&& !running;"),
     Edit(
