@@ -117,14 +117,19 @@ static void put_crc(dac_link *l)
     dac_link_put(l->image[l->idle].info + DAC_LINK_IMAGE_CRC, ~crc);
 }
 
-static bool has_slow_part(const dac_program *program)
+/* Whether a program has words that are not put into its image here: those of a slow part or of a table of pixels. */
+static bool has_further_words(const dac_program *program)
 {
+    bool further = false;
+
 #if DAC_SLOW_PART
-    return program->x.slow != NULL || program->y.slow != NULL;
-#else
-    (void)program;
-    return false;
+    further = program->x.slow != NULL || program->y.slow != NULL;
 #endif
+#if DAC_PIXEL_TABLE
+    further = further || program->schedule.pixel_table != NULL;
+#endif
+    (void)program;
+    return further;
 }
 
 /* A compiled program goes the way of an upload too. The sequencer checks what an image does not have: the coding of the
@@ -134,7 +139,7 @@ static bool load_compiled(dac_link *l, const dac_library_entry *entry)
     uint8_t info[DAC_LINK_INFO], payload[4];
     dac_link_answer a = {0, 0, 0, 0, payload};
 
-    if (has_slow_part(&entry->program) || dac_sequencer_load(l->sequencer, &entry->program) != DAC_LOADED)
+    if (has_further_words(&entry->program) || dac_sequencer_load(l->sequencer, &entry->program) != DAC_LOADED)
         return false;
     announce(entry, info);
     if (dac_link_begin(l, info, &a).reason != DAC_LINK_NO_REASON

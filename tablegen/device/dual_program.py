@@ -45,5 +45,5 @@ def require_dual(program: ScanProgram) -> DualProgram:
         If an axis has one, or might have one.
     """
     if not isinstance(program, DualProgram):
-        raise ValueError("a program with a slow part plays in the sequencer of C and over its link, not in Verilog")
+        raise ValueError("a program with a slow part is for C and its link; nothing writes one for Verilog")
     return program

@@ -239,10 +239,7 @@ class FrameProgram(Struct, frozen=True, eq=False):
         Ints
             Codes, shape of ``k``.
         """
-        samples = replace(self.fast, words=self.table(line)).samples(k)
-        here = np.array(line)
-        sums = self.gains.at(here) * samples + self.slow.at(here, self.lines) + k * self._ramps(line, line + 1)[0]
-        return shift_round(sums, self.output.gain_q)
+        return shift_round(self._sums(line, 1, np.ravel(k))[0], self.output.gain_q).reshape(np.shape(k))
 
     def played(self, first: int, count: int, remainders: Remainders) -> Ints:
         """Return the codes of consecutive lines before the clamp, and update ``remainders``.
@@ -280,8 +277,10 @@ class FrameProgram(Struct, frozen=True, eq=False):
         slow = self.slow.at(np.arange(first, stop + 1), self.lines).tolist()
         return np.array([ramp(after - here, step) for here, after in pairwise(slow)], dtype=np.int64)
 
-    def _sums(self, first: int, count: int) -> Ints:
-        k, lines = np.arange(self.fast.phase.ticks, dtype=np.int64), np.arange(first, first + count)
+    def _sums(self, first: int, count: int, k: Ints | None = None) -> Ints:
+        """Return the sums at ticks of lines, shape (count, len(k)); at all ticks unless ``k`` says which."""
+        k = np.arange(self.fast.phase.ticks, dtype=np.int64) if k is None else k
+        lines = np.arange(first, first + count)
         samples = np.stack([replace(self.fast, words=self.table(line)).samples(k) for line in lines.tolist()])
         gains, slow = self.gains.at(lines), self.slow.at(lines, self.lines)
         ramps = self._ramps(first, first + count)
