@@ -239,7 +239,8 @@ class FrameProgram(Struct, frozen=True, eq=False):
         Ints
             Codes, shape of ``k``.
         """
-        return shift_round(self._sums(line, 1, np.ravel(k))[0], self.output.gain_q).reshape(np.shape(k))
+        codes: Ints = shift_round(self._sums(line, 1, np.ravel(k))[0], self.output.gain_q)
+        return codes.reshape(np.shape(k))
 
     def played(self, first: int, count: int, remainders: Remainders) -> Ints:
         """Return the codes of consecutive lines before the clamp, and update ``remainders``.
