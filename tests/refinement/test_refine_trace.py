@@ -48,6 +48,16 @@ def drive(line: LinePlan, turns: np.ndarray) -> np.ndarray:
     return line.drive.v_offset + line.drive.v_amplitude * (w - 0.5)
 
 
+def error_of_phase(line: LinePlan, turns: np.ndarray, sigma: float) -> float:
+    """Return the largest standard error of a phase [periods] of a fit of phase, period, gain and offset to noise."""
+    step = 1e-6
+    slope = (drive(line, turns + step) - drive(line, turns - step)) / (2.0 * step)
+    jacobian = np.column_stack([slope, slope * turns, drive(line, turns), np.ones(len(turns))])
+    covariance = sigma**2 * np.linalg.inv(jacobian.T @ jacobian)[:2, :2]
+    line_of_time = np.column_stack([np.ones(len(turns)), turns])
+    return float(np.sqrt(np.max(np.einsum("ij,jk,ik->i", line_of_time, covariance, line_of_time))))
+
+
 @given(
     start=st.floats(0.0, 0.999),
     clock=st.floats(-2e-3, 2e-3),
@@ -67,8 +77,7 @@ def test_the_drive_says_when_each_sample_was_taken(
     time = 17.3 + turns * 0.01 * (1.0 + clock)
     readings = drive(line, turns) + noise * 20.0 * np.random.default_rng(seed).standard_normal(len(turns))
     found = phase_by_drive(line, time, readings, late * 0.01)
-    # Five standard errors of a phase: the noise over the slope of the drive, 2 a period.
-    error = 5.0 * noise / 2.0 / np.sqrt(len(turns)) * 2.0 + 1e-7
+    error = 5.0 * error_of_phase(line, turns, 20.0 * noise) + 1e-7
     off = found.turns - turns + late / (1.0 + clock)
     assert np.max(np.abs(off - np.rint(np.mean(off)))) < error
     assert found.period_s == pytest.approx(0.01 * (1.0 + clock), rel=2.0 * error / periods)
