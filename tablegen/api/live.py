@@ -14,6 +14,7 @@ from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.variants import Variant, other_settings, variants
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
+from tablegen.device.schedule import Schedule
 from tablegen.device.sequencer import can_keep
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused, Unsuitable
@@ -31,13 +32,18 @@ _START_WAIT_S = 5.0
 
 @dataclass(frozen=True)
 class LiveAxis:
-    """Where an axis scans: position of the offset above that at 0 V, size of the whole line, voltages at the piezo."""
+    """Where an axis scans: position of the offset above that at 0 V, size of the whole line, voltages at the piezo.
+
+    ``drift_nm`` is how far creep and hysteresis move the image in the frame after the change, by the operator of the
+    axis; None without one, at an angle, and where the scan before is not known.
+    """
 
     position_nm: float
     size_nm: float
     window_nm: float
     offset_v: float
     amplitude_v: float
+    drift_nm: float | None = None
 
     @classmethod
     def of_build(cls, build: Build | TurnedBuild) -> "tuple[LiveAxis, LiveAxis]":
@@ -249,6 +255,7 @@ class Live:
         image = scan.image("auto", device.info)
         swap = self._swap(plan)
         check(scan, image, device.info, self._limits, swap=swap)
+        before = self.plan if self._is_sent else None
         try:
             preview, result = self._upload(image, plan, swap)
         except (Refused, Unsuitable):
@@ -259,6 +266,11 @@ class Live:
         self._scan, self._is_sent = live, True
         self._playing = _Playing.of_upload(live, result.generation)
         x, y = LiveAxis.of_build(live.build)
+        if before is not None and isinstance(plan, Plan) and isinstance(before, Plan):
+            x, y = (
+                replace(axis, drift_nm=_drift_nm(last, now, plan.schedule))
+                for axis, last, now in zip((x, y), before.lines, plan.lines, strict=True)
+            )
         return LiveScan(
             name=scan.name,
             digest=scan.digest,
@@ -321,6 +333,14 @@ class Live:
             return CommitMode.LINE
         keeps = self._is_sent and can_keep(self.plan.program, plan.program)
         return CommitMode.KEEP if keeps else CommitMode.FRAME
+
+
+def _drift_nm(before: LinePlan, now: LinePlan, schedule: Schedule) -> float | None:
+    """Return the drift of an axis in the first frame after a change; None without an operator."""
+    transient = now.drive.shape.identification.transient_from(before.drive.shape.identification)
+    if transient is None:
+        return None
+    return transient.drift_nm(1.0 / float(schedule.line_rate), 0, schedule.lines)
 
 
 def _zoomed(variant: Variant, factor: float) -> dict[str, Any]:

@@ -71,5 +71,9 @@ class Identification(Struct, frozen=True, kw_only=True, eq=False):
         """
         return None
 
+    def transient_from(self, before: "Identification") -> Transient | None:
+        """Return the transient of this line after another line of the same axis; None where the model knows none."""
+        return None
+
 
 NO_IDENTIFICATION = Identification()

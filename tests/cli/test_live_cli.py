@@ -17,6 +17,8 @@ import pytest
 from building import REPOSITORY, Variant, write_variant
 from client_line import Noise, VirtualLine, intact
 from client_rig import BOOT, Bench, client, info_for, model
+from link_programs import INFO
+from operator_files import operator_file, write_operator_scan
 from replacing import replace
 from sets import LONG_TEST
 from turned_scans import write_turned
@@ -26,6 +28,8 @@ from tablegen.api.live import Live
 from tablegen.base.input_errors import Rejected
 from tablegen.cli.device.live import live as live_command
 from tablegen.cli.device.live_keys import KEYS
+from tablegen.compensation.models.operator import OperatorIdentification
+from tablegen.compensation.operator.in_time import OperatorInTime, Start
 from tablegen.config.load import load
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
@@ -588,3 +592,31 @@ class _Watch:
         self.low, self.high = min(self.low, *codes), max(self.high, *codes)
         if tick.playing and tick.line:
             self.lines.append(line)
+
+
+def test_the_drift_after_a_change_is_that_of_the_operator_in_time(tmp_path: Path) -> None:
+    """Lines before the move and a frame after it, stepped in time on the operator; y has none."""
+    file = write_operator_scan(tmp_path, operator_file(creep=0.03), "y.band_limit.harmonics = 32", "- [limits]")
+    first, then = planned(file), planned(file, x__offset_nm=planned(file).x.drive.position_nm + 100.0)
+    shapes = info_for(PreparedScan.of_plan(first), features=INFO.features | Feature.COMMIT_MODES)
+    start, moved, zoomed = said(
+        Bench(model(shapes, boot=BOOT)), file, {"do": "move", "x_nm": 100.0}, {"do": "zoom", "factor": 0.5}
+    )
+    assert [start["scan"][axis]["drift_nm"] for axis in "xy"] == [None, None]
+    assert moved["scan"]["y"]["drift_nm"] is None
+    assert zoomed["scan"]["x"]["drift_nm"] not in (None, moved["scan"]["x"]["drift_nm"])
+
+    known, drive = then.x.drive.shape.identification, then.x.drive
+    assert isinstance(known, OperatorIdentification)
+    ticks, lines = then.x.program.ticks, then.schedule.lines
+    line = np.arange(0, ticks, 5)
+    volts = then.x.converter
+    played = [
+        drive.driver.share(volts.v_zero + volts.v_per_code * plan.x.codes(0, ticks)[line]) for plan in (first, then)
+    ]
+    u = np.concatenate([np.tile(played[0], 3), np.tile(played[1], lines + 1)])
+    at = (np.arange(len(u)) / len(line)) / float(then.schedule.line_rate)
+    axis = OperatorInTime(known.operator, lambda _: known.factor)
+    means = axis.position(at, u, Start.LINE).reshape(-1, len(line)).mean(axis=1)[3:]
+    assert moved["scan"]["x"]["drift_nm"] == pytest.approx(abs(means[-1] - means[0]), rel=0.1)
+    assert moved["scan"]["x"]["drift_nm"] > 0.1

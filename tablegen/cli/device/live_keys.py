@@ -103,4 +103,5 @@ def _bar(line: "LinePlan", axis: "LiveAxis") -> str:
     last = min(max(int(high * _BAR), first), _BAR - 1)
     bar = "." * first + "=" * (last + 1 - first) + "." * (_BAR - 1 - last)
     place = f"{drive.size_nm:.5g} nm at {drive.position_nm:.5g} nm"
-    return f"{line.axis} {driver.v_min:g} V [{bar}] {driver.v_max:g} V  {place}"
+    drift = "" if axis.drift_nm is None else f", drifts {axis.drift_nm:.2g} nm in the first frame"
+    return f"{line.axis} {driver.v_min:g} V [{bar}] {driver.v_max:g} V  {place}{drift}"

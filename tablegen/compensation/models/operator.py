@@ -31,7 +31,13 @@ from tablegen.compensation.operator.scan_line import (
     learn_waveform,
     size_sine,
 )
-from tablegen.compensation.operator.transient import SLOWEST_HZ, after_offset, after_size
+from tablegen.compensation.operator.transient import (
+    SLOWEST_HZ,
+    SettledLine,
+    after_offset,
+    after_size,
+    transient_between,
+)
 from tablegen.compensation.operator.uncertainty import possible_errors, size_uncertainty
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.driver import Driver
@@ -48,12 +54,14 @@ class OperatorIdentification(Identification, frozen=True, kw_only=True, eq=False
     """The piezo as the operator knows it, at the rate and offset of a line.
 
     ``operator`` is that of this rate, ``factor`` that of its loops at the mean of the line's drive, and ``between``
-    which share of the size is uncertain since the turns of the drive are not even about that mean.
+    which share of the size is uncertain since the turns of the drive are not even about that mean. ``settled`` is the
+    line as the operator plays it.
     """
 
     operator: Operator
     factor: float
     between: float
+    settled: SettledLine
 
     def piezo(self, driver: Driver, response: Response | None, seed: tuple[int, ...] | None = None) -> OperatorPiezo:
         """Return the piezo that does what the operator says, or that departs from it at random."""
@@ -63,6 +71,12 @@ class OperatorIdentification(Identification, frozen=True, kw_only=True, eq=False
             operator = departing(operator, seed)
             factor *= 1.0 + self.between * float(np.random.default_rng((*seed, 1)).standard_normal())
         return OperatorPiezo(operator, factor, driver, response)
+
+    def transient_from(self, before: Identification) -> Transient | None:
+        """Return the transient of this line after another one, by this operator."""
+        if not isinstance(before, OperatorIdentification):
+            return None
+        return transient_between(_creeping_late(self.operator), before.settled, self.settled, self.factor)
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -214,7 +228,6 @@ def _made(
             f"[{request.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
             "size"
         )
-    late = replace(operator, creep=operator.creep.down_to(SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = solution.v_amplitude * request.driver.span / request.v_amplitude
 
@@ -228,14 +241,20 @@ def _made(
         traces=operator.lines,
         expectation=_expectation(operator, solution, _uncertainty(operator, request, solution)),
         unmeasured_percent=solution.unmeasured_percent,
-        transients=_transients(late, request, solution, factor),
+        transients=_transients(_creeping_late(operator), request, solution, factor),
         operator=operator,
         factor=factor,
         between=between,
+        settled=SettledLine.about(solution.stroke, solution.centre, request.turn, 1.0 / request.rate_hz),
     )
     if place is not None:
         return SineLine.of(series, request.turn, place=place, identification=identification)
     return WholeLine.of(series, request.turn, trade=trade, identification=identification)
+
+
+def _creeping_late(operator: Operator) -> Operator:
+    """Return the operator with creep for all that a few frames may last."""
+    return replace(operator, creep=operator.creep.down_to(SLOWEST_HZ))
 
 
 def _transients(
