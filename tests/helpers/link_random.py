@@ -10,7 +10,7 @@ from cut_flash import MODES, CutFlash
 from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, TABLE_PIXELS, CompiledProgram, HostDevice, Started, widest
 from link_images import damaged, damaged_slow, digest, random_image, random_limits, random_slow_program, resealed
 from link_talk import IDENTITY, Talk
-from pixel_tables import PIXELS, damaged_table, long_windows, table_image
+from pixel_tables import PIXELS, damaged_table, long_windows, table_image, with_table
 from programs import random_dual
 from replacing import replace
 
@@ -189,7 +189,7 @@ class Dialogue:
         return damaged(self.rng, image) if self.rng.random() < 0.3 else image
 
     def _some_table_image(self) -> ProgramImage:
-        image, program = random_image(self.rng, self.shape)
+        image, program = random_image(self.rng, self.shape, order=self.order)
         schedule = long_windows(self.rng, program.schedule.ticks, program.schedule.lines)
         image = table_image(self.rng, replace(program, schedule=schedule))
         if self.rng.random() < 0.1:  # form of the table
@@ -199,7 +199,10 @@ class Dialogue:
         return damaged_table(self.rng, image) if self.rng.random() < 0.3 else image
 
     def _some_slow_image(self) -> ProgramImage:
-        image = make_image(random_slow_program(self.rng, self.shape), digest(self.rng))
+        program = random_slow_program(self.rng, self.shape)
+        if self.pixels and self.rng.random() < 0.7:
+            program = replace(program, schedule=with_table(self.rng, program.schedule))
+        image = make_image(program, digest(self.rng))
         if self.rng.random() < 0.1:  # form of the slow part
             data = bytearray(image.data)
             data[4 * (PAGE_WORDS * int(self.rng.integers(1, 3)) + 12) + int(self.rng.integers(0, 3))] ^= 1 << int(

@@ -219,6 +219,17 @@ def test_tables_of_pixels_are_kept_and_moved() -> None:
         Dialogue(SHAPE, seed, store=True, pixels=True, moves=seed % 2 == 1).play(250)
 
 
+@pytest.mark.rest
+def test_a_table_of_pixels_stands_beside_slow_parts_and_shaped_output() -> None:
+    seen: Counter[object] = Counter()
+    for seed in range(3):
+        for features in ({"slow": True}, {"order": 3}):
+            dialogue = Dialogue(SHAPE, seed, pixels=True, **features)  # type: ignore[arg-type]
+            dialogue.play(150)
+            seen += dialogue.seen
+    assert seen[Request.COMMIT] > 10, seen
+
+
 def test_a_configuration_with_one_fault_is_refused() -> None:
     scan = make_scan(1, index_bits=(5, 5))
     device = HostDevice(scan.program, scan.program, key=KEY, pixels=True)
