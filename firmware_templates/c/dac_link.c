@@ -50,6 +50,14 @@ static bool good_slow(const dac_link_config *c)
 }
 #endif
 
+#if DAC_PIXEL_TABLE
+static bool good_pixel_memory(const dac_link_config *c)
+{
+    return c->table_pixels == 0
+        || (c->pixel_ticks[0] != NULL && c->pixel_ticks[1] != NULL && c->pixel_ticks[0] != c->pixel_ticks[1]);
+}
+#endif
+
 static dac_link_started judge_config(const dac_link_config *c)
 {
     if (!good_axis(&c->x) || !good_axis(&c->y))
@@ -59,6 +67,10 @@ static dac_link_started judge_config(const dac_link_config *c)
 #if DAC_SLOW_PART
     if (!good_slow(c))
         return DAC_LINK_BAD_SLOW;
+#endif
+#if DAC_PIXEL_TABLE
+    if (!good_pixel_memory(c))
+        return DAC_LINK_BAD_PIXEL_TABLE;
 #endif
     return dac_link_judge_key(c);
 }

@@ -54,6 +54,7 @@ typedef struct {
 #else
 #define DAC_LINK_PARTS 1
 #endif
+#define DAC_LINK_Y_PARTS (DAC_LINK_PARTS + DAC_PIXEL_TABLE) /* those of y, then a table of pixels */
 
 /* The resources of an axis. */
 typedef struct {
@@ -79,6 +80,10 @@ typedef struct {
 #if DAC_SLOW_PART
     uint8_t slow_knots;       /* maximum knots of a slow part, 2..65; 0: the link takes no slow parts */
     uint8_t slow_index_bits;  /* of the longest slow table, 3..14 */
+#endif
+#if DAC_PIXEL_TABLE
+    uint16_t table_pixels;    /* maximum pixels of a table of pixels; 0: the link takes no such tables */
+    uint16_t *pixel_ticks[2]; /* 2 table_pixels words each; one is written while the other one plays */
 #endif
     uint8_t window;           /* frames that the host may send without an answer; 0: as many as the ring holds */
     uint8_t key_bytes;        /* 16..32, or 0: no key */
@@ -113,7 +118,8 @@ typedef enum {
     DAC_LINK_NO_IDENTITY, /* a key, but no identity of 4..32 bytes */
     DAC_LINK_NO_RANDOM,   /* a key, but neither `random` nor boot_persists: challenges would come again after a start */
     DAC_LINK_NO_CLOCK,    /* a key, but no `milliseconds`: challenges would last for ever */
-    DAC_LINK_BAD_SLOW     /* slow_knots or slow_index_bits out of range, or memory of slow parts missing or shared */
+    DAC_LINK_BAD_SLOW,    /* slow_knots or slow_index_bits out of range, or memory of slow parts missing or shared */
+    DAC_LINK_BAD_PIXEL_TABLE /* table_pixels without memory, or with shared memory */
 } dac_link_started;
 
 /* Private, down to the functions. It is declared here so that the application can allocate it. */
@@ -126,13 +132,13 @@ typedef struct {
 
 /* A position in an image. */
 typedef struct {
-    uint8_t part;  /* 0 program words, then the DAC_LINK_PARTS of x, those of y, DAC_LINK_END behind them */
+    uint8_t part;  /* 0 program words, the DAC_LINK_PARTS of x, the DAC_LINK_Y_PARTS of y, DAC_LINK_END behind them */
     uint8_t byte;  /* byte of the word */
     uint32_t word; /* word of the part */
     uint32_t held; /* the bytes of a word that were received already */
 } dac_link_place;
 
-#define DAC_LINK_END (1 + 2 * DAC_LINK_PARTS)
+#define DAC_LINK_END (1 + DAC_LINK_PARTS + DAC_LINK_Y_PARTS)
 
 /* A part of an image for an axis. */
 typedef struct {
@@ -184,7 +190,7 @@ typedef struct {
     uint32_t received;
     uint32_t taken_generation, taken_line; /* when the program became active */
     dac_link_place place;
-    dac_link_part x_part[DAC_LINK_PARTS], y_part[DAC_LINK_PARTS];
+    dac_link_part x_part[DAC_LINK_PARTS], y_part[DAC_LINK_Y_PARTS];
 #if DAC_SLOW_PART
     dac_slow_part slow[2][2]; /* of both images: those of x and y */
 #endif

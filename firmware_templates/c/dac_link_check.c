@@ -3,11 +3,16 @@
 #include "dac_link_parts.h"
 #include "dac_slow.h"
 
+enum {
+    CRC, PROGRAM, FOURIER, RENDER, WORD,
 #if DAC_SLOW_PART
-enum { CRC, PROGRAM, FOURIER, RENDER, WORD, SLOW_WORD, RANGE, SLEW, JUMP };
-#else
-enum { CRC, PROGRAM, FOURIER, RENDER, WORD, RANGE, SLEW, JUMP };
+    SLOW_WORD,
 #endif
+#if DAC_PIXEL_TABLE
+    PIXELS,
+#endif
+    RANGE, SLEW, JUMP
+};
 
 #define OUTSIDE 1 /* codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses */
 
@@ -685,6 +690,29 @@ static dac_link_finding check_jump(dac_link *l, bool *done)
 }
 #endif
 
+#if DAC_PIXEL_TABLE
+/* The pixels of a window, 0 trace and 1 retrace: each has a tick at least, and all together those of the window. */
+static dac_link_finding check_pixels(dac_link *l, unsigned window, bool *done)
+{
+    const dac_link_image *const image = &l->image[l->idle];
+    const uint32_t pixels = dac_link_program_word(image, 0, DAC_LINK_PIXELS);
+    const uint32_t count = dac_link_program_word(image, 0, (window == 0 ? DAC_LINK_FORWARD : DAC_LINK_BACKWARD) + 1u);
+    dac_link_check *const c = &l->check;
+
+    *done = true;
+    if (dac_link_pixel_word(l, image) == 0)
+        return nothing;
+    const uint16_t *const ticks = l->config->pixel_ticks[l->idle] + window * pixels;
+    for (const uint32_t end = slice(l, pixels); c->at != end; c->at++) {
+        if (ticks[c->at] == 0 || ticks[c->at] > count - c->sum)
+            return finding(DAC_LINK_PIXEL_TICKS, window, c->at);
+        c->sum += ticks[c->at];
+    }
+    *done = c->at == pixels;
+    return *done && c->sum != count ? finding(DAC_LINK_PIXEL_TICKS, window, pixels) : nothing;
+}
+#endif
+
 /* Checks the content of the memory, not the received bytes. */
 static dac_link_finding check_crc(dac_link *l, bool *done)
 {
@@ -761,6 +789,12 @@ static dac_link_finding check(dac_link *l, bool *done)
 #if DAC_SLOW_PART
     case SLOW_WORD:
         return check_slow_words(l, axis, done);
+#endif
+#if DAC_PIXEL_TABLE
+    case PIXELS:
+        return check_pixels(l, axis, done);
+#endif
+#if DAC_SLOW_PART
     case RANGE:
         return has_slow(l, axis) ? check_lines(l, axis, DAC_LINK_RANGE, done) : check_range(l, axis, done);
     case SLEW:

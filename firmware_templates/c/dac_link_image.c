@@ -22,7 +22,12 @@ static uint32_t most_of(const dac_link_config *config, const dac_link_axis *axis
 
 uint32_t dac_link_most_bytes(const dac_link_config *config)
 {
-    return DAC_LINK_PROGRAM + most_of(config, &config->x) + most_of(config, &config->y);
+#if DAC_PIXEL_TABLE
+    const uint32_t pixels = UINT32_C(4) * config->table_pixels;
+#else
+    const uint32_t pixels = 0;
+#endif
+    return DAC_LINK_PROGRAM + most_of(config, &config->x) + most_of(config, &config->y) + pixels;
 }
 
 uint32_t dac_link_table_words(const dac_link_image *image, unsigned axis)
@@ -100,6 +105,25 @@ static void place_slow(dac_link *l, unsigned axis)
 }
 #endif
 
+#if DAC_PIXEL_TABLE
+#define PIXEL_PART (DAC_LINK_END - 1)
+
+static bool has_room_for_pixels(const dac_link *l, const dac_link_image *image)
+{
+    const uint32_t word = dac_link_pixel_word(l, image), pixels = dac_link_program_word(image, 0, DAC_LINK_PIXELS);
+
+    return word == 0 || (word == 1 && pixels >= 1 && pixels <= l->config->table_pixels);
+}
+
+/* The table of pixels: of the trace, then of the retrace. Without one it has no words. */
+static dac_link_part pixels_of(const dac_link *l, const dac_link_image *image)
+{
+    const uint32_t words = 2 * dac_link_program_word(image, 0, DAC_LINK_PIXELS);
+    const dac_link_part part = {dac_link_pixel_word(l, image) != 0 ? words : 0, 2, 0};
+    return part;
+}
+#endif
+
 static uint32_t bytes_of(const dac_link_part *parts)
 {
     uint32_t bytes = 0;
@@ -138,6 +162,12 @@ static dac_link_finding lay_out(dac_link *l)
 #endif
     }
     bytes += bytes_of(l->x_part) + bytes_of(l->y_part);
+#if DAC_PIXEL_TABLE
+    if (!has_room_for_pixels(l, image))
+        return dac_link_because(DAC_LINK_SHAPE, 0);
+    l->y_part[DAC_LINK_PARTS] = pixels_of(l, image);
+    bytes += 2 * l->y_part[DAC_LINK_PARTS].words;
+#endif
     return bytes == dac_link_get(image->info + DAC_LINK_BYTES) ? dac_link_fine()
                                                               : dac_link_because(DAC_LINK_LENGTH, bytes);
 }
@@ -243,6 +273,10 @@ dac_link_finding dac_link_store(dac_link *l, uint8_t byte)
     if (at->byte == part->bytes - 1) {
         if (part->harmonics)
             axis->fourier[at->word] = extended(at->held, 4);
+#if DAC_PIXEL_TABLE
+        else if (at->part == PIXEL_PART)
+            l->config->pixel_ticks[l->idle][at->word] = (uint16_t)at->held;
+#endif
         else
             put_word(axis, l->idle, at->part, at->word, extended(at->held, part->bytes));
     }
@@ -258,6 +292,10 @@ uint8_t dac_link_load_byte(const dac_link *l, dac_link_place *at)
 
     if (at->part == 0) {
         word = l->image[l->idle].program[at->word];
+#if DAC_PIXEL_TABLE
+    } else if (at->part == PIXEL_PART) {
+        word = l->config->pixel_ticks[l->idle][at->word];
+#endif
     } else {
         const dac_link_axis *const axis = dac_link_axis_of(l, axis_at(at->part));
         const bool fourier = part_at(at->part, l->x_part, l->y_part)->harmonics != 0;
@@ -270,7 +308,7 @@ uint8_t dac_link_load_byte(const dac_link *l, dac_link_place *at)
 uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, uint8_t count)
 {
     const dac_link_image *const image = &l->image[l->playing];
-    dac_link_part x[DAC_LINK_PARTS], y[DAC_LINK_PARTS];
+    dac_link_part x[DAC_LINK_PARTS], y[DAC_LINK_Y_PARTS];
     dac_link_place at = {0, 0, offset, 0};
     uint8_t done = 0;
 
@@ -279,6 +317,9 @@ uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, u
 #if DAC_SLOW_PART
     list_slow(l, image, 0, x);
     list_slow(l, image, 1, y);
+#endif
+#if DAC_PIXEL_TABLE
+    y[DAC_LINK_PARTS] = pixels_of(l, image);
 #endif
     if (offset >= DAC_LINK_PROGRAM) {
         uint32_t rest = offset - DAC_LINK_PROGRAM;
@@ -295,6 +336,11 @@ uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, u
     for (; done != count && at.part != DAC_LINK_END; done++) {
         const unsigned shift = 8u * at.byte;
         uint32_t word;
+#if DAC_PIXEL_TABLE
+        if (at.part == PIXEL_PART)
+            word = l->config->pixel_ticks[l->playing][at.word];
+        else
+#endif
         if (at.part != 0)
             word = (uint32_t)word_at(dac_link_axis_of(l, axis_at(at.part)), l->playing, at.part, at.word);
         else if (at.word >= 64 && at.word % 64 / 4 == DAC_LINK_ORDER)
@@ -319,7 +365,7 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
     s->turn_tick = dac_link_program_word(image, 0, DAC_LINK_TURN_TICK);
     s->pixels = dac_link_program_word(image, 0, DAC_LINK_PIXELS);
 #if DAC_PIXEL_TABLE
-    s->pixel_table = NULL;
+    s->pixel_table = dac_link_pixel_word(l, image) != 0 ? l->config->pixel_ticks[dac_link_tables(l)] : NULL;
 #endif
     for (unsigned i = 0; i < 4; i++) {
         windows[i]->first = dac_link_program_word(image, 0, DAC_LINK_FORWARD + 2 * i);

@@ -30,6 +30,9 @@ static void put_scan(uint8_t *page, const dac_program *p)
     }
     put_word(page, DAC_LINK_PIXELS, s->pixels);
     put_word(page, DAC_LINK_Y_STEPS, p->y.hold_ticks != 1);
+#if DAC_PIXEL_TABLE
+    put_word(page, DAC_LINK_PIXEL_WORD, s->pixel_table != NULL);
+#endif
 }
 
 static void put_axis(uint8_t *page, const dac_axis_program *a)
@@ -83,6 +86,10 @@ static void announce(const dac_library_entry *entry, uint8_t *info)
         shape[3] = 0;
         bytes += axes[axis]->length * table_bytes(axes[axis]);
     }
+#if DAC_PIXEL_TABLE
+    if (entry->program.schedule.pixel_table != NULL)
+        bytes += 4 * entry->program.schedule.pixels;
+#endif
     dac_link_put(info + DAC_LINK_BYTES, bytes);
     dac_link_put(info + DAC_LINK_IMAGE_CRC, 0); /* computed when the image is in memory */
 }
@@ -107,6 +114,16 @@ static void store_table(dac_link *l, const dac_axis_program *a)
             (void)dac_link_store(l, (uint8_t)((uint32_t)a->table[word] >> 8 * byte));
 }
 
+#if DAC_PIXEL_TABLE
+static void store_pixels(dac_link *l, const dac_schedule *s)
+{
+    for (uint32_t word = 0; s->pixel_table != NULL && word < 2 * s->pixels; word++) {
+        (void)dac_link_store(l, (uint8_t)s->pixel_table[word]);
+        (void)dac_link_store(l, (uint8_t)(s->pixel_table[word] >> 8));
+    }
+}
+#endif
+
 static void put_crc(dac_link *l)
 {
     dac_link_place at = {0, 0, 0, 0};
@@ -117,19 +134,15 @@ static void put_crc(dac_link *l)
     dac_link_put(l->image[l->idle].info + DAC_LINK_IMAGE_CRC, ~crc);
 }
 
-/* Whether a program has words that are not put into its image here: those of a slow part or of a table of pixels. */
+/* Whether a program has words that are not put into its image here: those of a slow part. */
 static bool has_further_words(const dac_program *program)
 {
-    bool further = false;
-
 #if DAC_SLOW_PART
-    further = program->x.slow != NULL || program->y.slow != NULL;
-#endif
-#if DAC_PIXEL_TABLE
-    further = further || program->schedule.pixel_table != NULL;
-#endif
+    return program->x.slow != NULL || program->y.slow != NULL;
+#else
     (void)program;
-    return further;
+    return false;
+#endif
 }
 
 /* A compiled program goes the way of an upload too. The sequencer checks what an image does not have: the coding of the
@@ -147,6 +160,9 @@ static bool load_compiled(dac_link *l, const dac_library_entry *entry)
         return false;
     store_table(l, &entry->program.x);
     store_table(l, &entry->program.y);
+#if DAC_PIXEL_TABLE
+    store_pixels(l, &entry->program.schedule);
+#endif
     put_crc(l);
     return true;
 }

@@ -49,7 +49,8 @@ enum {
     DAC_LINK_GENERATION,
     DAC_LINK_NO_TRIAL,
     DAC_LINK_FLASH,
-    DAC_LINK_SLOW_PART = 38
+    DAC_LINK_PIXEL_TICKS,
+    DAC_LINK_SLOW_PART
 };
 
 typedef struct {
@@ -102,7 +103,8 @@ enum { DAC_LINK_HASH = 0, DAC_LINK_BYTES = 32, DAC_LINK_IMAGE_CRC = 36, DAC_LINK
 
 /* Words of the pages. */
 enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LINK_TURN_TICK, DAC_LINK_FORWARD,
-       DAC_LINK_BACKWARD = 6, DAC_LINK_UP = 8, DAC_LINK_DOWN = 10, DAC_LINK_PIXELS = 12, DAC_LINK_Y_STEPS };
+       DAC_LINK_BACKWARD = 6, DAC_LINK_UP = 8, DAC_LINK_DOWN = 10, DAC_LINK_PIXELS = 12, DAC_LINK_Y_STEPS,
+       DAC_LINK_PIXEL_WORD };
 enum { DAC_LINK_PHASE_STEP, DAC_LINK_PHASE_REMAINDER, DAC_LINK_PHASE_PERIOD, DAC_LINK_GAIN, DAC_LINK_OFFSET_LOW,
        DAC_LINK_OFFSET_HIGH, DAC_LINK_CODE_MIN, DAC_LINK_CODE_MAX, DAC_LINK_MAX_STEP, DAC_LINK_PARK_CODE,
        DAC_LINK_ORDER, DAC_LINK_SHAPING_WORD, DAC_LINK_SLOW_WORD, DAC_LINK_KNOT_SPACING, DAC_LINK_SLOW_STEP,
@@ -145,6 +147,14 @@ static inline unsigned dac_link_index_bits(const dac_link_image *image, unsigned
 {
     return dac_link_shape(image, axis)[0] & (DAC_SPLINE ? DAC_CUBIC - 1u : 255u);
 }
+
+#if DAC_PIXEL_TABLE
+/* The word that says whether an image has a table of pixels; 0 on a device that has no memory for one. */
+static inline uint32_t dac_link_pixel_word(const dac_link *l, const dac_link_image *image)
+{
+    return l->config->table_pixels != 0 ? dac_link_program_word(image, 0, DAC_LINK_PIXEL_WORD) : 0;
+}
+#endif
 
 /* The word that describes the slow part of an axis; 0 without one, and on a device that has none. */
 static inline uint32_t dac_link_slow_word(const dac_link *l, const dac_link_image *image, unsigned axis)

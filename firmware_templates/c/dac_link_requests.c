@@ -14,6 +14,9 @@ enum { KEEPS_PROGRAMS = 128 };
 #if DAC_SLOW_PART
 enum { PLAYS_SLOW_PARTS = 1 };
 #endif
+#if DAC_PIXEL_TABLE
+enum { PLAYS_PIXEL_TABLES = 4 };
+#endif
 #define FURTHER (DAC_MOVE ? 2u : 0u) /* further features, by the options; HELLO ends with them if there are any */
 #if DAC_MOVE
 enum { MOVED = 2 }; /* behind PERMITS */
@@ -106,6 +109,27 @@ static void put_status(const dac_link *l, uint8_t *at)
         at[44 + i] = hash == NULL || s.swaps == 0 ? 0 : hash[i];
 }
 
+#if DAC_PIXEL_TABLE
+/* Further features of a link with tables of pixels; returns their bytes. Those of slow parts are 0 without them. */
+static uint8_t put_further(const dac_link_config *c, uint8_t *at)
+{
+    uint32_t further = FURTHER | PLAYS_PIXEL_TABLES;
+
+    at[4] = at[5] = 0;
+#if DAC_SLOW_PART
+    if (c->slow_knots != 0) {
+        further |= PLAYS_SLOW_PARTS;
+        at[4] = c->slow_knots;
+        at[5] = c->slow_index_bits;
+    }
+#endif
+    dac_link_put(at, further);
+    at[6] = (uint8_t)c->table_pixels;
+    at[7] = (uint8_t)(c->table_pixels >> 8);
+    return 8;
+}
+#endif
+
 /* Requests. */
 
 dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *a)
@@ -119,6 +143,12 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     a->length = DEVICE + STATUS;
     put_device(l, a->payload);
     put_status(l, a->payload + DEVICE);
+#if DAC_PIXEL_TABLE
+    if (l->config->table_pixels != 0) {
+        a->length = (uint8_t)(DEVICE + STATUS + put_further(l->config, a->payload + DEVICE + STATUS));
+        return dac_link_fine();
+    }
+#endif
 #if DAC_SLOW_PART
     if (l->config->slow_knots != 0) {
         dac_link_put(a->payload + DEVICE + STATUS, FURTHER | PLAYS_SLOW_PARTS);

@@ -61,9 +61,10 @@ def preview_words(playing: DualProgram, plan: DualProgram) -> PreviewWords | Non
     """
     old, new = playing.schedule, plan.schedule
     timing = [
-        (each.ticks, each.lines, each.pixels, each.turn_tick, each.forward, each.backward, each.up, each.down)
+        (each.ticks, each.lines, each.pixels, each.turn_tick, each.forward, each.backward, each.up, each.down,
+         each.pixel_table)
         for each in (old, new)
-    ]
+    ]  # fmt: skip
     if timing[0] != timing[1] or (playing.y.hold, playing.y.phase.ticks) != (plan.y.hold, plan.y.phase.ticks):
         return None
     x, x_error_percent = _closest(playing.x, plan.x)

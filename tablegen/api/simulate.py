@@ -25,6 +25,7 @@ from tablegen.virtual.simulation import Run, models_of
 from tablegen.virtual.simulation import simulate as play
 
 OWN, DEFAULT = "own", "default"
+_SINE = "a sine is simulated on the scanner file's own operator alone; leave --scanner-truth out, or take 'line'"
 
 
 @one_blas_thread
@@ -83,6 +84,8 @@ def simulate(
     if truth == OWN or (truth is None and operators):
         own_runs = tuple(simulate_own(setup, seed, progress))
         return SimulatedScan(setup.scan.name, None, (), own_runs, tuple(operators), *_answers(setup))
+    if setup.scan.x.motion != "line":
+        raise Rejected([setup.scan_file.problem("x.motion", _SINE)])
     name = truth or DEFAULT
     laboratory = Laboratory(name, setup.scanner)
     model, scanner = laboratory.truth, laboratory.scanner
@@ -102,7 +105,7 @@ def simulate(
 def _answers(setup: Setup) -> tuple[tuple[ErrorAnswer, ...], str]:
     """Return the error of each axis, and the time of an image; empty where the scan itself cannot be played."""
     try:
-        plan = make_plan(setup)
+        plan = make_plan(setup, sines=True)
         certificates = certify(plan)
     except Rejected:  # the simulation says of each model why
         return (), ""

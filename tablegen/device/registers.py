@@ -26,6 +26,7 @@ SCAN_WORDS = (
     "pixels",
     "y_steps",
 )
+PIXEL_TABLE_WORD = len(SCAN_WORDS)  # behind them: 1 where the schedule has a table of pixels, 0 without
 AXIS_WORDS = (
     "phase_step",
     "phase_remainder",
@@ -59,11 +60,8 @@ def program_words(schedule: Schedule, x: AxisProgram, y: AxisProgram, harmonics:
     Raises
     ------
     ValueError
-        If the gains and the ratios of a slow part are at different lines, for which there are no words, or the schedule
-        has a table of pixels.
+        If the gains and the ratios of a slow part are at different lines, for which there are no words.
     """
-    if schedule.pixel_table is not None:
-        raise ValueError("a program with a table of pixels plays in C alone, neither over the link nor in Verilog")
     steps = not isinstance(y, FrameProgram) and y.hold != 1
     pages = [
         _scan(schedule, steps),
@@ -83,6 +81,7 @@ def _scan(schedule: Schedule, steps: bool) -> list[int]:
         *(edge for window in windows for edge in (window.first, window.count)),
         schedule.pixels,
         int(steps),
+        int(schedule.pixel_table is not None),
     ]
 
 

@@ -61,7 +61,7 @@ def first_objection(
     for page, limits in ((1, x), (2, y)):
         if contents.axis(page, "max_step") > limits.max_step:
             return Reason.STEP, page - 1
-    for check in (_fourier, _word, _slow_word, _range, _slew):
+    for check in (_fourier, _word, _slow_word, _pixel_ticks, _range, _slew):
         for page in (1, 2):
             if failure := check(contents, page):
                 return failure
@@ -157,6 +157,15 @@ def _slow_word(contents: Contents, page: int) -> Finding | None:
     table = _unfit(slow.table, contents.shape(page).word_bits) | (np.abs(offsets) >= reach)
     before = np.zeros(len(contents.table(page)) + len(slow.second), dtype=np.bool_)
     return _first(np.concatenate([before, table, _unfit(slow.gains, GAIN_BITS)]), Reason.WORD, page)
+
+
+def _pixel_ticks(contents: Contents, page: int) -> Finding | None:
+    """Check the table of pixels of the trace (page 1) or the retrace (2): each has a tick, and they fill the window."""
+    if contents.pixel_ticks is None:
+        return None
+    ticks, count = contents.pixel_ticks[page - 1], contents.scan("forward_count" if page == 1 else "backward_count")
+    ends = np.cumsum(ticks)
+    return _first(np.append((ticks == 0) | (ends > count), ends[-1] != count), Reason.PIXEL_TICKS, page)
 
 
 def _unfit(words: Ints, bits: int) -> Bools:

@@ -35,6 +35,8 @@ MAXIMUM_KNOTS = 65  # as in tablegen.fixedpoint.frame_program
 _SLOW_INDEX_BITS = range(3, 15)
 _SLOW_PART_BYTES = (112, 176)  # where an image has the words slow_part of x and y
 _KNOT_BYTES = 3 + 2  # a gain and a ratio
+_PIXEL_BYTES = 2 * 2  # the ticks of a pixel in trace and retrace
+MAXIMUM_TABLE_PIXELS = 65535
 # Of both axes: a word more for each of the table, the slow table and the knots.
 MAXIMUM_SLOW_BYTES = 2 * (
     (1 << MAXIMUM_INDEX_BITS) + (_MAXIMUM_WORD_BYTES << _SLOW_INDEX_BITS[-1]) + _KNOT_BYTES * MAXIMUM_KNOTS
@@ -47,7 +49,8 @@ def most_bytes(info: DeviceInfo) -> int:
     ``image_bytes`` may be more, where its memory is; and less, where tables are longer than what was uploaded for them.
     """
     fourier = _FOURIER_BYTES * (2 * info.harmonics + 1)
-    return PROGRAM_BYTES + sum(max(_table_bytes(axis, info), fourier) for axis in (info.x, info.y))
+    tables = sum(max(_table_bytes(axis, info), fourier) for axis in (info.x, info.y))
+    return PROGRAM_BYTES + tables + _PIXEL_BYTES * info.table_pixels
 
 
 def _table_bytes(axis: AxisShape, info: DeviceInfo) -> int:
@@ -79,13 +82,16 @@ def check_device(info: DeviceInfo) -> None:
         _check_shape(name, shape)
         _check("HELLO", f"{name} code_max", limits.code_max, limits.code_min, (1 << shape.dac_bits) - 1)
         _check("HELLO", f"{name} max_step", limits.max_step, 1, (1 << 32) - 1)
-    slow_bytes = 0
+    further_bytes = 0
     if More.SLOW_PARTS in info.more:
         _check("HELLO", "knots of a slow part", info.slow_knots, 2, MAXIMUM_KNOTS)
         bits = _SLOW_INDEX_BITS
         _check("HELLO", "index_bits of a slow table", info.slow_index_bits, bits[0], bits[-1])
-        slow_bytes = MAXIMUM_SLOW_BYTES
-    _check("HELLO", "image_bytes", info.image_bytes, 0, MAXIMUM_IMAGE_BYTES + slow_bytes)
+        further_bytes += MAXIMUM_SLOW_BYTES
+    if More.PIXEL_TABLES in info.more:
+        _check("HELLO", "pixels of a table", info.table_pixels, 1, MAXIMUM_TABLE_PIXELS)
+        further_bytes += _PIXEL_BYTES * MAXIMUM_TABLE_PIXELS
+    _check("HELLO", "image_bytes", info.image_bytes, 0, MAXIMUM_IMAGE_BYTES + further_bytes)
 
 
 def _check_shape(name: str, shape: AxisShape) -> None:

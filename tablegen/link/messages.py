@@ -79,6 +79,7 @@ class Reason(IntEnum):
     GENERATION = 34
     TRIAL = 35
     FLASH = 36
+    PIXEL_TICKS = 37
     SLOW_PART = 38
 
 
@@ -104,6 +105,7 @@ class More(IntFlag):
 
 
 NO_MORE = More(0)
+FURTHER_PARTS = More.SLOW_PARTS | More.PIXEL_TABLES  # those with words in an image
 
 
 class DeviceState(IntEnum):
@@ -218,12 +220,14 @@ class DeviceInfo:
     """The properties of a device, fixed at its build; ``shaping`` is its highest order of shaped output.
 
     They are 56 bytes in front of the status in the answer to HELLO, and ``more`` behind it, where it is not 0; behind
-    that ``slow_knots`` and ``slow_index_bits``, the most knots and the longest slow table, where it plays slow parts.
+    that ``slow_knots`` and ``slow_index_bits``, the most knots and the longest slow table, where it plays slow parts or
+    tables of pixels (0 without slow parts); behind those ``table_pixels``, the most pixels of such a table.
     """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
     MORE: ClassVar[struct.Struct] = struct.Struct("<I")
     SLOW: ClassVar[struct.Struct] = struct.Struct("<2B")
+    PIXELS: ClassVar[struct.Struct] = struct.Struct("<H")
 
     version: int
     features: Feature
@@ -241,6 +245,7 @@ class DeviceInfo:
     more: More = NO_MORE
     slow_knots: int = 0
     slow_index_bits: int = 0
+    table_pixels: int = 0
 
     def pack(self) -> bytes:
         """Return the beginning of the answer to HELLO."""
@@ -251,8 +256,10 @@ class DeviceInfo:
     def hello(self, status: "DeviceStatus") -> bytes:
         """Return the answer to HELLO; without further features it has the length that it had before them."""
         answer = self.pack() + status.pack() + (self.MORE.pack(self.more) if self.more else b"")
-        slow = More.SLOW_PARTS in self.more
-        return answer + (self.SLOW.pack(self.slow_knots, self.slow_index_bits) if slow else b"")
+        pixels = More.PIXEL_TABLES in self.more
+        if pixels or More.SLOW_PARTS in self.more:
+            answer += self.SLOW.pack(self.slow_knots, self.slow_index_bits)
+        return answer + (self.PIXELS.pack(self.table_pixels) if pixels else b"")
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
@@ -274,6 +281,9 @@ class DeviceInfo:
         slow_at = more_at + cls.MORE.size
         has_slow = more & More.SLOW_PARTS and len(payload) >= slow_at + cls.SLOW.size
         knots, slow_bits = cls.SLOW.unpack_from(payload, slow_at) if has_slow else (0, 0)
+        pixels_at = slow_at + cls.SLOW.size
+        has_pixels = more & More.PIXEL_TABLES and len(payload) >= pixels_at + cls.PIXELS.size
+        (pixels,) = cls.PIXELS.unpack_from(payload, pixels_at) if has_pixels else (0,)
         return cls(
             version,
             Feature(features),
@@ -291,6 +301,7 @@ class DeviceInfo:
             More(more),
             knots,
             slow_bits,
+            pixels,
         )
 
 

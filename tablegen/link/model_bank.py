@@ -8,7 +8,14 @@ from fractions import Fraction
 
 from tablegen.config.schema import MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.device.dual_program import ScanProgram
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SLOW_INDEX_SHIFT, SLOW_WORDS
+from tablegen.device.registers import (
+    AXIS_WORDS,
+    PAGE_WORDS,
+    PIXEL_TABLE_WORD,
+    SCAN_WORDS,
+    SLOW_INDEX_SHIFT,
+    SLOW_WORDS,
+)
 from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.messages import (
@@ -24,7 +31,7 @@ from tablegen.link.messages import (
     Upload,
 )
 from tablegen.link.players import Player
-from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, layout, make_image, take_apart
+from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, make_image, size_of, take_apart
 
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table, and of a slow one
 _MIXED_INDEX_BITS = 8  # most index bits of a table of lines with a slow part
@@ -73,6 +80,10 @@ def program_of(contents: Contents, update_rate_hz: int = 0) -> ScanProgram:
         If it cannot be played at all.
     """
     scan = contents.scan
+    pixels = None
+    if contents.pixel_ticks is not None:
+        forward, backward = contents.pixel_ticks.tolist()
+        pixels = tuple(forward), tuple(backward)
     schedule = Schedule(
         ticks=scan("line_ticks"),
         lines=scan("frame_lines"),
@@ -86,6 +97,7 @@ def program_of(contents: Contents, update_rate_hz: int = 0) -> ScanProgram:
         turn_line=0,
         up=Window(scan("up_first"), scan("up_count")),
         down=Window(scan("down_first"), scan("down_count")),
+        pixel_table=pixels,
     )
     return ScanProgram(contents.program(1), contents.program(2), schedule)
 
@@ -178,18 +190,18 @@ class Bank:
                 raise RequestRefused(Reason.SHAPE, page - 1)
             if (slow := self._slow_part(words, page)) and not self._plays(slow, shape):
                 raise RequestRefused(Reason.SHAPE, page - 1)
-        size = PROGRAM_BYTES + sum(layout(words, info.x, info.y, self._slow_parts))
+        if More.PIXEL_TABLES in self._info.more:
+            has, pixels = words[PIXEL_TABLE_WORD], words[SCAN_WORDS.index("pixels")]
+            if has and not (has == 1 and 1 <= pixels <= self._info.table_pixels):
+                raise RequestRefused(Reason.SHAPE, 0)
+        size = size_of(words, info.x, info.y, self._info.more)
         if size != info.image_bytes:
             raise RequestRefused(Reason.LENGTH, size)
-
-    @property
-    def _slow_parts(self) -> bool:
-        return More.SLOW_PARTS in self._info.more
 
     def _slow_part(self, words: Sequence[int], page: int) -> int:
         """Return the word that describes the slow part of an axis; 0 without one."""
         at = page * PAGE_WORDS + len(AXIS_WORDS) + SLOW_WORDS.index("slow_part")
-        return words[at] if self._slow_parts else 0
+        return words[at] if More.SLOW_PARTS in self._info.more else 0
 
     def _plays(self, slow: int, shape: AxisShape) -> bool:
         """Return True if the device plays a slow part of this size beside a table of this shape."""
@@ -242,7 +254,7 @@ class Bank:
             if zlib.crc32(image) != incoming.info.image_crc:
                 raise RequestRefused(Reason.IMAGE)
             authentic(image)
-        contents = take_apart(image, incoming.info.x, incoming.info.y, self._slow_parts)
+        contents = take_apart(image, incoming.info.x, incoming.info.y, self._info.more)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
         if objection := first_objection(contents, *self.limits, playing, self._info.shaping):
@@ -310,7 +322,7 @@ class Bank:
         info = image.info
         self._check_announcement(info)
         self._check_words(info, image.data)
-        contents = take_apart(image.data, info.x, info.y, self._slow_parts)
+        contents = take_apart(image.data, info.x, info.y, self._info.more)
         if objection := first_objection(contents, *self.limits, None, self._info.shaping):
             raise RequestRefused(*objection)
         self.active = ActiveUpload(info, image.data, 1, 0)
@@ -365,5 +377,5 @@ class Bank:
 
     def _of_tables(self, active: ActiveUpload) -> bytes:
         """Return the image of the tables that play."""
-        program = program_of(take_apart(active.image, active.info.x, active.info.y, self._slow_parts))
+        program = program_of(take_apart(active.image, active.info.x, active.info.y, self._info.more))
         return make_image(program, active.info.hash.hex()).data

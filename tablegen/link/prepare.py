@@ -170,7 +170,8 @@ def check(
     Unsuitable
         If it would not, with every objection.
     """
-    objections = [*_device(image, info, scan), *_slow_parts(scan, info), *([] if any_rate else _rate(scan, info))]
+    objections = [*_device(image, info, scan), *_slow_parts(scan, info), *_pixel_table(scan, info)]
+    objections += [] if any_rate else _rate(scan, info)
     if why := lacks_mode(info, swap):
         objections.append(why)
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
@@ -232,6 +233,24 @@ def _slow_parts(scan: PreparedScan, info: DeviceInfo) -> list[str]:
                 f"{name}: a slow table of {length} words; the device holds {most}: raise its slow_index_bits"
             )
     return reasons
+
+
+def _pixel_table(scan: PreparedScan, info: DeviceInfo) -> list[str]:
+    """Return why a device does not play the table of pixels of a scan; empty if there is none, or it does."""
+    schedule = scan.program.schedule
+    if schedule.pixel_table is None:
+        return []
+    if More.PIXEL_TABLES not in info.more:
+        return [
+            "the fast axis is a sine, whose pixels have a table, and the device plays none over its link: build its "
+            "firmware with DAC_PIXEL_TABLE=1 and memory for a table of pixels, or set motion = 'line'"
+        ]
+    if schedule.pixels > info.table_pixels:
+        return [
+            f"a table of {schedule.pixels} pixels; the device has memory for {info.table_pixels}: raise table_pixels "
+            "in it"
+        ]
+    return []
 
 
 def _rate(scan: PreparedScan, info: DeviceInfo) -> list[str]:

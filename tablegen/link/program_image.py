@@ -12,6 +12,7 @@ from tablegen.device.registers import (
     AXIS_WORDS,
     OFFSET_LOW_BITS,
     PAGE_WORDS,
+    PIXEL_TABLE_WORD,
     SCAN_WORDS,
     SLOW_INDEX_SHIFT,
     SLOW_WORDS,
@@ -24,7 +25,7 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import OFF, Shaping
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.link.messages import CUBIC, AxisShape, ImageInfo
+from tablegen.link.messages import CUBIC, FURTHER_PARTS, AxisShape, ImageInfo, More
 from tablegen.numerics.arrays import Ints
 
 PROGRAM_WORDS = 3 * PAGE_WORDS
@@ -35,6 +36,8 @@ SECOND_BYTES, GAIN_BYTES, RATIO_BYTES = (
     3,
     2,
 )  # bytes per word of a slow part; the slow table's are as wide as a table's
+PIXEL_BYTES = 2  # bytes per number of ticks of a table of pixels
+_PIXELS = SCAN_WORDS.index("pixels")
 _NAMES = (*AXIS_WORDS, *SLOW_WORDS)
 _KNOTS = 127  # mask of slow_part
 
@@ -47,8 +50,8 @@ class ProgramImage:
     data: bytes
 
 
-class AxisPart(NamedTuple):
-    """A part of the words of an axis in an image: what they are, how many, and the bytes of one."""
+class ImagePart(NamedTuple):
+    """A part of the words behind the program words of an image: what they are, how many, and the bytes of one."""
 
     name: str
     length: int
@@ -89,6 +92,8 @@ def make_image(
         if isinstance(axis, FrameProgram):
             data += _bytes(axis.second, SECOND_BYTES) + _bytes(axis.slow.words, size)
             data += _bytes(axis.gains.words, GAIN_BYTES) + _bytes(axis.ratios.words, RATIO_BYTES)
+    for counts in program.schedule.pixel_table or ():
+        data += np.array(counts, dtype="<u2").tobytes()
     shapes = shape_of(program.x), shape_of(program.y)
     info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), *shapes)
     return ProgramImage(info, data)
@@ -131,7 +136,10 @@ class SlowWords:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """The parts of an image: the program words, unsigned, and the words of both axes, signed."""
+    """The parts of an image: the program words, unsigned, and the words of both axes, signed.
+
+    ``pixel_ticks``: the ticks of each pixel of trace and retrace, shape (2, pixels); None without a table of pixels.
+    """
 
     words: tuple[int, ...]
     x_shape: AxisShape
@@ -140,6 +148,7 @@ class Contents:
     y: Ints
     x_slow: SlowWords | None = None
     y_slow: SlowWords | None = None
+    pixel_ticks: Ints | None = None
 
     def scan(self, name: str) -> int:
         """Return a word of the page of the scan by its name in ``tablegen.device.registers.SCAN_WORDS``."""
@@ -241,44 +250,50 @@ def _signed(word: int) -> int:
     return word - (1 << 32) if word >> 31 else word
 
 
-def parts_of(words: Sequence[int], page: int, shape: AxisShape, slow_parts: bool = True) -> list[AxisPart]:
+def parts_of(words: Sequence[int], page: int, shape: AxisShape, more: More = FURTHER_PARTS) -> list[ImagePart]:
     """Return the parts of the words of x (1) or y (2), in the order of an image.
 
     Parameters
     ----------
     words
         Program words.
-    slow_parts
-        False for a device that has none: it ignores the words of a slow part.
+    more
+        Further features of the device: without slow parts it ignores their words.
     """
     word = dict(zip(_NAMES, words[page * PAGE_WORDS : (page + 1) * PAGE_WORDS], strict=True))
     if harmonics := word["harmonics"]:
-        return [AxisPart("Fourier", 2 * harmonics + 1, FOURIER_BYTES)]
+        return [ImagePart("Fourier", 2 * harmonics + 1, FOURIER_BYTES)]
     length, size = 1 << shape.length_bits if shape.index_bits else word["phase_period"], shape.word_bytes
-    table, slow = AxisPart("table", length, size), word["slow_part"]
-    if not (slow and slow_parts):
+    table, slow = ImagePart("table", length, size), word["slow_part"]
+    if not slow or More.SLOW_PARTS not in more:
         return [table]
     knots = slow & _KNOTS
     return [
         table,
-        AxisPart("second table", length, SECOND_BYTES),
-        AxisPart("slow table", 1 << (slow >> SLOW_INDEX_SHIFT & 31), size),
-        AxisPart("gain", knots, GAIN_BYTES),
-        AxisPart("ratio", knots, RATIO_BYTES),
+        ImagePart("second table", length, SECOND_BYTES),
+        ImagePart("slow table", 1 << (slow >> SLOW_INDEX_SHIFT & 31), size),
+        ImagePart("gain", knots, GAIN_BYTES),
+        ImagePart("ratio", knots, RATIO_BYTES),
     ]
 
 
-def layout(words: Sequence[int], x: AxisShape, y: AxisShape, slow_parts: bool = True) -> tuple[int, int]:
-    """Return the bytes that follow the program words for x and for y; ``slow_parts`` as in ``parts_of``."""
-    x_bytes, y_bytes = (
-        sum(part.length * part.size for part in parts_of(words, page, shape, slow_parts))
-        for page, shape in ((1, x), (2, y))
-    )
-    return x_bytes, y_bytes
+def pixel_part(words: Sequence[int], more: More = FURTHER_PARTS) -> ImagePart:
+    """Return the part behind the words of y, the table of pixels: of the trace, then of the retrace.
+
+    Without such a table, or on a device that plays none, it has no words.
+    """
+    has = words[PIXEL_TABLE_WORD] and More.PIXEL_TABLES in more
+    return ImagePart("pixel", 2 * words[_PIXELS] if has else 0, PIXEL_BYTES)
 
 
-def take_apart(data: bytes, x: AxisShape, y: AxisShape, slow_parts: bool = True) -> Contents:
-    """Take apart an image of tables of these shapes; ``slow_parts`` as in ``parts_of``.
+def size_of(words: Sequence[int], x: AxisShape, y: AxisShape, more: More = FURTHER_PARTS) -> int:
+    """Return the bytes of an image with these program words; ``more`` as in ``parts_of``."""
+    parts = [*parts_of(words, 1, x, more), *parts_of(words, 2, y, more), pixel_part(words, more)]
+    return PROGRAM_BYTES + sum(part.length * part.size for part in parts)
+
+
+def take_apart(data: bytes, x: AxisShape, y: AxisShape, more: More = FURTHER_PARTS) -> Contents:
+    """Take apart an image of tables of these shapes; ``more`` as in ``parts_of``.
 
     Raises
     ------
@@ -288,16 +303,19 @@ def take_apart(data: bytes, x: AxisShape, y: AxisShape, slow_parts: bool = True)
     if len(data) < PROGRAM_BYTES:
         raise ValueError(f"an image of {len(data)} bytes; the program words alone have {PROGRAM_BYTES}")
     words = tuple(int(word) for word in np.frombuffer(data, dtype="<u4", count=PROGRAM_WORDS))
-    size = PROGRAM_BYTES + sum(layout(words, x, y, slow_parts))
+    size = size_of(words, x, y, more)
     if len(data) != size:
         raise ValueError(f"an image of {len(data)} bytes; it says {size} of itself")
     tables, slow = [], []
     at = PROGRAM_BYTES
     for page, shape in ((1, x), (2, y)):
         values = []
-        for part in parts_of(words, page, shape, slow_parts):
+        for part in parts_of(words, page, shape, more):
             values.append(_words(data[at : at + part.length * part.size], part.size))
             at += part.length * part.size
         tables.append(values[0])
         slow.append(SlowWords(*values[1:]) if len(values) > 1 else None)
-    return Contents(words, x, y, tables[0], tables[1], slow[0], slow[1])
+    pixels = None
+    if pixel_part(words, more).length:
+        pixels = np.frombuffer(data, dtype="<u2", offset=at).astype(np.int64).reshape(2, -1)
+    return Contents(words, x, y, tables[0], tables[1], slow[0], slow[1], pixels)

@@ -16,8 +16,8 @@ _ORDERS = {0: "no shaping", 1: "'first'", 2: "'first' and 'second'", 3: "all ord
 
 # For these, `detail` is an axis, plus 2 times the index of a word where there is one.
 _AXIS_REASONS = {
-    Reason.SHAPE: "its table is too long for the device, or of another mode or width of words than the device has; an "
-    "FPGA plays one mode and length; build for this device",
+    Reason.SHAPE: "its table is too long for the device, or of another mode or width of words than the device has, or "
+    "has too many pixels; an FPGA plays one mode and length; build for this device",
     Reason.PERIOD: "its period, phase step and remainder do not match; build it again",
     Reason.OUTPUT: "gain, offset, code limits or max_step are out of range or order; build it again",
     Reason.SLOW_PART: "it has a slow part, whose gain and offset are not those of a table; upload the new scan instead",
@@ -196,6 +196,11 @@ def _word(page: int, index: int, contents: "Contents | None", limits: AxisLimits
     return f"word {index} of its table{value} does not fit {bits}; build it again"
 
 
+def _pixel_ticks(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    way = "trace" if page == 1 else "retrace"
+    return f"pixel {index} of the {way} has no tick, or the pixels do not fill their window; build it again"
+
+
 def _range(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
     ends = "code_min..code_max"
     if contents is not None:
@@ -228,6 +233,7 @@ _CHECKS: dict[Reason, Callable[[int, int, "Contents | None", AxisLimits | None],
     Reason.CODES: _codes,
     Reason.STEP: _step,
     Reason.WORD: _word,
+    Reason.PIXEL_TICKS: _pixel_ticks,
     Reason.RANGE: _range,
     Reason.SLEW: _slew,
     Reason.JUMP: _jump,

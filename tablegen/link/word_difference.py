@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
 from tablegen.link.prepare import PreparedScan
-from tablegen.link.program_image import PROGRAM_BYTES, parts_of
+from tablegen.link.program_image import PROGRAM_BYTES, ImagePart, parts_of, pixel_part
 
 _SIGNED = {"gain", "offset_high"}
 
@@ -45,16 +45,17 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
             )
     at = PROGRAM_BYTES
     data, info = image_expected.data, image_expected.info
-    for axis, page, shape in (("x", 1, info.x), ("y", 2, info.y)):
-        for part in parts_of(ours, page, shape):
-            end = at + part.length * part.size
-            there_words = _signed(image[at:end], part.size)
-            for index, word in enumerate(_signed(data[at:end], part.size)):
-                other = there_words[index] if index < len(there_words) else None
-                if other != word:
-                    name = f"{axis}: {part.name} word {index}"
-                    differing.append(Difference(name, at + part.size * index, word, other))
-            at = end
+    parts: list[tuple[str, ImagePart]] = [("x", part) for part in parts_of(ours, 1, info.x)]
+    parts += [("y", part) for part in parts_of(ours, 2, info.y)]
+    for page, part in [*parts, ("scan", pixel_part(ours))]:
+        end, signed = at + part.length * part.size, page != "scan"
+        there_words = _decoded(image[at:end], part.size, signed)
+        for index, word in enumerate(_decoded(data[at:end], part.size, signed)):
+            other = there_words[index] if index < len(there_words) else None
+            if other != word:
+                name = f"{page}: {part.name} word {index}"
+                differing.append(Difference(name, at + part.size * index, word, other))
+        at = end
     if len(image) > at:
         differing.append(Difference("after the last word", at, 0, len(image) - at))
     return differing
@@ -67,7 +68,7 @@ def _words(data: bytes) -> list[int]:
 
 def _name(index: int) -> str:
     page, word = divmod(index, PAGE_WORDS)
-    names = (*AXIS_WORDS, *SLOW_WORDS) if page else SCAN_WORDS
+    names = (*AXIS_WORDS, *SLOW_WORDS) if page else (*SCAN_WORDS, "pixel_table")
     return f"{('scan', 'x', 'y')[page]}: {names[word] if word < len(names) else f'unused word {word}'}"
 
 
@@ -75,6 +76,6 @@ def _signed_word(name: str, word: int) -> int:
     return word - (1 << 32) if name[3:] in _SIGNED and word >> 31 else word
 
 
-def _signed(data: bytes, size: int) -> list[int]:
+def _decoded(data: bytes, size: int, signed: bool) -> list[int]:
     whole = len(data) // size * size
-    return [int.from_bytes(data[at : at + size], "little", signed=True) for at in range(0, whole, size)]
+    return [int.from_bytes(data[at : at + size], "little", signed=signed) for at in range(0, whole, size)]

@@ -9,8 +9,8 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, Scan
 
 SINE = (
-    "a sine is for `check`, `show`, `build` with the format c, and `verify`; leave this out, or take 'line', for "
-    "anything else"
+    "a sine is for `check`, `show`, `build` with the format c, `verify`, `upload`, `readback`, `live` and `simulate`; "
+    "leave this out, or take 'line', for anything else"
 )
 PIXEL_FORMATS = ("c",)  # which play a table of pixels
 _HARMONICS = "a sine has one harmonic of the drive; leave this out, or take motion = 'line'"

@@ -12,7 +12,9 @@ from tablegen.compensation.identification import MeasuredLine, SettledAxis
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
-from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.device.schedule import Schedule
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.planning.sine_setup import with_motion
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 SEEDS = 20
@@ -83,12 +85,18 @@ def simulate_own(setup: Setup, seed: int, tell: Callable[[str], object] = lambda
         ),
     )
     tell("finding the waveform on the operator")
-    plan = make_plan(plain)
-    runs = [_axis(plain, name, getattr(plan, name), seed, tell) for name in own_axes(setup)]
+    plan = make_plan(plain, sines=True)
+    if plan.schedule.pixel_table is not None:
+        tell("the fast axis is a sine; its errors are those of its pixels")
+    straight = plain if scan.x.motion == "line" else with_motion(plain, "line")
+    runs = [_axis(straight, name, plan, seed, tell) for name in own_axes(setup)]
     return [replace(run, refined=getattr(scan, run.axis).refinement is not None) for run in runs]
 
 
-def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], object]) -> OwnRun:
+def _axis(setup: Setup, name: str, plan: Plan, seed: int, tell: Callable[[str], object]) -> OwnRun:
+    """Simulate an axis of a plan; other corrections move the fast axis straight, as ``setup`` says."""
+    line: LinePlan = getattr(plan, name)
+    pixels = plan.schedule if name == "x" and plan.schedule.pixel_table is not None else None
     table = _table(setup, name)
     assert table is not None
     traces, centre = line.drive.shape.identification.traces, line.drive.driver.share(line.drive.v_offset)
@@ -105,11 +113,12 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
             rows.append(OwnRow(correction, "", rejected=why))
             continue
         try:
-            played = line if model == table.model() else getattr(make_plan(with_model(setup, model)), name)
+            own = model == table.model()
+            played = line if own else getattr(make_plan(with_model(setup, model)), name)
         except Rejected as faults:
             rows.append(OwnRow(correction, model, rejected="; ".join(map(str, faults.problems))))
             continue
-        runs = _on_each(played, plants)
+        runs = _on_each(played, plants, pixels if own else None)
         rows.append(OwnRow(correction, model, tuple(map(image_errors, runs)), example=runs[0]))
     nearest = min(abs(one.centre - centre) for one in traces)
     return OwnRun(name, line.drive.size_nm, traces, nearest, False, tuple(rows))
@@ -129,12 +138,12 @@ def errors_on(line: LinePlan, plants: Sequence[SettledAxis]) -> tuple[tuple[floa
     Unphysical
         If a departure makes a branch run backwards.
     """
-    return tuple(map(image_errors, _on_each(line, plants)))
+    return tuple(map(image_errors, _on_each(line, plants, None)))
 
 
-def _on_each(line: LinePlan, plants: Sequence[SettledAxis]) -> list[AxisRun]:
+def _on_each(line: LinePlan, plants: Sequence[SettledAxis], pixels: Schedule | None) -> list[AxisRun]:
     try:
-        return run_on_each(line, plants, _MOST_TICKS)
+        return run_on_each(line, plants, _MOST_TICKS, pixels)
     except Unphysical as reason:
         raise Unphysical(f"{line.axis}: with a random departure of its own uncertainty, {reason}") from None
 

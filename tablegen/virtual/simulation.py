@@ -12,9 +12,11 @@ from tablegen.compensation.identification import SettledAxis
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
+from tablegen.device.schedule import Schedule
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.virtual.line_error import LineError, about_window_line, line_error
+from tablegen.virtual.pixel_line_error import pixel_line_error
 from tablegen.virtual.played import MAX_TICKS, PlayedDrive, intended, played
 from tablegen.virtual.scanner import VirtualScanner
 
@@ -64,8 +66,12 @@ def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
     return run_on_each(line, [axis])[0]
 
 
-def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS) -> list[AxisRun]:
+def run_on_each(
+    line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS, pixels: Schedule | None = None
+) -> list[AxisRun]:
     """Play the same line on several axes, with at most ``most_ticks`` ticks per period.
+
+    ``pixels`` is the schedule of a line that is a sine: the errors are then those of its pixels.
 
     Raises
     ------
@@ -73,12 +79,16 @@ def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = M
         If the line leaves the range of an axis.
     """
     drive = played(line, most_ticks)
-    requested = intended(line, drive)
-    return [_axis_run(line, drive, requested, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
+    settled = [axis.settled(drive.volts, drive.tick_s) for axis in axes]
+    if pixels is not None and line.imaged is not None:
+        errors = [pixel_line_error(each, pixels, line.imaged) for each in settled]
+    else:
+        requested, turn, window = intended(line, drive), line.drive.turn, line.band_limit.window
+        errors = [line_error(each, turn, window, requested, 0.5) for each in settled]
+    return [_axis_run(line, drive, *each) for each in zip(settled, errors, strict=True)]
 
 
-def _axis_run(line: LinePlan, drive: PlayedDrive, requested: Floats, displacement: Floats) -> AxisRun:
-    error = line_error(displacement, line.drive.turn, line.band_limit.window, requested, 0.5)
+def _axis_run(line: LinePlan, drive: PlayedDrive, displacement: Floats, error: LineError) -> AxisRun:
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
     return AxisRun(
         axis=line.axis,

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from frame_programs import common_knots, scan_program
-from programs import random_schedule
+from programs import random_dual, random_schedule
 from replacing import replace
 
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SLOW_WORDS, program_words
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, PIXEL_TABLE_WORD, SLOW_WORDS, program_words
+from tablegen.device.schedule import Window
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
@@ -42,3 +43,14 @@ def test_gains_and_ratios_at_other_lines_have_no_words() -> None:
     apart = replace(program.x, ratios=replace(program.x.ratios, spacing=program.x.gains.spacing + 1))
     with pytest.raises(ValueError, match="at different lines"):
         program_words(program.schedule, apart, program.y)
+
+
+def test_word_14_of_the_scan_says_whether_pixels_have_a_table() -> None:
+    program = random_dual(np.random.default_rng(5), SHAPE)
+    window = Window(0, 3)
+    schedule = replace(program.schedule, ticks=8, pixels=2, forward=window, backward=Window(4, 3))
+    with_table = replace(schedule, pixel_table=((1, 2), (2, 1)))
+    plain, table = (program_words(each, program.x, program.y) for each in (schedule, with_table))
+    assert PIXEL_TABLE_WORD == 14
+    assert (plain[14], table[14]) == (0, 1)
+    assert plain[:14] + plain[15:] == table[:14] + table[15:]

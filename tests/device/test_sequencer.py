@@ -11,7 +11,6 @@ from variants import plan_of
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.played_lines import play_line
-from tablegen.device.registers import program_words
 from tablegen.device.schedule import Schedule, Window, pixel_starts
 from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick
 
@@ -118,8 +117,6 @@ def test_pixels_of_a_table_start_where_the_counts_before_them_end(counts: list[i
                 walked.append(tick)
             remaining -= 1
         assert starts.tolist() == walked
-    with pytest.raises(ValueError, match="neither over the link nor in Verilog"):
-        program_words(schedule, None, None)  # type: ignore[arg-type]
 
 
 @pytest.mark.common

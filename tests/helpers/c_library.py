@@ -135,7 +135,27 @@ class PixelCProgram(Structure):
     _fields_ = (("schedule", PixelCSchedule), ("x", AxisProgram), ("y", AxisProgram))
 
 
-AnyCProgram = CProgram | ShapedCProgram | SlowCProgram | ShapedSlowCProgram | PixelCProgram
+class PixelShapedCProgram(Structure):
+    """With DAC_PIXEL_TABLE and DAC_SHAPING."""
+
+    _fields_ = (("schedule", PixelCSchedule), ("x", ShapedAxisProgram), ("y", ShapedAxisProgram))
+
+
+class PixelSlowCProgram(Structure):
+    """With DAC_PIXEL_TABLE and DAC_SLOW_PART."""
+
+    _fields_ = (("schedule", PixelCSchedule), ("x", SlowAxisProgram), ("y", SlowAxisProgram))
+
+
+AnyCProgram = (
+    CProgram
+    | ShapedCProgram
+    | SlowCProgram
+    | ShapedSlowCProgram
+    | PixelCProgram
+    | PixelShapedCProgram
+    | PixelSlowCProgram
+)
 # By whether the runtime has DAC_SHAPING, and DAC_SLOW_PART.
 AXES: dict[tuple[bool, bool], Any] = {
     (False, False): AxisProgram,
@@ -148,6 +168,13 @@ PROGRAMS: dict[tuple[bool, bool], Any] = {
     (True, False): ShapedCProgram,
     (False, True): SlowCProgram,
     (True, True): ShapedSlowCProgram,
+}
+
+
+PIXEL_PROGRAMS: dict[tuple[bool, bool], Any] = {
+    (False, False): PixelCProgram,
+    (True, False): PixelShapedCProgram,
+    (False, True): PixelSlowCProgram,
 }
 
 
@@ -332,7 +359,8 @@ class Library:
         counts = schedule.pixel_table and self.array(c_uint16, [*schedule.pixel_table[0], *schedule.pixel_table[1]])
         table = None if counts is None else ctypes.addressof(counts)
         planned = PixelCSchedule(*times, *windows, pixel_table=table)
-        return PixelCProgram(planned, axes[0].program, axes[1].program), (*axes, counts)
+        kind = PIXEL_PROGRAMS[bool(self.shaping), self.slow_part]
+        return kind(planned, axes[0].program, axes[1].program), (*axes, counts)
 
 
 def converter_of(output: Output, power_up_code: int = 0) -> Converter:

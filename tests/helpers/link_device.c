@@ -70,6 +70,11 @@ device *device_new(const device_setup *setup, uint32_t boot)
     c->slow_knots = SLOW_KNOTS;
     c->slow_index_bits = SLOW_INDEX_BITS;
 #endif
+#if DAC_PIXEL_TABLE
+    c->table_pixels = TABLE_PIXELS;
+    for (unsigned i = 0; i < 2; i++)
+        c->pixel_ticks[i] = place((size_t)2 * TABLE_PIXELS, sizeof(uint16_t));
+#endif
     c->harmonics = setup->harmonics;
     c->sine = setup->sine;
     c->sine_index_bits = setup->sine_index_bits;
@@ -111,6 +116,10 @@ void device_delete(device *d)
 #if DAC_SLOW_PART
     free_slow(&d->config.x);
     free_slow(&d->config.y);
+#endif
+#if DAC_PIXEL_TABLE
+    free(d->config.pixel_ticks[0]);
+    free(d->config.pixel_ticks[1]);
 #endif
     free(d->config.x.fourier);
     free(d->config.y.fourier);
@@ -346,6 +355,12 @@ dac_link_started device_refusal(const device *d, unsigned fault)
     case 20: c.x.mixed = NULL; break;
     case 21: c.y.mixed = NULL; break;
     case 22: c.y.mixed = c.x.mixed; break;
+#endif
+#if DAC_PIXEL_TABLE
+    case 23: c.pixel_ticks[0] = NULL; break;
+    case 24: c.pixel_ticks[1] = NULL; break;
+    case 25: c.pixel_ticks[1] = c.pixel_ticks[0]; break;
+    case 26: c.table_pixels = 0; c.pixel_ticks[0] = NULL; break; /* none */
 #endif
     default: break;
     }

@@ -9,6 +9,9 @@ enum { OUT = 1 << 20, COMPILED = 4 };
 #if DAC_SLOW_PART
 enum { SLOW_KNOTS = 65, SLOW_INDEX_BITS = 7 }; /* of every device; tests/link_device.py has them too */
 #endif
+#if DAC_PIXEL_TABLE
+enum { TABLE_PIXELS = 16 }; /* likewise */
+#endif
 enum { AXIS_FAULTS = 20, FAULTS = 2 * AXIS_FAULTS + 11 }; /* of a configuration */
 
 typedef struct {

@@ -46,6 +46,7 @@ HERE = Path(__file__).parent
 LINES = REPOSITORY / "examples" / "firmware" / "cortex_m"
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 SLOW_KNOTS, SLOW_INDEX_BITS = 65, 7  # of every device with slow parts
+TABLE_PIXELS = 16  # of every device with tables of pixels
 _UNTIL_IDLE = 0xFFFFFFFF
 
 
@@ -77,6 +78,7 @@ class Started(IntEnum):
     NO_RANDOM = 5
     NO_CLOCK = 6
     BAD_SLOW = 7
+    BAD_PIXEL_TABLE = 8
 
 
 class _Record(Structure):
@@ -172,11 +174,12 @@ def device_library(
     store: bool = False,
     moves: bool = False,
     slow: bool = False,
+    pixels: bool = False,
 ) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
     ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept and played
-    by number, with ``slow`` they may have slow parts; one that ``moves`` takes MOVE.
+    by number, with ``slow`` they may have slow parts, with ``pixels`` a table of pixels; one that ``moves`` takes MOVE.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -186,6 +189,7 @@ def device_library(
     more += ["-DDAC_MOVE=1"] if moves else []
     more += ["-DDAC_STORE=1", "-DDAC_LIBRARY=1"] if store else []
     more += ["-DDAC_SLOW_PART=1"] if slow else []
+    more += ["-DDAC_PIXEL_TABLE=1"] if pixels else []
     sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
     return DeviceLibrary(compile_device(folder / "device.so", bits, sources=sources, more=more))
 
@@ -200,8 +204,8 @@ class HostDevice:
 
     ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
     can do, ``library`` to that of ``device_library`` with the order ``shaping``, ``modes`` of a COMMIT, or ``moves``,
-    and ``slow`` parts. Nonces are those of ``derived_nonce``, changed by what ``random`` gives, or ``nonces``;
-    ``started`` is why the link was not.
+    ``slow`` parts, and tables of ``pixels``. Nonces are those of ``derived_nonce``, changed by what ``random`` gives,
+    or ``nonces``; ``started`` is why the link was not.
     ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout; its library
     has the programs ``compiled``.
     """
@@ -230,6 +234,7 @@ class HostDevice:
         modes: bool = False,
         moves: bool = False,
         slow: bool = False,
+        pixels: bool = False,
         flash: tuple[CutFlash, Layout] | None = None,
         stores_while_playing: bool = False,
         compiled: Sequence[CompiledProgram] = (),
@@ -237,7 +242,7 @@ class HostDevice:
         x, y = fast_of(like.x), fast_of(like.y)
         bits = 16 if max(x.bits, y.bits, x.output.word_bits, y.output.word_bits) <= 16 else 32
         spline, store = "cubic" in (x.mode, y.mode), flash is not None
-        self.library = library or device_library(bits, shaping, spline, modes, store, moves, slow)
+        self.library = library or device_library(bits, shaping, spline, modes, store, moves, slow, pixels)
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True

@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 from cut_flash import MODES, CutFlash
-from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, CompiledProgram, HostDevice, Started, widest
+from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, TABLE_PIXELS, CompiledProgram, HostDevice, Started, widest
 from link_images import damaged, damaged_slow, digest, random_image, random_limits, random_slow_program, resealed
 from link_talk import IDENTITY, Talk
+from pixel_tables import PIXELS, damaged_table, long_windows, table_image, with_table
 from programs import random_dual
+from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, PIXEL_TABLE_WORD
 from tablegen.link.acceptance import first_objection
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
@@ -60,9 +62,10 @@ class Dialogue:
         order: int = 0,
         store: bool = False,
         slow: bool = False,
+        pixels: bool = False,
         **how: Any,
     ) -> None:
-        self.slow = slow
+        self.slow, self.pixels = slow, pixels
         self.rng = np.random.default_rng(seed)
         self.shape, self.key, self.order = shape, key, order
         boot = self._some_boot(slow) if self.rng.random() < 0.9 else None
@@ -99,6 +102,7 @@ class Dialogue:
             update_rate_hz=20000,
             shaping=order,
             slow=slow,
+            pixels=pixels,
             **how,
         )
         assert self.device.started is Started.STARTED, self.device.started
@@ -119,7 +123,7 @@ class Dialogue:
                 size + (1 << each.index_bits) + (each.word_bytes << SLOW_INDEX_BITS) + knots
                 for size, each in zip(sizes, shapes, strict=True)
             ]
-        most = 192 + sum(max(size, 4 * (2 * HARMONICS + 1)) for size in sizes)
+        most = 192 + sum(max(size, 4 * (2 * HARMONICS + 1)) for size in sizes) + 4 * TABLE_PIXELS * pixels
         ring = self.device.library.ring // 256
         degree = SPLINE_DEGREE if "cubic" in (x.mode, y.mode) else 0
         info = DeviceInfo(
@@ -134,8 +138,11 @@ class Dialogue:
             20000,
             order,
             degree,
-            (More.MOVE if self._moves else More(0)) | (More.SLOW_PARTS if slow else More(0)),
-            *((SLOW_KNOTS, SLOW_INDEX_BITS) if slow else ()),
+            (More.MOVE if self._moves else More(0))
+            | (More.SLOW_PARTS if slow else More(0))
+            | (More.PIXEL_TABLES if pixels else More(0)),
+            *((SLOW_KNOTS, SLOW_INDEX_BITS) if slow else (0, 0)),
+            TABLE_PIXELS if pixels else 0,
         )
         self._clock = 0
         self.device.set_clock(0)
@@ -171,6 +178,8 @@ class Dialogue:
     def _some_image(self) -> ProgramImage:
         if self.slow and self.rng.random() < 0.7:
             return self._some_slow_image()
+        if self.pixels and self.rng.random() < 0.7:
+            return self._some_table_image()
         kind = str(self.rng.choice(["smooth", "smooth", "tame", "wild"]))
         image, _ = random_image(self.rng, self.shape, HARMONICS, kind, self.order)  # type: ignore[arg-type]
         if self.rng.random() < 0.05:
@@ -179,8 +188,21 @@ class Dialogue:
             return resealed(image, bytes(data))
         return damaged(self.rng, image) if self.rng.random() < 0.3 else image
 
+    def _some_table_image(self) -> ProgramImage:
+        image, program = random_image(self.rng, self.shape, order=self.order)
+        schedule = long_windows(self.rng, program.schedule.ticks, program.schedule.lines)
+        image = table_image(self.rng, replace(program, schedule=schedule))
+        if self.rng.random() < 0.1:  # form of the table
+            data, at = bytearray(image.data), 4 * int(self.rng.choice([PIXELS, PIXEL_TABLE_WORD]))
+            data[at + int(self.rng.integers(0, 2))] ^= 1 << int(self.rng.integers(0, 8))
+            return resealed(image, bytes(data))
+        return damaged_table(self.rng, image) if self.rng.random() < 0.3 else image
+
     def _some_slow_image(self) -> ProgramImage:
-        image = make_image(random_slow_program(self.rng, self.shape), digest(self.rng))
+        program = random_slow_program(self.rng, self.shape)
+        if self.pixels and self.rng.random() < 0.7:
+            program = replace(program, schedule=with_table(self.rng, program.schedule))
+        image = make_image(program, digest(self.rng))
         if self.rng.random() < 0.1:  # form of the slow part
             data = bytearray(image.data)
             data[4 * (PAGE_WORDS * int(self.rng.integers(1, 3)) + 12) + int(self.rng.integers(0, 3))] ^= 1 << int(
@@ -251,6 +273,8 @@ class Dialogue:
             doings += [(3, self._play)]
         if self._moves:
             doings += [(15, self._move), (2, self._whole)]
+        if self.pixels:
+            doings += [(8, self._another)]
         if self.device.notes is not None:  # a replay has no cuts
             doings = [doing for doing in doings if doing[1] != self._cut]
         weights = np.array([weight for weight, _ in doings])
@@ -280,6 +304,13 @@ class Dialogue:
         for wire in self.talk.upload(self._image):
             self._send(wire)
         self._commit(sure=True)
+
+    def _another(self) -> None:
+        """Another image, whole, with time for it to be taken."""
+        self._send(self.talk.acting(Request.ABORT))
+        self._image = self._some_image()
+        self._whole()
+        self._tick(60)
 
     def _tagged(self, kind: int, payload: bytes = b"", image: bytes | None = None) -> bytes:
         if self.key and self.rng.random() < 0.9:

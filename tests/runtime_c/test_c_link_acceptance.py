@@ -54,12 +54,12 @@ class Bench:
         limits: tuple[AxisLimits, AxisLimits],
         shape: SequencerShape,
         order: int = 0,
-        slow: bool = False,
+        **features: bool,
     ) -> None:
         boot = None if state == "nothing plays" else program
         bits = max(shape.x_index_bits, 3), max(shape.y_index_bits, 3)
         self.device = HostDevice(
-            program, boot, limits=limits, index_bits=bits, harmonics=HARMONICS, shaping=order, slow=slow
+            program, boot, limits=limits, index_bits=bits, harmonics=HARMONICS, shaping=order, **features
         )
         self.talk = Talk()
         self.ask(self.talk.hello())

@@ -322,22 +322,6 @@ def check_compiled_is_refused(library: DeviceLibrary | None = None) -> None:
     assert not device.device.play(3), "a longer table, behind a program that has played"
 
 
-@pytest.mark.common
-def test_a_compiled_table_of_pixels_is_refused(tmp_path: Path) -> None:
-    """An image has none here: the program would play with pixels of equal length."""
-    options = [f"-D{name}=1" for name in ("DAC_STORE", "DAC_LIBRARY", "DAC_PIXEL_TABLE")]
-    path = compile_device(tmp_path / "device.so", sources=[*c_runtime(), *c_link(), *c_store()], more=options)
-    program = SCANS[2].program
-    schedule = program.schedule
-    windows = schedule.forward, schedule.backward
-    counts = [(*[1] * (schedule.pixels - 1), window.count - schedule.pixels + 1) for window in windows]
-    sine = replace(program, schedule=replace(schedule, pixel_table=(counts[0], counts[1])))
-    entries = tuple(CompiledProgram(b"scan", SCANS[2].digest.encode(), each) for each in (sine, program))
-    device = StoreDevice(new_flash(), DeviceLibrary(path), compiled=entries)
-    assert not device.device.play(0)
-    assert device.device.play(1)
-
-
 def check_words_of_no_program(library: DeviceLibrary | None = None) -> None:
     """A slot whose program words make no image of its length is refused at once, and leaves no upload behind."""
     flash = new_flash()

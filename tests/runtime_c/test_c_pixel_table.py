@@ -10,33 +10,16 @@ import pytest
 from building import run_clean
 from c_library import BAD_SCHEDULE, LOADED, Library, PixelCProgram, Twin, compile_library
 from c_scripts import long_dual
-from numpy.random import Generator
+from pixel_tables import with_table
 from programs import random_schedule
 from replacing import replace
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.schedule import Schedule
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 6, 16)
 TABLE = "-DDAC_PIXEL_TABLE=1"
-
-
-def parts(rng: Generator, pixels: int, ticks: int) -> tuple[int, ...]:
-    """Divide ticks at random into so many pixels."""
-    cuts = np.sort(rng.choice(np.arange(1, ticks), pixels - 1, replace=False))
-    return tuple(np.diff([0, *cuts.tolist(), ticks]).tolist())
-
-
-def with_table(rng: Generator, schedule: Schedule) -> Schedule:
-    """Give a schedule a table of pixels, where both windows have ticks."""
-    fewest = min(schedule.forward.count, schedule.backward.count)
-    if not fewest:
-        return schedule
-    pixels = int(rng.choice([1, fewest, (fewest + 2) // 3]))
-    table = parts(rng, pixels, schedule.forward.count), parts(rng, pixels, schedule.backward.count)
-    return replace(schedule, pixels=pixels, pixel_table=table)
 
 
 @cache
