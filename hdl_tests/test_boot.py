@@ -219,21 +219,26 @@ def check_word(
         raise Wrong(f"word {at}")
 
 
-def check_start(name: str, lines: Sequence[str]) -> int:
-    """Hold the clocks before the first read against the law; returns how many there are."""
-    start = SETUPS[name].parameters["START_CLOCKS"]
+def check_start(start: int, lines: Sequence[str]) -> None:
+    """Hold the clocks before the first read against the law."""
     if any(line.split()[0] != "4" for line in lines[:start]):  # booting, and nothing else
         raise Wrong("a boot before the memories can be read")
-    return start
 
 
 def check(name: str, lines: Sequence[str]) -> int:
     """Hold what left against the law; returns how many boots came to their end."""
-    writes, clocks = SETUPS[name].writes, stimulus(name)
+    one = SETUPS[name]
+    return check_boots(one.writes, stimulus(name), lines, one.parameters["START_CLOCKS"], AT_BOTH_ENDS)
+
+
+def check_boots(
+    writes: Sequence[Write], clocks: Sequence[Clock], lines: Sequence[str], start: int, most_idle: int
+) -> int:
+    """The same of a boot of these writes, which waits for ``most_idle`` clocks of its own at most."""
     if len(lines) != len(clocks):
         raise Wrong("a capture of another length")
+    check_start(start, lines)
     ended = at = idle = 0
-    start = check_start(name, lines)
     for asked, line in zip(clocks[start:], lines[start:], strict=True):
         flags, *where = line.split()
         missing, booting, write, commit = (hexadecimal(flags) >> bit & 1 for bit in (3, 2, 1, 0))
@@ -252,7 +257,7 @@ def check(name: str, lines: Sequence[str]) -> int:
         # A clock without a word is one that was held up, the first one, or after the commit, held up or not, the last.
         elif asked.writable or at == len(writes):
             idle += 1
-            if idle > AT_BOTH_ENDS:
+            if idle > most_idle:
                 raise Wrong(f"nothing at word {at}")
         if asked.reset:
             at = idle = 0

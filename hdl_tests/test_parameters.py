@@ -16,8 +16,8 @@ from test_lint import MODULES, NEEDED, SOURCES, lint, path_of
 MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
 PUBLIC = (
-    "dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_coding", "dac_spi", "dac_axi_stream", "dac_bus",
-    "dac_synchronise", "adc_pixels", "dac_marker_delay",
+    "dac_sequencer", "program_loader", "dac_boot", "dac_slow_boot", "dac_fourier", "dac_coding", "dac_spi",
+    "dac_axi_stream", "dac_bus", "dac_synchronise", "adc_pixels", "dac_marker_delay",
 )  # fmt: skip
 Values = Mapping[str, int | str]
 SLOW_PART = {"SLOW_PART": 1, "LOW_AREA": 1}
@@ -120,6 +120,16 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({**BOOT, "Y_HARMONICS": 513, "Y_WORDS": 1027}, "Y_HARMONICS_is_not_1_to_512"),
         ({**BOOT, "X_WORDS": 4}, "X_WORDS_is_not_two_X_HARMONICS_and_one"),
         ({**BOOT, "Y_HARMONICS": 2}, "Y_WORDS_is_not_two_Y_HARMONICS_and_one"),
+        ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
+    ],
+    "dac_slow_boot": [
+        ({"X_TABLE_WORDS": 7}, "X_TABLE_WORDS_is_not_8_to_16384"),
+        ({"X_SLOW_WORDS": 16385}, "X_SLOW_WORDS_is_not_8_to_16384"),
+        ({"X_KNOTS": 1}, "X_KNOTS_is_not_2_to_65"),
+        ({"Y_TABLE_WORDS": 16385}, "Y_TABLE_WORDS_is_not_8_to_16384"),
+        ({"Y_SLOW_WORDS": 7}, "Y_SLOW_WORDS_is_not_8_to_16384"),
+        ({"Y_KNOTS": 66}, "Y_KNOTS_is_not_2_to_65"),
+        ({"WORD_BITS": 17}, "WORD_BITS_is_not_18_to_21"),
         ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
     ],
     "dac_fourier": [
@@ -233,6 +243,18 @@ LEGAL: dict[str, list[Values]] = {
         {"X_WORDS": 1, "Y_WORDS": 1, "X_WORD_BITS": 8, "Y_WORD_BITS": 24, "START_CLOCKS": 0},
         BOOT,
         {"X_WORDS": 65536, "Y_WORDS": 65536},
+    ],
+    "dac_slow_boot": [
+        {
+            "X_TABLE_WORDS": 8,
+            "X_SLOW_WORDS": 8,
+            "X_KNOTS": 2,
+            "Y_TABLE_WORDS": 16384,
+            "Y_SLOW_WORDS": 16384,
+            "Y_KNOTS": 65,
+            "WORD_BITS": 21,
+            "START_CLOCKS": 0,
+        }
     ],
     "dac_fourier": [
         {"X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "HARMONICS": 1},

@@ -53,6 +53,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "fourier_renderer": ("dac_fourier", {"MULTIPLIER": 1}),
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
+    "slow_boot": ("dac_slow_boot", {}),
     "loader": ("program_loader", {"FOURIER": 1, "UPDATE_RATE": 500_000}),
     "loader_direct": (
         "program_loader",

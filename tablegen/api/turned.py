@@ -9,16 +9,19 @@ import numpy as np
 
 from tablegen.api.build import BrokenLimit, Source, setup_of
 from tablegen.api.result import Result
-from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
 from tablegen.certificate.error_answer import duration
 from tablegen.certificate.summary import rate
 from tablegen.certificate.turned_errors import TurnedCertificate, certify_turned
 from tablegen.config.load import Setup
+from tablegen.emit.render import format_rejected
 from tablegen.emit.templates import comment_safe
-from tablegen.emit.turned import TurnedContent, turned_files, turned_runtime
+from tablegen.emit.turned import TURNED_FORMATS, require_format, turned_files, turned_runtime
+from tablegen.emit.turned_content import TurnedContent
 from tablegen.emit.write import leftover_files, outdated_files, write_files
 from tablegen.manifest.format import MANIFEST, content_hash, read_json
 from tablegen.manifest.turned_record import turned_manifest, turned_record
+from tablegen.planning.clock import slow_clocks_per_tick
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
 from tablegen.version import __version__
 
@@ -36,6 +39,7 @@ def build_turned(
     *,
     scan: Mapping[str, Any] | None = None,
     scanner: Mapping[str, Any] | None = None,
+    formats: Sequence[str] | None = None,
     progress: Callable[[str], object] = lambda _: None,
 ) -> "TurnedBuild":
     """Plan and certify a scan at an angle, on coupled axes or with drift, and write it into ``out`` if one is given.
@@ -46,18 +50,20 @@ def build_turned(
         As for ``plan``.
     out : str or Path, optional
         Directory; files of an earlier build there are removed.
+    formats : sequence of str, optional
+        "c" and "verilog"; by default those of the scan, or "c" alone.
     progress : callable
         Called with a text for each stage.
 
     Returns
     -------
     TurnedBuild
-        Plan, certificate and files: C99, and the manifest.
+        Plan, certificate and files: C99 or Verilog, and the manifest.
 
     Raises
     ------
     Rejected
-        The input is wrong, or an axis has no operator.
+        The input is wrong, an axis has no operator, or a format cannot hold the scan.
     BrokenLimit
         The certificate exceeds a limit of the scan.
     CannotWrite
@@ -75,18 +81,39 @@ def build_turned(
     if not setup.mixes_motions:
         why = "this scan has no angle, coupling or drift; `build` builds it"
         raise Rejected([setup.scan_file.problem("name", why)])
-    formats = setup.scan.emit.formats
-    if formats is not None and formats != ["c"]:
-        raise Rejected([setup.scan_file.problem("emit.formats", "a scan at an angle has the format c alone")])
+    names = _formats(setup, formats)
     plan = make_turned_plan(setup, progress)
+    clocks = _clocks_per_tick(setup, plan, names, explicit=formats is not None)
     certificate = certify_turned(plan, progress)
     if broken := _broken(setup, plan, certificate):
         raise BrokenLimit(broken)
-    built = TurnedBuild(setup, plan, certificate)
+    built = TurnedBuild(setup, plan, certificate, names, clocks)
     if out is not None:
         progress("writing the files")
         built.write(out)
     return built
+
+
+def _formats(setup: Setup, formats: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the formats of a build, those of the scan file unless they are given, each once."""
+    names = tuple(dict.fromkeys(formats or setup.scan.emit.formats or ("c",)))
+    if not set(names) <= set(TURNED_FORMATS):
+        why = "a scan at an angle, on coupled axes or with drift has the formats c and verilog"
+        raise format_rejected(setup, why, explicit=formats is not None)
+    return names
+
+
+def _clocks_per_tick(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, explicit: bool) -> int:
+    """Return the clocks of a tick of an FPGA, 0 where none plays the scan or its clock is not known."""
+    for name in formats:
+        try:
+            require_format(name, plan.program)
+        except Unphysical as error:
+            raise format_rejected(setup, str(error), explicit=explicit) from None
+    problems = Problems()
+    clocks = slow_clocks_per_tick(setup, plan.program, problems) if "verilog" in formats else 0
+    problems.stop_if_any()
+    return clocks
 
 
 def _broken(setup: Setup, plan: TurnedPlan, certificate: TurnedCertificate) -> list[Problem]:
@@ -110,10 +137,19 @@ def _broken(setup: Setup, plan: TurnedPlan, certificate: TurnedCertificate) -> l
 class TurnedBuild(Result):
     """A certified scan at an angle: its plan, certificate and emitted files."""
 
-    def __init__(self, setup: Setup, plan: TurnedPlan, certificate: TurnedCertificate) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        plan: TurnedPlan,
+        certificate: TurnedCertificate,
+        formats: Sequence[str] = ("c",),
+        clocks_per_tick: int = 0,
+    ) -> None:
         self.setup = setup
         self.plan = plan
         self.certificate = certificate
+        self._formats = list(formats)
+        self._clocks_per_tick = clocks_per_tick
 
     @property
     def name(self) -> str:
@@ -123,7 +159,7 @@ class TurnedBuild(Result):
     @property
     def formats(self) -> list[str]:
         """The names of its formats."""
-        return ["c"]
+        return list(self._formats)
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -153,15 +189,16 @@ class TurnedBuild(Result):
         plan, record = self.plan, turned_record(self.plan)
         digest = content_hash(record)
         text = tuple(map(comment_safe, self.summary().splitlines()))
-        content = TurnedContent(plan.name, digest, plan.program, __version__, plan.scanner, text)
-        files = turned_files(content) | turned_runtime()
-        files[MANIFEST] = turned_manifest(record, digest, self.certificate, files)
+        clocks = self._clocks_per_tick
+        content = TurnedContent(plan.name, digest, plan.program, __version__, plan.scanner, text, clocks)
+        files = turned_files(content, self.formats) | turned_runtime(self.formats)
+        files[MANIFEST] = turned_manifest(record, digest, self.formats, self.certificate, files, clocks)
         return files
 
     @property
     def runtime(self) -> set[str]:
         """The names of those files that are the same in every build."""
-        return set(turned_runtime())
+        return set(turned_runtime(self.formats))
 
     @property
     def prepared(self) -> "PreparedScan":

@@ -20,6 +20,12 @@ def verilog_runtime() -> list[Path]:
     return list(_runtime("verilog", ".v"))
 
 
+def verilog_slow_part() -> list[Path]:
+    """Return the modules of a slow part, in order of name; a build of a scan at an angle copies them too."""
+    folder = resource_folder("firmware_templates") / "verilog" / "slow"
+    return sorted(folder.glob("*.v"))
+
+
 def c_runtime() -> list[Path]:
     """Return the C sequencer, headers and sources, in order of name; every build copies it."""
     return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith((_C_LINK, _C_STORE))]

@@ -107,6 +107,9 @@ def verify(
 ) -> int:
     """Verify that the sequencer of the build in DIR plays the scan that its manifest describes, bit for bit.
 
+    Of a scan at an angle, NAME_top.v alone plays in Verilog: its boot, a frame and a line; --axis, --fourier and --seed
+    have no effect.
+
     If DIR is a library of tablegen sweep, every program of it is verified in this way, and the index is compared with
     the programs.
 

@@ -410,7 +410,8 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             Meta(
                 min_length=1,
                 max_length=64,
-                description="formats to write, by `tablegen formats`; default: c and verilog",
+                description="formats to write, by `tablegen formats`; default: c and verilog, of a scan at an angle "
+                "c alone",
             ),
         ]
         | None

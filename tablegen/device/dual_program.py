@@ -45,5 +45,5 @@ def require_dual(program: ScanProgram) -> DualProgram:
         If an axis has one, or might have one.
     """
     if not isinstance(program, DualProgram):
-        raise ValueError("a program with a slow part is for C and its link; nothing writes one for Verilog")
+        raise ValueError("a program with a slow part is for C, its link, and the Verilog of a scan at an angle")
     return program

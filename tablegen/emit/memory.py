@@ -15,9 +15,10 @@ from tablegen.numerics.arrays import Ints
 
 
 class Memory(Struct, frozen=True, eq=False):
-    """The words of one memory of a device; ``name`` is x, y, x_fourier, y_fourier, program or sine.
+    """The words of one memory of a device.
 
-    ``words`` are integers of ``bits`` bits, in two's complement but for the program's registers, which are unsigned.
+    ``name`` is x, y, x_fourier, y_fourier, program or sine; of a scan at an angle x, y, slow or program. ``words``
+    are integers of ``bits`` bits, in two's complement but for the program's registers, which are unsigned.
     """
 
     name: str

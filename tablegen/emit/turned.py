@@ -1,35 +1,53 @@
-"""The files of a scan at an angle: C99 for the sequencer with a slow part, and the manifest."""
+"""The files of a scan at an angle by format: C99 and Verilog for the sequencers with a slow part."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from msgspec import Struct
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.base.resources import c_link, c_runtime, c_store
 from tablegen.device.dual_program import ScanProgram
 from tablegen.emit.constants import axis_constants, sequence_constants, storage_bits
 from tablegen.emit.formats.c import literal
 from tablegen.emit.templates import comment_safe, rows, template
-from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.emit.turned_content import TurnedContent
+from tablegen.emit.turned_verilog import turned_verilog_files, turned_verilog_runtime
 from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.numerics.arrays import Ints
 
-
-class TurnedContent(Struct, frozen=True, eq=False):
-    """A scan at an angle as its files have it; words of comments are empty where a manifest is the source."""
-
-    name: str
-    hash: str
-    program: ScanProgram
-    version: str = ""
-    scanner: str = ""
-    summary: tuple[str, ...] = ()
+TURNED_FORMATS = ("c", "verilog")
 
 
-def turned_files(content: TurnedContent) -> dict[str, bytes]:
-    """Render the C files that were made for a scan at an angle, by name."""
+def require_format(format_name: str, program: ScanProgram) -> None:
+    """Check that a format of ``TURNED_FORMATS`` can hold a scan at an angle.
+
+    Raises
+    ------
+    Unphysical
+        If it is Verilog, and the output is shaped.
+    """
+    if format_name == "verilog" and max(axis.output.shaping.order for axis in (program.x, program.y)):
+        raise Unphysical(
+            "the Verilog sequencer shapes no scan at an angle; take the format c, or leave shaping out of the dac"
+        )
+
+
+def turned_files(content: TurnedContent, formats: Iterable[str]) -> dict[str, bytes]:
+    """Render the files that were made for a scan at an angle in some of ``TURNED_FORMATS``, by name."""
+    makers = {"c": _c_files, "verilog": turned_verilog_files}
+    return {name: text for each in formats for name, text in makers[each](content).items()}
+
+
+def turned_runtime(formats: Iterable[str]) -> dict[str, bytes]:
+    """Read the files of the sequencers in these formats, by name."""
+    runtimes = {"c": lambda: (*c_runtime(), *c_link(), *c_store()), "verilog": turned_verilog_runtime}
+    return {path.name: read_bytes(path, BUILD_FILE) for each in formats for path in runtimes[each]()}
+
+
+def _c_files(content: TurnedContent) -> dict[str, bytes]:
     context = _context(content)
     sources = {
         f"{content.name}.h": "c/turned.h.j2",
@@ -38,11 +56,6 @@ def turned_files(content: TurnedContent) -> dict[str, bytes]:
         f"{content.name}_program.c": "c/turned_program.c.j2",
     }
     return {name: template(source, context, literal) for name, source in sources.items()}
-
-
-def turned_runtime() -> dict[str, bytes]:
-    """Read the files of the C sequencer, by name."""
-    return {path.name: read_bytes(path, BUILD_FILE) for path in (*c_runtime(), *c_link(), *c_store())}
 
 
 def turned_options(program: ScanProgram) -> dict[str, int]:
@@ -72,8 +85,7 @@ def _context(content: TurnedContent) -> dict[str, Any]:
 
 
 def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
-    program = content.program.x if axis == "x" else content.program.y
-    assert isinstance(program, FrameProgram)
+    program = content.axes["xy".index(axis)]
     prefix = f"{content.name}_{axis}"
     constants = {
         key: value

@@ -39,7 +39,7 @@ def _context(content: Content) -> dict[str, Any]:
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": sine_memory(content),
         "dac_bits": dac_bits,
-        "code_range": _range(dac_bits),
+        "code_range": port_range(dac_bits),
         "axes": [_axis(content, axis) for axis in content.axes],
     }
 
@@ -57,11 +57,12 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
         "harmonics": axis.harmonics,
         "fourier_memory": f"{prefix}_fourier.mem",
         "word_bits": output.word_bits,
-        "word_range": _range(output.word_bits),
+        "word_range": port_range(output.word_bits),
         "twos_complement": int(output.coding == "twos-complement"),
         "left_aligned": int(output.align == "left"),
     }
 
 
-def _range(bits: int) -> str:
+def port_range(bits: int) -> str:
+    """Return the range of a port of so many bits, as wide as the widest one."""
     return f"[{bits - 1}:0]".ljust(_PORT)

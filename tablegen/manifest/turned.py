@@ -104,8 +104,8 @@ class TurnedFigures(Struct):
     codes: dict[Literal["x", "y"], TurnedCodes]
 
 
-class TurnedManifest(Struct):
-    """The part of a manifest that is read."""
+class TurnedManifest(Struct, kw_only=True):
+    """The part of a manifest that is read; ``clocks_per_tick`` are those of an FPGA, 0 where they are not known."""
 
     tablegen: Version
     hash: Digest
@@ -114,6 +114,10 @@ class TurnedManifest(Struct):
     files: dict[BuildFileName, Digest]
     sequence: ManifestSequence
     turned: TurnedFields
+    formats: Annotated[list[Literal["c", "verilog"]], Meta(min_length=1, max_length=2)] = msgspec.field(
+        default_factory=lambda: ["c"]
+    )
+    clocks_per_tick: Annotated[int, Meta(ge=0, lt=1 << 31)] = 0
     certificate: TurnedFigures
 
 

@@ -1,7 +1,7 @@
 """The plan of a scan at an angle and its certificate as plain data: the content of its manifest."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from msgspec import structs
@@ -31,13 +31,23 @@ def turned_record(plan: TurnedPlan) -> dict[str, Any]:
 
 
 def turned_manifest(
-    record: dict[str, Any], digest: str, certificate: TurnedCertificate, files: Mapping[str, bytes]
+    record: dict[str, Any],
+    digest: str,
+    formats: Sequence[str],
+    certificate: TurnedCertificate,
+    files: Mapping[str, bytes],
+    clocks_per_tick: int = 0,
 ) -> bytes:
-    """Write the plan's record with its hash, the certificate, and the SHA-256 of every other file of the build."""
+    """Write the plan's record with its hash, the certificate, and the SHA-256 of every other file of the build.
+
+    ``formats`` stand in it unless they are c alone, ``clocks_per_tick`` unless it is 0.
+    """
     manifest = {
         "tablegen": __version__,
         "hash": digest,
         **record,
+        **({"formats": list(formats)} if list(formats) != ["c"] else {}),
+        **({"clocks_per_tick": clocks_per_tick} if clocks_per_tick else {}),
         "certificate": certificate_record(certificate),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
     }

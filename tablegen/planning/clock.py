@@ -6,7 +6,8 @@ from tablegen.base.figures import at_least, at_most
 from tablegen.base.input_errors import Problems
 from tablegen.config.frame import exact
 from tablegen.config.load import Setup
-from tablegen.device.clocks import least_clocks
+from tablegen.device.clocks import least_clocks, least_slow_clocks
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.program import Program
 
@@ -16,13 +17,21 @@ _MOST = (1 << 31) - 1
 
 def clocks_per_tick(setup: Setup, schedule: Schedule, programs: tuple[Program, Program], problems: Problems) -> int:
     """Return the clocks from tick to tick at ``emit.clock_hz``, 0 without this key or where ``problems`` grew."""
+    return _clocks(setup, schedule, least_clocks(programs), problems)
+
+
+def slow_clocks_per_tick(setup: Setup, program: ScanProgram, problems: Problems) -> int:
+    """Return the same for a program with a slow part on both axes, which the sequencer plays in low area."""
+    return _clocks(setup, program.schedule, least_slow_clocks(program), problems)
+
+
+def _clocks(setup: Setup, schedule: Schedule, least: int, problems: Problems) -> int:
     clock_hz = setup.scan.emit.clock_hz
     if clock_hz is None:
         return 0
     rate = schedule.update_rate_hz
     exact_clocks = exact(clock_hz) / rate
     clocks = round(exact_clocks)
-    least = least_clocks(programs)
     why = None
     if clocks < least:
         why = (

@@ -34,8 +34,8 @@ from tablegen.planning.waveforms import make_waveforms
 from tablegen.waveform.series import FourierSeries
 
 MIXED = (
-    "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the format c, "
-    "`verify`, `upload` and `readback`; leave this out for anything else"
+    "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the formats c and "
+    "verilog, `verify`, `upload` and `readback`; leave this out for anything else"
 )
 
 

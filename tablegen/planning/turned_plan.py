@@ -183,8 +183,8 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
 
 
 def _at_0_degrees(setup: Setup) -> Setup:
-    """Return the setup without an angle, coupling and drift."""
-    scan = replace(setup.scan, angle_deg=0.0, drift_nm_per_s=(0.0, 0.0))
+    """Return the setup without an angle, coupling and drift, and without a clock, which a slow part takes others of."""
+    scan = replace(setup.scan, angle_deg=0.0, drift_nm_per_s=(0.0, 0.0), emit=replace(setup.scan.emit, clock_hz=None))
     return replace(setup, scan=scan, scanner=replace(setup.scanner, coupling=Coupling()))
 
 

@@ -91,8 +91,9 @@ def verify(
         return verify_library(folder, verify_program)
     if is_turned(folder):
         with _work_folder(None if keep is None else Path(keep)) as work:
-            most = DEFAULT_TICKS["c"] if ticks is None else ticks
-            return verify_turned(folder, work, target, most, progress, other_version=other_version)
+            return verify_turned(
+                folder, work, target, ticks, progress, simulator=simulator, other_version=other_version
+            )
     player, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
         most = most_ticks if ticks is None else ticks

@@ -1,17 +1,18 @@
-"""Verify a build of a scan at an angle: its files, its certificate, and what its C plays on this machine."""
+"""Verify a build of a scan at an angle: its files, its certificate, and what its C or its Verilog plays."""
 
-from collections.abc import Callable
-from itertools import zip_longest
+from collections.abc import Callable, Sequence
+from itertools import dropwhile, zip_longest
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from tablegen.base.input_errors import shortened
+from tablegen.base.input_errors import Unphysical, shortened
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.device.dual_program import AxisProgram
 from tablegen.device.sequencer import Sequencer, Tick
-from tablegen.emit.turned import TurnedContent, turned_files, turned_options, turned_runtime
+from tablegen.emit.turned import require_format, turned_files, turned_options, turned_runtime
+from tablegen.emit.turned_content import TurnedContent
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import StoredTurned, read_turned
@@ -25,11 +26,14 @@ from tablegen.verification.checks.directory import copies, wrong_digests
 from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.stream import FLAGS
+from tablegen.verification.verilog.simulate import require
+from tablegen.verification.verilog.turned_play import TurnedPlay
 from tablegen.version import __version__
 
 _BENCH = Path(__file__).parent / "c" / "frame_bench.c"
 _REST = 5  # ticks before the scan
 _FRAMES = 2
+_MOST_TICKS = {"c": 3_000_000, "icarus": 3_000, "verilator": 30_000}  # unless they are given
 _TICK = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1"), ("faults", "u1")])
 _LEAST_TICKS_A_SECOND = 5000  # a slower program counts as hanging
 
@@ -38,9 +42,10 @@ def verify_turned(
     folder: Path,
     work: Path,
     target: Literal["verilog", "c", "cortex-m", "files"] | None,
-    most_ticks: int,
+    most_ticks: int | None,
     progress: Callable[[str | Callable[[], str]], None],
     *,
+    simulator: Literal["icarus", "verilator"] = "icarus",
     other_version: bool = False,
 ) -> Report:
     """Verify the build of a scan at an angle in ``folder``.
@@ -50,9 +55,11 @@ def verify_turned(
     work
         Empty directory in which the build is played.
     target
-        "c", which is the default, or "files", which plays nothing.
+        "verilog", the default where the build has it; "c"; or "files", which plays nothing.
     most_ticks
-        Bound of the ticks that are played.
+        Bound of the ticks that are played; by default those of ``_MOST_TICKS``.
+    simulator
+        What plays the Verilog.
     other_version
         True to accept a build of another version, whose runtime cannot be compared with the installed one.
 
@@ -61,13 +68,14 @@ def verify_turned(
     NotABuild
         If the folder holds no such build, or the target cannot play one.
     ToolMissing
-        If a compiler is not installed.
+        If a compiler or simulator is not installed.
     """
     stored = read_turned(folder)
-    if target not in (None, "c", "files"):
-        raise NotABuild(f"{folder}: is a scan at an angle, which plays in C alone; verify it with --target c or files")
-    if target != "files":
+    target = _target(folder, stored.manifest.formats, target)
+    if target == "c":
         require_compiler(host_compiler())
+    if target == "verilog":
+        require(simulator)
     watch, manifest = Stopwatch(), stored.manifest
     progress("hashing the files")
     checks = watch.timed(_file_checks(folder, stored, other_version))
@@ -76,14 +84,49 @@ def verify_turned(
     notes: list[str] = []
     difference = None
     if target != "files":
-        progress("compiling the C, and playing it")
-        ticks = min(_FRAMES * manifest.sequence.schedule.frame_ticks, most_ticks)
-        if ticks < manifest.sequence.schedule.frame_ticks:
-            whole = manifest.sequence.schedule.frame_ticks
+        schedule = manifest.sequence.schedule
+        whole = schedule.frame_ticks
+        session = _FRAMES * whole if target == "c" else whole + schedule.ticks
+        ticks = min(
+            session, _MOST_TICKS[simulator if target == "verilog" else target] if most_ticks is None else most_ticks
+        )
+        if ticks < whole:
             notes.append(f"{ticks} of the {whole} ticks of a frame were played; --ticks {whole} plays them all")
-        played, difference = _played_checks(folder, work, stored, ticks)
+        if target == "c":
+            progress("compiling the C, and playing it")
+            played, difference = _played_checks(folder, work, stored, ticks)
+        else:
+            progress(f"{simulator} plays {ticks} ticks")
+            played = TurnedPlay(_content_of(stored), ticks).checks(folder, work / "verilog", simulator)
         checks += watch.timed(played)
     return Report(manifest.name, checks, difference, notes, watch.seconds)
+
+
+def _target(folder: Path, formats: Sequence[str], target: str | None) -> Literal["c", "verilog", "files"]:
+    """Return what plays a build of these formats.
+
+    Raises
+    ------
+    NotABuild
+        If the target cannot play it.
+    """
+    if target == "files":
+        return "files"
+    if target is None:
+        return "verilog" if "verilog" in formats else "c"
+    if target == "cortex-m":
+        raise NotABuild(f"{folder}: is a scan at an angle, which no emulator plays; verify it with another --target")
+    if target not in formats:
+        raise NotABuild(
+            f"{folder}: this build has the formats {', '.join(formats)}, and no {target}; verify it with another "
+            f"--target, or build it with --format {target}"
+        )
+    return "verilog" if target == "verilog" else "c"
+
+
+def _content_of(stored: StoredTurned) -> TurnedContent:
+    manifest = stored.manifest
+    return TurnedContent(manifest.name, manifest.hash, stored.program, clocks_per_tick=manifest.clocks_per_tick)
 
 
 def _file_checks(folder: Path, stored: StoredTurned, other_version: bool) -> list[Check]:
@@ -94,11 +137,19 @@ def _file_checks(folder: Path, stored: StoredTurned, other_version: bool) -> lis
     checks = [Check("manifest", "its own hash", "1 plan", failure=edited)]
     wrong = wrong_digests(folder, manifest.files)
     checks.append(differing_check("files", "SHA-256 in the manifest", f"{len(manifest.files)} files", wrong))
-    own = turned_files(TurnedContent(manifest.name, manifest.hash, stored.program))
-    different = [why for name, right in own.items() if (why := _difference(folder / name, right))]
-    checks.append(differing_check("c files", "manifest", f"{len(own)} files", different))
+    own: dict[str, bytes] = {}
+    for each in manifest.formats:
+        try:
+            require_format(each, stored.program)
+        except Unphysical as error:
+            checks.append(Check(f"{each} files", "manifest", "0 files", failure=f"{each} files: {error}"))
+            continue
+        files = turned_files(_content_of(stored), [each])
+        different = [why for name, right in files.items() if (why := _difference(folder / name, right))]
+        checks.append(differing_check(f"{each} files", "manifest", f"{len(files)} files", different))
+        own |= files
     if manifest.tablegen == __version__:
-        runtime = turned_runtime()
+        runtime = turned_runtime(manifest.formats)
         unlike = [f"{name}: is not that of tablegen" for name in runtime if _content(folder / name) != runtime[name]]
         unlike += [f"{name}: is not listed" for name in (*own, *runtime) if name not in manifest.files]
         checks.append(differing_check("files", f"tablegen {__version__}", f"{len(runtime)} files", unlike))
@@ -119,16 +170,22 @@ def _content(path: Path) -> bytes | None:
 
 
 def _difference(path: Path, right: bytes) -> str | None:
-    """Return the first line of a C file that is not as the manifest has it, behind the banner."""
+    """Return the first line of a file that is not as the manifest has it, behind the comment at its beginning."""
     content = _content(path)
     if content is None:
         return f"{path.name}: cannot be read"
-    ours = content.decode("utf-8", "replace").partition("*/")[2].splitlines()
-    expected = right.decode("ascii").partition("*/")[2].splitlines()
+    ours = _behind_banner(path, content.decode("utf-8", "replace"))
+    expected = _behind_banner(path, right.decode("ascii"))
     if ours == expected:
         return None
     line, other = next(pair for pair in zip_longest(ours, expected, fillvalue="") if pair[0] != pair[1])
     return f"{path.name}: a line is {line.strip()[:60]!r}, it is {other.strip()[:60]!r} by the manifest"
+
+
+def _behind_banner(path: Path, text: str) -> list[str]:
+    if path.suffix in (".c", ".h"):
+        return text.partition("*/")[2].splitlines()
+    return list(dropwhile(lambda line: line.startswith("//"), text.splitlines()))
 
 
 def _code_check(stored: StoredTurned) -> Check:

@@ -84,13 +84,17 @@ def test_other_commands_refuse_it(command: tuple[str, ...], scan: Path) -> None:
 
 
 def test_another_format_is_refused(scan: Path, tmp_path: Path) -> None:
-    outcome = run("build", scan, "-o", tmp_path / "out", "-f", "verilog")
+    outcome = run("build", scan, "-o", tmp_path / "out", "-f", "csv")
     assert outcome.status == 2
-    assert outcome.err.splitlines() == ["formats: a scan at an angle, on coupled axes or with drift has c alone"]
+    assert outcome.err.splitlines() == [
+        "formats: a scan at an angle, on coupled axes or with drift has the formats c and verilog"
+    ]
     path = write_turned(tmp_path, 30.0, *SHORT, "+ [emit]\nformats = ['c', 'csv']")
     outcome = run("check", path)
     assert outcome.status == 2
-    assert "emit.formats: a scan at an angle has the format c alone" in outcome.err
+    assert (
+        "emit.formats: a scan at an angle, on coupled axes or with drift has the formats c and verilog" in outcome.err
+    )
 
 
 def test_a_limit_that_is_exceeded_ends_with_its_status(tmp_path: Path) -> None:

@@ -177,7 +177,7 @@ def test_lines_and_ticks_have_to_be_those_of_the_schedule() -> None:
 
 def test_the_link_and_verilog_take_no_slow_part() -> None:
     program = made(2, "x", "smooth", 6, 30)
-    with pytest.raises(ValueError, match="nothing writes one for Verilog"):
+    with pytest.raises(ValueError, match="and the Verilog of a scan at an angle"):
         require_dual(program)
     assert isinstance(program.y, FrameProgram) is False
     dual = DualProgram(program.y, program.y, program.schedule)  # type: ignore[arg-type]

@@ -143,7 +143,7 @@ def test_other_words_are_heard_in_what_is_played(file: str, old: str, new: str, 
 
 
 def test_other_targets_and_readers_say_what_it_is(build: Path) -> None:
-    with pytest.raises(NotABuild, match="is a scan at an angle, which plays in C alone"):
+    with pytest.raises(NotABuild, match="is a scan at an angle, which no emulator plays"):
         verify(build, "cortex-m")
     with pytest.raises(NotABuild, match="is of a scan at an angle; of the commands that read a build"):
         read_build(build)

@@ -199,11 +199,9 @@ def _turned(setup: "Setup", formats: "Sequence[str] | None", strict: bool) -> "T
     from tablegen.api.turned import build_turned
     from tablegen.base.input_errors import Rejected
 
-    if formats is not None and list(formats) != ["c"]:
-        fail(["formats: a scan at an angle, on coupled axes or with drift has c alone"], ExitStatus.WRONG_INPUT)
     try:
         with Progress() as progress:
-            built = build_turned(setup, progress=progress.now)
+            built = build_turned(setup, formats=formats, progress=progress.now)
     except BrokenLimit as broken:
         fail(broken.problems, ExitStatus.BROKEN_LIMIT)
     except Rejected as rejected:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.base.reading import BUILD_FILE, read_text
-from tablegen.base.resources import resource_folder, verilog_runtime
+from tablegen.base.resources import resource_folder, verilog_runtime, verilog_slow_part
 from tablegen.device.widths import least_widths
 from tablegen.emit.constants import sequence_constants, shaping_constants, verilog_axis_constants, verilog_constants
 from tablegen.emit.content import AxisContent, Content
@@ -36,8 +36,9 @@ class Verilog(Format):
         return verilog_runtime()
 
     def sources(self) -> list[Path]:
-        """Return the runtime and the template."""
-        return [*self.runtime(), *(resource_folder("firmware_templates") / "verilog").glob("*.j2")]
+        """Return the runtime, also that of a scan at an angle, and the templates."""
+        templates = (resource_folder("firmware_templates") / "verilog").glob("*.j2")
+        return [*self.runtime(), *verilog_slow_part(), *templates]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
         """Compare the constants of the header, and the words of the memory files."""

@@ -150,8 +150,6 @@ def bench_text(content: Content, index_bits: tuple[int, int], top: bool = False)
     With ``top`` its ``NAME_top.v`` plays beside the session.
     """
     name = content.name.upper()
-    formats = {key: "%h" if key == "HASH" else "%0d" for key in expected_constants(content)}
-    lines = [f'        $fwrite(constants, "{how}\\n", {name}_{key});' for key, how in formats.items()]
     return _MODULE.format(
         header=f"{content.name}.vh",
         X=f"{name}_X",
@@ -160,8 +158,14 @@ def bench_text(content: Content, index_bits: tuple[int, int], top: bool = False)
         y_index_bits=index_bits[1],
         spacing=SPACING_CLOCKS,
         top=_TOP_PLAYS if top else _NO_TOP,
-        constants="\n".join(lines),
+        constants=written_constants(content.name, expected_constants(content)),
     )
+
+
+def written_constants(name: str, constants: Mapping[str, str]) -> str:
+    """Return the Verilog that writes constants of the header of a build down, each on a line."""
+    formats = {key: "%h" if key == "HASH" else "%0d" for key in constants}
+    return "\n".join(f'        $fwrite(constants, "{how}\\n", {name.upper()}_{key});' for key, how in formats.items())
 
 
 def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, int | str]:
@@ -199,14 +203,13 @@ def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
     }
 
 
-def different_constants(folder: Path, content: Content) -> list[str]:
-    """List the constants that the simulator reads in the header otherwise than the manifest has them."""
-    constants = expected_constants(content)
+def different_constants(folder: Path, name: str, constants: Mapping[str, str]) -> list[str]:
+    """List the constants that the simulator reads in the header of a build otherwise than the manifest has them."""
     readings = (folder / CONSTANTS).read_text("ascii", "replace").split()
     if len(readings) != len(constants):
-        return [f"{content.name}.vh: {len(readings)} of its constants were read, there are {len(constants)}"]
+        return [f"{name}.vh: {len(readings)} of its constants were read, there are {len(constants)}"]
     return [
-        f"{content.name}.vh: {content.name.upper()}_{key} is {value} to the simulator, it is {right} in the manifest"
+        f"{name}.vh: {name.upper()}_{key} is {value} to the simulator, it is {right} in the manifest"
         for (key, right), value in zip(constants.items(), readings, strict=True)
         if value != right
     ]

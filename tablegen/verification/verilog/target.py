@@ -158,7 +158,7 @@ class VerilogTarget:
                 "verilog header",
                 "manifest, by the simulator",
                 f"{len(expected_constants(content))} constants",
-                different_constants(run.folder, content),
+                different_constants(run.folder, content.name, expected_constants(content)),
             ),
             *check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()}),
             *check_waveform(captures[-1], stored, job.limits),

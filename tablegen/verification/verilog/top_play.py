@@ -5,6 +5,7 @@ than a session: a top that boots Fourier words is told to withdraw them once all
 tables instead. The other parameters serve both ways.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.device.dual_program import ScanProgram
 from tablegen.device.registers import program_words
 from tablegen.device.sequencer import Sequencer
 from tablegen.emit.content import Content
@@ -62,7 +64,7 @@ module top_play #(
     wire [31:0] x_sent = x_word, y_sent = y_word;
     integer upload, booted, played, clocks = 0;
 
-    {name}_top #(.PLAIN_MULTIPLIER(1), .START_CLOCKS(50)) device (
+    {name}_top #({settings}.START_CLOCKS(50)) device (
         .clock(clock), .reset(1'b0), .write(write), .write_region(word[50:48]), .write_address(word[47:32]),
         .write_data(word[31:0]), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
         .committed(committed), .booting(booting), .missing(missing), .arm(start), .arm_frames(16'd0),
@@ -113,11 +115,11 @@ module top_play #(
             step;
             commit = 0;
         end
-        repeat (16) step;
+        repeat ({rest}) step;
         tick = 1;
         step;
         tick = 0;
-        repeat (100) step;
+        repeat ({rest}) step;
         start = 1;
         step;
         start = 0;
@@ -138,7 +140,7 @@ endmodule
 """
 
 
-class _Write(NamedTuple):
+class Write(NamedTuple):
     """A write at the host port."""
 
     region: int
@@ -176,82 +178,156 @@ class TopPlay:
 
     def prepare(self, build: Path, folder: Path, model: Path) -> list[Path]:
         """Copy the top of a build into ``folder``, memory files to where the ``model`` runs; return top and bench."""
-        model.mkdir(exist_ok=True)
-        for memory in memories(self.content):
-            name = f"{self.content.name}_{memory.name}.mem"
-            if (build / name).is_file():
-                (model / name).write_bytes(read_bytes(build / name, BUILD_FILE))
         upload = self._tables() if self.content.renders_tables else []
-        (folder / _UPLOAD).write_text("".join(f"{one.packed():016x}\n" for one in upload), "ascii")
-        bench = folder / f"{BENCH}.v"
-        bench.write_text(self._bench_text(), "ascii")
-        top = folder / f"{self.content.name}_top.v"
-        top.write_bytes(read_bytes(build / top.name, BUILD_FILE))
-        return [top, bench]
+        names = [f"{self.content.name}_{memory.name}.mem" for memory in memories(self.content)]
+        return write_top(self.content.name, names, self._bench_text(), build, folder, model, upload)
 
     def parameters(self) -> dict[str, str]:
         """Return the files of the bench, relative to the folder in which the model runs."""
-        names = {"UPLOAD": _UPLOAD, "BOOTED": _BOOTED, "PLAYED": _PLAYED}
-        return {key: f"../{name}" for key, name in names.items()}
+        return top_parameters()
 
     def check(self, folder: Path) -> Check:
         """Compare what was booted and played in a folder with the manifest and the integer model."""
-        boot = np.array([*(one.packed() for one in self._boot()), 0], dtype=np.uint64)
-        model, booted, played = self._model(), read_capture(folder / _BOOTED), read_capture(folder / _PLAYED)
-        failure = _boot_failure(boot, booted) or _play_failure(model, played)
-        wrong = _different(boot, booted) + _different(model, played)
-        compared = f"{len(boot) - 1} words booted, {self.ticks} ticks"
-        name = f"{self.content.name}_top.v"
-        return Check("top", "integer model", compared, f"{wrong} differ", "0", failure and f"{name}: {failure}")
+        return check_top(self.content.name, self._boot(), self.content.program, self.ticks, folder)
 
     def _bench_text(self) -> str:
-        x, y = (axis.program.output for axis in self.content.axes)
-        return _MODULE.format(
-            name=self.content.name,
-            dac_bits=x.dac_bits,
-            x_bits=x.word_bits,
-            y_bits=y.word_bits,
+        return top_bench_text(
+            self.content.name,
+            self.content.program,
             boot_clocks=self._boot_clocks,
-            other_sine=_OTHER_SINE.format(self.content.name) if self.content.renders_tables else "1'b0",
-            withdraws=int(self.content.renders_tables),
             ticks=self.ticks,
-            pause=self.pace - 1,
+            pace=self.pace,
+            settings=".PLAIN_MULTIPLIER(1), ",
+            other_sine=_OTHER_SINE.format(self.content.name) if self.content.renders_tables else "1'b0",
+            withdraws=self.content.renders_tables,
         )
 
-    def _boot(self) -> list[_Write]:
+    def _boot(self) -> list[Write]:
         """Return what the top writes at power-up."""
         if not self.content.renders_tables:
             return self._tables()
         x, y = self.content.axes
         words = [(X_FOURIER, x.fourier_words), (Y_FOURIER, y.fourier_words)]
-        return self._registers((x.harmonics, y.harmonics)) + _writes(words)
+        return self._registers((x.harmonics, y.harmonics)) + writes(words)
 
-    def _tables(self) -> list[_Write]:
+    def _tables(self) -> list[Write]:
         x, y = self.content.axes
-        return self._registers((0, 0)) + _writes([(X_TABLE, x.program.words), (Y_TABLE, y.program.words)])
+        return self._registers((0, 0)) + writes([(X_TABLE, x.program.words), (Y_TABLE, y.program.words)])
 
-    def _registers(self, harmonics: tuple[int, int]) -> list[_Write]:
+    def _registers(self, harmonics: tuple[int, int]) -> list[Write]:
         x, y = (axis.program for axis in self.content.axes)
         words = program_words(self.content.schedule, x, y, harmonics)
-        return [_Write(PROGRAM, address, word) for address, word in enumerate(words)]
-
-    def _model(self) -> Words:
-        """Return each tick and its converter words, the tick that takes the program first, and the flags at the end."""
-        x, y = (axis.program.output for axis in self.content.axes)
-        model = Sequencer(None)
-        model.commit(self.content.program)
-        ticks = [model.step()]
-        model.arm()
-        model.trigger()
-        ticks += [model.step() for _ in range(self.ticks)]
-        words = [word for tick in ticks for word in (pack(tick), y.word(tick.y) << 32 | x.word(tick.x))]
-        return np.array([*words, 0, 0], dtype=np.uint64)
+        return [Write(PROGRAM, address, word) for address, word in enumerate(words)]
 
 
-def _writes(regions: "list[tuple[int, np.ndarray]]") -> list[_Write]:
+def writes(regions: "list[tuple[int, np.ndarray]]", address: int = 0) -> list[Write]:
+    """Return the writes of words to regions, each from an address on."""
     return [
-        _Write(region, address, int(word)) for region, words in regions for address, word in enumerate(words.tolist())
+        Write(region, address + at, int(word)) for region, words in regions for at, word in enumerate(words.tolist())
     ]
+
+
+def top_bench_text(
+    name: str,
+    program: ScanProgram,
+    *,
+    boot_clocks: int,
+    ticks: int,
+    pace: int,
+    settings: str = "",
+    rest: int = 100,
+    other_sine: str = "1'b0",
+    withdraws: bool = False,
+) -> str:
+    """Return the bench module of ``NAME_top.v``.
+
+    Parameters
+    ----------
+    boot_clocks
+        Clocks in which the boot has to end.
+    ticks, pace
+        How many ticks of the scan it plays, and how many clocks apart.
+    settings
+        Parameters of the top, with a comma behind each.
+    rest
+        Clocks before the tick that takes the program, and before the trigger.
+    other_sine, withdraws
+        An expression that is 1 for a wrong sine, and whether what was booted is replaced by an upload.
+    """
+    x, y = program.x.output, program.y.output
+    return _MODULE.format(
+        name=name,
+        dac_bits=x.dac_bits,
+        x_bits=x.word_bits,
+        y_bits=y.word_bits,
+        boot_clocks=boot_clocks,
+        settings=settings,
+        rest=rest,
+        other_sine=other_sine,
+        withdraws=int(withdraws),
+        ticks=ticks,
+        pause=pace - 1,
+    )
+
+
+def write_top(
+    name: str, memories: Iterable[str], bench_text: str, build: Path, folder: Path, model: Path, upload: Sequence[Write]
+) -> list[Path]:
+    """Write what plays the top of a build: its copy and the bench into ``folder``, and memory files beside the model.
+
+    Parameters
+    ----------
+    memories
+        Names of memory files; those that the build lacks are left out.
+    model
+        Folder in which the model runs, which is made.
+    upload
+        Writes that the bench makes where it withdraws what was booted.
+
+    Returns
+    -------
+    list of Path
+        Top and bench.
+    """
+    model.mkdir(exist_ok=True)
+    for memory in memories:
+        if (build / memory).is_file():
+            (model / memory).write_bytes(read_bytes(build / memory, BUILD_FILE))
+    (folder / _UPLOAD).write_text("".join(f"{one.packed():016x}\n" for one in upload), "ascii")
+    bench = folder / f"{BENCH}.v"
+    bench.write_text(bench_text, "ascii")
+    top = folder / f"{name}_top.v"
+    top.write_bytes(read_bytes(build / top.name, BUILD_FILE))
+    return [top, bench]
+
+
+def top_parameters() -> dict[str, str]:
+    """Return the files of the bench of a top, relative to the folder in which the model runs."""
+    names = {"UPLOAD": _UPLOAD, "BOOTED": _BOOTED, "PLAYED": _PLAYED}
+    return {key: f"../{name}" for key, name in names.items()}
+
+
+def check_top(name: str, boot: Sequence[Write], program: ScanProgram, ticks: int, folder: Path) -> Check:
+    """Compare what a top booted and played in a folder with the writes of its boot and the integer model."""
+    expected = np.array([*(one.packed() for one in boot), 0], dtype=np.uint64)
+    model, booted, played = _model(program, ticks), read_capture(folder / _BOOTED), read_capture(folder / _PLAYED)
+    failure = _boot_failure(expected, booted) or _play_failure(model, played)
+    wrong = _different(expected, booted) + _different(model, played)
+    compared = f"{len(boot)} words booted, {ticks} ticks"
+    return Check("top", "integer model", compared, f"{wrong} differ", "0", failure and f"{name}_top.v: {failure}")
+
+
+def _model(program: ScanProgram, count: int) -> Words:
+    """Return each tick and its converter words, the tick that takes the program first, and the flags at the end."""
+    x, y = program.x.output, program.y.output
+    model = Sequencer(None)
+    model.commit(program)
+    ticks = [model.step()]
+    model.arm()
+    model.trigger()
+    ticks += [model.step() for _ in range(count)]
+    words = [word for tick in ticks for word in (pack(tick), y.word(tick.y) << 32 | x.word(tick.x))]
+    return np.array([*words, 0, 0], dtype=np.uint64)
 
 
 def _different(expected: Words, got: Words) -> int:

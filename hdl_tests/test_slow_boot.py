@@ -1,0 +1,232 @@
+"""dac_slow_boot before a dac_boot: the slow parts, then the program and a commit, wherever it waits or begins again.
+
+What is written follows from random programs, not from the files that are read. ``test_boot.py`` has the stimulus.
+"""
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mutants
+import numpy as np
+import pytest
+from building import BENCHES, REPOSITORY
+from slow_scripts import SLOW_FOLDER, X_PARTS, Y_PARTS, random_scan
+from test_boot import BOOT, COMMIT, Clock, Write, Wrong, check_boots
+
+from tablegen.device.registers import program_words
+from tablegen.emit.memory import memory_file
+from tablegen.emit.turned_content import TurnedContent
+from tablegen.emit.turned_verilog import turned_memories
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.verilog.simulate import Design, compile_design
+
+pytestmark = pytest.mark.common
+
+BENCH = BENCHES / "slow_boot_bench.v"
+SLOW_BOOT = SLOW_FOLDER / "dac_slow_boot.v"
+MOST_IDLE = 5  # clocks on which a boot that is not held up writes nothing: both modules begin, and end
+AFTER = 6  # clocks of the host before the next reset
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The memory files of a program by their parameters, the parameters to go with them, and the writes of a boot."""
+
+    files: Mapping[str, bytes]
+    parameters: Mapping[str, int]
+    writes: Sequence[Write]
+
+
+def setup(seed: int, shape: SequencerShape, start_clocks: int = 0) -> Setup:
+    """A random program of a shape, with a slow part on both axes."""
+    program = random_scan(np.random.default_rng(seed), shape, 40, 3, "wild")
+    content = TurnedContent("boot", "", program)
+    files = {"x": "X", "y": "Y", "slow": "SLOW", "program": "PROGRAM"}
+    memories = {one.name: one for one in turned_memories(content)}
+    parameters = {"START_CLOCKS": start_clocks, "WORD_BITS": memories["slow"].bits}
+    writes: list[Write] = []
+    for letter, region, axis in zip("XY", (X_PARTS, Y_PARTS), content.axes, strict=True):
+        assert isinstance(axis, FrameProgram)
+        parameters |= {
+            f"{letter}_WORDS": len(axis.fast.words),
+            f"{letter}_WORD_BITS": axis.fast.bits,
+            f"{letter}_SLOW_WORDS": len(axis.slow.words),
+            f"{letter}_KNOTS": len(axis.gains.words),
+        }
+        for part, words in enumerate((axis.second, axis.slow.words, axis.gains.words, axis.ratios.words)):
+            writes += [(region, part << 14 | at, int(word) & 0xFFFFFFFF) for at, word in enumerate(words)]
+    registers = program_words(program.schedule, program.x, program.y)
+    writes += [(0, address, word) for address, word in enumerate(registers)]
+    for region, axis in zip((1, 2), content.axes, strict=True):
+        writes += [(region, address, int(word) & 0xFFFFFFFF) for address, word in enumerate(axis.fast.words)]
+    texts = {f"{key}_FILE": memory_file(memories[name].words, memories[name].bits) for name, key in files.items()}
+    return Setup(texts, parameters, [*writes, COMMIT])
+
+
+SETUPS = {
+    "cubic": setup(1, SequencerShape(16, 3, 3, 16, 3, 4, 16)),
+    "wide": setup(2, SequencerShape(16, 3, 4, 21, 3, 3, 12)),
+    "late": setup(3, SequencerShape(16, 3, 3, 16, 3, 3, 16), start_clocks=37),
+}
+
+
+def boots(clocks: int) -> Iterator[tuple[int, int]]:
+    """Reset and writable by clocks: held up at random, reset at each eleventh clock of a boot, and at random."""
+    for last in range(0, clocks + AFTER, 11):
+        for at in range(last):
+            yield 0, int(at % 7 != last % 7)
+        yield 1, last % 2
+    rng = random.Random(clocks)
+    for often in (0.5, 0.1, 0.9):
+        for _ in range(6 * clocks):
+            yield int(rng.random() < 0.3 / clocks), int(rng.random() < often)
+
+
+def stimulus(name: str) -> list[Clock]:
+    """For a setup; the host asks for something on most clocks. It ends with a boot and some clocks of the host."""
+    clocks = len(SETUPS[name].writes) + MOST_IDLE
+    rng = random.Random(name)
+    start = [(int(clock == 10), clock % 2) for clock in range(SETUPS[name].parameters["START_CLOCKS"])]
+    return [
+        Clock(
+            reset, writable, rng.getrandbits(1), int(rng.random() < 0.2),
+            (rng.getrandbits(3), rng.getrandbits(16), rng.getrandbits(32)),
+        )
+        for reset, writable in [*start, *boots(clocks), (1, 1), *[(0, 1)] * (clocks + AFTER)]
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant(mutants.Mutant):
+    """A fault of dac_slow_boot, and in ``where`` the setup that shows it."""
+
+    where: str = "cubic"
+
+    @property
+    def path(self) -> Path:
+        return SLOW_BOOT
+
+
+FAULTS: dict[str, tuple[str, ...]] = {
+    "it_begins_at_once": ("started = waited == START[START_BITS-1:0]", "started = 1'b1", "late"),
+    "the_word_does_not_wait": ("now = writing && writable", "now = writing"),
+    "the_word_read_does_not_wait": ("        if (writable) begin", "        if (1'b1) begin"),
+    "the_address_does_not_wait": ("if (reading && started && writable)", "if (reading && started)"),
+    "a_word_has_no_sign": ("{{32{word[WORD_BITS-1]}}, word[", "{32'd0, word["),
+    "a_word_is_lost": ("read_at == LAST[", "read_at + 1'b1 == LAST["),
+    "the_parts_of_y_are_those_of_x": ("is_y ? Y_PARTS : X_PARTS", "is_y ? X_PARTS : X_PARTS"),
+    "y_is_as_long_as_x": ("(is_y ? LAST_Y_TABLE : LAST_X_TABLE)", "LAST_X_TABLE"),
+    "its_slow_table_too": ("(is_y ? LAST_Y_SLOW : LAST_X_SLOW)", "LAST_X_SLOW"),
+    "its_knots_too": ("(is_y ? LAST_Y_KNOT : LAST_X_KNOT)", "LAST_X_KNOT"),
+    "ratios_follow_as_one_part": ("wire ends = place", "wire ends = part != 2'd2 && place"),
+    "the_other_boot_does_not_wait": ("boot_writable = writable && !loading", "boot_writable = writable"),
+    "the_commit_does_not_wait": ("commit = !loading && boot_commit", "commit = reading && boot_commit"),
+    "the_rest_is_not_heard": ("loading ? now : boot_write", "loading ? now : 1'b0"),
+    "the_rest_has_no_data": ("wide[31:0] : boot_data", "wide[31:0] : 32'd0"),
+    "a_reset_goes_on_where_it_was": ("            read_at <= 0;\n", ""),
+    "a_reset_goes_on_at_its_place": ("            place <= 14'd0;\n", ""),
+    "a_reset_goes_on_in_its_part": ("            part <= 2'd0;\n", ""),
+    "a_reset_goes_on_with_y": ("            is_y <= 1'b0;\n", ""),
+    "a_reset_does_not_load": ("            reading <= 1'b1;\n", ""),
+    "a_reset_leaves_a_word_on_its_way": ("            writing <= 1'b0;\n", ""),
+}  # fmt: skip
+MUTANTS = {name: Mutant(name, SLOW_BOOT.name, *fault) for name, fault in FAULTS.items()}
+
+
+def play(folder: Path, played: Mapping[str, tuple[str, Mutant | None]]) -> dict[str, list[str]]:
+    """Setups by the names of benches, all in one simulation; those with a mutant have a module of their own."""
+    (folder / "build").mkdir(parents=True)
+    sources, instances = [BENCH, SLOW_BOOT, BOOT], []
+    for index, (bench, (name, mutant)) in enumerate(played.items()):
+        module, clocks = "slow_boot_bench", stimulus(name)
+        if mutant is not None:
+            module = f"slow_boot_bench_{bench}"
+            for path, text in ((BENCH, BENCH.read_text("utf-8")), (SLOW_BOOT, mutant.source)):
+                sources.append(folder / f"{path.stem}_{bench}.v")
+                renamed = text.replace("dac_slow_boot #(", f"dac_slow_boot_{bench} #(")
+                sources[-1].write_text(renamed.replace("slow_boot_bench #(", f"{module} #("), "utf-8")
+        for key, content in SETUPS[name].files.items():
+            (folder / "build" / f"{bench}_{key}.mem").write_bytes(content)
+        (folder / "build" / f"{bench}.hex").write_text("".join(f"{each.word:x}\n" for each in clocks), "ascii")
+        given = [f".{key}({value})" for key, value in {**SETUPS[name].parameters, "DEPTH": len(clocks)}.items()]
+        given += [f'.{key}("{bench}_{key}.mem")' for key in SETUPS[name].files]
+        given += [f'.STIMULUS("{bench}.hex")', f'.CAPTURE("{bench}.txt")']
+        instances.append(f"    {module} #({', '.join(given)}) bench_{index} (.clock(clock), .done(done[{index}]));\n")
+    top = folder / "boot_top.v"
+    top.write_text(
+        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
+        f"    wire [{len(instances) - 1}:0] done;\n    wire all_done = &done;\n{''.join(instances)}endmodule\n",
+        "ascii",
+    )
+    compiled = compile_design("icarus", Design([top, *sources], "boot_top"), folder / "build")
+    assert compiled.run("cocotb_outputs") == (1, 0)
+    return {bench: (compiled.folder / f"{bench}.txt").read_text("ascii").splitlines() for bench in played}
+
+
+def check(name: str, lines: Sequence[str]) -> int:
+    """Hold what left against the law; returns how many boots came to their end."""
+    one = SETUPS[name]
+    return check_boots(one.writes, stimulus(name), lines, one.parameters["START_CLOCKS"], MOST_IDLE)
+
+
+@pytest.fixture(scope="module")
+def captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    return play(tmp_path_factory.mktemp("boot") / "boot", {name: (name, None) for name in SETUPS})
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[str, list[str]], name: str) -> None:
+    assert check(name, captured[name]) >= 3
+    assert {(region, data >> 31) for region, _, data in SETUPS[name].writes if region > 4} == {
+        (region, sign) for region in (X_PARTS, Y_PARTS) for sign in (0, 1)
+    }
+
+
+@pytest.mark.parametrize("words", [None, -1, 3])
+def test_a_file_that_is_missing_or_short_is_said(words: int | None, tmp_path: Path) -> None:
+    """The boot goes on to its end, for what stands before the sequencer to withdraw it."""
+    (tmp_path / "build").mkdir()
+    one = SETUPS["cubic"]
+    for key, content in one.files.items():
+        lines = content.splitlines(keepends=True)
+        if key != "SLOW_FILE" or words is not None:
+            kept = lines[:words] if key == "SLOW_FILE" else lines
+            (tmp_path / "build" / f"{key}.mem").write_bytes(b"".join(kept))
+    depth = len(one.writes) + 2 * MOST_IDLE
+    (tmp_path / "build" / "stimulus.hex").write_text(f"{1 << 53:x}\n" * depth, "ascii")
+    given = [f".{key}({value})" for key, value in {**one.parameters, "DEPTH": depth}.items()]
+    given += [f'.{key}("{key}.mem")' for key in one.files]
+    top = tmp_path / "boot_top.v"
+    top.write_text(
+        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
+        f"    wire all_done;\n    slow_boot_bench #({', '.join(given)}) bench (.clock(clock), .done(all_done));\n"
+        "endmodule\n",
+        "ascii",
+    )
+    compiled = compile_design("icarus", Design([top, BENCH, SLOW_BOOT, BOOT], "boot_top"), tmp_path / "build")
+    assert compiled.run("cocotb_outputs") == (1, 0)
+    flags = [line.split()[0] for line in (compiled.folder / "capture.txt").read_text("ascii").splitlines()]
+    assert flags.count("d") == 1  # missing, booting, and a commit; where there are no words, flags are undefined
+    assert not {"5", "1"} & set(flags)
+    assert flags[-1] == "8"
+
+
+@pytest.fixture(scope="module")
+def mutants_captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    benches = {name: (mutant.where, mutant) for name, mutant in MUTANTS.items()}
+    return play(tmp_path_factory.mktemp("boot") / "mutants", benches)
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_is_found(mutants_captured: dict[str, list[str]], name: str) -> None:
+    with pytest.raises(Wrong):
+        check(MUTANTS[name].where, mutants_captured[name])
+
+
+def test_the_documentation_counts_them() -> None:
+    page = (REPOSITORY / "docs" / "verilog.md").read_text("utf-8")
+    assert f"with {len(MUTANTS)} mutants" in page

@@ -1,0 +1,142 @@
+"""A play of the Verilog of a scan at an angle: its ``NAME_top.v`` boots, and plays from the start of a frame.
+
+The header is compiled beside it, and its constants are written down as the simulator reads them.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from tablegen.device.clocks import least_slow_clocks, slow_line_clocks
+from tablegen.device.registers import program_words
+from tablegen.emit.turned_content import TurnedContent
+from tablegen.emit.turned_verilog import slow_parts, turned_constants, turned_memories
+from tablegen.verification import process_group as worker
+from tablegen.verification.build_report import differing_check
+from tablegen.verification.checks.directory import copies, some
+from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.failures import SimulationFailed
+from tablegen.verification.play.stream import PROGRAM, X_TABLE, Y_TABLE
+from tablegen.verification.verilog.bench import CONSTANTS, TOP, different_constants, written_constants
+from tablegen.verification.verilog.top_play import (
+    Write,
+    check_top,
+    top_bench_text,
+    top_parameters,
+    write_top,
+    writes,
+)
+
+_X_PARTS, _Y_PARTS = 5, 6  # regions
+_PART_SHIFT = 14  # of the address: second table, slow table, gains, ratios
+_OTHER_CLOCKS = 2000  # to boot and to drain, beside the words
+_TARGET = "tablegen.verification.verilog.target"  # which has the job that compiles and runs a bench
+
+_MODULE = """\
+// The bench of tablegen verify for a scan at an angle: its header, and a play of its top.
+`timescale 1ns / 1ps
+`default_nettype none
+
+module verify_bench #(
+    parameter CONSTANTS = "", parameter UPLOAD = "", parameter BOOTED = "", parameter PLAYED = ""
+);
+`include "{name}.vh"
+    // For the cocotb side of the bench.
+    wire finished;
+    wire refused = 1'b0;
+    wire [127:0] fault_counts = 128'd0;
+    wire [31:0] strobes = 32'd0, ticks = 32'd0, jitter = 32'd0, latency = 32'd0;
+
+    top_play #(.UPLOAD(UPLOAD), .BOOTED(BOOTED), .PLAYED(PLAYED)) top (.finished(finished));
+
+    integer constants;
+    initial begin
+        constants = $fopen(CONSTANTS, "w");
+{constants}
+        $fclose(constants);
+    end
+endmodule
+
+`default_nettype wire
+"""
+
+
+@dataclass(frozen=True)
+class TurnedPlay:
+    """A play of ``ticks`` ticks from the start of a frame, as close to each other as the sequencer allows."""
+
+    content: TurnedContent
+    ticks: int
+
+    def checks(self, folder: Path, work: Path, simulator: Literal["icarus", "verilator"]) -> list[Check]:
+        """Play the build in ``folder`` and return what differs; ``work`` is an empty folder, which is made."""
+        name = self.content.name
+        work.mkdir(exist_ok=True)
+        modules = sorted(path.name for path in folder.glob("dac_*.v"))
+        sources, missing = copies(folder, [*modules, f"{name}_top.v", f"{name}.vh"], work / "rtl")
+        if missing:
+            return [Check("simulation", simulator, "nothing", failure=f"simulation: {some(missing)}")]
+        memories = [f"{name}_{one.name}.mem" for one in turned_memories(self.content)]
+        beside = write_top(name, memories, self._bench_text(), folder, work, work / simulator, [])
+        bench, constants = work / f"{TOP}.v", self._constants()
+        bench.write_text(_MODULE.format(name=name, constants=written_constants(name, constants)), "ascii")
+        job = {
+            "simulator": simulator,
+            "sources": [str(path) for path in (*sources[: len(modules)], *beside, bench)],
+            "includes": [str(sources[-1].parent)],
+            "parameters": {"CONSTANTS": f"../{CONSTANTS}", **top_parameters()},
+            "clocks": self._clocks,
+        }
+        try:
+            worker.run(work, _TARGET, job)
+            different = different_constants(work, name, constants)
+            header = differing_check(
+                "verilog header", "manifest, by the simulator", f"{len(constants)} constants", different
+            )
+            return [header, check_top(name, self._boot(), self.content.program, self.ticks, work)]
+        except (SimulationFailed, OSError, ValueError) as error:
+            return [Check("simulation", simulator, f"{self.ticks} ticks", failure=f"simulation: {error}")]
+
+    @property
+    def _pace(self) -> int:
+        return least_slow_clocks(self.content.program)
+
+    @property
+    def _rest(self) -> int:
+        """Clocks in which line 0 is worked out, before a tick takes the program and again before the trigger."""
+        return slow_line_clocks(self.content.program) + 100
+
+    @property
+    def _boot_clocks(self) -> int:
+        return len(self._boot()) + _OTHER_CLOCKS // 2
+
+    @property
+    def _clocks(self) -> int:
+        return self._boot_clocks + 2 * self._rest + self.ticks * self._pace + _OTHER_CLOCKS
+
+    def _constants(self) -> dict[str, str]:
+        numbers = {key: str(value) for key, value in turned_constants(self.content).items()}
+        return {"HASH": self.content.hash, **numbers}
+
+    def _bench_text(self) -> str:
+        return top_bench_text(
+            self.content.name,
+            self.content.program,
+            boot_clocks=self._boot_clocks,
+            ticks=self.ticks,
+            pace=self._pace,
+            rest=self._rest,
+        )
+
+    def _boot(self) -> list[Write]:
+        """Return what the top writes at power-up: the slow parts first."""
+        program, (x, y) = self.content.program, self.content.axes
+        boot: list[Write] = []
+        for region, axis in ((_X_PARTS, x), (_Y_PARTS, y)):
+            for part, words in enumerate(slow_parts(axis)):
+                boot += writes([(region, np.array(words))], part << _PART_SHIFT)
+        registers = program_words(program.schedule, x, y)
+        boot += [Write(PROGRAM, address, word) for address, word in enumerate(registers)]
+        return boot + writes([(X_TABLE, x.fast.words), (Y_TABLE, y.fast.words)])
