@@ -83,7 +83,8 @@ typedef struct {
 
 DAC_CODE_ATTR static inline dac_segment dac_segment_of(const dac_word *words)
 {
-    const int32_t first = words[0], second = words[1], third = words[2], fourth = words[3], ends = first + third;
+    const int32_t first = DAC_TABLE_WORD(words[0]), second = DAC_TABLE_WORD(words[1]);
+    const int32_t third = DAC_TABLE_WORD(words[2]), fourth = DAC_TABLE_WORD(words[3]), ends = first + third;
     const dac_segment s = {
         2 * ends + 8 * second,
         12 * (third - first),

@@ -14,6 +14,10 @@
 
 #ifdef DAC_CONFIG_FILE
 #include DAC_CONFIG_FILE
+#elif defined(__AVR__) && defined(__has_include)
+#if __has_include("tablegen_options.h") /* of an Arduino library, which has no options of a compiler */
+#include "tablegen_options.h"
+#endif
 #endif
 
 #ifndef DAC_TABLE_STORAGE_BITS
@@ -48,6 +52,24 @@
 
 #ifndef DAC_PIXEL_TABLE
 #define DAC_PIXEL_TABLE 0 /* 1: plays programs with a table of the ticks of each pixel */
+#endif
+
+#ifndef DAC_PROGMEM
+#define DAC_PROGMEM 0 /* 1, on an AVR: tables are in flash, and are read there; the link has its own in RAM */
+#endif
+#if DAC_PROGMEM && (DAC_SLOW_PART || DAC_PIXEL_TABLE)
+#error "DAC_PROGMEM has no slow parts and no tables of pixels"
+#endif
+#if DAC_PROGMEM
+#include <avr/pgmspace.h>
+#define DAC_TABLE_ATTR PROGMEM
+#if DAC_TABLE_STORAGE_BITS == 16
+#define DAC_TABLE_WORD(word) ((dac_word)pgm_read_word(&(word)))
+#else
+#define DAC_TABLE_WORD(word) ((dac_word)pgm_read_dword(&(word)))
+#endif
+#else
+#define DAC_TABLE_WORD(word) (word) /* reads a word of a table */
 #endif
 
 #ifndef DAC_REQUESTS
@@ -134,7 +156,8 @@
 #define DAC_CONFIG_VALUE(option) "(" DAC_CONFIG_TEXT(option) ")"
 #define DAC_CONFIG_SYMBOL(name, value) __asm__(".hidden " name "\n.globl " name "\n" name " = " value "\n");
 DAC_CONFIG_SYMBOL("dac_objects_need_the_same_options",
-                  "((((((((((((" DAC_CONFIG_VALUE(DAC_PIXEL_TABLE) "*2+" DAC_CONFIG_VALUE(
+                  "(((((((((((((" DAC_CONFIG_VALUE(DAC_PROGMEM) "*2+" DAC_CONFIG_VALUE(
+                      DAC_PIXEL_TABLE) ")*2+" DAC_CONFIG_VALUE(
                       DAC_MOVE) ")*2+" DAC_CONFIG_VALUE(DAC_SLOW_PART) ")*4+" DAC_CONFIG_VALUE(
                       DAC_TABLE_STORAGE_BITS) "/16)*4+" DAC_CONFIG_VALUE(
                       DAC_OUTPUT_STORAGE_BITS) "/16)*256+" DAC_CONFIG_VALUE(DAC_STRIDE) ")*4+" DAC_CONFIG_VALUE(

@@ -156,8 +156,9 @@ bool dac_synthesize(dac_word *table, uint32_t room, unsigned index_bits, unsigne
 {
     struct renderer r;
 
-    if (index_bits < 3 || index_bits > 16 || room < DAC_TABLE_ROOM(index_bits) || sine_index_bits < index_bits
-        || sine_index_bits > 16 || bits < 8 || bits > 24 || bits > DAC_TABLE_STORAGE_BITS || harmonics < 1
+    if (DAC_PROGMEM || index_bits < 3 || index_bits > 16
+        || room < DAC_TABLE_ROOM(index_bits) || sine_index_bits < index_bits || sine_index_bits > 16
+        || bits < 8 || bits > 24 || bits > DAC_TABLE_STORAGE_BITS || harmonics < 1
         || harmonics > 4096 || !fits(words, 2 * harmonics + 1))
         return false;
     r.table = table;

@@ -60,7 +60,7 @@ static bool good_pixel_memory(const dac_link_config *c)
 
 static dac_link_started judge_config(const dac_link_config *c)
 {
-    if (!good_axis(&c->x) || !good_axis(&c->y))
+    if (DAC_PROGMEM || !good_axis(&c->x) || !good_axis(&c->y)) /* tables of the link are not in flash */
         return DAC_LINK_BAD_AXIS;
     if (!good_fourier(c))
         return DAC_LINK_BAD_FOURIER;

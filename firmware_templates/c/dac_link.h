@@ -112,7 +112,7 @@ typedef struct {
 /* Why a link was not started. */
 typedef enum {
     DAC_LINK_STARTED = 0,
-    DAC_LINK_BAD_AXIS,    /* converter, limits, word_bits, index_bits, room or tables of an axis */
+    DAC_LINK_BAD_AXIS,    /* converter, limits, word_bits, index_bits, room or tables of an axis; or DAC_PROGMEM */
     DAC_LINK_BAD_FOURIER, /* harmonics above 4096 or without memory, or a sine that is missing or too short */
     DAC_LINK_BAD_KEY,     /* not 16..32 bytes */
     DAC_LINK_NO_IDENTITY, /* a key, but no identity of 4..32 bytes */

@@ -60,8 +60,10 @@ static bool good_length(const dac_axis_program *p)
 static bool good_table(const dac_axis_program *p)
 {
     return p->table != NULL && p->bits >= 8 && p->bits <= (CUBIC(p) ? 21 : 24) && good_length(p)
-        && p->table[p->length] == p->table[0]
-        && (!CUBIC(p) || (p->table[p->length + 1] == p->table[1] && p->table[p->length + 2] == p->table[2]));
+        && DAC_TABLE_WORD(p->table[p->length]) == DAC_TABLE_WORD(p->table[0])
+        && (!CUBIC(p)
+            || (DAC_TABLE_WORD(p->table[p->length + 1]) == DAC_TABLE_WORD(p->table[1])
+                && DAC_TABLE_WORD(p->table[p->length + 2]) == DAC_TABLE_WORD(p->table[2])));
 }
 
 /* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a

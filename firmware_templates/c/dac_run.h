@@ -13,7 +13,8 @@ struct dac_pair {
     const int32_t words = ((const struct dac_pair *)((table) + (index)))->words;                                      \
     const int32_t here = (int16_t)words, there = words >> 16
 #else
-#define DAC_NEIGHBOURS(table, index, here, there) const int32_t here = (table)[index], there = (table)[(index) + 1]
+#define DAC_NEIGHBOURS(table, index, here, there)                                                                     \
+    const int32_t here = DAC_TABLE_WORD((table)[index]), there = DAC_TABLE_WORD((table)[(index) + 1])
 #endif
 
 /* Hides a value from the optimiser, so that the compiler neither computes it in advance nor computes it again. */
@@ -34,7 +35,8 @@ DAC_CODE_ATTR static inline int32_t dac_sample_at(const dac_bank_axis *bank, uin
 #endif
     const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
     const unsigned guard = DAC_GUARD(bank);
-    return dac_lerp(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
+    return dac_lerp(DAC_TABLE_WORD(bank->table[index]), DAC_TABLE_WORD(bank->table[index + 1]), high & 0x7fffu, guard,
+                    DAC_HALF(guard));
 }
 
 #if DAC_SPLINE

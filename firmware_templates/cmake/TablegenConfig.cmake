@@ -10,8 +10,14 @@
 #
 # builds the scan file into DIRECTORY (by default tablegen/NAME in the binary directory), and makes a library NAME of
 # its C sources: NAME.c, NAME_program.c (not if header-only), and the runtime dac_*.c. Who links to it finds the headers, and
-# is compiled with the DAC_TABLE_STORAGE_BITS and DAC_OUTPUT_STORAGE_BITS that the scan needs, with its DAC_SHAPING, and
-# with DAC_SPLINE for cubic tables.
+# is compiled with the DAC_TABLE_STORAGE_BITS and DAC_OUTPUT_STORAGE_BITS that the scan needs, with its DAC_SHAPING,
+# with DAC_SPLINE for cubic tables, DAC_SLOW_PART for a scan at an angle, and DAC_PIXEL_TABLE for a sine.
+#
+#     tablegen_runtime(TARGET NAME SCANS SCAN... [OUTPUT DIRECTORY])
+#
+# builds several scans, of any widths, for one runtime: a library NAME of the dac_*.c, and a library NAME_SCAN of the C
+# sources of each scan file SCAN.toml. Who links to NAME has all of them, and is compiled with a header DAC_CONFIG_FILE,
+# which has the highest of each option that any of the scans needs.
 #
 # TABLEGEN, which may be given on the command line of cmake, is the program; a list is one with its first arguments.
 #
@@ -37,16 +43,11 @@ if(NOT TABLEGEN)
   return()
 endif()
 
-function(tablegen_build scan)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TARGET;OUTPUT" "")
-  if(DEFINED arg_UNPARSED_ARGUMENTS OR DEFINED arg_KEYWORDS_MISSING_VALUES OR NOT DEFINED arg_TARGET)
-    message(FATAL_ERROR "tablegen_build(${ARGV}): write tablegen_build(SCAN TARGET NAME [OUTPUT DIRECTORY])")
-  endif()
-  if(NOT DEFINED arg_OUTPUT)
-    set(arg_OUTPUT "tablegen/${arg_TARGET}")
-  endif()
-  cmake_path(ABSOLUTE_PATH scan BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
-  cmake_path(ABSOLUTE_PATH arg_OUTPUT BASE_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}" NORMALIZE OUTPUT_VARIABLE folder)
+# Adds the command that builds a scan, and sets in the caller's scope: scan, folder, stamp, files, sources, manifest.
+function(tablegen_add_scan command scan_file target output)
+  set(folder "${output}")
+  cmake_path(ABSOLUTE_PATH scan_file BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE OUTPUT_VARIABLE scan)
+  cmake_path(ABSOLUTE_PATH folder BASE_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}" NORMALIZE)
   # A hyphen is in no name of a scan: these cannot meet a file of the build.
   set(stamp "${folder}/tablegen-build.stamp")
   set(depfile "${folder}/tablegen-build.d")
@@ -66,13 +67,10 @@ function(tablegen_build scan)
     string(JSON name MEMBER "${listed}" ${i})
     list(APPEND files "${folder}/${name}")
   endforeach()
-  set(kinds TABLE OUTPUT)
-  set(parts table output)
-  set(keys bits word_bits)
   set(sources ${files})
   list(FILTER sources INCLUDE REGEX "\\.c$")
   if(NOT sources)
-    message(FATAL_ERROR "tablegen_build(${scan}): makes a library of C sources; add \"c\" to emit.formats")
+    message(FATAL_ERROR "${command}(${scan}): makes a library of C sources; add \"c\" to emit.formats")
   endif()
 
   # The stamp is removed first: nothing looks built that an interrupted or failed tablegen has left.
@@ -80,7 +78,7 @@ function(tablegen_build scan)
   if(CMAKE_GENERATOR MATCHES "Makefiles")
     # CMake before 3.27.9 only adds to what it knows a command to read (its issue 25428), and a file that is no longer
     # read, and was removed, would have it run for ever. What it knows stands here; without it, it reads DEPFILE alone.
-    list(APPEND outdated "${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${arg_TARGET}_tablegen.dir/compiler_depend.internal")
+    list(APPEND outdated "${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}_tablegen.dir/compiler_depend.internal")
   endif()
   add_custom_command(
     OUTPUT "${stamp}"
@@ -93,35 +91,128 @@ function(tablegen_build scan)
     COMMENT "tablegen build ${scan}"
     VERBATIM)
   # A target of its own runs once, however many targets use the files.
-  add_custom_target("${arg_TARGET}_tablegen" DEPENDS "${stamp}")
+  add_custom_target("${target}_tablegen" DEPENDS "${stamp}")
+  foreach(result scan folder stamp files sources manifest)
+    set(${result} "${${result}}" PARENT_SCOPE)
+  endforeach()
+endfunction()
+
+function(tablegen_build scan)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TARGET;OUTPUT" "")
+  if(DEFINED arg_UNPARSED_ARGUMENTS OR DEFINED arg_KEYWORDS_MISSING_VALUES OR NOT DEFINED arg_TARGET)
+    message(FATAL_ERROR "tablegen_build(${ARGV}): write tablegen_build(SCAN TARGET NAME [OUTPUT DIRECTORY])")
+  endif()
+  if(NOT DEFINED arg_OUTPUT)
+    set(arg_OUTPUT "tablegen/${arg_TARGET}")
+  endif()
+  tablegen_add_scan(tablegen_build "${scan}" "${arg_TARGET}" "${arg_OUTPUT}")
 
   add_library("${arg_TARGET}" STATIC ${sources})
   target_include_directories("${arg_TARGET}" PUBLIC "${folder}")
-  foreach(kind part key IN ZIP_LISTS kinds parts keys)
-    set(storage 16)
-    foreach(axis x y)
-      string(JSON bits GET "${manifest}" axes ${axis} ${part} ${key})
-      if(bits GREATER 16)
-        set(storage 32)
-      endif()
-    endforeach()
-    target_compile_definitions("${arg_TARGET}" PUBLIC DAC_${kind}_STORAGE_BITS=${storage})
-  endforeach()
-  foreach(axis x y)
-    string(JSON mode GET "${manifest}" axes ${axis} table mode)
-    if(mode STREQUAL "cubic")
-      target_compile_definitions("${arg_TARGET}" PUBLIC DAC_SPLINE=1)
-    endif()
-  endforeach()
+  set(axes axes)
   set(shaping 0)
+  string(JSON turned ERROR_VARIABLE straight GET "${manifest}" turned)
+  if(NOT straight)
+    set(axes turned axes)
+    target_compile_definitions("${arg_TARGET}" PUBLIC DAC_SLOW_PART=1 DAC_SPLINE=1)
+  endif()
+  set(TABLE 16)
+  set(OUTPUT 16)
+  set(spline FALSE)
   foreach(axis x y)
-    string(JSON order ERROR_VARIABLE none GET "${manifest}" axes ${axis} output shaping order)
-    if(order GREATER shaping) # what is not there is no number
+    string(JSON bits ERROR_VARIABLE none GET "${manifest}" ${axes} ${axis} table bits)
+    if(bits GREATER 16) # what is not there is no number
+      set(TABLE 32)
+    endif()
+    string(JSON bits GET "${manifest}" ${axes} ${axis} output word_bits)
+    if(bits GREATER 16)
+      set(OUTPUT 32)
+    endif()
+    string(JSON mode ERROR_VARIABLE none GET "${manifest}" ${axes} ${axis} table mode)
+    if(mode STREQUAL "cubic")
+      set(spline TRUE)
+    endif()
+    string(JSON order ERROR_VARIABLE none GET "${manifest}" ${axes} ${axis} output shaping order)
+    if(order GREATER shaping)
       set(shaping ${order})
     endif()
   endforeach()
+  target_compile_definitions("${arg_TARGET}" PUBLIC DAC_TABLE_STORAGE_BITS=${TABLE} DAC_OUTPUT_STORAGE_BITS=${OUTPUT})
+  if(spline)
+    target_compile_definitions("${arg_TARGET}" PUBLIC DAC_SPLINE=1)
+  endif()
   if(shaping)
     target_compile_definitions("${arg_TARGET}" PUBLIC DAC_SHAPING=${shaping})
   endif()
+  string(JSON pixels ERROR_VARIABLE equal LENGTH "${manifest}" sequence pixel_table)
+  if(NOT equal)
+    target_compile_definitions("${arg_TARGET}" PUBLIC DAC_PIXEL_TABLE=1)
+  endif()
+  add_dependencies("${arg_TARGET}" "${arg_TARGET}_tablegen")
+endfunction()
+
+function(tablegen_runtime)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "TARGET;OUTPUT" "SCANS")
+  if(DEFINED arg_UNPARSED_ARGUMENTS OR DEFINED arg_KEYWORDS_MISSING_VALUES OR NOT DEFINED arg_TARGET
+     OR NOT DEFINED arg_SCANS)
+    message(FATAL_ERROR
+      "tablegen_runtime(${ARGV}): write tablegen_runtime(TARGET NAME SCANS SCAN... [OUTPUT DIRECTORY])")
+  endif()
+  if(NOT DEFINED arg_OUTPUT)
+    set(arg_OUTPUT "tablegen/${arg_TARGET}")
+  endif()
+  cmake_path(ABSOLUTE_PATH arg_OUTPUT BASE_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}" NORMALIZE OUTPUT_VARIABLE common)
+  set(options "${common}/dac_options.h")
+  set(options_stamp "${common}/tablegen-runtime.stamp")
+  set(libraries "")
+  set(folders "")
+  set(stamps "")
+  foreach(one IN LISTS arg_SCANS)
+    cmake_path(GET one STEM LAST_ONLY stem)
+    string(MAKE_C_IDENTIFIER "${stem}" stem)
+    set(library "${arg_TARGET}_${stem}")
+    if(library IN_LIST libraries)
+      message(FATAL_ERROR "tablegen_runtime(TARGET ${arg_TARGET}): two scans would be the library ${library}, "
+                          "by the names of their files; rename one, for example ${one}")
+    endif()
+    tablegen_add_scan(tablegen_runtime "${one}" "${library}" "${common}/${stem}")
+    set(own ${sources})
+    list(FILTER own EXCLUDE REGEX "/dac_[a-z_]*\\.c$")
+    if(own)
+      add_library("${library}" STATIC ${own})
+      set(reach PUBLIC)
+    else()
+      add_library("${library}" INTERFACE) # header-only
+      set(reach INTERFACE)
+    endif()
+    target_include_directories("${library}" ${reach} "${folder}")
+    target_link_libraries("${library}" ${reach} "${arg_TARGET}")
+    add_dependencies("${library}" "${library}_tablegen" "${arg_TARGET}_tablegen")
+    if(NOT libraries) # all have the same runtime
+      set(runtime ${sources})
+      list(FILTER runtime INCLUDE REGEX "/dac_[a-z_]*\\.c$")
+    endif()
+    list(APPEND libraries "${library}")
+    list(APPEND folders "${folder}")
+    list(APPEND stamps "${stamp}")
+  endforeach()
+
+  add_custom_command(
+    OUTPUT "${options_stamp}"
+    BYPRODUCTS "${options}"
+    COMMAND ${TABLEGEN} runtime ${folders} --output "${options}" --quiet
+    COMMAND "${CMAKE_COMMAND}" -E touch "${options_stamp}"
+    DEPENDS ${stamps}
+    COMMENT "tablegen runtime ${arg_TARGET}"
+    VERBATIM)
+  add_custom_target("${arg_TARGET}_tablegen" DEPENDS "${options_stamp}")
+  foreach(library IN LISTS libraries)
+    add_dependencies("${arg_TARGET}_tablegen" "${library}_tablegen")
+  endforeach()
+
+  add_library("${arg_TARGET}" STATIC ${runtime})
+  target_include_directories("${arg_TARGET}" PUBLIC "${common}")
+  target_compile_definitions("${arg_TARGET}" PUBLIC "DAC_CONFIG_FILE=\"dac_options.h\"")
+  target_link_libraries("${arg_TARGET}" INTERFACE ${libraries})
   add_dependencies("${arg_TARGET}" "${arg_TARGET}_tablegen")
 endfunction()

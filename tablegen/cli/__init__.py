@@ -53,6 +53,7 @@ _COMMANDS = {
     "delete": ("device.kept", "delete"),
     "ports": ("device.ports", "ports"),
     "init": ("init", "init"),
+    "runtime": ("runtime", "runtime"),
     "formats": ("formats", "formats"),
     "paths": ("paths", "paths"),
     "schema": ("schema", "schema"),

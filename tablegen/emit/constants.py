@@ -9,6 +9,7 @@ from tablegen.fixedpoint.synthesis import FRACTION_BITS
 # Constants that may need more than 32 bits: languages that give constants a type give these a wide one in every build.
 WIDE = frozenset({"UPDATE_RATE_MILLIHZ", "PHASE_STEP", "OFFSET_WORD"})
 
+LEAST_STORAGE_BITS = 16  # of words in memory of the C, which a runtime has by default
 LEAST_INDEX_BITS = 2  # of a sequencer in Verilog
 DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # value of INTERPOLATED: the degree between words
 
@@ -120,4 +121,4 @@ def is_wide(name: str) -> bool:
 
 def storage_bits(bits: int) -> int:
     """Return the bits in which the C holds table words, or converter words, of so many bits."""
-    return 16 if bits <= 16 else 32
+    return LEAST_STORAGE_BITS if bits <= LEAST_STORAGE_BITS else 32

@@ -9,8 +9,8 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.base.resources import c_link, c_runtime, c_store
 from tablegen.device.dual_program import ScanProgram
-from tablegen.emit.constants import axis_constants, sequence_constants, storage_bits
-from tablegen.emit.formats.c import literal
+from tablegen.emit.constants import LEAST_STORAGE_BITS, axis_constants, sequence_constants, storage_bits
+from tablegen.emit.formats.c import beyond_defaults, literal
 from tablegen.emit.templates import comment_safe, rows, template
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.emit.turned_verilog import turned_verilog_files, turned_verilog_runtime
@@ -60,13 +60,14 @@ def _c_files(content: TurnedContent) -> dict[str, bytes]:
 
 def turned_options(program: ScanProgram) -> dict[str, int]:
     """Return the macros that the runtime and an application are compiled with."""
-    return {f"DAC_{key}": value for key, value in _storage(program).items()} | {"DAC_SLOW_PART": 1}
+    return {f"DAC_{key}": value for key, value in _storage(program).items()}
 
 
 def _storage(program: ScanProgram) -> dict[str, int]:
     outputs = program.x.output, program.y.output
     widest, order = max(each.word_bits for each in outputs), max(each.shaping.order for each in outputs)
-    options = {"TABLE_STORAGE_BITS": 16, "OUTPUT_STORAGE_BITS": storage_bits(widest), "SPLINE": 1}
+    widths = {"TABLE_STORAGE_BITS": LEAST_STORAGE_BITS, "OUTPUT_STORAGE_BITS": storage_bits(widest)}
+    options = widths | {"SPLINE": 1, "SLOW_PART": 1}
     return options | ({"SHAPING": order} if order else {})
 
 
@@ -80,6 +81,7 @@ def _context(content: TurnedContent) -> dict[str, Any]:
         "summary": content.summary,
         "sequence": sequence_constants(content.program.schedule),
         "storage": _storage(content.program),
+        "needs": beyond_defaults(_storage(content.program)),
         "axes": [_axis(content, axis) for axis in "xy"],
     }
 
@@ -93,11 +95,11 @@ def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
         if not key.startswith("FOURIER") and key != "HARMONICS"
     }
     arrays = {
-        "table": ("int16_t", _with_first_again(program.fast.words)),
+        "table": (f"{content.name}_word", _with_first_again(program.fast.words)),
         "second": ("int8_t", program.second),
         "gains": ("int32_t", program.gains.words),
         "ratios": ("int16_t", program.ratios.words),
-        "slow": ("int16_t", _with_first_again(program.slow.words)),
+        "slow": (f"{content.name}_word", _with_first_again(program.slow.words)),
     }
     return {
         "axis": axis,

@@ -21,6 +21,7 @@ WORDS = {
     "tables": f"no.toml --plot {FILE}",
     "simulate --plot": f"no.toml --plot {FILE}",
     "simulate --csv": f"no.toml --csv {FILE}",
+    "runtime": f"no -o {FILE}",
     "report": f"no.toml -o {FILE}",
     "report --svg": f"no.toml --svg {FILE}",
     "compare": f"no.toml no.toml -o {FILE}",

@@ -103,7 +103,10 @@ MUTANTS: tuple[Mutant, ...] = (
             "a frame of too many ticks": ("p->frame_lines <= INT32_MAX / p->line_ticks", "true"),
             "a turn behind the line": ("p->turn_tick <= p->line_ticks", "true"),
             "words of 7 bits": ("p->bits >= 8", "p->bits >= 7"),
-            "any word behind the last one": ("p->table[p->length] == p->table[0]", "true"),
+            "any word behind the last one": (
+                "DAC_TABLE_WORD(p->table[p->length]) == DAC_TABLE_WORD(p->table[0])",
+                "true",
+            ),
             "a direct table of any length": ("return p->length == p->phase_period && ", "return "),
             "4 words": ("INDEX_BITS(p) >= 3", "INDEX_BITS(p) >= 2"),
             "x has any period": ("p->x.phase_period == ticks", "p->x.phase_period != 0"),

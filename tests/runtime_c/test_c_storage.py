@@ -24,16 +24,24 @@ INCLUDES = [f"-I{folder}" for folder in sorted({str(path.parent) for path in c_r
 @pytest.mark.common
 @pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_a_program_of_another_width_does_not_compile(tmp_path: Path, compiler: str) -> None:
+    """Narrow words take the width of the runtime; those of a header that was read before its width was known do not."""
     unit = tmp_path / "unit.c"
-    unit.write_text(UNIT, "ascii")
     for bits, scan in ((16, VARIANTS["example"]), (32, VARIANTS["bits_18"])):
-        folder = tmp_path / str(bits)
-        build(folder, scan)
-        for compiled in (16, 32):
-            options = [f"-DDAC_TABLE_STORAGE_BITS={compiled}", "-DDAC_OUTPUT_STORAGE_BITS=32", *INCLUDES]
-            done = run([*COMPILERS[compiler], *options, f"-I{folder / 'out'}", "-fsyntax-only", unit])
-            assert (done.returncode == 0) == (bits == compiled), done.stderr
-            assert bits == compiled or "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in done.stderr
+        build(tmp_path / str(bits), scan)
+    late = f'#include "{NAME}.h"\n#define DAC_TABLE_STORAGE_BITS 32\n'
+    for bits, compiled, before, compiles in (
+        (16, 16, "", True),
+        (16, 32, "", True),
+        (16, None, late, False),
+        (32, 16, "", False),
+        (32, 32, "", True),
+    ):
+        unit.write_text(before + UNIT, "ascii")
+        width = [] if compiled is None else [f"-DDAC_TABLE_STORAGE_BITS={compiled}"]
+        options = [*width, "-DDAC_OUTPUT_STORAGE_BITS=32", *INCLUDES, f"-I{tmp_path / str(bits) / 'out'}"]
+        done = run([*COMPILERS[compiler], *options, "-fsyntax-only", unit])
+        assert (done.returncode == 0) == compiles, done.stderr
+        assert compiles or "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in done.stderr
 
 
 @pytest.mark.common

@@ -16,6 +16,7 @@ from emulation import BOARDS, CmsdkBoard, Firmware, Pl011Board
 from following import Differs, Follower, follow
 from qemu import Machine
 
+from tablegen.base.resources import c_runtime
 from tablegen.config.load import load
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.verification.play.stream import FLAGS
@@ -292,13 +293,14 @@ def test_the_converter_of_the_stm32h7_port_is_checked(options: tuple[str, ...], 
     assert reason in done.stderr
 
 
-def test_avr_plays_the_scan_in_time(tmp_path: Path) -> None:
-    """Every tick is the model's, and takes fewer cycles than there are between two interrupts."""
+@pytest.mark.parametrize("in_flash", [0, 1])
+def test_avr_plays_the_scan_in_time(tmp_path: Path, in_flash: int) -> None:
+    """Every tick is the model's, and takes fewer cycles than there are between two interrupts; RAM has no table."""
     ticks, executable = 2600, tmp_path / "avr.elf"
     built = build(tmp_path, SLOW_12_BITS)
     source, sources = REPOSITORY / "tests" / "helpers" / "avr_step.c", sorted(built.folder.glob("*.c"))
     run_clean(
-        ["avr-gcc", "-std=c99", "-mmcu=atmega2560", "-O2", *WARNINGS, f"-DTICKS={ticks}",
+        ["avr-gcc", "-std=c99", "-mmcu=atmega2560", "-O2", *WARNINGS, f"-DTICKS={ticks}", f"-DDAC_PROGMEM={in_flash}",
          f"-I{built.folder}", source, *sources, "-o", executable]
     )  # fmt: skip
     done = run(["simavr", "-m", "atmega2560", "-f", str(AVR_HZ), executable])
@@ -307,3 +309,32 @@ def test_avr_plays_the_scan_in_time(tmp_path: Path) -> None:
     assert len(lines) == ticks
     follow([line[:-5] for line in lines], built.plan, 1)
     assert max(int(line[-4:], 16) for line in lines) < AVR_HZ / AVR_UPDATE_HZ / 2
+    symbols = re.findall(r"^[0-9a-f]+ (\w) \w+_(?:table|fourier|sine)$", run_clean(["avr-nm", executable]), re.M)
+    assert symbols == ["T" if in_flash else "D"] * 5
+    page = " ".join((REPOSITORY / "docs" / "c.md").read_text("utf-8").split())
+    initialised = run_clean(["avr-size", executable]).splitlines()[1].split()[1]
+    clocks = round(float(np.mean([int(line[-4:], 16) for line in lines])))
+    told = (f"then has {initialised} bytes", f"takes {clocks} clocks")
+    before = (f"initialised data in place of {initialised},", f"clocks in place of {clocks} in the mean")
+    assert all(figure in page for figure in (told if in_flash else before)), (initialised, clocks)
+
+
+def test_a_link_does_not_start_where_tables_are_read_from_flash(tmp_path: Path) -> None:
+    """Its tables are in RAM. What it and the renderer answer is constant, so that the compiler drops the rest."""
+    source = tmp_path / "unit.c"
+    source.write_text(
+        '#include "dac_link.c"\n#include "dac_fourier.c"\n'
+        "int starts(void) { return judge_config(0) == DAC_LINK_STARTED; }\n"
+        "int renders(void) { return dac_synthesize(0, 9, 3, 16, 0, 1, 0, 3); }\n",
+        "ascii",
+    )
+    command = ["avr-gcc", "-std=c99", "-mmcu=atmega2560", "-O2", f"-I{c_runtime()[0].parent}", "-S", source, "-o", "-"]
+    for flag, is_constant in (("-DDAC_PROGMEM=1", True), ("-DDAC_PROGMEM=0", False)):
+        shown = run_clean([*command, flag], tmp_path)
+        for name in ("starts", "renders"):
+            body = shown.partition(f"\n{name}:\n")[2].partition("\t.size")[0]
+            instructions = re.findall(r"^\t([a-z]\w*.*)$", body, re.M)
+            assert instructions[-1] == "ret"
+            assert (instructions[:-1] == ["ldi r24,0", "ldi r25,0"]) == is_constant
+    refused = run([*command, "-DDAC_PROGMEM=1", "-DDAC_SLOW_PART=1"], tmp_path)
+    assert "DAC_PROGMEM has no slow parts and no tables of pixels" in refused.stderr

@@ -1,6 +1,7 @@
 """C99 tables and constants, with the C sequencer and the device's end of the serial link."""
 
 import re
+from collections.abc import Mapping
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.base.resources import c_link, c_runtime, c_store, resource_folder
 from tablegen.emit.constants import (
+    LEAST_STORAGE_BITS,
     axis_constants,
     scan_constants,
     sequence_constants,
@@ -101,6 +103,11 @@ def runtime_options(content: Content) -> dict[str, int]:
     return {f"DAC_{key}": value for key, value in (_storage(content) | shaping_constants(content)).items()}
 
 
+def beyond_defaults(options: Mapping[str, int]) -> dict[str, int]:
+    """Return the options above the defaults of a runtime, by their names without ``DAC_``."""
+    return {key: value for key, value in options.items() if not key.endswith("_BITS") or value > LEAST_STORAGE_BITS}
+
+
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """Return the number of constants of the C header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.h", _constants(content)
@@ -179,7 +186,9 @@ def _context(content: Content) -> dict[str, Any]:
         "greatest_gain": signed_limits(GAIN_BITS)[1],
         "storage": storage,
         "shaping": shaping_constants(content),
-        "word_type": f"int{storage['TABLE_STORAGE_BITS']}_t",
+        "needs": beyond_defaults(storage | shaping_constants(content)),
+        "narrow": storage["TABLE_STORAGE_BITS"] == LEAST_STORAGE_BITS,
+        "word_type": f"{content.name}_word" if storage["TABLE_STORAGE_BITS"] == LEAST_STORAGE_BITS else "int32_t",
         "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
         "axes": [_axis(content, axis) for axis in content.axes],
         "pixel_rows": rows(_pixel_ticks(content)),

@@ -5,7 +5,7 @@ from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
-from building import NAME, Build
+from building import NAME, Build, run
 from formatted import Formatted, check_finds_a_flip, formatted
 from short_scans import model_ticks, short
 from sketches import own_warnings, run_builder, simulated_output
@@ -90,7 +90,7 @@ def test_a_sketch_includes_headers_of_the_build(tmp_path: Path, header_only: boo
 
 
 def test_a_changed_build_is_found(tmp_path: Path) -> None:
-    check_finds_a_flip(formatted(tmp_path, "short", "arduino"), "arduino", ["library.properties"])
+    check_finds_a_flip(formatted(tmp_path, "short", "arduino"), "arduino", ["library.properties", "tablegen_options.h"])
 
 
 def library(tmp_path: Path, changes: dict[str, object], folder: str = "scan") -> Build:
@@ -138,6 +138,9 @@ def test_a_sketch_plays_the_model(tmp_path: Path, changes: dict[str, object]) ->
     verilog = [name for name in built.files if name.endswith((".v", ".vh", ".mem"))]
     assert bool(verilog) == (changes["emit.formats"] != ["arduino"])
     assert not any(name in done.stdout for name in verilog)
+    symbols = run(["avr-nm", "-C", tmp_path / "compiled" / "play.ino.elf"]).stdout
+    assert set(re.findall(rf"^[0-9a-f]+ (\w) {NAME}_[xy]_table$", symbols, re.MULTILINE)) <= {"t", "T"}
+    assert f"{NAME}_x_table" in symbols
     shown = simulated_output(tmp_path / "compiled" / "play.ino.elf")
     assert "refused" not in shown
     program = built.plan.program
