@@ -89,6 +89,14 @@ CASES = {
         "one axis, low area, shaped: to scanner", "dac_axis_serial", "HX8K", {**_AXIS, "SHAPING": 3}, most_cells=974
     ),
     "sequencer": Case("two axes, a sample a clock", "dac_sequencer", "HX8K", _TOP),
+    "sequencer_alternate": Case(
+        "two axes, a sample in 2 clocks",
+        "dac_sequencer",
+        "HX8K",
+        {**_TOP, "ALTERNATE": 1},
+        most_cells=4500,
+        folder="pair",
+    ),
     "sequencer_low_area": Case("two axes, low area", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1}),
     "sequencer_low_area_fourier": Case(
         "two axes, low area, Fourier words", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1, "FOURIER": 1}

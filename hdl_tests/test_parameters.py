@@ -21,6 +21,8 @@ PUBLIC = (
 )  # fmt: skip
 Values = Mapping[str, int | str]
 SLOW_PART = {"SLOW_PART": 1, "LOW_AREA": 1}
+ALTERNATE = {"ALTERNATE": 1}
+ALTERNATE_HAS_NO = "ALTERNATE_has_no_LOW_AREA_PLAIN_MULTIPLIER_FOURIER_or_SHAPING"
 
 FOURIER = {"FOURIER": 1, "X_WORD_BITS": 32, "Y_WORD_BITS": 32, "X_WORDS": 3, "Y_WORDS": 3, "X_HARMONICS": 1}
 CUBIC = {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3}
@@ -74,6 +76,14 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({**SLOW_PART, "X_INDEX_BITS": 15}, "X_or_Y_INDEX_BITS_with_SLOW_PART_are_more_than_14"),
         ({**SLOW_PART, "SLOW_INDEX_BITS": 2}, "SLOW_INDEX_BITS_is_not_3_to_14"),
         ({**SLOW_PART, "SLOW_INDEX_BITS": 15}, "SLOW_INDEX_BITS_is_not_3_to_14"),
+        ({"ALTERNATE": 2}, "ALTERNATE_is_not_0_to_1"),
+        ({**ALTERNATE, "LOW_AREA": 1}, ALTERNATE_HAS_NO),
+        ({**ALTERNATE, "PLAIN_MULTIPLIER": 1}, ALTERNATE_HAS_NO),
+        ({**ALTERNATE, "FOURIER": 1}, ALTERNATE_HAS_NO),
+        ({**ALTERNATE, "SHAPING": 1}, ALTERNATE_HAS_NO),
+        ({**ALTERNATE, "Y_INTERPOLATED": 3}, "ALTERNATE_plays_no_cubic_table"),
+        ({**ALTERNATE, "Y_WORD_BITS": 15}, "X_and_Y_WORD_BITS_with_ALTERNATE_are_not_the_same"),
+        ({**ALTERNATE, "DAC_BITS": 18}, "X_WORD_BITS_with_ALTERNATE_are_less_than_DAC_BITS_takes"),
     ],
     "program_loader": [
         ({"CLOCKS_PER_BIT": 7}, "CLOCKS_PER_BIT_is_not_8_to_65536"),
@@ -224,6 +234,8 @@ LEGAL: dict[str, list[Values]] = {
         {"LOW_AREA": 1, "PLAIN_MULTIPLIER": 1, "FOURIER": 1, "COMMIT_MODES": 1},
         {**SMALL, **SLOW_PART, "SLOW_INDEX_BITS": 3, "LINE_BITS": 1},
         {**LARGE, **SLOW_PART, **CUBIC, **LONG_SPLINE, "SLOW_INDEX_BITS": 14},
+        {**SMALL, **ALTERNATE, "TICK_BITS": 3, "LINE_BITS": 1, "PERIOD_BITS": 1, "COUNT_BITS": 2},
+        {**LARGE, **ALTERNATE, "DAC_BITS": 22, "TICK_BITS": 30, "COMMIT_MODES": 1},
         {**SMALL, "SHAPING": 1},
         {**LARGE, "SHAPING": 3, "PLAIN_MULTIPLIER": 1},
         {**SMALL, **CUBIC, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "TICK_BITS": 3, "PERIOD_BITS": 1},

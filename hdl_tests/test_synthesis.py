@@ -19,7 +19,7 @@ sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
 
 MODULES = resources.MODULES
-BUS, ADC, SLOW = (MODULES / name for name in ("bus", "adc", "slow"))
+BUS, ADC, SLOW, PAIR = (MODULES / name for name in ("bus", "adc", "slow", "pair"))
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "as_it_comes": ("dac_sequencer", {}),
     "multiplier_blocks": ("dac_sequencer", {"PLAIN_MULTIPLIER": 1}),
@@ -40,6 +40,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "cubic_y_plain": ("dac_sequencer", {"Y_INTERPOLATED": 3, "PLAIN_MULTIPLIER": 1, "SHAPING": 3}),
     "cubic_low_area": ("dac_sequencer", {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3, "LOW_AREA": 1}),
     "slow_part": ("dac_sequencer", {"SLOW_PART": 1, "LOW_AREA": 1, "X_INTERPOLATED": 3, "X_INDEX_BITS": 6}),
+    "alternate": ("dac_sequencer", {"ALTERNATE": 1, "X_INTERPOLATED": 0, "X_POWER_UP_CODE": 32768}),
     "spi": ("dac_spi", {}),
     "spi_chain": ("dac_spi", {"TOPOLOGY": 3, "FRAME_BITS": 24, "WORD_BITS": 20, "HALF_PERIOD": 3, "CPHA": 1}),
     "spi_two_channels": ("dac_spi", {"TOPOLOGY": 1, "FRAME_BITS": 24, "LDAC_CLOCKS": 0}),
@@ -65,7 +66,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
 def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> subprocess.CompletedProcess[str]:
     values = " ".join(f"-chparam {name} {value}" for name, value in parameters.items())
     script = (
-        f"read_verilog -defer {folder}/*.v {BUS}/*.v {ADC}/*.v {SLOW}/*.v; "
+        f"read_verilog -defer {folder}/*.v {BUS}/*.v {ADC}/*.v {SLOW}/*.v {PAIR}/*.v; "
         f"hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )

@@ -9,7 +9,8 @@
 //           With SHAPING it is a clock later, and two with LOW_AREA = 1. Where SHAPING is 3, ticks are at least 6
 //           clocks apart: `busy` is high on the five after a tick. Where a table is cubic, a strobe comes 64, 57 or 90
 //           clocks after its tick, and ticks are at least 11 clocks apart. With SLOW_PART it is 3 clocks later, and
-//           `busy` is high while the line that the next tick begins is not ready.
+//           `busy` is high while the line that the next tick begins is not ready. With ALTERNATE a strobe comes 48
+//           clocks after its tick, and ticks are at least 2 clocks apart: `busy` is high on the one after a tick.
 //
 // docs/sequencer.md defines what happens on which tick, and every bit of every code. All inputs must be synchronous to
 // `clock`. The design relies on power-up values of its registers, as FPGAs have them: a reset must not move a code.
@@ -30,6 +31,7 @@ module dac_sequencer #(
     parameter COUNT_BITS = 16,       // bits of a fault counter
     parameter PLAIN_MULTIPLIER = 0,  // 1: multiplies with `*`, in multiplier blocks; 0: in look-up tables
     parameter LOW_AREA = 0,          // 1: 41 clocks per sample, less area, no multiplier blocks
+    parameter ALTERNATE = 0,         // 1: both axes by turns in one pipeline, 2 clocks per sample, less area
     parameter COMMIT_MODES = 0,      // 1: a commit has a mode
     parameter FOURIER = 0,           // 1: computes tables from Fourier words
     parameter HARMONICS = 64,        // with FOURIER: largest number of harmonics
@@ -190,6 +192,22 @@ module dac_sequencer #(
         end
         if (SLOW_PART != 0 && (X_INDEX_BITS > 14 || Y_INDEX_BITS > 14)) begin : guard_29
             dac_sequencer_X_or_Y_INDEX_BITS_with_SLOW_PART_are_more_than_14 stop ();
+        end
+        if (ALTERNATE < 0 || ALTERNATE > 1) begin : guard_32
+            dac_sequencer_ALTERNATE_is_not_0_to_1 stop ();
+        end
+        if (ALTERNATE != 0 && (LOW_AREA != 0 || PLAIN_MULTIPLIER != 0 || FOURIER != 0 || SHAPING != 0)) begin : guard_33
+            dac_sequencer_ALTERNATE_has_no_LOW_AREA_PLAIN_MULTIPLIER_FOURIER_or_SHAPING stop ();
+        end
+        if (ALTERNATE != 0 && SPLINE != 0) begin : guard_34
+            dac_sequencer_ALTERNATE_plays_no_cubic_table stop ();
+        end
+        if (ALTERNATE != 0 && X_WORD_BITS != Y_WORD_BITS) begin : guard_35
+            dac_sequencer_X_and_Y_WORD_BITS_with_ALTERNATE_are_not_the_same stop ();
+        end
+        // The half that rounds lies above the low word of the offset.
+        if (ALTERNATE != 0 && (X_WORD_BITS > 21 ? 25 : X_WORD_BITS + 4) < DAC_BITS + 3) begin : guard_36
+            dac_sequencer_X_WORD_BITS_with_ALTERNATE_are_less_than_DAC_BITS_takes stop ();
         end
         if (SLOW_PART != 0 && (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14)) begin : guard_30
             dac_sequencer_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
@@ -403,6 +421,44 @@ module dac_sequencer #(
                     .clamped(y_clamped)
                 );
             end
+        end else if (ALTERNATE) begin : alternating
+            localparam FLAGS_AT = 46, MARKERS_LEFT = 43;  // clocks from a tick's flags and markers to its codes
+            reg [5:0] at;  // counts clocks
+            reg works;
+            initial begin
+                at = 6'd0;
+                works = 1'b0;
+            end
+            always @(posedge clock) begin
+                at <= at + 1;
+                works <= accepted_tick;
+            end
+            assign busy = works;
+            assign overrun = tick && busy;
+            assign drained = swapped_done;
+
+            dac_pair_delay #(.BITS(5), .CLOCKS(FLAGS_AT)) with_tick (
+                .clock(clock), .at(at), .in({tick_0, runs_0, begins_0, load_0, clears_0}),
+                .out({done, runs_done, begins_done, swapped_done, clears_done})
+            );
+            dac_pair_delay #(.BITS(5), .CLOCKS(MARKERS_LEFT)) with_markers (
+                .clock(clock), .at(at), .in({line_3, frame_3, pixel_3, backward_3, images_3}),
+                .out({line_done, frame_done, pixel_done, backward_done, images_done})
+            );
+            wire reached, clamped;
+            assign {x_reached, y_reached, x_clamped, y_clamped} = {reached, 1'b1, clamped, 1'b0};
+            dac_pair #(
+                .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS),
+                .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(X_WORD_BITS),
+                .PERIOD_BITS(PERIOD_BITS > X_PERIOD_BITS ? PERIOD_BITS : X_PERIOD_BITS),
+                .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+            ) axes (
+                .clock(clock), .at(at), .x_write(x_write), .y_write(y_write), .write_address(address[3:0]),
+                .write_data(data), .x_table_write(x_table_write), .y_table_write(y_table_write),
+                .table_address(table_address[LONGER_BITS-1:0]), .table_data(table_data[X_WORD_BITS-1:0]), .bank(bank),
+                .tick(tick_0), .load(load_0), .runs(runs_0), .line(line_0), .frame(frame_0), .y_advance(y_advance_0),
+                .reached(reached), .clamped(clamped), .x(x), .y(y)
+            );
         end else begin : pipelined
             // Bit i is the flag of the tick i clocks ago.
             reg [LATENCY-1:0] ticks, loads, runnings;

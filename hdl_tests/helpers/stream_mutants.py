@@ -15,6 +15,7 @@ from building import BENCHES as BENCHES_FOLDER
 from building import run_clean, tool
 from limits import ENDED, within
 from mutants import Verdict
+from pair_play import ALTERNATE, PAIR_PACES, pair_script, pair_sources
 from programs import random_dual
 from slow_scripts import SLOW_PART, SlowScript, slow_play, slow_sources
 from stream_benches import with_sine
@@ -28,6 +29,7 @@ from stream_scripts import (
     random_renderings,
     refusals,
     sweep,
+    within_limits,
 )
 
 from tablegen.base.resources import verilog_runtime
@@ -58,6 +60,10 @@ SHAPES = {
     "cubic low area": SequencerShape(24, 3, 3, 12, 1, 3, 12),
     "modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
     "slow": SequencerShape(24, 3, 3, 8, 1, 2, 9),
+    "pair": SequencerShape(16, 1, 4, 16, 1, 3, 16),
+    "pair direct": SequencerShape(8, 0, 6, 8, 1, 2, 8),
+    "pair long table": SequencerShape(20, 1, 12, 20, 1, 2, 20),
+    "pair sweep": SequencerShape(16, 1, 3, 16, 1, 2, 16),
 }
 SHAPED = {  # parameters, paces, samples
     "second": ({"SHAPING": 2}, (1, 3), 5000),
@@ -68,6 +74,7 @@ SPLINES = {  # parameters, how it is placed, samples
     "cubic": ({}, Placement(spline=True), 1500),
     "cubic low area": ({"LOW_AREA": 1}, Placement("serial", spline=True), 300),
 }
+PAIRS = ("pair", "pair direct", "pair long table", "pair sweep")
 BENCHES = tuple(SHAPES)
 
 
@@ -79,7 +86,7 @@ class Mutant(mutants.Mutant):
 
     @property
     def path(self) -> Path:
-        return next(path for path in slow_sources() if path.stem == self.file)
+        return next(path for path in (*slow_sources(), *pair_sources()) if path.stem == self.file)
 
 
 @cache
@@ -99,6 +106,12 @@ def script_of(bench: str) -> Script:
     elif bench == "modes":
         script.tick_every(1)
         modes(rng, script, shape)
+    elif bench in ("pair", "pair direct"):
+        script = pair_script()
+        script.tick_every(PAIR_PACES[0])
+        play(script, within_limits(random_dual(rng, shape, (40, 40), kind="tame", lines=(2, 2))))
+        script.wait_ticks(90)
+        random_play(rng, script, shape, 2500, PAIR_PACES, (8, 20))
     elif bench == "slow":
         script = SlowScript(shape=shape)
         slow_play(rng, script, 400, 5)
@@ -112,12 +125,14 @@ def script_of(bench: str) -> Script:
         play(script, random_dual(rng, shape, (150, 160), kind="tame"))
         script.wait_ticks(150)
         random_play(rng, script, shape, len(script.expected) + 250, (LEAST_PACE,))
-    elif bench == "long table":
+    elif bench in ("long table", "pair long table"):
+        pace = 2 if bench in PAIRS else 1
+        script = pair_script() if bench in PAIRS else script
         for _ in range(2):
             program = random_dual(rng, shape, (200, 220), kind="tame", lines=(3, 3))
             script.load(program)
             script.request("commit", program=program)
-            script.tick_every(1)
+            script.tick_every(pace)
             script.wait_ticks(300)
             for ticks in (100, 330, 500):  # begins again in mid-line, and swaps at the end of one
                 script.request("park")
@@ -125,13 +140,14 @@ def script_of(bench: str) -> Script:
                 script.wait_ticks(ticks)
             script.tick_every(0)
     else:
-        script = sweep(rng, shape, 500, refused=bench == "direct")
+        pace = 2 if bench in PAIRS else 1
+        script = sweep(rng, shape, 500, pace, refused=bench in ("direct", "pair sweep"))
     return script
 
 
 def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[list[Path], dict[str, int | str]]:
     """Return the sources of the bench of this name, with a mutant in them or with none, and its parameters."""
-    sources = slow_sources() if bench == "slow" else list(verilog_runtime())
+    sources = slow_sources() if bench == "slow" else pair_sources() if bench in PAIRS else list(verilog_runtime())
     folder.mkdir(parents=True, exist_ok=True)
     if mutant is not None:
         changed = folder / f"{mutant.file}.v"
@@ -144,6 +160,8 @@ def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[l
         parameters |= SHAPED[bench][0]
     if bench in SPLINES:
         parameters |= SPLINES[bench][0]
+    if bench in PAIRS:
+        parameters |= ALTERNATE
     if bench == "slow":
         parameters |= SLOW_PART
     if bench == "fourier":
@@ -1010,9 +1028,93 @@ def _slow() -> Iterator[Mutant]:
             yield Mutant(breaks, file, old, new, "slow")
 
 
+def _pair() -> Iterator[Mutant]:
+    """Both axes by turns: whose flags, words and state are where, and the stages that are its own."""
+    for file, faults in {
+        "dac_pair": (
+            ("a tick never waits for its turn", "waits <= tick && beat;", "waits <= 1'b0;"),
+            ("y has the flags of another tick", "if (x_here) begin", "if (y_here) begin"),
+            ("y reads the bank of the next tick", ".in(bank_0)", ".in(tick_bank)"),
+            ("the bank is a clock early", ".CLOCKS(9)) with_phase", ".CLOCKS(8)) with_phase"),
+            ("half a digit of a fraction is lost", "phase[17-Y_INDEX_BITS +: 15]", "phase[16-Y_INDEX_BITS +: 15]"),
+            ("the code of x is not kept", "assign x = beat ? ~code_1 : ~code_2;", "assign x = ~code_1;"),
+            ("the code of y is not kept", "assign y = beat ? ~code_inverse : ~code_1;", "assign y = ~code_inverse;"),
+            ("x need not reach its target", "reached_1 && (beat ? code_reached : reached_2)", "reached_1"),
+            ("codes move without a tick", "valid <= ticks;", "valid <= 1'b1;"),
+            ("the park code comes a clock early", "RUNNING_AT = 37", "RUNNING_AT = 36"),
+            ("x and y swap their gains", "load_hold <= is_gain;", "load_hold <= load_hold ^ is_gain;"),
+        ),
+        "dac_pair_words": (
+            ("y has the high offset of x", "6'd30: {of_y, address} = {1'b1,", "6'd30: {of_y, address} = {1'b0,"),
+            ("y parks with x", "6'd36: {of_y, address} = {1'b1,", "6'd36: {of_y, address} = {1'b0,"),
+            ("the step is loaded a clock early", "assign is_step = was ==", "assign is_step = address =="),
+            ("words of x and y are the same", "words[{write_y, write_address}]", "words[{1'b0, write_address}]"),
+        ),
+        "dac_pair_ring": (
+            ("a loaded value does not stay", "other <= now;", "other <= load ? other : now;"),
+        ),
+        "dac_pair_delay": (("all is a clock late", "BEHIND = 65 -", "BEHIND = 64 -"),),
+        "dac_pair_phase": (
+            ("the remainder never wraps", "restart || !over[PERIOD_BITS] ? at_less", "restart ? at_less"),
+            ("one more at every advance", "carry <= advances && wraps;", "carry <= advances;"),
+            ("the rest grows without an advance", "by <= 0;", "by <= {1'b0, at_remainder};"),
+            ("a line begins where the last one ended", "last <= restarts ? 32'd0 : phase;", "last <= phase;"),
+            ("the phase goes on without an advance", "way <= advances ? at_step : 32'd0;", "way <= at_step;"),
+        ),
+        "dac_pair_table": (
+            ("tables of x and y are the same", "{write_y, write_bank, write", "{1'b0, write_bank, write"),
+            ("x reads the row of y", "read_y ? y_odd : x_odd", "y_odd"),
+            ("even words are read from one bank", "{read_y, read_bank, next", "{read_y, 1'b0, next"),
+        ),
+        "dac_pair_interpolator": (
+            ("interpolation rounds down", "{GUARD_BITS{1'b0}}, 1'b1} + step", "{GUARD_BITS{1'b0}}, 1'b0} + step"),
+            ("the word is a clock early", ".CLOCKS(9)) start", ".CLOCKS(8)) start"),
+        ),
+        "dac_pair_output": (
+            ("codes are rounded down", "half = {2'b01,", "half = {2'b00,"),
+            ("odd digits of the gain are those of the other axis", "i % 2 == 0 ? held", "i % 2 != 2 ? held"),
+            ("a low code is held at the other axis' limit", "is_low ? {1'b0, ~min_inverse_last}",
+             "is_low ? {1'b0, ~min_inverse}"),
+            ("a high code is held at the other axis' limit", "is_high ? ~max_inverse_last", "is_high ? ~max_inverse"),
+            ("a low code clamps unseen", "clamps <= was_low_1 || is_high;", "clamps <= is_high;"),
+        ),
+        "dac_pair_slew": (
+            ("a target comes without a tick", "target_1 <= valid ? ~target : target_2;", "target_1 <= ~target;"),
+            ("the code goes on without a tick", "less <= 0;", "less <= less;"),
+            ("the code goes back without a tick", "plus <= 0;", "plus <= plus;"),
+            ("the code is of the other target", "target_4 <= target_3;", "target_4 <= target_2;"),
+            ("it arrives a step early", "is_below = below[BITS+2];", "is_below = 1'b0;"),
+        ),
+    }.items():  # fmt: skip
+        for breaks, old, new in faults:
+            yield Mutant(breaks, file, old, new, "pair long table" if file == "dac_pair_phase" else "pair")
+    yield Mutant(
+        "one axis clamps unseen", "dac_pair", "clamped_1 || (beat ? code_clamped : clamped_2)",
+        "(beat ? code_clamped : clamped_2)", "pair sweep",
+    )  # fmt: skip
+    yield Mutant(
+        "the remainder is that of a clock before",
+        "dac_pair",
+        ".remainder(word_2[",
+        ".remainder(word_3[",
+        "pair long table",
+    )
+    for breaks, old, new in (
+        ("the limit above is one lower", "{2'b11, max_inverse};", "{2'b11, max_inverse} + 1;"),
+        ("the limit below is one higher", "{3'b111, min_inverse} + 1;", "{3'b111, min_inverse};"),
+    ):
+        yield Mutant(breaks, "dac_pair_output", old, new, "pair direct")
+    for breaks, old, new in (
+        ("the direct table is that of y", "beat ? X_INTERPOLATED == 0 : Y_INTERPOLATED == 0",
+         "beat ? Y_INTERPOLATED == 0 : X_INTERPOLATED == 0"),
+        ("a direct table has a word in two advances", "32'd1 << (32 - X_INDEX_BITS)", "32'd1 << (31 - X_INDEX_BITS)"),
+    ):  # fmt: skip
+        yield Mutant(breaks, "dac_pair", old, new, "pair direct")
+
+
 MUTANTS: tuple[Mutant, ...] = (
     *_axis(), *_output(), *_scan(), *_modes(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(),
-    *_cubic(), *_slow(),
+    *_cubic(), *_slow(), *_pair(),
 )  # fmt: skip
 
 

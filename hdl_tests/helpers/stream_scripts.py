@@ -69,6 +69,13 @@ def clamped(program: DualProgram) -> DualProgram:
     return replace(program, x=replace(program.x, output=output), schedule=schedule)
 
 
+def within_limits(program: DualProgram) -> DualProgram:
+    """A tame one whose limits of x are the codes that it reaches: neither of them clamps."""
+    codes = program.x.codes(np.arange(program.schedule.ticks))
+    output = replace(program.x.output, code_min=int(codes.min()), code_max=int(codes.max()))
+    return replace(program, x=replace(program.x, output=output))
+
+
 def random_requests(rng: Generator, script: Script) -> None:
     """A clock with requests, several of them now and then."""
     names = {str(rng.choice(["arm", "trigger", "park", "clear_faults"]))}
