@@ -36,24 +36,24 @@ COUNTS: dict[MeasuredRun, dict[Mode, dict[str, float]]] = {
         "cubic": {"cortex-m4": 35.1, "cortex-m0plus": 73.9},
     },
     MeasuredRun(32, 16, False): {
-        "direct": {"cortex-m4": 36.5, "cortex-m0plus": 144.3},
-        "interpolated": {"cortex-m4": 36.5, "cortex-m0plus": 144.3},
-        "cubic": {"cortex-m4": 26.7, "cortex-m0plus": 232.3},
+        "direct": {"cortex-m4": 22.4, "cortex-m0plus": 62.6},
+        "interpolated": {"cortex-m4": 22.4, "cortex-m0plus": 62.6},
+        "cubic": {"cortex-m4": 26.8, "cortex-m0plus": 83.3},
     },
     MeasuredRun(32, 16, True): {
-        "direct": {"cortex-m4": 43.5, "cortex-m0plus": 152.3},
-        "interpolated": {"cortex-m4": 43.5, "cortex-m0plus": 152.3},
-        "cubic": {"cortex-m4": 33.7, "cortex-m0plus": 240.3},
+        "direct": {"cortex-m4": 29.4, "cortex-m0plus": 70.6},
+        "interpolated": {"cortex-m4": 29.4, "cortex-m0plus": 70.6},
+        "cubic": {"cortex-m4": 33.8, "cortex-m0plus": 91.3},
     },
     MeasuredRun(32, 32, False): {
-        "direct": {"cortex-m4": 36.6, "cortex-m0plus": 144.6},
-        "interpolated": {"cortex-m4": 36.6, "cortex-m0plus": 144.5},
-        "cubic": {"cortex-m4": 27.0, "cortex-m0plus": 232.7},
+        "direct": {"cortex-m4": 22.7, "cortex-m0plus": 68.0},
+        "interpolated": {"cortex-m4": 22.7, "cortex-m0plus": 67.9},
+        "cubic": {"cortex-m4": 26.9, "cortex-m0plus": 83.6},
     },
     MeasuredRun(32, 32, True): {
-        "direct": {"cortex-m4": 44.6, "cortex-m0plus": 153.5},
-        "interpolated": {"cortex-m4": 44.6, "cortex-m0plus": 153.5},
-        "cubic": {"cortex-m4": 35.0, "cortex-m0plus": 241.7},
+        "direct": {"cortex-m4": 30.7, "cortex-m0plus": 77.0},
+        "interpolated": {"cortex-m4": 30.7, "cortex-m0plus": 76.9},
+        "cubic": {"cortex-m4": 34.9, "cortex-m0plus": 92.6},
     },
 }
 INSTRUCTIONS = COUNTS[MeasuredRun(16, 16, False)]
