@@ -5,11 +5,22 @@
 #include "dac_sequencer.h"
 
 #if DAC_TABLE_STORAGE_BITS == 16
-typedef int32_t dac_wide; /* holds the difference of two words times a fraction */
 #define DAC_GUARD(bank) 4
 #else
-typedef int64_t dac_wide;
 #define DAC_GUARD(bank) ((bank)->guard)
+#endif
+
+#if !DAC_LONG_MULTIPLY
+/* Runs with 32 bits scale gain and offset by 2^DAC_UP, as if all samples had as many bits as the storage allows, for
+ * words of 16 bits only if they are shaped. Of wider words they keep the DAC_FINE lower bits of a product apart. */
+#if DAC_TABLE_STORAGE_BITS == 16
+#define DAC_UP(bits, guard) (16u - (bits))
+#define DAC_FINE 0
+#else
+#define DAC_UP(bits, guard) (25u - (bits) - (guard))
+#define DAC_FINE 5
+#define DAC_FINE_MASK ((UINT32_C(1) << DAC_FINE) - 1)
+#endif
 #endif
 
 #define DAC_RUN 16 /* ticks of a run that share one check of clamp and slew guard */
@@ -24,18 +35,8 @@ DAC_CODE_ATTR static inline void dac_advance(dac_position *at, const dac_positio
     at->low = low;
 }
 
-/* The sample between two words: guard bits below the LSB of a word, rounded to nearest, ties up. `half` is
- * DAC_HALF(guard). */
-#define DAC_HALF(guard) ((dac_wide)1 << (14u - (guard)))
-DAC_CODE_ATTR static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard,
-                                             dac_wide half)
-{
-    const dac_wide rise = ((dac_wide)(there - here) * (dac_wide)fraction + half) >> (15u - guard);
-    return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
-}
-
-#if DAC_SPLINE || DAC_SLOW_PART
-/* Horner's rule: lower + value * fraction / 2^19, to nearest, ties up. The fraction has 18 bits; |value| <= 2^27, of
+#if DAC_SPLINE || DAC_SLOW_PART || DAC_TABLE_STORAGE_BITS != 16
+/* Horner's rule: lower + value * fraction / 2^19, to nearest, ties up. The fraction has 18 bits; |value| < 2^27, of
  * words of 16 bits 2^22. The fraction is passed as a dac_factor, which is the same for all three steps. */
 #if DAC_LONG_MULTIPLY || defined(__riscv_mul)
 typedef int32_t dac_factor; /* the fraction times 2^13, so that the upper word of a product is the sum's */
@@ -56,6 +57,22 @@ DAC_CODE_ATTR static inline int32_t dac_horner(int32_t lower, int32_t value, dac
     return lower + (int32_t)(product >> 32) + (int32_t)((uint32_t)product >> 31);
 #endif
 }
+#elif DAC_TABLE_STORAGE_BITS != 16
+typedef int32_t dac_factor;
+#define DAC_FACTOR(fraction) (int32_t)(fraction)
+DAC_CODE_ATTR static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor fraction)
+{
+    /* Products of the value's lower 14 bits have 32 bits. Those of its upper 14 bits have 32 bits with the sign, and
+     * the sum stays below 2^31 since |value| does not reach 2^27. */
+    int32_t sum = (int32_t)(((uint32_t)value & 0x3fffu) * (uint32_t)fraction >> 14) + (value >> 14) * fraction;
+#if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__)
+    /* The carry of the shift rounds. */
+    __asm__(".syntax unified\n\tasrs %0, %0, #5\n\tadcs %0, %1" : "+l"(sum) : "l"(lower) : "cc");
+#else
+    sum = lower + ((sum + 16) >> 5);
+#endif
+    return sum;
+}
 #else
 typedef struct {
     int32_t upper, lower; /* 9 bits each: products with a value, and their sum, stay below 2^31 */
@@ -73,7 +90,31 @@ DAC_CODE_ATTR static inline int32_t dac_horner(int32_t lower, int32_t value, dac
     return sum;
 }
 #endif
+#endif
 
+/* The sample between two words: guard bits below the LSB of a word, rounded to nearest, ties up. `half` is
+ * DAC_HALF(guard). */
+#if DAC_TABLE_STORAGE_BITS == 16
+#define DAC_HALF(guard) ((int32_t)1 << (14u - (guard)))
+DAC_CODE_ATTR static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard,
+                                             int32_t half)
+{
+    const int32_t rise = ((there - here) * (int32_t)fraction + half) >> (15u - guard);
+    return rise + here * ((int32_t)1 << guard);
+}
+#else
+/* A line is a step of Horner's rule: (there - here) 2^(guard + 1) is below 2^27, and the fraction takes 3 bits more. */
+#define DAC_HALF(guard) 0 /* the rule rounds by itself */
+DAC_CODE_ATTR static inline int32_t dac_lerp(int32_t here, int32_t there, uint32_t fraction, unsigned guard,
+                                             int32_t half)
+{
+    const int32_t unit = (int32_t)1 << guard;
+    (void)half;
+    return dac_horner(here * unit, (there - here) * (2 * unit), DAC_FACTOR(fraction << 3));
+}
+#endif
+
+#if DAC_SPLINE || DAC_SLOW_PART
 #define DAC_SPLINE_UNIT 12 /* units of a sample for the LSB of a word */
 
 /* The segment of a cubic spline that begins at a word, by powers of half of the fraction. */

@@ -77,7 +77,7 @@ DAC_CODE_ATTR static inline uint32_t play_along(dac_axis *axis, const dac_bank_a
     const volatile int64_t offset = bank->run_offset;
     int32_t gain = bank->run_gain;
     const unsigned guard = DAC_GUARD(bank);
-    dac_wide half = DAC_HALF(guard);
+    int32_t half = DAC_HALF(guard);
     uint32_t done = 0;
     int32_t code = axis->code;
 #if DAC_SPLINE
@@ -125,12 +125,24 @@ DAC_CODE_ATTR static inline uint32_t play_along(dac_axis *axis, const dac_bank_a
     return done;
 }
 
+#if DAC_SPLINE
+#if DAC_TABLE_STORAGE_BITS == 16
+DAC_ALWAYS_INLINE uint32_t play_cubic
+#else /* the loop of lines would take registers */
+DAC_NOINLINE uint32_t play_cubic
+#endif
+    (dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out, uint32_t ticks)
+{
+    return play_along(axis, bank, at, step, out, ticks, true);
+}
+#endif
+
 DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
                                    dac_output *out, uint32_t ticks)
 {
 #if DAC_SPLINE
     if (bank->cubic)
-        return play_along(axis, bank, at, step, out, ticks, true);
+        return play_cubic(axis, bank, at, step, out, ticks);
 #endif
     return play_along(axis, bank, at, step, out, ticks, false);
 }
@@ -142,7 +154,7 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
                                   dac_output *out, uint32_t ticks)
 {
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL, false};
+    const dac_short_kind kind = {false, true, 0, DAC_SHORT_BITS(bank, axis), NULL, false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
@@ -155,7 +167,7 @@ DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, ui
         return play_spline(axis, bank, at, step, out, ticks);
 #endif
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL, false};
+    const dac_short_kind kind = {false, false, 0, DAC_SHORT_BITS(bank, axis), NULL, false};
     return dac_play_short(axis, bank, stretch, kind);
 }
 

@@ -84,14 +84,12 @@
 #define DAC_WAIT 8 /* ticks that are played one by one after a refused run, before the next run is tried */
 #endif
 
-/* 1: runs add products of 64 bits. 0: they use 32 bits, for processors where such a sum takes a call or several
- * instructions. Words of more than 16 bits need 64 bits everywhere. */
-#if DAC_TABLE_STORAGE_BITS != 16
-#undef DAC_LONG_MULTIPLY
-#define DAC_LONG_MULTIPLY 1
-#elif !defined(DAC_LONG_MULTIPLY)
-#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__) \
-    || (defined(__riscv) && __riscv_xlen == 32)
+/* 1: runs add products of 64 bits. 0: they use 32 bits, for processors where such a sum takes a call, or more
+ * instructions than with 32 bits: on RISC-V that is so with words of 16 bits. */
+#ifndef DAC_LONG_MULTIPLY
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__)
+#define DAC_LONG_MULTIPLY 0
+#elif defined(__riscv) && __riscv_xlen == 32 && (DAC_TABLE_STORAGE_BITS == 16 || !defined(__riscv_mul))
 #define DAC_LONG_MULTIPLY 0
 #else
 #define DAC_LONG_MULTIPLY 1

@@ -224,10 +224,13 @@ static dac_position power_divided(unsigned zeros, uint32_t divisor)
  * Returns whether they fit. */
 static bool scale_shaped(dac_bank_axis *b, const dac_axis_program *p)
 {
-#if DAC_TABLE_STORAGE_BITS != 16
+#if !DAC_LONG_MULTIPLY
+    b->run_gain = p->gain_word * (INT32_C(1) << DAC_UP(p->bits, b->guard));
+    b->run_offset = p->offset_word * ((int64_t)1 << DAC_UP(p->bits, b->guard));
+#elif DAC_TABLE_STORAGE_BITS != 16
     b->run_gain = p->gain_word;
     b->run_offset = p->offset_word;
-#elif DAC_LONG_MULTIPLY
+#else
     /* With the 11 bits more of a sample the upper word has the code and its remainder. */
     const unsigned up = 29u - p->bits;
     const int32_t most = up > 14 ? INT32_C(1) << (31 - up) : INT32_C(1) << 17;
@@ -235,9 +238,6 @@ static bool scale_shaped(dac_bank_axis *b, const dac_axis_program *p)
         return false;
     b->run_gain = p->gain_word * (INT32_C(1) << up);
     b->run_offset = p->offset_word * ((int64_t)1 << (up + 11));
-#else
-    b->run_gain = p->gain_word * (INT32_C(1) << (16 - p->bits));
-    b->run_offset = p->offset_word * ((int64_t)1 << (16 - p->bits));
 #endif
     return true;
 }
@@ -261,15 +261,25 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 #if !DAC_LONG_MULTIPLY
     uint32_t gain = (uint32_t)(p->gain_word < 0 ? -p->gain_word : p->gain_word);
 
+#if DAC_TABLE_STORAGE_BITS != 16
+    const int32_t unit = INT32_C(1) << DAC_UP(p->bits, b->guard);
+    gain *= (uint32_t)unit;
 #if DAC_SHAPING
-    if (b->order != 0)
-        gain <<= 16 - p->bits;
+    if (b->order == 0)
 #endif
-    b->run_spread = 31;
+    {
+        b->run_gain = p->gain_word * unit;
+        b->run_offset = b->offset * unit;
+    }
+#elif DAC_SHAPING
+    if (b->order != 0)
+        gain <<= DAC_UP(p->bits, b->guard);
+#endif
+    b->run_spread = 31 + DAC_FINE;
     for (; gain != 0; gain >>= 1)
         b->run_spread--;
-    if (b->run_spread > 19)
-        b->run_spread = 19;
+    if (b->run_spread > 19 + DAC_FINE)
+        b->run_spread = 19 + DAC_FINE;
 #else
     const unsigned left = 32u - p->gain_q;
 #if DAC_SHAPING

@@ -301,13 +301,13 @@ typedef struct {
 #endif
     const dac_word *table;
     uint32_t length;            /* words of the table, without the one behind the last */
-    int32_t gain, run_gain;     /* with gain_q and, if not shaped, with 32 fraction bits */
+    int32_t gain, run_gain;     /* with gain_q and, if not shaped, with 32 fraction bits, or as DAC_UP scales it */
     int32_t code_min, code_max, max_step, park_code;
     int32_t run_half, run_room; /* half a window of 2^run_bits codes, and the room for it between the limits */
     uint32_t run_most;          /* maximum ticks of a run; 0: no runs */
     dac_position step;          /* step per advance, rounded up */
     int64_t offset;             /* offset_word and half an LSB */
-    int64_t run_offset;         /* the same with 32 fraction bits; if shaped, offset_word as run_gain needs it */
+    int64_t run_offset;         /* the same as run_gain is scaled; if shaped, offset_word */
 #if DAC_SLOW_PART
     /* Of a program with a slow part, the consumer sets table, gain, offset, ramp and what belongs to runs at the start
      * of each line that plays. */

@@ -58,7 +58,7 @@ DAC_ALWAYS_INLINE uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint6
     const int32_t gain = bank->run_gain, weight = DAC_WEIGHT(bank);
     const unsigned guard = DAC_GUARD(bank);
     const uint32_t mask = (UINT32_C(1) << bits) - 1;
-    dac_wide half = DAC_HALF(guard);
+    int32_t half = DAC_HALF(guard);
     dac_shaper shaper = axis->shaper;
     uint32_t done = 0;
 #if DAC_SPLINE

@@ -45,12 +45,23 @@
  * lower 32 bits are less than 3 codes above 2^31. Where T is there, the code is right. Where it is 2^32 less, T(s0)
  * would have to be less than 3 codes above the lower end: but that of the first block is in the middle half of the
  * window, and those of others are within 4 codes of its middle, since a code differs from its unrounded value by 4 at
- * most. */
+ * most.
+ *
+ * In words of more than 16 bits, s has up to 25 bits, and T is rounded down to 2^DAC_FINE of what gain and offset are
+ * scaled to: two values differ by no more than before, of spreads 2^DAC_FINE as wide. The rise has 32 bits, so that it
+ * is never wrong; while it is below 2^(spread + 1) <= 2^25, its product with fine_gain is below 2^30. */
 
 /* Feeds back the remainders of a block of values, up to `end`, and writes its codes to `out`. Returns false, and leaves
  * the axis as it was, if a code is outside the window. */
 typedef bool (*dac_feeder)(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,
                            dac_output *out);
+
+/* `bits` of a dac_short_kind that is not shaped. */
+#if DAC_TABLE_STORAGE_BITS == 16
+#define DAC_SHORT_BITS(bank, axis) ((bank)->gain_q)
+#else
+#define DAC_SHORT_BITS(bank, axis) (36u - (axis)->bits)
+#endif
 
 /* The stretch of a waveform that is played: a position, cut to 64 bits and rounded up, the step of a tick, and the
  * place of the first code. */
@@ -64,7 +75,7 @@ typedef struct {
 typedef struct {
     bool shaped, cubic;
     unsigned order;    /* of the shaping; not used with a feeder */
-    unsigned bits;     /* below a code: those of the remainder if it is shaped, else gain_q */
+    unsigned bits;     /* below a code: those of the remainder if it is shaped, else DAC_SHORT_BITS */
     dac_feeder feeder; /* NULL: the loop that computes values also makes codes of them */
     bool ramps;        /* the offset grows by a ramp every tick */
 } dac_short_kind;
@@ -72,6 +83,9 @@ typedef struct {
 /* State of the block of ticks that is played. Functions that take it are inlined, so that it stays in registers. */
 typedef struct {
     uint32_t gain, rest;    /* a code above `base`, with its fraction, is gain * rise + rest */
+#if DAC_TABLE_STORAGE_BITS != 16
+    uint32_t fine_gain, fine_rest; /* plus (fine_gain * rise + fine_rest) / 2^DAC_FINE, rounded down */
+#endif
     uint32_t rise, rise_or; /* of the last sample, and the bits of all */
     uint32_t last;          /* the last code */
     uint32_t out_of_window; /* the bits of all codes above `base`: none is above run_bits while all are in the window */
@@ -80,6 +94,9 @@ typedef struct {
     dac_output *out, *stop; /* without: place of the next code, and the end of the block */
 #if DAC_SLOW_PART
     uint32_t ramp; /* what `rest` grows by every tick */
+#if DAC_TABLE_STORAGE_BITS != 16
+    uint32_t fine_ramp;
+#endif
 #endif
 #if DAC_SHAPING
     uint32_t mask; /* of a remainder */
@@ -91,11 +108,19 @@ typedef struct {
 /* Makes a code, or a value for the feeder, of the rise of a sample. */
 DAC_ALWAYS_INLINE void dac_short_put(dac_short_block *b, const dac_short_kind *kind, uint32_t rise)
 {
+#if DAC_TABLE_STORAGE_BITS == 16
     uint32_t value = b->gain * rise + b->rest;
+#else
+    uint32_t value = b->gain * rise + ((b->fine_gain * rise + b->fine_rest) >> DAC_FINE) + b->rest;
+#endif
 
 #if DAC_SLOW_PART
-    if (kind->ramps)
+    if (kind->ramps) {
         b->rest += b->ramp;
+#if DAC_TABLE_STORAGE_BITS != 16
+        b->fine_rest += b->fine_ramp;
+#endif
+    }
 #endif
     b->rise = rise;
     b->rise_or |= rise;
@@ -124,30 +149,35 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     const DAC_RELOAD uint64_t advance = s.step;
     uint64_t at = s.at;
     dac_short_block b;
-#if DAC_SHAPING
-    int64_t offset = kind.shaped ? bank->run_offset : bank->offset;
+#if DAC_TABLE_STORAGE_BITS != 16
+    const unsigned guard = bank->guard;
+#endif
+    const bool scaled = kind.shaped || DAC_TABLE_STORAGE_BITS != 16;
+    int64_t offset = scaled ? bank->run_offset : bank->offset;
     const unsigned below = kind.shaped ? kind.bits + DAC_BELOW : kind.bits;
+    const int32_t gain = scaled ? bank->run_gain : bank->gain;
 
-    b.gain = (uint32_t)(kind.shaped ? bank->run_gain : bank->gain);
+#if DAC_TABLE_STORAGE_BITS == 16
+    b.gain = (uint32_t)gain;
+#else
+    b.gain = (uint32_t)(gain >> DAC_FINE);
+    b.fine_gain = (uint32_t)gain & DAC_FINE_MASK;
+#endif
+#if DAC_SHAPING
     b.mask = (UINT32_C(1) << kind.bits) - 1;
     b.weight = DAC_WEIGHT(bank);
     b.shaper = axis->shaper;
-#else
-    int64_t offset = bank->offset;
-    const unsigned below = kind.bits;
-
-    b.gain = (uint32_t)bank->gain;
 #endif
 #if DAC_SLOW_PART
-    const unsigned up = kind.shaped ? 16u - bank->bits : 0u;
-    const int64_t ramp = kind.shaped ? bank->run_ramp : bank->ramp;
+    const unsigned up = scaled ? DAC_UP(bank->bits, bank->guard) : 0u;
+    const int64_t ramp = scaled ? bank->run_ramp : bank->ramp;
 
     if (kind.ramps)
         offset += axis->rise * (INT64_C(1) << up);
 #endif
     const uint32_t spread = UINT32_C(1) << bank->run_spread;
     const int32_t begin = dac_sample_at(bank, (uint32_t)(at >> 32));
-    const int32_t unrounded = (int32_t)(((int64_t)(int32_t)b.gain * begin + offset) >> below);
+    const int32_t unrounded = (int32_t)(((int64_t)gain * begin + offset) >> (below + DAC_FINE));
     const uint32_t first = (uint32_t)(unrounded - axis->code), half = (uint32_t)bank->run_half;
     const bool fed = kind.feeder != NULL;
     uint32_t done = 0, sample = (uint32_t)begin;
@@ -163,17 +193,27 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.out = s.out;
     b.last = 0;
 #if DAC_SLOW_PART
-    b.ramp = (uint32_t)ramp;
+    b.ramp = (uint32_t)(ramp >> DAC_FINE);
+#if DAC_TABLE_STORAGE_BITS != 16
+    b.fine_ramp = (uint32_t)ramp & DAC_FINE_MASK;
+#endif
 #endif
     while (done < s.ticks) {
         const uint32_t length = dac_block_of(s.ticks - done);
         const uint32_t origin = sample - spread;
+#if DAC_TABLE_STORAGE_BITS == 16
         uint32_t low = (UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE);
+#endif
         uint32_t values[DAC_RUN];
         const uint32_t *const end = values + length;
 
         b.base = axis->code - bank->run_half;
-        b.rest = b.gain * origin + (uint32_t)offset - ((uint32_t)b.base << below);
+        b.rest = b.gain * origin + (uint32_t)(offset >> DAC_FINE) - ((uint32_t)b.base << below);
+#if DAC_TABLE_STORAGE_BITS != 16
+        b.fine_rest = b.fine_gain * origin + ((uint32_t)offset & DAC_FINE_MASK);
+        b.rest += (uint32_t)((int32_t)b.fine_rest >> DAC_FINE); /* |fine_gain * origin| < 2^30 */
+        b.fine_rest &= DAC_FINE_MASK;
+#endif
         b.stop = b.out + length * DAC_STRIDE;
         b.value = values;
         b.out_of_window = 0;
@@ -187,6 +227,17 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
             } while (fed ? b.value != end : b.out != b.stop);
         } else
 #endif
+#if DAC_TABLE_STORAGE_BITS != 16
+        {
+            do {
+                const uint32_t high = (uint32_t)(at >> 32);
+                DAC_NEIGHBOURS(table, high >> 15, here, there);
+                const int32_t value = dac_lerp(here, there, high & 0x7fffu, guard, DAC_HALF(guard));
+                at += advance;
+                dac_short_put(&b, &kind, (uint32_t)value - origin);
+            } while (fed ? b.value != end : b.out != b.stop);
+        }
+#else
 #if !defined(__OPTIMIZE_SIZE__) /* what is small has the other loop only */
         if ((at + (DAC_RUN - 1) * s.step) >> 47 == at >> 47) { /* all between the same two words */
             DAC_NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
@@ -227,6 +278,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
                 dac_short_put(&b, &kind, rise);
             } while (fed ? b.value != end : b.out != b.stop);
         }
+#endif
         if (fed) {
             if (b.rise_or > 2 * spread - 1 || !kind.feeder(axis, bank, values, end, b.out))
                 break;

@@ -120,19 +120,22 @@ DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
     bank->run_offset = bank->offset * ((int64_t)1 << left);
     bank->run_ramp = bank->ramp * ((int64_t)1 << left);
 #else
-    const unsigned up = SHAPED(bank) ? 16u - bank->bits : 0u; /* a sample of 16-bit words, as in dac_program.c */
+    const bool scaled = SHAPED(bank) || DAC_TABLE_STORAGE_BITS != 16;
+    const unsigned up = scaled ? DAC_UP(bank->bits, bank->guard) : 0u; /* as in dac_program.c */
     const int64_t ramp = (bank->ramp < 0 ? -bank->ramp : bank->ramp) << up;
-    uint8_t spread = 30;
+    uint8_t spread = 30 + DAC_FINE;
 
     for (uint32_t gain = (uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain) << up; gain != 0; gain >>= 1)
         spread--;
-#if DAC_SHAPING
+#if DAC_SHAPING || DAC_TABLE_STORAGE_BITS != 16
+    const int64_t half = DAC_TABLE_STORAGE_BITS == 16 || SHAPED(bank) ? (int64_t)1 << (bank->gain_q - 1u) : 0;
+
     bank->run_gain = bank->gain * (INT32_C(1) << up);
-    bank->run_offset = (bank->offset - ((int64_t)1 << (bank->gain_q - 1u))) * ((int64_t)1 << up);
+    bank->run_offset = (bank->offset - half) * ((int64_t)1 << up);
     bank->run_ramp = bank->ramp * ((int64_t)1 << up);
 #endif
-    bank->run_spread = spread > 19 ? 19 : spread;
-    bank->run_most = DAC_RUN * ramp <= INT32_C(1) << 30 ? bank->line_most : 0;
+    bank->run_spread = spread > 19 + DAC_FINE ? 19 + DAC_FINE : spread;
+    bank->run_most = DAC_RUN * ramp <= INT64_C(1) << (30 + DAC_FINE) ? bank->line_most : 0;
 #endif
 }
 
@@ -261,7 +264,7 @@ DAC_NOINLINE uint64_t sample_lines(const dac_bank_axis *bank, uint64_t at, uint6
 {
     const dac_word *const table = bank->table;
     const unsigned guard = DAC_GUARD(bank);
-    dac_wide half = DAC_HALF(guard);
+    int32_t half = DAC_HALF(guard);
 
     DAC_HIDE_FROM_OPTIMIZER(half);
     do {
@@ -329,7 +332,7 @@ DAC_NOINLINE uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uin
                                   dac_output *out, uint32_t ticks)
 {
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, true, 0, bank->gain_q, NULL, true};
+    const dac_short_kind kind = {false, true, 0, DAC_SHORT_BITS(bank, axis), NULL, true};
     return dac_play_short(axis, bank, stretch, kind);
 }
 #endif
@@ -346,7 +349,7 @@ DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, 
         return play_spline(axis, bank, at, step, out, ticks);
 #endif
     const dac_stretch stretch = {at, step, out, ticks};
-    const dac_short_kind kind = {false, false, 0, bank->gain_q, NULL, true};
+    const dac_short_kind kind = {false, false, 0, DAC_SHORT_BITS(bank, axis), NULL, true};
     return dac_play_short(axis, bank, stretch, kind);
 }
 

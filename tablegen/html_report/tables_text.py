@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from tablegen.html_report.table_rows import AxisTables, TableRow
 
 _HEAD = (
-    "     mode           words  bits     packed       in C   error [LSB]    instructions   cells",
-    "                                    [bits]     [bits]     max    rms      M4    M0+    HX8K",
+    "     mode           words  bits     packed       in C   error [LSB]         instructions       cells",
+    "                                    [bits]     [bits]     max    rms      M4    M0+   RV32    HX8K",
 )
 
 
@@ -41,5 +41,5 @@ def _row(row: TableRow, digits: int) -> str:
     return (
         f"  {mark}  {shape.mode:<13}{shape.length:>7}{shape.bits:>6}{shape.memory_bits:>11}{row.stored_bits:>11}"
         f"{row.max_error_lsb:>8.{digits}f}{row.rms_error_lsb:>7.{digits}f}"
-        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{row.cells:>8}"
+        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{takes['riscv32']:>7.1f}{row.cells:>8}"
     )

@@ -162,7 +162,7 @@ def test_modes_are_in_the_order_of_what_they_take() -> None:
 
     In Verilog a spline takes 11 clocks for a sample, and no more cells than 3000.
     """
-    for core in ("cortex-m4", "cortex-m0plus"):
+    for core in ("cortex-m4", "cortex-m0plus", "riscv32"):
         direct, interpolated, cubic = (INSTRUCTIONS[mode][core] for mode in MODES)
         assert direct == pytest.approx(interpolated, abs=0.2)
         assert interpolated < cubic

@@ -69,12 +69,21 @@ def test_what_the_modes_take_is_what_the_command_says(benchmark: ModuleType) -> 
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("widths", [MeasuredRun(16, 16, False), MeasuredRun(32, 32, True)])
-def test_instructions_are_counted(benchmark: ModuleType, widths: MeasuredRun) -> None:
-    """On a Cortex-M4; a cubic table of 16 bits may take 30."""
-    counted = benchmark.instructions("cortex-m4", widths)
-    assert counted == {mode: takes["cortex-m4"] for mode, takes in COUNTS[widths].items()}
+@pytest.mark.parametrize(
+    ("core", "widths"), [("cortex-m4", MeasuredRun(16, 16, False)), ("riscv32", MeasuredRun(32, 32, True))]
+)
+def test_instructions_are_counted(benchmark: ModuleType, core: str, widths: MeasuredRun) -> None:
+    """A cubic table of 16 bits may take 30 on a Cortex-M4."""
+    counted = benchmark.instructions(core, widths)
+    assert counted == {mode: takes[core] for mode, takes in COUNTS[widths].items()}
     assert widths.coded or counted["cubic"] <= 30.0
+
+
+def test_a_cortex_m0_plays_wide_words_without_long_products() -> None:
+    """A spline of 21 bits takes less than 120 instructions a sample, and a line between words of 24 bits 90."""
+    takes = COUNTS[MeasuredRun(32, 16, False)]
+    assert takes["cubic"]["cortex-m0plus"] < 120
+    assert takes["interpolated"]["cortex-m0plus"] < 90
 
 
 @pytest.mark.rest

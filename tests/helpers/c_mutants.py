@@ -50,6 +50,7 @@ PLACES = (
     "fill",
     "step",
     "wide",
+    "wide short",
     "short",
     "cubic",
     "cubic short",
@@ -70,6 +71,9 @@ EQUIVALENT = {**c_mutants_axis.EQUIVALENT, **c_mutants_program.EQUIVALENT, **c_m
 @cache
 def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
     """What the benches play; the same every time."""
+    if where == "wide short":
+        names = ("cubic_and_lines", "bits_24", "dac_24_words_8")
+        return tuple((long_play(name, 20_000), LONG[name][0]) for name in names)
     if where == "wide":
         names = ("bits_20", "bits_24", "dac_24_words_8")
         long = [(long_play(name, 9000), LONG[name][0]) for name in names]
@@ -166,7 +170,7 @@ def _holds(check: Check, libraries: Libraries) -> bool:
 def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     fill = 0 if where == "step" else FILL
     shaped = where.startswith("shaped")
-    kinds = ("wide", "cubic", "shaped wide", "shaped")
+    kinds = ("wide short", "wide", "cubic", "shaped wide", "shaped")
     playing = scripts(next((kind for kind in kinds if where.startswith(kind)), "fill"))
     chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where.endswith(("short", "few")) else {})
     chosen |= {"DAC_FEW_REGISTERS": 1} if where.endswith("few") else {}

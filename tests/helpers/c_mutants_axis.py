@@ -8,13 +8,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "fill",
         {
             "the carry of the position is lost": ("(low < step->low ? 1u : 0u)", "0u"),
-            "the sample is rounded down": ("((dac_wide)1 << (14u - (guard)))", "((dac_wide)0)"),
+            "the sample is rounded down": ("((int32_t)1 << (14u - (guard)))", "((int32_t)0)"),
             "the sample's ties are rounded down": (
-                "((dac_wide)1 << (14u - (guard)))",
-                "(((dac_wide)1 << (14u - (guard))) - 1)",
+                "((int32_t)1 << (14u - (guard)))",
+                "(((int32_t)1 << (14u - (guard))) - 1)",
             ),
             "the rise has no guard bits": (">> (15u - guard);", ">> 15u;"),
-            "the word has no guard bits": ("(dac_wide)here * ((dac_wide)1 << guard)", "(dac_wide)here"),
+            "the word has no guard bits": ("here * ((int32_t)1 << guard)", "here"),
         },
     ),
     *changed(
@@ -169,8 +169,8 @@ MUTANTS: tuple[Mutant, ...] = (
         "cubic",
         {
             "runs of lines are those of splines": (
-                "    if (bank->cubic)\n        return play_along",
-                "    return play_along",
+                "    if (bank->cubic)\n        return play_cubic",
+                "    return play_cubic",
             ),
         },
     ),
@@ -249,7 +249,25 @@ MUTANTS: tuple[Mutant, ...] = (
             ),
             "short: two words for all ticks": ("(at + (DAC_RUN - 1) * s.step) >> 47 == at >> 47", "true"),
             "short: two words for too many ticks": ("(DAC_RUN - 1) * s.step", "DAC_RUN / 2 * s.step"),
-            "short: the offset is lost": ("+ (uint32_t)offset - ", "- "),
+            "short: the offset is lost": ("+ (uint32_t)(offset >> DAC_FINE) - ", "- "),
+        },
+    ),
+    *changed(
+        "dac_arithmetic.h",
+        "wide short",
+        {
+            "wide: a product loses a bit of the value": ("(uint32_t)value & 0x3fffu", "(uint32_t)value & 0x1fffu"),
+            "wide: a step of the rule is rounded down": ("((sum + 16) >> 5)", "(sum >> 5)"),
+            "wide: a line rises by half": ("(2 * unit)", "unit"),
+        },
+    ),
+    *changed(
+        "dac_short.h",
+        "wide short",
+        {
+            "wide: the lower bits of the gain are lost": ("b->fine_gain * rise + b->fine_rest", "b->fine_rest"),
+            "wide: the origin has no lower bits": ("b.fine_gain * origin + ", ""),
+            "wide: a carry is lost": ("(uint32_t)((int32_t)b.fine_rest >> DAC_FINE)", "0"),
         },
     ),
     *removed(

@@ -141,10 +141,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_program.c",
         "checks short",
         {
-            "short: a rise may be twice as wide": ("b->run_spread = 31;", "b->run_spread = 32;"),
+            "short: a rise may be twice as wide": ("b->run_spread = 31 + DAC_FINE;", "b->run_spread = 32 + DAC_FINE;"),
             "short: a gain below zero": ("p->gain_word < 0 ? -p->gain_word : p->gain_word", "p->gain_word"),
             "short: a rise of more bits than there are": (
-                "if (b->run_spread > 19)\n        b->run_spread = 19;",
+                "if (b->run_spread > 19 + DAC_FINE)\n        b->run_spread = 19 + DAC_FINE;",
                 "if (b->run_spread > 21)\n        b->run_spread = 21;",
             ),
         },

@@ -115,7 +115,7 @@ MUTANTS: tuple[Mutant, ...] = (
                 "(UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE)",
                 "0u - (origin << DAC_ABOVE)",
             ),
-            "short: a shaped run loses its offset": ("kind.shaped ? bank->run_offset : bank->offset", "bank->offset"),
+            "short: a shaped run loses its offset": ("scaled ? bank->run_offset : bank->offset", "bank->offset"),
         },
     ),
     *changed(

@@ -48,6 +48,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "few_spline_shaping": ("-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0", "-DDAC_FEW_REGISTERS=1", "-DDAC_SPLINE=1"),
     "wide": ("-DDAC_SPLINE=1",),
     "wide_shaping": ("-DDAC_SHAPING=3", "-DDAC_SPLINE=1"),
+    "short_wide": ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SPLINE=1"),
+    "few_wide_shaping": ("-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0", "-DDAC_FEW_REGISTERS=1", "-DDAC_SPLINE=1"),
 }
 TICKS, LINES = 90, 5
 LONG_TICKS = 700  # of lines with many runs
@@ -506,7 +508,7 @@ SHAPED_MUTANTS = {
 SHORT_SHAPED_MUTANTS = {
     "short shaped runs have the gain of the axis": ("    bank->run_gain = bank->gain * (INT32_C(1) << up);\n", ""),
     "short shaped runs have the offset of the axis": (
-        "    bank->run_offset = (bank->offset - ((int64_t)1 << (bank->gain_q - 1u))) * ((int64_t)1 << up);\n",
+        "    bank->run_offset = (bank->offset - half) * ((int64_t)1 << up);\n",
         "",
     ),
     "short shaped runs have no ramp": ("    bank->run_ramp = bank->ramp * ((int64_t)1 << up);\n", ""),
@@ -520,7 +522,7 @@ SHORT_MUTANTS = {
         "    if (kind.ramps)\n        offset += axis->rise * (INT64_C(1) << up);\n",
         "",
     ),
-    "the spread is that of the axis": ("    bank->run_spread = spread > 19 ? 19 : spread;\n", ""),
+    "the spread is that of the axis": ("    bank->run_spread = spread > 19 + DAC_FINE ? 19 + DAC_FINE : spread;\n", ""),
 }
 _FORK = get_context("fork")
 

@@ -157,7 +157,7 @@ def test_a_runtime_that_was_changed_is_compiled(folder: Path, cache: Path) -> No
     """A source, or a header that others include: the objects of the one that was right are not taken for it."""
     assert run("verify", folder, "--target", "c").status == 0
     for name, old, new in (
-        ("dac_arithmetic.h", "(dac_wide)1 << (14u - (guard))", "(dac_wide)0"),
+        ("dac_arithmetic.h", "(int32_t)1 << (14u - (guard))", "(int32_t)0"),
         ("dac_sequencer.c", "(uint8_t)(all | DAC_LINE |", "(uint8_t)(all |"),
     ):
         path = folder / name

@@ -429,7 +429,7 @@ def test_an_array_of_another_length_or_name_or_content_is_found(folder: Path) ->
 MUTANTS = [
     # name, file, pattern, replacement, what fails
     ("swap in mid-line", "sequencer.c", r"\(s->running && s->tick != 0\)", "false", ("markers", "integer model")),
-    ("rounding", "arithmetic.h", r"\(dac_wide\)1 << \(14u - \(?guard\)?\)", "(dac_wide)0", ("y", "integer model")),
+    ("rounding", "arithmetic.h", r"\(int32_t\)1 << \(14u - \(?guard\)?\)", "(int32_t)0", ("y", "integer model")),
     ("no lower limit", "program.c", r"b->code_min = p->code_min;", "b->code_min = 0;", ("faults", "integer model")),
     ("no slew guard", "program.c", r"b->max_step = p->max_step;", "b->max_step = 1 << 23;", ("y", "slew guard")),
     ("gain of x", "program.c", r"b->gain = p->gain_word;", "b->gain = p->gain_word + 40;", ("x", "integer model")),
@@ -482,7 +482,7 @@ def test_an_edited_runtime_is_played_and_found(
 @pytest.mark.common
 def test_a_rounding_is_told_with_its_first_tick(folder: Path) -> None:
     """One code too low here and there, with tick, expected and got."""
-    substitute(folder / "dac_arithmetic.h", r"\(dac_wide\)1 << \(14u - \(?guard\)?\)", "(dac_wide)0")
+    substitute(folder / "dac_arithmetic.h", r"\(int32_t\)1 << \(14u - \(?guard\)?\)", "(int32_t)0")
     outcome = verify(folder)
     *_, expected, got = differing(outcome)
     codes = [re.findall(r"[xy] (\d+)", text) for text in (expected, got)]
