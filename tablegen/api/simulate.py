@@ -85,6 +85,8 @@ def simulate(
         return SimulatedScan(setup.scan.name, None, (), own_runs, tuple(operators), *_answers(setup))
     name = truth or DEFAULT
     laboratory = Laboratory(name, setup.scanner)
+    if laboratory.scanner.coupling:
+        raise Unphysical(f"{truth}: [coupling] is played for a scan at an angle, on coupled axes or with drift alone")
     model, scanner = laboratory.truth, laboratory.scanner
     if laboratory.scaled:
         model = replace(model, name=f"{model.name}, {laboratory.scaled}")
