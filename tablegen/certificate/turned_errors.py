@@ -73,6 +73,13 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
     )
 
 
+def played_frame(plan: TurnedPlan) -> "ImagedFrame":
+    """Return the positions of a frame on the operators of the plan."""
+    ticks = np.arange(0, plan.schedule.ticks, -(-plan.schedule.ticks // _MOST_SAMPLES))
+    x_nm, y_nm = (played_position(axis, frame_codes(axis, ticks), ticks, plan.schedule.ticks) for axis in plan.axes)
+    return ImagedFrame.of(plan, x_nm, y_nm, (ticks + 0.5) / plan.schedule.ticks)
+
+
 def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
     """Return the codes of a frame at some ticks of each line, unshaped, shape (lines, len(ticks))."""
     program = axis.program

@@ -1,16 +1,15 @@
-"""Charts of the positions of a frame at an angle: the path, the errors over the image, and a lattice in it."""
+"""Charts of the positions of a frame at an angle: the errors over the image, and a lattice in it."""
 
 import numpy as np
 
 from tablegen.certificate.turned_errors import ImagedFrame
 from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark, Raster, Role
-from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.numerics.arrays import Bools, Ints
 from tablegen.planning.turned_plan import TurnedPlan
 
 _CELLS = 10.0  # of a lattice, over the shorter side of the image
 _LEAST_LINES = 6  # of a cell
 _COLUMNS = 256  # of a picture
-_PATH_LINES = 12
 _ZERO = Mark(0.0, "", "y")
 
 
@@ -66,24 +65,6 @@ def lattice_image(plan: TurnedPlan, frame: ImagedFrame, key: str, title: str) ->
     return Chart(
         f"image-{key}", f"{title}: lattice of {period:.3g} nm", "along the lines [nm]", "across [nm]", (),
         raster=Raster(heights[::-1], x, y, -2.0, 2.0), equal=True,
-    )  # fmt: skip
-
-
-def path(plan: TurnedPlan, frame: ImagedFrame, x_nm: Floats, y_nm: Floats) -> Chart:
-    """Draw where the tip goes over the instrument's x and y: every so many lines, the trace of what is imaged."""
-    inside, rows, _, _ = _trace(plan, frame)
-    columns = np.flatnonzero(plan.x.motion.inside(frame.t))[inside]
-    lines = np.flatnonzero(plan.x.motion.imaged)[rows]
-    shown = lines[np.unique(np.linspace(0, len(lines) - 1, min(_PATH_LINES, len(lines))).round().astype(np.int64))]
-    x, y = (one - float(np.mean(one[np.ix_(lines, columns)])) for one in (x_nm, y_nm))
-    curves = tuple(
-        DrawnCurve("imaged lines" if at == shown[0] else "", "forward", x[at, columns], y[at, columns])
-        for at in shown.tolist()
-    )
-    frame_path = DrawnCurve("frame", "other", x[:, 0], y[:, 0], faint=True)
-    return Chart(
-        "path", "Path of the tip", "x [nm]", "y [nm]", (frame_path, *curves), equal=True,
-        caption=f"{len(shown)} of {len(lines)} imaged lines, forward; and where the lines begin, over the whole frame.",
     )  # fmt: skip
 
 
