@@ -35,7 +35,7 @@ from tablegen.waveform.series import FourierSeries
 
 MIXED = (
     "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the format c, "
-    "`verify`, `upload`, `readback`, `simulate`, `report` and `compare`; leave this out for anything else"
+    "`verify`, `upload`, `readback`, `simulate`, `report`, `compare` and `correct`; leave this out for anything else"
 )
 
 
