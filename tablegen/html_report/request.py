@@ -122,12 +122,12 @@ def files(subject: Subject) -> Section:
         for axis, entry in subject.axes
         for name, digest in (entry.drive.model_files or {}).items()
     ]
-    made = f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats) or 'c, verilog'}"
-    return file_section(manifest.hash, made, subject.files, models)
+    origin = f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats) or 'c, verilog'}"
+    return file_section(manifest.hash, origin, subject.files, models)
 
 
 def file_section(
-    plan_hash: str, made: str, states: Sequence[FileState], more: Sequence[tuple[TableCell, ...]] = ()
+    plan_hash: str, origin: str, states: Sequence[FileState], more: Sequence[tuple[TableCell, ...]] = ()
 ) -> Section:
     """Return files with their SHA-256 below the hash of the plan and how they were made."""
     rows = [
@@ -138,7 +138,7 @@ def file_section(
         )
         for state in states
     ]
-    what = Bullets((TableCell(f"plan {plan_hash}"), TableCell(made)))
+    what = Bullets((TableCell(f"plan {plan_hash}"), TableCell(origin)))
     wrong = any(state.wrong for state in states)
     return Section(
         "files",

@@ -43,14 +43,14 @@ def path_chart(stored: StoredTurned) -> Chart:
     x, y = (frame_volts(fields, program) for _, fields, program in axes_of(stored))
     lines = _imaged(stored)
     places = np.unique(np.linspace(0, len(lines) - 1, min(_PATH_LINES, len(lines))).round())
-    shown = [lines[i] for i in places.astype(np.int64).tolist()]
+    examples = [lines[i] for i in places.astype(np.int64).tolist()]
     both = [np.append(one, one[:1], axis=0) for one in (x, y)]
     curves = [DrawnCurve("beginnings of lines", "other", both[0][:, 0], both[1][:, 0])]
-    for at in shown:
-        name = "imaged lines" if at == shown[0] else ""
+    for at in examples:
+        name = "imaged lines" if at == examples[0] else ""
         x_line, y_line = (np.append(one[at], whole[at + 1, 0]) for one, whole in zip((x, y), both, strict=True))
         curves.append(DrawnCurve(name, "forward", x_line, y_line))
-    caption = f"{len(shown)} of {len(lines)} imaged lines, forward and backward."
+    caption = f"{len(examples)} of {len(lines)} imaged lines, forward and backward."
     return Chart(
         "path", "Path of both drives", "x at the piezo [V]", "y at the piezo [V]", tuple(curves), equal=True,
         caption=caption,

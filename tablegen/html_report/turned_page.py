@@ -37,8 +37,8 @@ def turned_sections(subject: TurnedSubject, tell: Callable[[str], object] = lamb
     tell("drawing")
     parts += [_certificate(subject), _request(subject), _codes(subject), _tables(subject)]
     manifest = subject.manifest
-    made = f"made by tablegen {manifest.tablegen}; formats c"
-    files = file_section(manifest.hash, made, subject.files)
+    origin = f"made by tablegen {manifest.tablegen}; formats c"
+    files = file_section(manifest.hash, origin, subject.files)
     return [*parts, record_section(subject.verified, subject.digest), files]
 
 

@@ -158,5 +158,5 @@ def _write_samples(out: io.StringIO, start: str, plan: TurnedPlan, run: FrameRun
     grids = (run.volts.x, run.volts.y, run.x_nm, run.y_nm, run.imaged.fast_nm, run.imaged.slow_nm)
     thin = slice(None, None, -(-lines.size // _MOST_CSV_ROWS))
     columns = (lines.ravel()[thin], time_s.ravel()[thin], *(one.ravel()[thin] for one in grids), imaged.ravel()[thin])
-    for line, at_s, *values, seen in zip(*columns, strict=True):
-        out.write(f"{start},{line},{at_s:.9g},{','.join(f'{one:.9g}' for one in values)},{seen}\n")
+    for line, at_s, *values, flag in zip(*columns, strict=True):
+        out.write(f"{start},{line},{at_s:.9g},{','.join(f'{one:.9g}' for one in values)},{flag}\n")
