@@ -28,6 +28,7 @@ from tablegen.api.drift import drift as drift
 from tablegen.api.refine import refine as refine
 from tablegen.api.correct import correct as correct
 from tablegen.api.simulate import simulate as simulate
+from tablegen.api.simulate_turned import simulate_turned as simulate_turned
 from tablegen.api.predict import predict as predict
 from tablegen.api.compare import compare as compare
 from tablegen.api.tables import tables as tables
@@ -67,6 +68,7 @@ from tablegen.api.drift import ImageDrift as ImageDrift
 from tablegen.api.refine import RefinedScan as RefinedScan
 from tablegen.api.correct import Corrected as Corrected
 from tablegen.api.simulate import SimulatedScan as SimulatedScan
+from tablegen.api.simulate_turned import SimulatedTurned as SimulatedTurned
 from tablegen.api.predict import Predicted as Predicted
 from tablegen.api.compare import Compared as Compared
 from tablegen.api.tables import FeasibleTables as FeasibleTables

@@ -14,8 +14,18 @@ from tablegen.config.scanner import Scanner
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
 from tablegen.virtual.experiments import apparent_sizes, frequency_response, sensor_trace, triangle_size
-from tablegen.virtual.imaging import Conditions, FrameImages, Surface, grating, hexagonal, running_frame, triangle_frame
+from tablegen.virtual.imaging import (
+    Conditions,
+    FrameImages,
+    Surface,
+    grating,
+    hexagonal,
+    running_frame,
+    triangle_frame,
+    turned_frame,
+)
 from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.running import running_trace
 from tablegen.virtual.scaling import scaled_to
@@ -185,17 +195,26 @@ class Laboratory:
         The slow one goes up in ``slow_turn`` of its period, in which the image is taken.
         """
         axes, drives = (self.scanner.x, self.scanner.y), ((size_v, size_v), (offset_v, offset_v))
-        return triangle_frame(*axes, sample, *drives, rate_hz, conditions, pixels, pixels, (0.5, slow_turn))
+        coupling = self.scanner.coupling
+        return triangle_frame(
+            *axes, sample, *drives, rate_hz, conditions, pixels, pixels, (0.5, slow_turn), coupling=coupling
+        )
 
     def frame(
         self,
-        scan: "str | Path | Setup | Plan",
+        scan: "str | Path | Setup | Plan | TurnedPlan",
         sample: Surface,
         pixels: int | None = None,
         conditions: Conditions | None = None,
     ) -> FrameImages:
-        """Take trace and retrace of a settled frame of a build."""
-        return running_frame(_plan(scan), self.scanner.x, self.scanner.y, sample, conditions, pixels)
+        """Take trace and retrace of a settled frame of a build, also of one at an angle."""
+        if not isinstance(scan, Plan | TurnedPlan):
+            setup = scan if isinstance(scan, Setup) else load(scan)
+            scan = make_turned_plan(setup) if setup.mixes_motions else make_plan(setup)
+        axes, coupling = (self.scanner.x, self.scanner.y), self.scanner.coupling
+        if isinstance(scan, TurnedPlan):
+            return turned_frame(scan, *axes, sample, conditions, pixels, coupling=coupling)
+        return running_frame(scan, *axes, sample, conditions, pixels, coupling=coupling)
 
     def _axis(self, axis: Axis) -> VirtualAxis:
         scanner_axis: VirtualAxis = getattr(self.scanner, axis)

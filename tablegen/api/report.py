@@ -10,12 +10,16 @@ from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.warnings import Finding
 from tablegen.charts.chart import Chart
 from tablegen.charts.picture_file import PlottedCharts
+from tablegen.config.load import load
 from tablegen.emit.write import write_files
 from tablegen.html_report.page import answers, charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.ranking import ranked
 from tablegen.html_report.subject import OwnImage, Subject, of_directory
-from tablegen.html_report.verify_record import read_record
+from tablegen.html_report.turned_page import turned_answers, turned_findings, turned_page, turned_sections
+from tablegen.html_report.turned_subject import TurnedSubject, turned_directory, turned_scan
+from tablegen.html_report.verify_record import VerifyRecord, read_record
+from tablegen.manifest.turned import is_turned
 
 
 def report(
@@ -68,9 +72,20 @@ def report(
         except ValueError as error:
             raise Rejected([Problem(str(verified), 0, "", str(error))]) from None
     own = None if image is None else _own_image(Path(image), channel)
-    subject = of_directory(source, record) if source.is_dir() else planned_scan(source, record, progress)
-    subject = replace(subject, image=own)
-    return ReportPage(subject, progress)
+    subject = _subject(source, record, progress)
+    if isinstance(subject, TurnedSubject):
+        if own is not None:
+            why = "an image of yours is shown beside scans at 0 degrees alone; leave --image out"
+            raise Rejected([Problem(own.name, 0, "", why)])
+        return ReportPage(subject, progress)
+    return ReportPage(replace(subject, image=own), progress)
+
+
+def _subject(source: Path, record: VerifyRecord | None, progress: Callable[[str], object]) -> Subject | TurnedSubject:
+    if source.is_dir():
+        return turned_directory(source, record) if is_turned(source) else of_directory(source, record)
+    setup = load(source)
+    return turned_scan(setup, record, progress) if setup.mixes_motions else planned_scan(setup, record, progress)
 
 
 def _own_image(path: Path, channel: str | int | None) -> OwnImage:
@@ -84,22 +99,26 @@ def _own_image(path: Path, channel: str | int | None) -> OwnImage:
 class ReportPage(Result):
     """The page of a scan or of a build: ``content`` in HTML, and every chart by its name in ``figures``."""
 
-    def __init__(self, subject: Subject, progress: Callable[[str], object] = lambda _: None) -> None:
-        parts = sections(subject, progress)
+    def __init__(self, subject: Subject | TurnedSubject, progress: Callable[[str], object] = lambda _: None) -> None:
         self.subject = subject
-        self.content = page(subject, parts)
+        if isinstance(subject, TurnedSubject):
+            parts = turned_sections(subject, progress)
+            self.content = turned_page(subject, parts)
+        else:
+            parts = sections(subject, progress)
+            self.content = page(subject, parts)
         """The page: one file that needs no network and no other file."""
         self.figures: dict[str, Chart] = charts_of(parts)
 
     @property
     def answers(self) -> list[str]:
         """The lines that the page begins with: the error of each axis, and the time; empty for a build."""
-        return answers(self.subject)
+        return turned_answers(self.subject) if isinstance(self.subject, TurnedSubject) else answers(self.subject)
 
     @property
     def findings(self) -> list[Finding]:
         """Warnings to read before the image is trusted, the worst first."""
-        return ranked(self.subject)
+        return turned_findings(self.subject) if isinstance(self.subject, TurnedSubject) else ranked(self.subject)
 
     @property
     def broken(self) -> tuple[str, ...]:
@@ -121,7 +140,7 @@ class ReportPage(Result):
     def summary(self) -> str:
         """Return the findings of the page, the worst first."""
         findings = [one.line for one in self.findings] or ["no findings"]
-        return "\n".join([*answers(self.subject), *findings])
+        return "\n".join([*self.answers, *findings])
 
     def charts(self) -> PlottedCharts:
         """Return all charts of the page."""

@@ -88,6 +88,8 @@ def simulate(
         raise Rejected([setup.scan_file.problem("x.motion", _SINE)])
     name = truth or DEFAULT
     laboratory = Laboratory(name, setup.scanner)
+    if laboratory.scanner.coupling:
+        raise Unphysical(f"{truth}: [coupling] is played for a scan at an angle, on coupled axes or with drift alone")
     model, scanner = laboratory.truth, laboratory.scanner
     if laboratory.scaled:
         model = replace(model, name=f"{model.name}, {laboratory.scaled}")

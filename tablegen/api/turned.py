@@ -9,27 +9,20 @@ import numpy as np
 
 from tablegen.api.build import BrokenLimit, Source, setup_of
 from tablegen.api.result import Result
-from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
-from tablegen.certificate.error_answer import duration
-from tablegen.certificate.summary import rate
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.turned_errors import TurnedCertificate, certify_turned
+from tablegen.certificate.turned_summary import broken_limits, turned_brief, turned_summary, turned_warnings
 from tablegen.config.load import Setup
-from tablegen.emit.render import format_rejected
-from tablegen.emit.templates import comment_safe
-from tablegen.emit.turned import TURNED_FORMATS, require_format, turned_files, turned_runtime
-from tablegen.emit.turned_content import TurnedContent
+from tablegen.emit.turned import turned_runtime
+from tablegen.emit.turned_scan import formats_of_turned, render_turned, turned_clocks
 from tablegen.emit.write import leftover_files, outdated_files, write_files
-from tablegen.manifest.format import MANIFEST, content_hash, read_json
-from tablegen.manifest.turned_record import turned_manifest, turned_record
-from tablegen.planning.clock import slow_clocks_per_tick
+from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
-from tablegen.version import __version__
 
 if TYPE_CHECKING:
     from tablegen.charts.picture_file import PlottedCharts
     from tablegen.link.prepare import PreparedScan
 
-_WARNED_PERCENT = 1.0
 _POINTS = 200  # of a line in a chart
 
 
@@ -81,57 +74,17 @@ def build_turned(
     if not setup.mixes_motions:
         why = "this scan has no angle, coupling or drift; `build` builds it"
         raise Rejected([setup.scan_file.problem("name", why)])
-    names = _formats(setup, formats)
+    names = formats_of_turned(setup, formats)
     plan = make_turned_plan(setup, progress)
-    clocks = _clocks_per_tick(setup, plan, names, explicit=formats is not None)
+    clocks = turned_clocks(setup, plan, names, explicit=formats is not None)
     certificate = certify_turned(plan, progress)
-    if broken := _broken(setup, plan, certificate):
+    if broken := broken_limits(setup, plan, certificate):
         raise BrokenLimit(broken)
     built = TurnedBuild(setup, plan, certificate, names, clocks)
     if out is not None:
         progress("writing the files")
         built.write(out)
     return built
-
-
-def _formats(setup: Setup, formats: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the formats of a build, those of the scan file unless they are given, each once."""
-    names = tuple(dict.fromkeys(formats or setup.scan.emit.formats or ("c",)))
-    if not set(names) <= set(TURNED_FORMATS):
-        why = "a scan at an angle, on coupled axes or with drift has the formats c and verilog"
-        raise format_rejected(setup, why, explicit=formats is not None)
-    return names
-
-
-def _clocks_per_tick(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, explicit: bool) -> int:
-    """Return the clocks of a tick of an FPGA, 0 where none plays the scan or its clock is not known."""
-    for name in formats:
-        try:
-            require_format(name, plan.program)
-        except Unphysical as error:
-            raise format_rejected(setup, str(error), explicit=explicit) from None
-    problems = Problems()
-    clocks = slow_clocks_per_tick(setup, plan.program, problems) if "verilog" in formats else 0
-    problems.stop_if_any()
-    return clocks
-
-
-def _broken(setup: Setup, plan: TurnedPlan, certificate: TurnedCertificate) -> list[Problem]:
-    """Return the limits of the scan file that the certificate exceeds."""
-    errors, limits, problems = certificate.errors, plan.limits, []
-    figures = {
-        "max_error_lsb": (limits.max_error_lsb, max(errors.code_lsb), "a code is off by", "LSB"),
-        "max_scaling_error_percent": (
-            limits.max_scaling_error_percent,
-            max(errors.scaling, abs(errors.fast_size), abs(errors.slow_size)),
-            "scaling and sizes are off by up to",
-            "%",
-        ),
-    }
-    for key, (limit, value, what, unit) in figures.items():
-        if limit is not None and value > limit:
-            problems.append(setup.scan_file.problem(f"limits.{key}", f"{what} {value:.3g} {unit}, above {limit:g}"))
-    return problems
 
 
 class TurnedBuild(Result):
@@ -174,26 +127,12 @@ class TurnedBuild(Result):
     @property
     def warnings(self) -> list[str]:
         """Sizes or a residual above 1 %; empty if there are none."""
-        errors = self.certificate.errors
-        figures = {
-            "the residual": errors.rms,
-            "the size along the lines": errors.fast_size,
-            "the size across the lines": errors.slow_size,
-            "the shear": errors.shear,
-        }
-        return [f"{what} is off by {value:.2f} %" for what, value in figures.items() if abs(value) > _WARNED_PERCENT]
+        return [text for _, text in turned_warnings(self.certificate)]
 
     @cached_property
     def files(self) -> dict[str, bytes]:
         """Every file by its name, the manifest last."""
-        plan, record = self.plan, turned_record(self.plan)
-        digest = content_hash(record)
-        text = tuple(map(comment_safe, self.summary().splitlines()))
-        clocks = self._clocks_per_tick
-        content = TurnedContent(plan.name, digest, plan.program, __version__, plan.scanner, text, clocks)
-        files = turned_files(content, self.formats) | turned_runtime(self.formats)
-        files[MANIFEST] = turned_manifest(record, digest, self.formats, self.certificate, files, clocks)
-        return files
+        return render_turned(self.plan, self.certificate, self.formats, self._clocks_per_tick)
 
     @property
     def runtime(self) -> set[str]:
@@ -215,50 +154,11 @@ class TurnedBuild(Result):
 
     def brief(self) -> list[str]:
         """Return the lines that every output of the scan begins with: its errors, and the time of an image."""
-        errors = self.certificate.errors
-        return [
-            f"residual {errors.rms:.3f} % of the line by the operators; sizes {errors.fast_size:+.2f} % along the "
-            f"lines, {errors.slow_size:+.2f} % across",
-            duration(self.plan.schedule),
-        ]
+        return turned_brief(self.plan, self.certificate)
 
     def summary(self) -> str:
         """Return errors and drives as text."""
-        plan, errors, schedule = self.plan, self.certificate.errors, self.plan.schedule
-        geometry = plan.geometry
-        lines = [
-            f"{plan.name} on {plan.scanner!r} at {geometry.angle_deg:g} degrees: {rate(schedule.line_rate)} lines "
-            f"of {schedule.ticks} ticks, {schedule.lines} lines a frame",
-            *self._mixed(),
-            "",
-            "errors by the operators, percent of the line or of the frame",
-            f"  residual {errors.rms:.3f} rms, worst line {errors.worst_line:.3f}",
-            f"  scaling {errors.scaling:.2f} peak to peak",
-            f"  size {errors.fast_size:+.3f} along the lines, {errors.slow_size:+.3f} across",
-            f"  shear {errors.shear:+.3f}, angle {errors.rotation_deg:+.4f} degrees",
-        ]
-        if plan.x.motion.both:
-            lines.append(f"  trace and retrace differ by up to {errors.mismatch:.3f}")
-        lines += ["", "axis  of the line [nm]  of the frame [nm]  drive [V]  codes          step/limit  error [LSB]"]
-        for axis, codes, lsb in zip(plan.axes, self.certificate.codes, errors.code_lsb, strict=True):
-            volts = abs(axis.converter.v_per_code) * (codes.most - codes.least)
-            reach, step = f"{codes.least}..{codes.most}", f"{codes.steepest}/{axis.program.output.max_step}"
-            moves = f"{axis.motion.fast_nm:+16.2f}  {axis.motion.slow_nm:+17.2f}"
-            lines.append(f"{axis.axis:<4}  {moves}  {volts:9.3f}  {reach:<13}  {step:<10}  {lsb:.2f}")
-        return "\n".join(lines)
-
-    def _mixed(self) -> list[str]:
-        """Return coupling and drift in a line each, where there is any."""
-        geometry, lines = self.plan.geometry, []
-        if geometry.x_per_y or geometry.y_per_x:
-            lines.append(
-                f"coupled axes: {100.0 * geometry.x_per_y:+g} % of y along x, {100.0 * geometry.y_per_x:+g} % of x "
-                "along y"
-            )
-        if any(geometry.drift_nm_per_s):
-            x, y = geometry.drift_nm_per_s
-            lines.append(f"drift: {x:+g} nm/s along x, {y:+g} nm/s along y")
-        return lines
+        return "\n".join(turned_summary(self.plan, self.certificate))
 
     def charts(self) -> "PlottedCharts":
         """Return the drive of both axes on the first, a middle and the last imaged line, and over the frame."""

@@ -10,8 +10,8 @@ import numpy as np
 from msgspec import Struct
 
 from tablegen.fixedpoint.frame_program import played_extremes
-from tablegen.numerics.arrays import Bools, Floats, Ints
-from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.turned_plan import FrameGeometry, TurnedAxis, TurnedPlan
 
 _CHORD = 0.05  # of the line
 _MOST_SAMPLES = 512  # of a line, at which the position is computed
@@ -73,6 +73,13 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
     )
 
 
+def played_frame(plan: TurnedPlan) -> "ImagedFrame":
+    """Return the positions of a frame on the operators of the plan."""
+    ticks = np.arange(0, plan.schedule.ticks, -(-plan.schedule.ticks // _MOST_SAMPLES))
+    x_nm, y_nm = (played_position(axis, frame_codes(axis, ticks), ticks, plan.schedule.ticks) for axis in plan.axes)
+    return ImagedFrame.of(plan, x_nm, y_nm, (ticks + 0.5) / plan.schedule.ticks)
+
+
 def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
     """Return the codes of a frame at some ticks of each line, unshaped, shape (lines, len(ticks))."""
     program = axis.program
@@ -100,42 +107,82 @@ def played_position(axis: TurnedAxis, codes: Ints, ticks: Ints, line_ticks: int)
     return axis.piezo.position(closed, np.append(u, u[0]))[:-1].reshape(codes.shape)
 
 
-def frame_errors(plan: TurnedPlan, x_nm: Floats, y_nm: Floats, t: Floats) -> dict[str, float]:
-    """Return the errors of positions of both axes.
+class ImagedFrame(Struct, frozen=True, eq=False):
+    """Positions of a frame beside the wanted ones: along the lines, and across them, on the sample.
 
-    Parameters
-    ----------
-    x_nm, y_nm
-        Positions up to a constant, shape (lines, len(t)).
-    t
-        Phases of the line, shape (samples,).
+    ``fast_nm`` and ``slow_nm`` are the positions, shape (lines, samples), ``t`` the phases of the samples in a line.
+    ``maps`` are the affine images of the wanted position that fit the imaged samples best: a constant and the shares of
+    the line and of the frame, of either direction. ``left_nm`` is what they leave, shape (imaged lines, samples inside)
+    each, at the wanted positions ``along`` and ``across``, -0.5..0.5 of each motion.
     """
-    motion, (fast_nm, slow_nm) = plan.x.motion, plan.geometry.size_nm
-    lines = motion.lines
-    inside: Bools = motion.inside(t)
-    along = np.broadcast_to(motion.fast(t) - 0.5, (lines, len(t)))
-    across = motion.slow((np.arange(lines)[:, None] + t) / lines) - 0.5
-    time_s = (np.arange(lines)[:, None] + t) / motion.line_rate_hz
-    fast, slow = plan.geometry.on_the_sample(x_nm, y_nm, time_s)
-    at = np.ix_(np.flatnonzero(motion.imaged), np.flatnonzero(inside))
-    design = np.stack([np.ones(along[at].size), along[at].ravel(), across[at].ravel()], axis=1)
-    solutions, left = [], []
-    for values in (fast, slow):
-        measured = values[at].ravel()
-        solution = np.linalg.lstsq(design, measured, rcond=None)[0]
-        solutions.append(solution)
-        left.append((measured - design @ solution).reshape(along[at].shape))
-    (_, fast_fast, fast_slow), (_, slow_fast, slow_slow) = (row.tolist() for row in solutions)
-    squares = (left[0] / fast_nm) ** 2 + (left[1] / slow_nm) ** 2
+
+    t: Floats
+    fast_nm: Floats
+    slow_nm: Floats
+    maps: tuple[Floats, Floats]
+    left_nm: tuple[Floats, Floats]
+    along: Floats
+    across: Floats
+
+    @classmethod
+    def of(
+        cls, plan: TurnedPlan, x_nm: Floats, y_nm: Floats, t: Floats, geometry: FrameGeometry | None = None
+    ) -> "ImagedFrame":
+        """Return positions of both axes beside those that the plan wants.
+
+        Parameters
+        ----------
+        x_nm, y_nm
+            Positions up to a constant, shape (lines, len(t)).
+        t
+            Phases of the line, shape (samples,).
+        geometry
+            Coupling of the axes and drift of the sample, where they are others than those of the plan.
+        """
+        motion = plan.x.motion
+        lines = motion.lines
+        along = np.broadcast_to(motion.fast(t) - 0.5, (lines, len(t)))
+        across = motion.slow((np.arange(lines)[:, None] + t) / lines) - 0.5
+        time_s = (np.arange(lines)[:, None] + t) / motion.line_rate_hz
+        fast, slow = (geometry or plan.geometry).on_the_sample(x_nm, y_nm, time_s)
+        at = np.ix_(np.flatnonzero(motion.imaged), np.flatnonzero(motion.inside(t)))
+        design = np.stack([np.ones(along[at].size), along[at].ravel(), across[at].ravel()], axis=1)
+        maps, left = [], []
+        for values in (fast, slow):
+            measured = values[at].ravel()
+            solution = np.linalg.lstsq(design, measured, rcond=None)[0]
+            maps.append(np.asarray(solution, dtype=np.float64))
+            left.append(np.asarray(measured - design @ solution, dtype=np.float64).reshape(along[at].shape))
+        return cls(t, fast, slow, (maps[0], maps[1]), (left[0], left[1]), along[at], across[at])
+
+    def line_rms(self, size_nm: tuple[float, float]) -> Floats:
+        """Return the residual of each imaged line, rms, as a share of the sizes along and across."""
+        fast_nm, slow_nm = size_nm
+        squares = (self.left_nm[0] / fast_nm) ** 2 + (self.left_nm[1] / slow_nm) ** 2
+        return np.asarray(np.sqrt(np.mean(squares, axis=1)))
+
+
+def frame_errors(
+    plan: TurnedPlan, x_nm: Floats, y_nm: Floats, t: Floats, geometry: FrameGeometry | None = None
+) -> dict[str, float]:
+    """Return the errors of positions of both axes; the parameters are those of ``ImagedFrame.of``."""
+    return errors_of(plan, ImagedFrame.of(plan, x_nm, y_nm, t, geometry))
+
+
+def errors_of(plan: TurnedPlan, frame: ImagedFrame) -> dict[str, float]:
+    """Return the errors of a frame by the names of ``TurnedErrors``, without that of the codes."""
+    fast_nm, slow_nm = plan.geometry.size_nm
+    (_, fast_fast, fast_slow), (_, slow_fast, slow_slow) = (row.tolist() for row in frame.maps)
+    lines = frame.line_rms((fast_nm, slow_nm))
     return {
         "fast_size": 100.0 * (float(np.hypot(fast_fast, slow_fast)) / fast_nm - 1.0),
         "slow_size": 100.0 * (float(np.hypot(fast_slow, slow_slow)) / slow_nm - 1.0),
         "shear": 100.0 * (slow_fast / fast_fast + fast_slow / slow_slow),
         "rotation_deg": float(np.degrees(np.arctan2(slow_fast, fast_fast))),
-        "rms": 100.0 * float(np.sqrt(np.mean(squares))),
-        "worst_line": 100.0 * float(np.sqrt(np.max(np.mean(squares, axis=1)))),
-        "mismatch": _mismatch(plan, fast, t),
-        "scaling": _scaling(plan, fast, t),
+        "rms": 100.0 * float(np.sqrt(np.mean(lines * lines))),
+        "worst_line": 100.0 * float(np.max(lines)),
+        "mismatch": _mismatch(plan, frame.fast_nm, frame.t),
+        "scaling": _scaling(plan, frame.fast_nm, frame.t),
     }
 
 

@@ -105,7 +105,7 @@ def _part(part: Part, attributes: _Attributes, fine: int) -> Markup:
             places = [_number(fine * value, fine) for value in (part.x, part.y, part.width, part.height)]
             return Markup(
                 '<image x="{}" y="{}" width="{}" height="{}" preserveAspectRatio="none" '
-                'style="image-rendering:pixelated" href="{}"/>'
+                'image-rendering="pixelated" href="{}"/>'
             ).format(*places, data_address(indexed_png(part.shades, part.palette)))
         case Group():
             return Markup('<g class="{}">{}</g>').format(part.style, _all(part.parts, attributes, fine))

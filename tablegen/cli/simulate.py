@@ -13,6 +13,8 @@ from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, s
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
+    from tablegen.api.simulate import SimulatedScan
+    from tablegen.api.simulate_turned import SimulatedTurned
     from tablegen.config.load import Setup
 
 OWN, DEFAULT = "own", "default"
@@ -86,6 +88,9 @@ def simulate(
     Where the scanner file has an operator, your own scanner is simulated: the command plays the uncompensated triangle,
     the laws and the operator on scanners that differ from the operator by its uncertainty.
 
+    Of a scan at an angle, on coupled axes or with drift, it plays a whole frame of both axes: straight lines, and the
+    emitted integers.
+
     \b
     Examples:
       tablegen simulate annexin_200nm.toml
@@ -97,19 +102,20 @@ def simulate(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     check_plot(plot, as_json)
     from tablegen.api.simulate import simulate as simulated
+    from tablegen.api.simulate_turned import simulate_turned
     from tablegen.base.input_errors import Rejected, Unphysical
     from tablegen.config.load import load
 
+    result: SimulatedScan | SimulatedTurned
     try:
         setup = load(scan)
         own = _plays_own(context, setup, truth_file)
         if calibrated and not own:
             require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
         truth = OWN if own else truth_file or DEFAULT
+        play = simulate_turned if setup.mixes_motions else simulated
         with Progress() as progress:
-            result = simulated(
-                setup, truth, calibrated=calibrated, noise_percent=noise, seed=seed, progress=progress.now
-            )
+            result = play(setup, truth, calibrated=calibrated, noise_percent=noise, seed=seed, progress=progress.now)
     except Rejected as faults:
         fail(faults.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:

@@ -9,12 +9,14 @@ from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.law_charts import law_charts
 from tablegen.comparison.operators import SIDES, ComparedOperator, Place, residuals
 from tablegen.comparison.overlay import overlay
+from tablegen.comparison.turned import turned_charts
 from tablegen.compensation.operator.loop import POINTS
 from tablegen.html_report.blocks import Charts as ChartsBlock
 from tablegen.html_report.blocks import Section
 from tablegen.html_report.playing import PlayedAxis, played_axes
 from tablegen.html_report.scan_errors import inside
 from tablegen.html_report.subject import Subject, series_of
+from tablegen.html_report.turned_subject import TurnedSubject
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.numerics.arrays import Floats
 
@@ -24,8 +26,11 @@ _MOST_LOOPS = 4
 
 def comparison_charts(both: SideBySide) -> list[Chart]:
     """Return every chart that both sides can have."""
-    if both.a.subject is not None and both.b.subject is not None:
-        return [*_scans(both.a.subject, both.b.subject)]
+    a, b = both.a.subject, both.b.subject
+    if isinstance(a, TurnedSubject) and isinstance(b, TurnedSubject):
+        return [*turned_charts(a, b)]
+    if isinstance(a, Subject) and isinstance(b, Subject):
+        return [*_scans(a, b)]
     charts = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
     for name in both.a.operators:
         if name in both.b.operators:

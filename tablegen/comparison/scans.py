@@ -6,9 +6,10 @@ import msgspec
 
 from tablegen.comparison.quantity import ComparedQuantity, digest, keys_of
 from tablegen.comparison.scanners import scanner_quantities
+from tablegen.config.load import Setup
 from tablegen.emit.constants import storage_bits
-from tablegen.html_report.subject import PlannedScan, Subject
-from tablegen.manifest.fields import ManifestAxis, ManifestFigure, ManifestSequence
+from tablegen.html_report.subject import Subject
+from tablegen.manifest.fields import ManifestAxis, ManifestFigure, ManifestOutput, ManifestSequence
 
 _PARTS = (
     ("uncompensated", "scaling error {}, uncompensated"),
@@ -22,8 +23,8 @@ _PARTS = (
 
 def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
     """Return every quantity of a scan or a build, in the order of the report."""
-    quantities = [*_request(subject.planned)] if subject.planned is not None else []
-    quantities += _rates(subject.manifest.sequence)
+    quantities = [*request_keys(subject.planned.setup)] if subject.planned is not None else []
+    quantities += rates(subject.manifest.sequence)
     axes = (("x", subject.manifest.axes.x), ("y", subject.manifest.axes.y))
     for axis, entry in axes:
         quantities.append(ComparedQuantity(f"{axis} drive", "motion", "rests" if entry.resting else "moves"))
@@ -34,7 +35,7 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
         quantities += _waveform(axis, entry)
         quantities += _certificate(axis, entry)
         quantities += _expected(axis, entry)
-        quantities += _output(axis, entry)
+        quantities += output_limits(axis, entry.output)
     manifest = subject.manifest
     quantities += _memory(subject)
     quantities += [
@@ -49,13 +50,14 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
     return quantities
 
 
-def _request(planned: PlannedScan) -> Iterator[ComparedQuantity]:
+def request_keys(setup: Setup) -> Iterator[ComparedQuantity]:
     """Yield the keys of the scan file except the path of the scanner file, whose values are compared."""
-    values = msgspec.to_builtins(planned.setup.scan)
+    values = msgspec.to_builtins(setup.scan)
     yield from keys_of("asked for", "", {key: value for key, value in values.items() if key not in ("name", "scanner")})
 
 
-def _rates(sequence: ManifestSequence) -> Iterator[ComparedQuantity]:
+def rates(sequence: ManifestSequence) -> Iterator[ComparedQuantity]:
+    """Yield rates, and which ticks and lines are imaged."""
     schedule = sequence.schedule
     numbers: list[tuple[str, float, str]] = [
         ("line rate", float(schedule.line_rate), "Hz"),
@@ -198,9 +200,9 @@ def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
     yield ComparedQuantity("memory", "Fourier words in C", 4 * words, "bytes")
 
 
-def _output(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
+def output_limits(axis: str, output: ManifestOutput) -> Iterator[ComparedQuantity]:
     """Yield the converter and the limits that the device enforces."""
-    section, output = f"{axis} limits", entry.output
+    section = f"{axis} limits"
     numbers = (
         ("lowest code allowed", output.code_min, ""),
         ("highest code allowed", output.code_max, ""),

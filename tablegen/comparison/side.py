@@ -12,11 +12,14 @@ from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import scan_quantities
-from tablegen.config.load import load_scanner
+from tablegen.comparison.turned import turned_quantities
+from tablegen.config.load import load, load_scanner
 from tablegen.config.scanner import Scanner
 from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.subject import Subject, of_directory
+from tablegen.html_report.turned_subject import TurnedSubject, turned_directory, turned_scan
 from tablegen.manifest.format import MANIFEST
+from tablegen.manifest.turned import is_turned
 
 Kind = Literal["scan", "build", "scanner", "operator"]
 WORDS: dict[Kind, str] = {
@@ -40,7 +43,7 @@ class ComparedSide:
     kind: Kind
     quantities: list[ComparedQuantity]
     findings: tuple[Finding, ...] = ()
-    subject: Subject | None = None
+    subject: Subject | TurnedSubject | None = None
     scanner: Scanner | None = None
     operators: dict[str, ComparedOperator] = field(default_factory=dict)
 
@@ -98,21 +101,26 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
     NotABuild
         If a directory is not a build.
     """
+    subject: Subject | TurnedSubject
     if kind == "build":
-        subject = of_directory(path)
+        subject = turned_directory(path) if is_turned(path) else of_directory(path)
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
         text = f"{path.name or path}: does not agree with its manifest: {names}"
         damage = (Finding("note", 0.0, text, code="damaged-build"),) if wrong else ()
-        return ComparedSide(path, kind, scan_quantities(subject), damage, subject)
+        return ComparedSide(path, kind, _quantities(subject), damage, subject)
     if kind == "scan":
-        subject = planned_scan(path, progress=tell, remedies=False)
+        setup = load(path)
+        if setup.mixes_motions:
+            subject = turned_scan(setup, progress=tell)
+        else:
+            subject = planned_scan(setup, progress=tell, remedies=False)
         assert subject.planned is not None
         findings = tuple(
             Finding("note", 0.0, str(problem), code=problem.code, axis=problem.axis)
             for problem in subject.planned.broken
         )
-        return ComparedSide(path, kind, scan_quantities(subject), findings, subject)
+        return ComparedSide(path, kind, _quantities(subject), findings, subject)
     if kind == "operator":
         return ComparedSide(path, kind, [], operators={"": ComparedOperator.read(path)})
     scanner, file = load_scanner(path)
@@ -122,3 +130,7 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
         if table is not None and table.operator_file is not None:
             operators[axis] = ComparedOperator.read(path.parent / table.operator_file)
     return ComparedSide(path, kind, scanner_quantities(file, scanner), (), None, scanner, operators)
+
+
+def _quantities(subject: Subject | TurnedSubject) -> list[ComparedQuantity]:
+    return turned_quantities(subject) if isinstance(subject, TurnedSubject) else scan_quantities(subject)

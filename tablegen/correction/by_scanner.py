@@ -15,6 +15,7 @@ from tablegen.correction.old_scan import OldAxis, OldScan
 from tablegen.correction.scan_images import Images, timed
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import StraightScan
+from tablegen.correction.turned_scan import by_turned_scan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -59,10 +60,12 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, conditions: O
         If the image has another number of rows than the scan.
     """
     setup = load(scan)
-    plan = make_plan(setup)
     model = (
         ScannerModel(setup.scanner, setup.scanner_file, setup.scanner_folder) if scanner is None else _model(scanner)
     )
+    if setup.mixes_motions:
+        return by_turned_scan(images, setup, scan, model, conditions)
+    plan = make_plan(setup)
     if plan.y.drive.resting:
         raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, whose rows are one line of x")])
     part = plan.schedule.down if conditions.back else plan.schedule.up

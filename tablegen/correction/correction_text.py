@@ -10,6 +10,7 @@ from tablegen.images.scan_angle import angle_text
 
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
 _OTHER = 1.4  # times the size of the file: another size
+_SAME_ANGLE_DEG = 1.0
 _FEW_PERIODS = 8.0  # in the line
 _NOT_MOVED = 1e-9  # pixels: rounding
 _FAR = 1.0  # pixels of mismatch of trace and retrace that need a finding
@@ -131,14 +132,26 @@ def _by_affine_map(scan: StraightScan) -> list[Finding]:
     return notes
 
 
+def _by_angle(scan: StraightScan) -> list[Finding]:
+    """Return what the scan angle that the file states is to a correction by a scanner or a scan file."""
+    angle = scan.record.get("scan_angle_deg")
+    if angle is None or scan.record.get("affine") is not None or scan.record["by"].startswith("fit"):
+        return []
+    played = scan.record.get("scan", {}).get("angle_deg")
+    if played is None:
+        text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
+        return [Finding("spoils", 0.0, f"{text}. With --fit no axis is needed")]
+    apart = (abs((angle - one + 180.0) % 360.0 - 180.0) for one in (played, -played))  # signs differ by instrument
+    if min(apart) <= _SAME_ANGLE_DEG:
+        return []
+    text = f"{angle_text(angle)}, and the scan file has {played:g} degrees; is the image of this scan?"
+    return [Finding("spoils", 0.0, text)]
+
+
 def _findings(scan: StraightScan, images: Images) -> list[Finding]:
     """Return the findings, the worst first; percentages are of the picture."""
     notes = [Finding("note", 0.0, f"left out: {text}") for text in images.left_out]
-    affine = scan.record.get("affine")
-    angle = scan.record.get("scan_angle_deg")
-    if angle is not None and affine is None and not scan.record["by"].startswith("fit"):
-        text = f"{angle_text(angle)}; the correction took [x] of the scanner file for the fast axis"
-        notes.append(Finding("spoils", 0.0, f"{text}. With --fit no axis is needed"))
+    notes += _by_angle(scan)
     notes += _by_file(scan)
     if scan.record.get("missing"):
         text = missing_text([images.channels[i].heights for i in images.reference])
@@ -178,6 +191,6 @@ def _findings(scan: StraightScan, images: Images) -> list[Finding]:
             notes.append(Finding("limit", offset_percent, text))
         elif worst is not None and worst[1] > _FAR:
             text = "trace and retrace are still apart; are drive, offset, rate, turn and window those of the image?"
-            text = "trace and retrace are still apart: the lines are bent" if affine is not None else text
+            text = "trace and retrace are still apart: the lines are bent" if "affine" in scan.record else text
             notes.append(Finding("spoils", offset_percent, text))
     return worst_first(notes)

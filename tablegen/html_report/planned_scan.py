@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.scan_warnings import weighed_warnings
-from tablegen.config.load import load
+from tablegen.config.load import Setup, load
 from tablegen.emit.render import render_scan
 from tablegen.html_report.ranking import without_folder
 from tablegen.html_report.subject import PlannedScan, Subject, of_scan
@@ -13,7 +13,7 @@ from tablegen.html_report.verify_record import VerifyRecord
 
 
 def planned_scan(
-    scan: Path,
+    scan: Path | Setup,
     verified: VerifyRecord | None = None,
     progress: Callable[[str], object] = lambda _: None,
     *,
@@ -24,7 +24,7 @@ def planned_scan(
     Parameters
     ----------
     scan
-        Path of the scan file.
+        Path of the scan file, or a loaded one.
     verified
         The record of `tablegen verify --junit` of its build.
     progress
@@ -38,7 +38,7 @@ def planned_scan(
     Rejected
         For wrong input.
     """
-    certified = certify_scan(load(scan), progress, remedies=remedies, sines=False)
+    certified = certify_scan(scan if isinstance(scan, Setup) else load(scan), progress, remedies=remedies, sines=False)
     setup, plan, certificates = certified.setup, certified.plan, certified.certificates
     warnings = []
     if remedies:

@@ -49,7 +49,7 @@ def _slew(planned: PlannedScan | None, axis: str) -> float | None:
 def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[TableCell, ...]]:
     certificate, output = entry.certificate, entry.output
     of = "a code" if certificate.shaped is None else "the position"
-    rows = [_bounded(f"largest error of {of}", certificate.max_error_lsb, limits.max_error_lsb, "LSB")]
+    rows = [bounded(f"largest error of {of}", certificate.max_error_lsb, limits.max_error_lsb, "LSB")]
     if certificate.rms_error_lsb is not None:
         rows.append(row(f"rms error of {of}", f"{figure(certificate.rms_error_lsb, 3)} LSB", "", ""))
     if certificate.shaped is not None:
@@ -59,9 +59,9 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         text = f"moves {changes.get('position', 0.0):.3g} % of the line, removes {changes.get('scaling', 0.0):.3g} %"
         rows.append(row(f"refinement {side}", text, "", ""))
     if certificate.largest_step is not None:
-        rows.append(_bounded("largest step", certificate.largest_step, output.max_step, "codes a tick"))
+        rows.append(bounded("largest step", certificate.largest_step, output.max_step, "codes a tick"))
     if certificate.peak_slew_v_per_s is not None:
-        rows.append(_bounded("steepest slope at the piezo", certificate.peak_slew_v_per_s, slew, "V/s"))
+        rows.append(bounded("steepest slope at the piezo", certificate.peak_slew_v_per_s, slew, "V/s"))
     if certificate.peak_acceleration is not None:
         rows.append(
             row("largest acceleration", f"{certificate.peak_acceleration:.4g} of the line a period squared", "", "")
@@ -82,11 +82,11 @@ def _scaling(certificate: ManifestCertificate, most: float | None) -> list[tuple
     rows = []
     for side, error in (certificate.scaling_error_percent or {}).items():
         worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
-        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
-        rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
+        rows.append(bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
+        rows.append(bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
     if certificate.position is not None:
         for side, value in certificate.position.scaling_error_percent.items():
-            rows.append(_bounded(f"with the resonance that steps drive, {side}", value, None, "%", RESONANCE_PERCENT))
+            rows.append(bounded(f"with the resonance that steps drive, {side}", value, None, "%", RESONANCE_PERCENT))
     return rows
 
 
@@ -116,7 +116,7 @@ def _parts(subject: Subject) -> Grid:
     return Grid("Scaling errors and their parts taken alone [%, peak to peak]", head, tuple(rows))
 
 
-def _bounded(
+def bounded(
     name: str, value: float, limit: float | None, unit: str, advice: float | None = None, signed: bool = False
 ) -> tuple[TableCell, ...]:
     """Return a figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
@@ -146,7 +146,7 @@ def _expected(certificate: ManifestCertificate, most: float | None) -> tuple[tup
     for side, one in expected.scaling_percent.items():
         parts = own.get(side, {})
         both = one.value + max(parts.get("total", 0.0), parts.get("band_limit", 0.0))
-        rows.append(_bounded(f"with the waveform's, {side}", both, most, "%", LARGEST_PERCENT))
+        rows.append(bounded(f"with the waveform's, {side}", both, most, "%", LARGEST_PERCENT))
     if expected.mismatch_percent is not None:
         rows.append(_figure("trace to retrace", expected.mismatch_percent, basis))
     if expected.size_percent is not None:

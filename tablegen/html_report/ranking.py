@@ -1,12 +1,12 @@
 """The findings of a report: errors that spoil the image come first."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from tablegen.base.input_errors import Problem
 from tablegen.base.warnings import Axis, Finding, Weight, worst_first
 from tablegen.certificate.scan_notes import expected_mismatch, note_findings
-from tablegen.html_report.subject import Subject
+from tablegen.html_report.subject import FileState, Subject
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import ManifestAxis
 
@@ -20,10 +20,7 @@ def ranked(subject: Subject) -> list[Finding]:
 
 
 def _findings(subject: Subject) -> Iterator[Finding]:
-    for state in subject.files:
-        if state.wrong:
-            yield Finding("limit", 1000.0, f"{state.name} {state.wrong}", code="changed-file")
-    yield from _verified(subject.verified, subject)
+    yield from file_findings(subject.files, subject.verified, subject.digest)
     planned, reported = subject.planned, set[tuple[str, str]]()
     groups: list[list[Finding]] = [[finding for axis, entry in subject.axes for finding in _expected(axis, entry)]]
     if planned is not None:
@@ -33,6 +30,14 @@ def _findings(subject: Subject) -> Iterator[Finding]:
     for group in groups:  # a finding of a group with more weight is not repeated
         yield from (finding for finding in group if (finding.code, finding.axis) not in reported)
         reported |= {(finding.code, finding.axis) for finding in group}
+
+
+def file_findings(files: Iterable[FileState], verified: VerifyRecord | None, digest: str) -> Iterator[Finding]:
+    """Yield files that are not those of the manifest, whose SHA-256 is ``digest``, and faults of a record of verify."""
+    for state in files:
+        if state.wrong:
+            yield Finding("limit", 1000.0, f"{state.name} {state.wrong}", code="changed-file")
+    yield from _verified(verified, digest)
 
 
 def _of_problem(weight: Weight, percent: float, problem: Problem) -> Finding:
@@ -60,10 +65,10 @@ def _by_side(percent: Mapping[str, float]) -> str:
     return " and ".join(f"{value:.3g} % {side}" for side, value in percent.items())
 
 
-def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding]:
+def _verified(record: VerifyRecord | None, digest: str) -> Iterator[Finding]:
     if record is None:
         return
-    if record.digest != subject.digest:
+    if record.digest != digest:
         text = "the record of verify is of another build, or does not say of which"
         yield Finding("limit", 900.0, text, code="other-verify-record")
     failed = [check for check in record.checks if check.failure]
@@ -77,4 +82,4 @@ def without_folder(problem: Problem) -> Problem:
     return problem._replace(file=Path(problem.file).name)
 
 
-__all__ = ["Finding", "ranked", "without_folder"]
+__all__ = ["Finding", "file_findings", "ranked", "without_folder"]

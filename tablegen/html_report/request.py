@@ -1,8 +1,11 @@
 """The request beside the played scan, the files of the build, and the record of verify."""
 
+from collections.abc import Sequence
+
 from tablegen.certificate.summary import rate
 from tablegen.html_report.blocks import Bullets, Grid, Paragraph, Section, TableCell, row
-from tablegen.html_report.subject import Subject
+from tablegen.html_report.subject import FileState, Subject
+from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import ManifestAxis, ManifestSequence
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.settling import settling, settling_text
@@ -17,7 +20,7 @@ def request_section(subject: Subject) -> Section:
     rows = [
         row("lines", requested, f"{rate(schedule.line_rate)}, {schedule.ticks} ticks each"),
         row("frames", "", f"{rate(schedule.frame_rate)}, {schedule.lines} lines each"),
-        row("image", "", _image(sequence)),
+        row("image", "", image_text(sequence)),
     ]
     for axis, entry in subject.axes:
         drive = entry.drive
@@ -50,7 +53,8 @@ def schedule_hz(subject: Subject) -> float:
     return subject.manifest.axes.x.line.requested_hz
 
 
-def _image(sequence: ManifestSequence) -> str:
+def image_text(sequence: ManifestSequence) -> str:
+    """Return the pixels and lines of an image, in words."""
     up, down = sequence.up_lines[1], sequence.down_lines[1]
     lines = f"{up} lines" + (f" up and {down} down" if down else "")
     both = "trace and retrace" if sequence.backward_ticks[1] else "trace alone"
@@ -85,11 +89,16 @@ def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
 
 def verification(subject: Subject) -> Section:
     """Return the checks of a record, or how to get one."""
-    record, title = subject.verified, "Verification"
+    return record_section(subject.verified, subject.digest)
+
+
+def record_section(record: VerifyRecord | None, digest: str) -> Section:
+    """Return the checks of a record of verify beside a build whose manifest has this SHA-256, or how to get one."""
+    title = "Verification"
     if record is None:
         text = "No record was given. `tablegen verify DIR --junit verify.xml` makes one, `tablegen report --verified "
         return Section("verify", title, (Paragraph(text + "verify.xml` shows it here."),))
-    same = record.digest == subject.digest
+    same = record.digest == digest
     which = Paragraph("The record is of this very build.", "good")
     if not same:
         why = "is of another build" if record.digest else "does not say of which build it is"
@@ -108,28 +117,31 @@ def verification(subject: Subject) -> Section:
 def files(subject: Subject) -> Section:
     """Return every file with its SHA-256."""
     manifest = subject.manifest
+    models = [
+        row(f"{axis}: {name}", TableCell(digest, "quiet"), "")
+        for axis, entry in subject.axes
+        for name, digest in (entry.drive.model_files or {}).items()
+    ]
+    origin = f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats) or 'c, verilog'}"
+    return file_section(manifest.hash, origin, subject.files, models)
+
+
+def file_section(
+    plan_hash: str, origin: str, states: Sequence[FileState], more: Sequence[tuple[TableCell, ...]] = ()
+) -> Section:
+    """Return files with their SHA-256 below the hash of the plan and how they were made."""
     rows = [
         row(
             state.name,
             TableCell(state.sha256, "quiet"),
             TableCell(f"\u2717 {state.wrong}", "bad") if state.wrong else TableCell("", ""),
         )
-        for state in subject.files
+        for state in states
     ]
-    what = Bullets(
-        (
-            TableCell(f"plan {manifest.hash}"),
-            TableCell(f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats) or 'c, verilog'}"),
-        )
-    )
-    wrong = any(state.wrong for state in subject.files)
-    models = [
-        row(f"{axis}: {name}", TableCell(digest, "quiet"), "")
-        for axis, entry in subject.axes
-        for name, digest in (entry.drive.model_files or {}).items()
-    ]
+    what = Bullets((TableCell(f"plan {plan_hash}"), TableCell(origin)))
+    wrong = any(state.wrong for state in states)
     return Section(
         "files",
         "Files",
-        (what, Grid(f"{len(rows)} files with their SHA-256", ("file", "SHA-256", ""), (*rows, *models), not wrong)),
+        (what, Grid(f"{len(rows)} files with their SHA-256", ("file", "SHA-256", ""), (*rows, *more), not wrong)),
     )

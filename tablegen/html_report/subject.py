@@ -108,12 +108,23 @@ def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
         If the directory is not a build.
     """
     manifest = read_build(folder).manifest
-    digest = sha256(read_bytes(folder / MANIFEST, MANIFEST_KIND)).hexdigest()
-    states = [FileState(MANIFEST, digest)]
-    for name, promised in manifest.files.items():
+    digest = manifest_digest(folder)
+    states = (FileState(MANIFEST, digest), *files_beside(folder, manifest.files))
+    return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)
+
+
+def manifest_digest(folder: Path) -> str:
+    """Return the SHA-256 of the manifest in a directory."""
+    return sha256(read_bytes(folder / MANIFEST, MANIFEST_KIND)).hexdigest()
+
+
+def files_beside(folder: Path, promised_files: Mapping[str, str]) -> list[FileState]:
+    """Return the files of a build beside the SHA-256 that its manifest has of them."""
+    states = []
+    for name, promised in promised_files.items():
         try:
             wrong = "" if file_sha256(folder / name, BUILD_FILE) == promised else "differs from the manifest"
         except OSError as error:
             wrong = f"cannot be read: {error.strerror or error}"
         states.append(FileState(name, promised, wrong))
-    return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)
+    return states

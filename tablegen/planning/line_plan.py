@@ -35,7 +35,8 @@ from tablegen.waveform.series import FourierSeries
 
 MIXED = (
     "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the formats c and "
-    "verilog, `verify`, `upload` and `readback`; leave this out for anything else"
+    "verilog, `verify`, `upload`, `readback`, `live`, `simulate`, `report`, `compare` and `correct`; leave this out "
+    "for anything else"
 )
 
 

@@ -17,7 +17,7 @@ from tablegen.compensation.operator.in_time import OperatorInTime
 from tablegen.compensation.operator.operator import STROKE_REACH
 from tablegen.compensation.operator.turned_frame import BeyondDriver, FrameDrive, FrameMotion, learn_frame
 from tablegen.config.load import Setup
-from tablegen.config.scanner import Coupling
+from tablegen.config.scanner import Coupling, ScannerAxis
 from tablegen.config.schema import Limits
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
@@ -212,13 +212,7 @@ def _axis(
 ) -> TurnedAxis | None:
     axis, rate_hz = line.axis, motion.line_rate_hz
     scanner = setup.scanner.x if axis == "x" else setup.scanner.y
-    operator = known.at_rates(rate_hz, float(plan.schedule.frame_rate))
-    rate = 1.0
-    if scanner.frequency is not None and not operator.knows_rates:  # (23), as for a line
-        law = scanner.frequency
-        rate = frequency_gain(rate_hz, law.alpha, law.reference_hz)
-        rate /= frequency_gain(operator.creep.reference_hz, law.alpha, law.reference_hz)
-    piezo = OperatorInTime(operator, lambda mean: rate * known.factor(mean), known.response)
+    piezo = piezo_in_time(known, scanner, rate_hz, float(plan.schedule.frame_rate))
     n = np.arange(1.0, motion.harmonics + 1.0)
     response, boost_db = line.drive.response, line.drive.max_boost_db
 
@@ -239,6 +233,17 @@ def _axis(
         program = _within(setup, plan, line, _quantised(setup, plan, line, known, drive), problems)
         return TurnedAxis(axis, line.converter, motion, piezo, known, drive, program)
     return None
+
+
+def piezo_in_time(known: KnownAxis, scanner: ScannerAxis, line_hz: float, frame_hz: float) -> OperatorInTime:
+    """Return an axis of a scanner file in time, at the rates of the lines and of the frames."""
+    operator = known.at_rates(line_hz, frame_hz)
+    rate = 1.0
+    if scanner.frequency is not None and not operator.knows_rates:  # (23), as for a line
+        law = scanner.frequency
+        rate = frequency_gain(line_hz, law.alpha, law.reference_hz)
+        rate /= frequency_gain(operator.creep.reference_hz, law.alpha, law.reference_hz)
+    return OperatorInTime(operator, lambda mean: rate * known.factor(mean), known.response)
 
 
 def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:

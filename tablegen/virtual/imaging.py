@@ -11,10 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.compensation.identification import SettledAxis
+from tablegen.config.scanner import Coupling
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.played import played
+from tablegen.virtual.scanner import NO_COUPLING
+from tablegen.virtual.turned_run import emitted_volts
 
 _TICKS = 16384  # ticks per line
 _STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip
@@ -23,6 +27,9 @@ _ROUGH_WAVES = 40
 _FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is evaluated
 
 Position = Callable[[Floats], Floats]  # where an axis is, in nm, at times in its periods
+# Where both axes are: at the phases of the columns in a line, (pixels,), and of the pixels in a frame, (lines, pixels),
+# without and with the delay of the image.
+Move = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
 Surface = Callable[[Floats, Floats], Floats]  # height at x and y in nm
 
 
@@ -165,6 +172,7 @@ def running_frame(
     conditions: Conditions | None = None,
     pixels: int | None = None,
     down: bool = False,
+    coupling: Coupling = NO_COUPLING,
 ) -> FrameImages:
     """Simulate a settled frame of the emitted integers of a build.
 
@@ -181,10 +189,52 @@ def running_frame(
     if part.count == 0:
         raise ValueError(f"y images nothing on its way {'down' if down else 'up'}")
     return _frame(
-        (_playing(plan.x, x), _playing(plan.y, y)),
+        _apart(_playing(plan.x, x), _playing(plan.y, y)),
+        coupling,
         surface,
         conditions or Conditions(),
         columns=_columns(plan.x.drive.turn, plan.x.band_limit.window, pixels or schedule.pixels),
+        numbers=part.first + np.arange(part.count),
+        lines=schedule.lines,
+    )
+
+
+def turned_frame(
+    plan: TurnedPlan,
+    x: SettledAxis,
+    y: SettledAxis,
+    surface: Surface,
+    conditions: Conditions | None = None,
+    pixels: int | None = None,
+    down: bool = False,
+    coupling: Coupling = NO_COUPLING,
+) -> FrameImages:
+    """Simulate a settled frame of the emitted integers of a scan at an angle, as ``running_frame``.
+
+    ``surface`` is in the directions of the axes: the image shows it turned back by the scan angle.
+
+    Raises
+    ------
+    ValueError
+        As ``running_frame``.
+    """
+    schedule, motion = plan.schedule, plan.x.motion
+    part = schedule.down if down else schedule.up
+    if part.count == 0:
+        raise ValueError(f"the frame images nothing on its way {'down' if down else 'up'}")
+    volts = emitted_volts(plan)
+    tick_s = 1.0 / (motion.line_rate_hz * len(volts.t))
+    along_x, along_y = (_periodic(axis.settled(its.ravel(), tick_s), 0.5) for axis, its in ((x, volts.x), (y, volts.y)))
+
+    def move(_: Floats, __: Floats, frame: Floats) -> tuple[Floats, Floats]:
+        return along_x(frame % 1.0), along_y(frame % 1.0)
+
+    return _frame(
+        move,
+        coupling,
+        surface,
+        conditions or Conditions(),
+        columns=_columns(motion.fast_turn, motion.fast_window, pixels or schedule.pixels),
         numbers=part.first + np.arange(part.count),
         lines=schedule.lines,
     )
@@ -202,6 +252,7 @@ def triangle_frame(
     lines: int = 256,
     turn: tuple[float, float] = (0.5, 0.5),
     window: tuple[float, float] = (0.0, 1.0),
+    coupling: Coupling = NO_COUPLING,
 ) -> FrameImages:
     """Simulate a settled frame of an uncompensated triangle on each axis, x then y: ``lines`` on y's way up.
 
@@ -225,7 +276,8 @@ def triangle_frame(
         volts = offset + size * (ideal_triangle(_TICKS, bend) - 0.5)
         moves.append(_periodic(axis.settled(volts, 1.0 / (hz * _TICKS)), 0.0))
     return _frame(
-        (moves[0], moves[1]),
+        _apart(*moves),
+        coupling,
         surface,
         conditions or Conditions(),
         columns=_columns(turn[0], window, pixels),
@@ -265,8 +317,19 @@ def _periodic(displacement_nm: Floats, middle: float) -> Position:
     return position
 
 
+def _apart(x: Position, y: Position) -> Move:
+    """Return the motion of axes of which x has the period of a line and y that of a frame, in which it is slow."""
+
+    def move(times: Floats, frame: Floats, _: Floats) -> tuple[Floats, Floats]:
+        along, across = np.broadcast_arrays(x(times % 1.0), y(frame % 1.0))
+        return along, across
+
+    return move
+
+
 def _frame(
-    positions: tuple[Position, Position],
+    move: Move,
+    coupling: Coupling,
     surface: Surface,
     conditions: Conditions,
     columns: tuple[_Columns, _Columns],
@@ -279,7 +342,9 @@ def _frame(
     for column in columns:
         sample_times = column.times - conditions.late * column.lasts
         frame = (numbers[:, None] + column.times) / lines
-        x, y = np.broadcast_arrays(positions[0](sample_times % 1.0), positions[1](frame % 1.0))
+        x, y = move(sample_times, frame, (numbers[:, None] + sample_times) / lines)
+        if coupling:
+            x, y = x + coupling.x_per_y * y, y + coupling.y_per_x * x
         elapsed = (frame - numbers[0] / lines + conditions.frame) / (len(numbers) / lines)
         drift = [share * float(np.ptp(nm)) * elapsed**2 for share, nm in zip(conditions.drift, (x, y), strict=True)]
         heights = surface(x + drift[0], y + drift[1])

@@ -13,6 +13,7 @@ from tablegen.base.input_errors import Document, Problems
 from tablegen.base.quantities import Hertz, Name, PositiveVolts
 from tablegen.base.toml import read_toml
 from tablegen.config.decode import decode
+from tablegen.config.scanner import Coupling
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.virtual.duhem import Duhem, Lag
 from tablegen.virtual.preisach import Preisach
@@ -114,6 +115,7 @@ class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     identified_on: Annotated[Name, Meta(description="what the parameters come from")] = "nothing that its file names"
     v_max: Annotated[PositiveVolts, Meta(description="drive 1 of the hysteresis")]
     amplifier: AmplifierTruth = AmplifierTruth()
+    coupling: Coupling = Coupling()
     x: AxisTruth
     y: AxisTruth
 

@@ -59,7 +59,9 @@ def scaled_to(scanner: VirtualScanner, file: Scanner) -> tuple[VirtualScanner, s
         if times is not None:
             axes[name] = replace(axes[name], resonance=axes[name].resonance.faster(times))
             changes.append(f"a resonance of {getattr(file, name).resonance.frequency_hz:g} Hz in {name}")
-    return VirtualScanner(scanner.name, **axes), f"scaled to {file.driver}, {', '.join(changes)}"
+    return VirtualScanner(
+        scanner.name, axes["x"], axes["y"], scanner.coupling
+    ), f"scaled to {file.driver}, {', '.join(changes)}"
 
 
 def _scaled(axis: VirtualAxis, file: ScannerAxis, driver: Driver) -> ScaledAxis:

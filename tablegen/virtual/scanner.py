@@ -1,7 +1,8 @@
 """The virtual scanner: volts at the amplifier's output stage in, nanometres out.
 
 The order is dead time, amplifier bandwidth, hysteresis, sensitivity at the mean drive, creep, resonances; the axes are
-independent. The mean drive is that of the whole period or, with a memory, of the last tens of seconds.
+independent but for their coupling. The mean drive is that of the whole period or, with a memory, of the last tens of
+seconds.
 """
 
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from tablegen.config.scanner import Coupling
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.driver import Driver
 from tablegen.virtual import parameters
@@ -18,6 +20,7 @@ from tablegen.virtual.creep import logarithmic_creep
 from tablegen.virtual.modes import Modes, delay, low_pass, second_order, side_by_side
 from tablegen.virtual.parameters import Truth, sensitivity
 
+NO_COUPLING = Coupling()
 _STRAIGHT = Modes(1.0)
 _DRIVE_LEVELS = 2.0**36  # levels of the drive
 
@@ -190,13 +193,15 @@ class VirtualAxis:
 
 @dataclass(frozen=True)
 class VirtualScanner:
-    """The two axes, which do not couple."""
+    """The two axes, and how they couple."""
 
     name: str
     x: VirtualAxis
     y: VirtualAxis
+    coupling: Coupling = NO_COUPLING
 
     @classmethod
     def of(cls, truth: Truth) -> "VirtualScanner":
         """Return the scanner of a file."""
-        return cls(truth.name, *(VirtualAxis.of(axis, truth.v_max, truth.amplifier) for axis in (truth.x, truth.y)))
+        x, y = (VirtualAxis.of(axis, truth.v_max, truth.amplifier) for axis in (truth.x, truth.y))
+        return cls(truth.name, x, y, truth.coupling)

@@ -1,6 +1,7 @@
 """Commands of a scan at an angle: those that take it, those that refuse it, and their messages."""
 
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -74,13 +75,60 @@ def test_a_straight_build_takes_the_place_of_a_turned_one(scan: Path, tmp_path: 
 
 @pytest.mark.parametrize(
     "command",
-    [("report",), ("simulate",), ("tables",)],
+    [("tables",)],
 )
 def test_other_commands_refuse_it(command: tuple[str, ...], scan: Path) -> None:
     name, *options = command
     outcome = run(name, scan, *options)
     assert outcome.status == 2
     assert "scan.toml:1: angle_deg: a scan at an angle, on coupled axes or with drift is for" in outcome.err
+
+
+@pytest.mark.common
+def test_simulate_plays_the_frame_on_its_own_operators(scan: Path) -> None:
+    """The same numbers in text and JSON, below the lines of `show`."""
+    outcome, simulated = run("simulate", scan), tablegen.simulate_turned(scan)
+    plain = simulated.record
+    assert (outcome.status, outcome.err) == (0, "")
+    assert outcome.out == simulated.summary() + "\n"
+    assert outcome.out.splitlines()[:2] == simulated.built.brief() == [plain["answer"], plain["duration"]]
+    assert "at 30 degrees: simulation on the scanner file's own operator; 300 nm along the lines" in outcome.out
+    straight, built = (plain["own"]["corrections"][name]["errors"] for name in ("uncompensated", "operator"))
+    across = next(line for line in outcome.out.splitlines() if line.startswith("size across the lines"))
+    cells = [f"{one['slow_size']['mean']:+.3f} ({one['slow_size']['worst']:+.3f})" for one in (straight, built)]
+    assert across.split("%]")[1].split() == " ".join(cells).split()
+    assert straight["slow_size"]["mean"] > 5.0 > abs(built["slow_size"]["worst"])
+    assert outcome.out.splitlines()[-1].startswith("A simulation, not a measurement")
+    refused = run("simulate", scan, "--csv", "f.csv")
+    assert refused.status == 2
+    assert "--csv does not go with the scanner file's own operator" in refused.err
+
+
+@pytest.mark.common
+def test_simulate_plays_it_on_a_virtual_scanner(scan: Path, tmp_path: Path) -> None:
+    """With its coupling, if a file of one has any, which a scan that is not turned does not play."""
+    default = files("tablegen.virtual").joinpath("default.toml").read_text("utf-8")
+    (tmp_path / "coupled.toml").write_text(default + "\n[coupling]\ny_per_x = 0.1\n", "utf-8")
+    (tmp_path / "default.toml").write_text(default, "utf-8")
+    shears = []
+    for name in ("default.toml", "coupled.toml"):
+        options = ("--scanner-truth", tmp_path / name, "--no-calibration")
+        csv_file, plot = tmp_path / "frame.csv", tmp_path / "frame.svg"
+        outcome = run("simulate", scan, *options, "--csv", csv_file, "--plot", plot, "--json")
+        assert outcome.status == 0, outcome.err
+        plain = json.loads(outcome.out)["given"]["corrections"]["operator"]["errors"]
+        shears.append(plain["shear"]["mean"])
+        rows = [line.split(",") for line in csv_file.read_text("utf-8").splitlines()[1:]]
+        assert rows[0][-3:] == ["along_nm", "across_nm", "imaged"]
+        assert {row[1] for row in rows[1:]} == {"uncompensated", "operator"}
+        assert 8000 < len(rows) < 20010
+        assert "error across the lines" in plot.read_text("utf-8")
+    # y_per_x = 0.1 in the directions of the scan, by its rotated matrix.
+    assert shears[1] - shears[0] == pytest.approx(100.0 * (0.075 / 1.0433 - 0.025 / 0.9567), abs=0.3)
+    straight = write_turned(tmp_path, 0.0, *SHORT)
+    refused = run("simulate", straight, "--scanner-truth", tmp_path / "coupled.toml", "--no-calibration")
+    assert refused.status == 2
+    assert "coupled.toml: " in refused.err
 
 
 def test_another_format_is_refused(scan: Path, tmp_path: Path) -> None:
@@ -147,5 +195,7 @@ def test_python_has_the_same(scan: Path, tmp_path: Path) -> None:
     assert built.write(tmp_path / "out") == []
     assert built.record["turned"]["angle_deg"] == 30.0
     assert len(built.charts().charts) == 4
-    with pytest.raises(tablegen.Rejected, match="this scan has no angle, coupling or drift"):
-        tablegen.build_turned(turned_setup(tmp_path, 360.0, *SHORT))
+    straight = turned_setup(tmp_path, 360.0, *SHORT)
+    for function in (tablegen.build_turned, tablegen.simulate_turned):
+        with pytest.raises(tablegen.Rejected, match="this scan has no angle, coupling or drift"):
+            function(straight)

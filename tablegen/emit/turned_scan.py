@@ -1,0 +1,64 @@
+"""All files of a certified scan at an angle."""
+
+from collections.abc import Sequence
+
+from tablegen.base.input_errors import Problems, Unphysical
+from tablegen.certificate.turned_errors import TurnedCertificate
+from tablegen.certificate.turned_summary import turned_summary
+from tablegen.config.load import Setup
+from tablegen.emit.render import format_rejected
+from tablegen.emit.templates import comment_safe
+from tablegen.emit.turned import TURNED_FORMATS, require_format, turned_files, turned_runtime
+from tablegen.emit.turned_content import TurnedContent
+from tablegen.manifest.format import MANIFEST, content_hash
+from tablegen.manifest.turned_record import turned_manifest, turned_record
+from tablegen.planning.clock import slow_clocks_per_tick
+from tablegen.planning.turned_plan import TurnedPlan
+from tablegen.version import __version__
+
+
+def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tuple[str, ...]:
+    """Return the formats of a build, those of the scan file unless they are given, each once.
+
+    Raises
+    ------
+    Rejected
+        For a format that a scan at an angle does not have.
+    """
+    names = tuple(dict.fromkeys(formats or setup.scan.emit.formats or ("c",)))
+    if not set(names) <= set(TURNED_FORMATS):
+        why = "a scan at an angle, on coupled axes or with drift has the formats c and verilog"
+        raise format_rejected(setup, why, explicit=formats is not None)
+    return names
+
+
+def turned_clocks(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, explicit: bool = False) -> int:
+    """Return the clocks of a tick of an FPGA, 0 where none plays the scan or its clock is not known.
+
+    Raises
+    ------
+    Rejected
+        If a format cannot hold the scan, or the clock is too slow for it.
+    """
+    for name in formats:
+        try:
+            require_format(name, plan.program)
+        except Unphysical as error:
+            raise format_rejected(setup, str(error), explicit=explicit) from None
+    problems = Problems()
+    clocks = slow_clocks_per_tick(setup, plan.program, problems) if "verilog" in formats else 0
+    problems.stop_if_any()
+    return clocks
+
+
+def render_turned(
+    plan: TurnedPlan, certificate: TurnedCertificate, formats: Sequence[str], clocks_per_tick: int = 0
+) -> dict[str, bytes]:
+    """Return every file of a build by its name, the manifest last."""
+    names, record = list(formats), turned_record(plan)
+    digest = content_hash(record)
+    text = tuple(map(comment_safe, turned_summary(plan, certificate)))
+    content = TurnedContent(plan.name, digest, plan.program, __version__, plan.scanner, text, clocks_per_tick)
+    files = turned_files(content, names) | turned_runtime(names)
+    files[MANIFEST] = turned_manifest(record, digest, names, certificate, files, clocks_per_tick)
+    return files
