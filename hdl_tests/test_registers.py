@@ -147,7 +147,7 @@ def test_the_host_port_is_that_of_the_sequencer_and_of_the_top_of_a_build(front:
     assert own.items() <= core.items()
     opposite = {name: {"input": "output", "output": "input"}[way] for name, way in own.items()}
     assert len(opposite) == 23
-    top = ports((BUS.parent / "top.v.j2").read_text("utf-8"))
+    top = ports((BUS.parent / "top_ports.v.j2").read_text("utf-8"))
     assert {name: top.get(name) for name in opposite} == opposite
     sequencer = ports((BUS.parent / "dac_sequencer.v").read_text("ascii"))
     assert {name for name in opposite if sequencer.get(name) != opposite[name]} == {"booting", "missing"}

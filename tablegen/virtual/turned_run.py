@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.base.input_errors import Unphysical
 from tablegen.certificate.turned_errors import ImagedFrame, errors_of, frame_codes
 from tablegen.compensation.identification import SettledAxis
+from tablegen.compensation.models import IDENTIFIED
 from tablegen.compensation.operator.in_time import OperatorInTime
 from tablegen.compensation.operator.piezo import departing
 from tablegen.config.load import Setup
@@ -22,7 +23,7 @@ from tablegen.virtual.played import MAX_TICKS
 SEEDS = 10
 OWN_SAMPLES = 256  # of a line on an operator, whose position is linear between them
 MEASURES = ("rms", "worst_line", "mismatch", "scaling", "fast_size", "slow_size", "shear", "rotation_deg")
-UNCOMPENSATED, BUILT = "uncompensated", "operator"
+UNCOMPENSATED, BUILT = "uncompensated", IDENTIFIED
 
 
 @dataclass(frozen=True, eq=False)

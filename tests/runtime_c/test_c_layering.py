@@ -12,6 +12,7 @@ from tablegen.base.resources import c_link, c_runtime, c_store
 
 EVERYTHING = [*c_runtime(), *c_link(), *c_store()]
 # Their types stand below everything, the functions that they declare above.
+WRITTEN = {"tablegen_options.h"}  # by a build for an Arduino
 PUBLIC = {"dac_sequencer.h", "dac_link.h", "dac_store.h"}
 Graph = Mapping[str, set[str]]
 # What these compile makes other calls.
@@ -50,9 +51,9 @@ def calls(paths: Iterable[Path], folder: Path, *options: str) -> Graph:
 
 
 def includes(paths: Iterable[Path]) -> Graph:
-    """Of each file what it includes by a name in quotation marks."""
+    """Of each file what it includes by a name in quotation marks; what a build writes includes nothing."""
     pattern = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"]+)"', re.MULTILINE)
-    return {path.name: set(pattern.findall(path.read_text("utf-8"))) for path in paths}
+    return {path.name: set(pattern.findall(path.read_text("utf-8"))) - WRITTEN for path in paths}
 
 
 def modules(graph: Graph, public: Iterable[str] = PUBLIC) -> Graph:

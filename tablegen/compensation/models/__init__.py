@@ -17,6 +17,7 @@ from tablegen.compensation.model_problems import ModelProblems
 GROUP = "tablegen.models"
 DEFAULT = "harmonic"  # of a table that names none
 UNCOMPENSATED = "triangle"  # of an axis without a table
+IDENTIFIED = "operator"  # which a scan at an angle needs
 
 
 class UnknownModel(ValueError):
