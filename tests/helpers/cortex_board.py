@@ -16,7 +16,6 @@ from tablegen.verification.c.elf import read_executable
 SLICE = 40  # instructions between two looks at the peripherals
 FLASH, PRIVATE = 0x08000000, 0xE000E000
 _SIZE = 1 << 20
-_TRAP = FLASH + _SIZE - 16
 _FRAME = 32  # bytes that an interrupt puts on the stack
 _THREAD = 256  # below every priority
 
@@ -25,14 +24,25 @@ class CortexBoard:
     """The far end of a ``link_line.Line``. ``words`` are what the converters were given on each tick."""
 
     def __init__(
-        self, executable: Path, core: int, cycles: float, ram: tuple[int, int], devices: Mapping[int, int]
+        self,
+        executable: Path,
+        core: int,
+        cycles: float,
+        ram: tuple[int, int],
+        devices: Mapping[int, int],
+        flash: int = FLASH,
+        vectors: int = 0,
     ) -> None:
-        """Load firmware: RAM and devices are start and size; ``core`` is one of unicorn's numbers."""
+        """Load firmware: RAM and devices are start and size; ``core`` is one of unicorn's numbers.
+
+        The flash begins at ``flash``, and the vector table ``vectors`` bytes after that.
+        """
         self.words: list[tuple[int, int]] = []
         self.registers: dict[int, int] = {}  # by address; one without a meaning here keeps what is written
         self.longest: dict[int, int] = {}  # instructions, by interrupt
         self.now = 0.0  # in cycles of the processor
         self.byte_cycles = 0.0
+        self._vectors, self._trap = flash + vectors, flash + _SIZE - 16
         self._cycles = cycles
         self._enabled = 0
         self._priority: dict[int, int] = {}
@@ -42,14 +52,14 @@ class CortexBoard:
         self._sent = bytearray()
         self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
         self.uc.ctl_set_cpu_model(core)
-        self.uc.mem_map(FLASH, _SIZE)
+        self.uc.mem_map(flash, _SIZE)
         self.uc.mem_map(*ram)
         for start, size in devices.items():
             self._map(start, size)
         for segment in read_executable(executable).segments:
             self.uc.mem_write(segment.load_address, segment.data)
-        self.uc.reg_write(arm_const.UC_ARM_REG_SP, self.word(FLASH))
-        self._pc = self.word(FLASH + 4) & ~1
+        self.uc.reg_write(arm_const.UC_ARM_REG_SP, self.word(self._vectors))
+        self._pc = self.word(self._vectors + 4) & ~1
 
     def _map(self, start: int, size: int) -> None:
         def read(uc: object, offset: int, size: int, data: object) -> int:
@@ -152,9 +162,9 @@ class CortexBoard:
         frame = (self.uc.reg_read(arm_const.UC_ARM_REG_SP) - _FRAME) & ~7
         self.uc.mem_write(frame, b"\xee" * _FRAME)
         self.uc.reg_write(arm_const.UC_ARM_REG_SP, frame)
-        self.uc.reg_write(arm_const.UC_ARM_REG_LR, _TRAP | 1)
+        self.uc.reg_write(arm_const.UC_ARM_REG_LR, self._trap | 1)
         self.uc.reg_write(arm_const.UC_ARM_REG_XPSR, 0x01000000)
-        self._pc, self._active = self.word(FLASH + 4 * (16 + number)) & ~1, priority
+        self._pc, self._active = self.word(self._vectors + 4 * (16 + number)) & ~1, priority
         instructions = SLICE
         while not self._run(SLICE):
             self._pass()
@@ -165,6 +175,6 @@ class CortexBoard:
 
     def _run(self, instructions: int) -> bool:
         """So many instructions; True if a handler returned."""
-        self.uc.emu_start(self._pc | 1, _TRAP, count=instructions)
+        self.uc.emu_start(self._pc | 1, self._trap, count=instructions)
         self._pc = self.uc.reg_read(arm_const.UC_ARM_REG_PC)
-        return bool(self._pc == _TRAP)
+        return bool(self._pc == self._trap)

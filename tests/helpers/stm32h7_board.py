@@ -3,10 +3,6 @@
 unicorn has the processor; the model has RCC, PWR, TIM1, SPI 1 and 2, USART 3, four streams of DMA 1 with their
 multiplexer, a line of EXTI, and interrupts, as ST's RM0433 names them. What the firmware does not use is not there: a
 register without a meaning here keeps what is written.
-
-**Cache.** No emulator has one. Here the processor and DMA see memories of their own from the moment that the cache is
-on; a line goes from one to the other only when the firmware cleans or invalidates it. A real cache writes lines back by
-itself at times, which cannot be relied upon.
 """
 
 from collections.abc import Mapping
@@ -14,12 +10,15 @@ from pathlib import Path
 
 from converter_chips import Board as Converters
 from cortex_board import PRIVATE, CortexBoard
+from cortex_m7_cache import DataCache
 from unicorn import arm_const
+
+from tablegen.verification.c.elf import read_executable
 
 CYCLES = 1.0  # of the processor, an instruction
 OFF = -1  # the code of an output that is off
 _CORE_HZ, _TIMER_HZ, _SPI_HZ, _UART_HZ = 400_000_000, 200_000_000, 100_000_000, 100_000_000
-_RAM, _RAM_SIZE, _LINE = 0x24000000, 512 << 10, 32
+_RAM = 0x24000000, 512 << 10
 _TIM1, _SPI, _USART, _DMA, _DMAMUX = 0x40010000, (0x40013000, 0x40003800), 0x40004800, 0x40020000, 0x40020800
 _CR1, _DIER, _SR, _CCMR1, _CCMR2, _CCER, _CNT, _ARR = (
     _TIM1 + at for at in (0, 0xC, 0x10, 0x18, 0x1C, 0x20, 0x24, 0x2C)
@@ -32,11 +31,9 @@ _USART_CR1, _USART_CR3, _USART_BRR, _USART_ISR, _USART_ICR, _RDR, _TDR = (
 _LISR, _LIFCR = _DMA, _DMA + 8
 _RCC_CR, _RCC_CFGR, _PWR_CSR1, _PWR_D3CR = 0x58024400, 0x58024410, 0x58024804, 0x58024818
 _EXTICR2, _RTSR1, _CPUIMR1, _CPUPR1 = 0x5800040C, 0x58000000, 0x58000080, 0x58000088
-_CCR, _CCSIDR, _DCIMVAC, _DCISW, _DCCMVAC = 0xE000ED14, 0xE000ED80, 0xE000EF5C, 0xE000EF60, 0xE000EF68
 _IDLE, _TXE = 1 << 4, 1 << 7
 _FLAGS = (0, 6, 16, 22)  # of streams 0 to 3, in LISR
 _REQUESTS = {"update": 15, "compare 1": 11, "compare 4": 14}
-_SETS, _WAYS = 128, 4  # of its data cache of 16 KB
 
 
 class _Stream:
@@ -78,7 +75,7 @@ class _Stream:
         """Move an item from memory to the peripheral."""
         assert self._board.registers[self.at] >> 6 & 3 == 1
         address, width = self.next_address()
-        self._board.give(self._board.registers[self.at + 8], self._board.shared(address, width))
+        self._board.give(self._board.registers[self.at + 8], self._board.cache.shared(address, width))
 
     @property
     def asks(self) -> bool:
@@ -96,11 +93,10 @@ class Stm32h7Board(CortexBoard):
 
     def __init__(self, executable: Path, converter: str) -> None:
         devices = {0x40000000: 0x30000, 0x52000000: 0x3000, 0x58000000: 0x30000, PRIVATE: 0x1000}
-        super().__init__(executable, arm_const.UC_CPU_ARM_CORTEX_M7, CYCLES, (_RAM, _RAM_SIZE), devices)
+        super().__init__(executable, arm_const.UC_CPU_ARM_CORTEX_M7, CYCLES, _RAM, devices)
+        self.cache = DataCache(self.uc, _RAM, 16, read_executable(executable).segments)
         self.converters = Converters(converter)
         self.pixels: list[bool] = []
-        self._seen_by_dma: bytearray | None = None  # from when the cache is on
-        self._invalidated: set[int] = set()
         self._streams = tuple(_Stream(self, number) for number in range(4))
         self._period = 0.0  # of the timer, in cycles; 0 until it runs
         self._update = 0.0
@@ -116,24 +112,6 @@ class Stm32h7Board(CortexBoard):
         if self.registers.get(_EXTICR2, 0) >> 12 == 4 and self.registers.get(_RTSR1, 0) & line:
             self.registers[_CPUPR1] = self.registers.get(_CPUPR1, 0) | line
 
-    # Memory, as DMA sees it
-
-    def shared(self, address: int, size: int) -> int:
-        """Return what DMA reads."""
-        memory = self._seen_by_dma
-        assert memory is not None
-        return int.from_bytes(memory[address - _RAM : address - _RAM + size], "little")
-
-    def _maintain(self, address: int, value: int) -> None:
-        """Clean or invalidate a line of the cache."""
-        line = value & ~(_LINE - 1)
-        memory = self._seen_by_dma
-        assert memory is not None
-        if address == _DCCMVAC:
-            memory[line - _RAM : line - _RAM + _LINE] = self.uc.mem_read(line, _LINE)
-        else:
-            self.uc.mem_write(line, bytes(memory[line - _RAM : line - _RAM + _LINE]))
-
     # Registers
 
     def read(self, address: int, size: int) -> int:
@@ -145,19 +123,17 @@ class Stm32h7Board(CortexBoard):
             return value | (value & 7) << 3
         if address in (_PWR_CSR1, _PWR_D3CR):
             return value | 1 << 13
-        if address == _CCSIDR:  # sets, ways, lines of 32 bytes
-            return (_SETS - 1) << 13 | (_WAYS - 1) << 3 | 1
+        if (of_cache := self.cache.read(address)) is not None:
+            return of_cache
         if address == _USART_ISR:
             return self._status | (_TXE if self.now >= self._sent_at else 0)
         return value
 
     def write(self, address: int, size: int, value: int) -> None:
         """Write a register."""
-        if address in (_DCCMVAC, _DCIMVAC):
-            self._maintain(address, value)
-        elif address == _DCISW:
-            self._invalidated.add(value)
-        elif address == _LIFCR:
+        if self.cache.write(address, value):
+            return
+        if address == _LIFCR:
             self.registers[_LISR] = self.registers.get(_LISR, 0) & ~value
         elif address == _CPUPR1:
             self.registers[_CPUPR1] = self.registers.get(_CPUPR1, 0) & ~value
@@ -177,10 +153,6 @@ class Stm32h7Board(CortexBoard):
         """See to what a register starts."""
         if PRIVATE <= address < PRIVATE + 0x500:
             self.write_private(address, size, value)
-        elif address == _CCR and value >> 16 & 1:
-            ways = {way << 30 | number << 5 for way in range(_WAYS) for number in range(_SETS)}
-            assert self._invalidated == ways, "the data cache is not invalidated before it is on"
-            self._seen_by_dma = bytearray(self.uc.mem_read(_RAM, _RAM_SIZE))
         elif address == _USART_BRR:
             self.byte_cycles = value * 10 * _CORE_HZ / _UART_HZ
         elif address == _CR1 and value & 1 and not self._period:
@@ -270,10 +242,9 @@ class Stm32h7Board(CortexBoard):
         assert stream.runs
         assert stream.request == 45
         assert self.registers[stream.at + 8] == _RDR
-        assert self._seen_by_dma is not None
         address, width = stream.next_address()
         assert width == 1
-        self._seen_by_dma[address - _RAM] = byte
+        self.cache.store(address, byte, width)
         self._rests_at = end + self.byte_cycles
 
     def asking(self) -> Mapping[int, bool]:

@@ -255,7 +255,7 @@ AVR_HZ, AVR_UPDATE_HZ = 16_000_000, 2000
 
 
 @pytest.mark.parametrize("level", ["-O2", "-Os"])
-@pytest.mark.parametrize("port", ["stm32", "stm32h7", "rp2040"])
+@pytest.mark.parametrize("port", ["stm32", "stm32h7", "teensy41", "rp2040"])
 def test_a_port_compiles(port: str, level: str, tmp_path: Path) -> None:
     run_clean(
         ["make", "-C", FIRMWARE / port, f"BUILD={tmp_path / port}", f"CFLAGS={level}",
@@ -283,10 +283,11 @@ def test_the_scan_of_a_port_has_its_converter_checked(tmp_path: Path) -> None:
         (("UPDATE_RATE_HZ=800000",), "a_tick_has_room"),
     ],
 )
-def test_the_converter_of_the_stm32h7_port_is_checked(options: tuple[str, ...], reason: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("port", ["stm32h7", "teensy41"])
+def test_the_converter_of_a_port_is_checked(options: tuple[str, ...], reason: str, port: str, tmp_path: Path) -> None:
     """Negative controls: a scan of other words, a converter with shorter frames, a rate without time for them."""
     done = run(
-        ["make", "-C", FIRMWARE / "stm32h7", f"BUILD={tmp_path / 'port'}", f"TABLEGEN={sys.executable} -m tablegen",
+        ["make", "-C", FIRMWARE / port, f"BUILD={tmp_path / 'port'}", f"TABLEGEN={sys.executable} -m tablegen",
          *options]
     )  # fmt: skip
     assert done.returncode != 0

@@ -28,6 +28,7 @@ from pipe_board import PipeBoard
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
 from stm32h7_board import OFF, Stm32h7Board
+from teensy41_board import Teensy41Board
 
 from tablegen.config.load import load
 from tablegen.link.device import Device
@@ -230,8 +231,6 @@ def test_stm32h7(tmp_path: Path) -> None:
 
 
 H7_FAULTS = {
-    "no half is cleaned": ("        SCB_DCCMVAC = at;", "        (void)at;"),
-    "received bytes are not invalidated": ("        SCB_DCIMVAC = at;", "        (void)at;"),
     "the other half is cleaned": ("fill(0, HALF);\n        clean_half(0);", "fill(0, HALF);\n        clean_half(1);"),
     "the half that plays is filled": (
         "fill(0, HALF);\n        clean_half(0);",
@@ -242,25 +241,27 @@ H7_FAULTS = {
     "the pixel clock is that of lines": ("& DAC_PIXEL", "& DAC_LINE"),
     "y comes a tick early": ("TIM1_CNT = PERIOD - 1;", "TIM1_CNT = 0;"),
     "SYNC rises early": ("SETTLE = 88", "SETTLE = 0"),
-    "the cache is on before it is invalidated": (
-        "            SCB_DCISW = way << 30 | set << 5;",
-        "            (void)way;",
-    ),
     "the pin starts nothing": ("    edge = true;", "    edge = false;"),
     "a line that rests does not wake the link": ("USART3_CR1 = 1u << 4 |", "USART3_CR1 ="),
     "the outputs stay off": ("play.x[at] = play.y[at] = SPI_CONVERTER.setup[i];", "play.x[at] = play.y[at] = 0;"),
 }
 
 
+def _faulty(folder: Path, port: str, old: str, new: str) -> Path:
+    """Copy the ports, with a fault in the port or in what ports to a Cortex-M7 share."""
+    ports = folder / "firmware"
+    shutil.copytree(FIRMWARE, ports, ignore=shutil.ignore_patterns("build"))
+    files = [ports / port / "main.c", ports / "common" / "cortex_m7.h"]
+    texts = [file.read_text("ascii") for file in files]
+    assert sum(text.count(old) for text in texts) == 1
+    for file, text in zip(files, texts, strict=True):
+        file.write_text(text.replace(old, new), "ascii")
+    return ports
+
+
 @pytest.mark.parametrize("fault", H7_FAULTS)
 def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
-    old, new = H7_FAULTS[fault]
-    ports = tmp_path / "firmware"
-    shutil.copytree(FIRMWARE, ports, ignore=shutil.ignore_patterns("build"))
-    main = ports / "stm32h7" / "main.c"
-    text = main.read_text("ascii")
-    assert text.count(old) == 1
-    main.write_text(text.replace(old, new), "ascii")
+    ports = _faulty(tmp_path, "stm32h7", *H7_FAULTS[fault])
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
     firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", ports=ports)
     with pytest.raises((Differs, LinkError, AssertionError)):
@@ -283,6 +284,96 @@ def test_a_converter_of_the_stm32h7_port(converter: str, table: dict[str, object
     power_up = 1 << int(str(changes["dac.bits"])) - 1
     heard = follow_words(played, [commit(boot.program), start()], power_up, codes=True, pixels=True)
     assert len(played) - heard[1] > 331
+
+
+# Teensy 4.1: the scans of the STM32H7.
+
+
+def _teensy_play_boot(firmware: Path) -> list[tuple[int, int]]:
+    """Return the codes of the first lines of the boot scan, without those before the end of the set-up."""
+    board = Teensy41Board(firmware, "ad5791")
+    board.tick(1)
+    line = Line(board, baud=460800, tick_hz=H7_RATE)
+    line.sleep(0.002)
+    with Device(line.open, random=Random(8), sleep=line.sleep, timeout_s=0.02) as client:
+        client.arm()
+        client.trigger()
+        line.sleep(2 * 331 / H7_RATE)
+        assert client.status().faults == 0
+    # The first tick twice: off, switched on, and then as the model has it.
+    assert board.words[0] == (OFF, OFF)
+    assert board.words[1] == board.words[2]
+    return board.words[2:]
+
+
+def test_teensy41(tmp_path: Path) -> None:
+    """Two AD5791 by DMA behind a data cache; codes are those at the converters."""
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    played = _teensy_play_boot(_firmware("teensy41", tmp_path, file, "BAUD=460800"))
+    requests = [commit(boot.program), start()]
+    heard = follow_words(played, requests, H7_POWER_UP, codes=True)
+    assert len(played) - heard[1] > 2 * 331
+    wrong = heard[1] + 331
+    x, y = played[wrong]
+    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
+        follow_words([*played[:wrong], (x ^ 1, y), *played[wrong + 1 :]], requests, H7_POWER_UP, codes=True)
+
+
+TEENSY_FAULTS = {  # the first four are in what ports to a Cortex-M7 share
+    "no half is cleaned": ("        SCB_DCCMVAC = at;", "        (void)at;"),
+    "no barrier after a half is cleaned": (
+        "        SCB_DCCMVAC = at;\n    barrier();",
+        "        SCB_DCCMVAC = at;",
+    ),
+    "received bytes are not invalidated": ("        SCB_DCIMVAC = at;", "        (void)at;"),
+    "the cache is on before it is invalidated": (
+        "            SCB_DCISW = way << 30 | set << 5;",
+        "            (void)way;",
+    ),
+    "the other half is cleaned": ("    clean_half(half);", "    clean_half(1 - half);"),
+    "the half that plays is filled": (
+        "TCD_CITER(FRAME_CHANNEL) > HALF ? 1 : 0",
+        "TCD_CITER(FRAME_CHANNEL) > HALF ? 0 : 1",
+    ),
+    "half of a half is cleaned": ("clean(frames + half * HALF, HALF * 8)", "clean(frames + half * HALF, HALF * 4)"),
+    "a request moves a frame of x alone": ("<< 10 | 8u;", "<< 10 | 4u;"),
+    "a request moves two frames of each axis": ("<< 10 | 8u;", "<< 10 | 16u;"),
+    "minor loops have no offset": ("DMA_CR = 1u << 10 | 1u << 7;", "DMA_CR = 1u << 10;"),
+    "the destination does not go back at the end": (
+        "TCD_DLAST(FRAME_CHANNEL) = 2 * LPSPI_STEP;",
+        "TCD_DLAST(FRAME_CHANNEL) = 0;",
+    ),
+    "the source goes on at the end": (
+        "TCD_SLAST(FRAME_CHANNEL) = -(uint32_t)sizeof frames;",
+        "TCD_SLAST(FRAME_CHANNEL) = 0;",
+    ),
+    "too few requests before the start": (
+        "TCD_CITER(FRAME_CHANNEL) = 2 * HALF;",
+        "TCD_CITER(FRAME_CHANNEL) = 2 * HALF - 1;",
+    ),
+    "no interrupt at the half": ("TCD_CSR(FRAME_CHANNEL) = 1u << 2 | 1u << 1;", "TCD_CSR(FRAME_CHANNEL) = 1u << 1;"),
+    "another request": ("| REQUEST_FLEXPWM2_WRITE0;", "| (REQUEST_FLEXPWM2_WRITE0 + 1);"),
+    "no clock of DMA": ("    CCM_CCGR5 |= 3u << 6; ", "    "),
+    "no clock of SPI of y": ("CCM_CCGR1 |= 3u << 6 | 3u << 4;", "CCM_CCGR1 |= 3u << 6;"),
+    "no clock of the timer": ("CCM_CCGR4 |= 3u << 18 | 3u << 2;", "CCM_CCGR4 |= 3u << 2;"),
+    "PLL 2 stays bypassed": ("    CCM_ANALOG_PLL_SYS_CLR = 1u << 16;\n", ""),
+    "frames are a bit short": ("1u << 19 | (FRAME_BITS - 1u)", "1u << 19 | (FRAME_BITS - 2u)"),
+    "LDAC falls early": ("SETTLE = 60", "SETTLE = -60"),
+    "a line that rests does not wake the link": ("LPUART6_CTRL = 1u << 20 |", "LPUART6_CTRL ="),
+    "the outputs stay off": (
+        "frames[at][0] = frames[at][1] = SPI_CONVERTER.setup[i];",
+        "frames[at][0] = frames[at][1] = 0;",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", TEENSY_FAULTS)
+def test_a_fault_of_the_teensy41_port_is_found(fault: str, tmp_path: Path) -> None:
+    ports = _faulty(tmp_path, "teensy41", *TEENSY_FAULTS[fault])
+    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
+    firmware = _firmware("teensy41", tmp_path, file, "BAUD=460800", ports=ports)
+    with pytest.raises((Differs, LinkError, AssertionError)):
+        follow_words(_teensy_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True)
 
 
 # The reference firmware in QEMU, whose log is what SPI of a converter is sent.

@@ -46,48 +46,6 @@ void idle_interrupt(void);
 void trigger_interrupt(void);
 int main(void);
 
-static void barrier(void)
-{
-    __asm__ volatile("dsb\n\tisb" ::: "memory");
-}
-
-static void clean(const volatile void *from, uint32_t bytes)
-{
-    const uint32_t first = (uint32_t)(uintptr_t)from;
-
-    barrier();
-    for (uint32_t at = first; at != first + bytes; at += CACHE_LINE)
-        SCB_DCCMVAC = at;
-    barrier();
-}
-
-static void invalidate(const volatile void *from, uint32_t bytes)
-{
-    const uint32_t first = (uint32_t)(uintptr_t)from;
-
-    barrier();
-    for (uint32_t at = first; at != first + bytes; at += CACHE_LINE)
-        SCB_DCIMVAC = at;
-    barrier();
-}
-
-/* After a reset the data cache has anything in it: it is invalidated, all sets and ways, before it is switched on. */
-static void start_caches(void)
-{
-    SCB_ICIALLU = 0;
-    barrier();
-    SCB_CCR |= UINT32_C(1) << 17;
-    SCB_CSSELR = 0;
-    barrier();
-    const uint32_t geometry = SCB_CCSIDR;
-    for (uint32_t set = 0; set <= (geometry >> 13 & 0x7fff); set++)
-        for (uint32_t way = 0; way <= (geometry >> 3 & 0x3ff); way++) /* of which there are four */
-            SCB_DCISW = way << 30 | set << 5;
-    barrier();
-    SCB_CCR |= UINT32_C(1) << 16;
-    barrier();
-}
-
 /* 400 MHz from a clock of 8 MHz (bypass: from the debugger of a Nucleo board); buses at 200 MHz and 100 MHz, the timer
  * at 200 MHz, SPI at 100 MHz. */
 static void start_clocks(void)

@@ -4,9 +4,7 @@
 #ifndef STM32H7_H
 #define STM32H7_H
 
-#include <stdint.h>
-
-#define REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))
+#include "cortex_m7.h"
 
 /* Power control, embedded flash interface, reset and clock control */
 #define PWR_CSR1 REGISTER(0x58024804)
@@ -76,17 +74,5 @@ enum { REQUEST_TIM1_CH1 = 11, REQUEST_TIM1_CH4 = 14, REQUEST_TIM1_UP = 15, REQUE
 #define USART3_TDR REGISTER(0x40004828)
 enum { USART_IDLE = 1 << 4, USART_TRANSMIT_EMPTY = 1 << 7 };
 enum { DMA1_STREAM2 = 13, DMA1_STREAM3 = 14, EXTI9_5 = 23, USART3 = 39 }; /* interrupts (vector table) */
-/* Cortex-M7: Arm's generic user guide, DUI 0646: interrupts, caches */
-#define NVIC_ISER0 REGISTER(0xE000E100)
-#define NVIC_ISER1 REGISTER(0xE000E104)
-#define NVIC_IPR(interrupt) (*(volatile uint8_t *)(uintptr_t)(0xE000E400 + (interrupt)))
-#define SCB_CCR REGISTER(0xE000ED14)
-#define SCB_CCSIDR REGISTER(0xE000ED80)
-#define SCB_CSSELR REGISTER(0xE000ED84)
-#define SCB_ICIALLU REGISTER(0xE000EF50)
-#define SCB_DCIMVAC REGISTER(0xE000EF5C)
-#define SCB_DCISW REGISTER(0xE000EF60)
-#define SCB_DCCMVAC REGISTER(0xE000EF68)
-enum { CACHE_LINE = 32 }; /* bytes */
 
 #endif
