@@ -421,7 +421,8 @@ module dac_sequencer #(
                     .clamped(y_clamped)
                 );
             end
-        end else if (ALTERNATE) begin : alternating
+        end
+        if (ALTERNATE) begin : alternating
             localparam FLAGS_AT = 46, MARKERS_LEFT = 43;  // clocks from a tick's flags and markers to its codes
             reg [5:0] at;  // counts clocks
             reg works;
@@ -459,7 +460,8 @@ module dac_sequencer #(
                 .tick(tick_0), .load(load_0), .runs(runs_0), .line(line_0), .frame(frame_0), .y_advance(y_advance_0),
                 .reached(reached), .clamped(clamped), .x(x), .y(y)
             );
-        end else begin : pipelined
+        end
+        if (!LOW_AREA && !ALTERNATE) begin : pipelined
             // Bit i is the flag of the tick i clocks ago.
             reg [LATENCY-1:0] ticks, loads, runnings;
             initial begin

@@ -114,7 +114,7 @@ def script_of(bench: str) -> Script:
         random_play(rng, script, shape, 2500, PAIR_PACES, (8, 20))
     elif bench == "slow":
         script = SlowScript(shape=shape)
-        slow_play(rng, script, 400, 5)
+        slow_play(rng, script, 700, 5)  # slow tables of both signs play by then
     elif bench == "low area":
         script.tick_every(LEAST_PACE)
         tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
