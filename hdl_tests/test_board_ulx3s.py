@@ -53,7 +53,8 @@ def test_the_cells_play_the_model_once_they_are_triggered(board: Path, cells: Pa
     assert words == [each[: len(words[0])] for each in whole]
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_memories_that_read_as_0_are_seen(cells: Path) -> None:
     """The control: without what its memories hold the board would not play."""
     _, _, words = ULX3S.played(cells, START_CLOCKS + 200)

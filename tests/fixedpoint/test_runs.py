@@ -84,7 +84,7 @@ def test_every_tick_is_in_its_run(program: Program) -> None:
 
 
 @pytest.mark.rest
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.one_of(programs(), splines()))
 def test_every_tick_is_in_its_run_of_many(program: Program) -> None:
     check_every_tick_is_in_its_run(program)
@@ -193,7 +193,7 @@ def check_parts_do_not_show(program: Program, size: int) -> None:
 
 
 @pytest.mark.rest
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(st.one_of(programs(), splines()), st.integers(1, 40))
 def test_parts_do_not_show(program: Program, size: int) -> None:
     check_parts_do_not_show(program, size)
