@@ -134,7 +134,7 @@
 /* A library of programs. */
 
 #ifndef DAC_LIBRARY
-#define DAC_LIBRARY 0 /* 1: the link plays programs of the device by number, compiled ones and kept ones */
+#define DAC_LIBRARY 0 /* 1: the link plays programs of the device by number, compiled and kept ones; 2: hosts ask too */
 #endif
 
 /* Moves. */
@@ -161,7 +161,7 @@ DAC_CONFIG_SYMBOL("dac_objects_need_the_same_options",
                       DAC_OUTPUT_STORAGE_BITS) "/16)*256+" DAC_CONFIG_VALUE(DAC_STRIDE) ")*4+" DAC_CONFIG_VALUE(
                       DAC_SHAPING) ")*2+" DAC_CONFIG_VALUE(DAC_SPLINE) ")*256+" DAC_CONFIG_VALUE(
                       DAC_REQUESTS) ")*2+" DAC_CONFIG_VALUE(DAC_LONG_MULTIPLY) ")*2+" DAC_CONFIG_VALUE(
-                      DAC_COMMIT_MODES) ")*2+" DAC_CONFIG_VALUE(DAC_STORE) ")*2+" DAC_CONFIG_VALUE(DAC_LIBRARY) ")")
+                      DAC_COMMIT_MODES) ")*2+" DAC_CONFIG_VALUE(DAC_STORE) ")*4+" DAC_CONFIG_VALUE(DAC_LIBRARY) ")")
 DAC_CONFIG_SYMBOL("dac_objects_need_the_same_link_ring", DAC_CONFIG_VALUE(DAC_LINK_RING))
 #endif
 

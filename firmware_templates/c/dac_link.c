@@ -7,6 +7,9 @@
 
 enum { VERSION = 1, MOST_READ = 240, LIMITS = 32 };
 #define MOST_FRAMES (UINT32_C(1) << 31)
+#if DAC_LIBRARY > 1
+#define MOST_MODE (DAC_COMMIT_MODES ? 2u : 0u) /* DAC_COMMIT_FRAME, or DAC_COMMIT_LINE alone */
+#endif
 #define BLOCK (DAC_LINK_RING / 128) /* bytes of the ring that are freed at once */
 
 #if DAC_LINK_RING < 512 || DAC_LINK_RING > 32768 || (DAC_LINK_RING & (DAC_LINK_RING - 1)) != 0
@@ -135,19 +138,24 @@ static uint8_t next_byte(dac_link *l)
 
 /* Requests. */
 
-#if DAC_STORE || DAC_MOVE
+#if DAC_STORE || DAC_MOVE || DAC_LIBRARY > 1
 typedef uint32_t request_set;
 #else
 typedef unsigned request_set;
 #endif
-#if DAC_MOVE
-#define KNOWN DAC_LINK_MOVE /* the last request */
-#define ABOUT_KEPT(request) ((request) > DAC_LINK_LIMITS && (request) < DAC_LINK_MOVE)
+#if DAC_LIBRARY > 1
+#define KNOWN DAC_LINK_PLAY /* the last request */
+#elif DAC_MOVE
+#define KNOWN DAC_LINK_MOVE
 #elif DAC_STORE
 #define KNOWN DAC_LINK_DELETE
-#define ABOUT_KEPT(request) ((request) > DAC_LINK_LIMITS)
 #else
 #define KNOWN DAC_LINK_LIMITS
+#endif
+#if DAC_MOVE || DAC_LIBRARY > 1
+#define ABOUT_KEPT(request) ((request) > DAC_LINK_LIMITS && (request) < DAC_LINK_MOVE)
+#elif DAC_STORE
+#define ABOUT_KEPT(request) ((request) > DAC_LINK_LIMITS)
 #endif
 #if DAC_STORE
 #define TAGGED_STORE (UINT32_C(1) << DAC_LINK_SAVE | UINT32_C(1) << DAC_LINK_SELECT \
@@ -160,7 +168,12 @@ typedef unsigned request_set;
 #else
 #define TAGGED_MOVE 0u
 #endif
-#define TAGGED (TAGGED_ALWAYS | TAGGED_STORE | TAGGED_MOVE)
+#if DAC_LIBRARY > 1
+#define TAGGED_PLAY (UINT32_C(1) << DAC_LINK_PLAY)
+#else
+#define TAGGED_PLAY 0u
+#endif
+#define TAGGED (TAGGED_ALWAYS | TAGGED_STORE | TAGGED_MOVE | TAGGED_PLAY)
 #define TAGGED_ALWAYS (1u << DAC_LINK_COMMIT | 1u << DAC_LINK_PARK | 1u << DAC_LINK_ARM | 1u << DAC_LINK_TRIGGER \
                        | 1u << DAC_LINK_CLEAR | 1u << DAC_LINK_LIMITS)
 
@@ -198,6 +211,12 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
     case DAC_LINK_MOVE:
         return DAC_LINK_MOVE_BYTES;
 #endif
+#if DAC_LIBRARY > 1
+    case DAC_LINK_LIST:
+        return 2;
+    case DAC_LINK_PLAY:
+        return 3;
+#endif
     default:
         return 0;
     }
@@ -224,6 +243,10 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
 #if DAC_STORE
     else if (good && request == DAC_LINK_SELECT)
         good = payload[1] <= 1;
+#endif
+#if DAC_LIBRARY > 1
+    else if (good && request == DAC_LINK_PLAY)
+        good = payload[2] <= MOST_MODE;
 #endif
     return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
 }
@@ -289,6 +312,12 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
     case DAC_LINK_MOVE:
         return dac_link_move(l, payload, a);
 #endif
+#if DAC_LIBRARY > 1
+    case DAC_LINK_LIST:
+        return dac_link_list_number(l, payload, a);
+    case DAC_LINK_PLAY:
+        return dac_link_play_number(l, payload, a);
+#endif
     default:
         return dac_link_set_limits(l, payload, length, a);
     }
@@ -307,8 +336,12 @@ static dac_link_finding admit(dac_link *l, const uint8_t *frame, uint8_t length,
 #if DAC_STORE
     if (ABOUT_KEPT(request) && l->config->store == NULL)
         return dac_link_because(DAC_LINK_TYPE, 0);
-#elif DAC_MOVE
+#elif DAC_MOVE || DAC_LIBRARY > 1
     if (ABOUT_KEPT(request))
+        return dac_link_because(DAC_LINK_TYPE, 0);
+#endif
+#if DAC_LIBRARY > 1
+    if ((request > DAC_LINK_MOVE && dac_link_numbers(l) == 0) || (!DAC_MOVE && request == DAC_LINK_MOVE))
         return dac_link_because(DAC_LINK_TYPE, 0);
 #endif
     const dac_link_finding found = check_payload(l, request, frame + DAC_LINK_HEADER, length);

@@ -222,6 +222,9 @@ typedef struct {
 #if DAC_STORE || DAC_LIBRARY
     bool loading; /* a program of the device is checked or waits: it has no tag, and no COMMIT to be answered */
 #endif
+#if DAC_LIBRARY > 1
+    bool asked; /* and a PLAY is to be answered */
+#endif
 #if DAC_STORE
     uint8_t kept, kept_refused; /* slot of this start, or DAC_STORE_NONE; why it is not the one that was due */
 #endif
@@ -272,6 +275,11 @@ int32_t dac_link_find(const dac_link *l, const char *name);
  * the number has no program that suits the device, the interlock is open, or an upload or another program is on its
  * way. dac_link_work() does the rest; STATUS has the hash of what plays. */
 bool dac_link_play(dac_link *l, uint32_t number);
+
+#if DAC_COMMIT_MODES
+/* The same with the mode of the commit. Where the frame cannot go on with DAC_COMMIT_KEEP, the old program plays on. */
+bool dac_link_play_at(dac_link *l, uint32_t number, dac_commit_mode mode);
+#endif
 #endif
 
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */

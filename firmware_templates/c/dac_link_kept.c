@@ -87,12 +87,15 @@ bool dac_link_load_kept(dac_link *l)
     return start_with(l, slot) || (slot != store->state.selected && start_with(l, store->state.selected));
 }
 
-bool dac_link_load_slot(dac_link *l, uint8_t slot)
+#if DAC_LIBRARY
+dac_link_finding dac_link_load_slot(dac_link *l, uint8_t slot)
 {
     uint8_t info[DAC_LINK_INFO];
 
-    return dac_store_info(l->config->store, slot, info) && load_bytes(l, slot, info).reason == DAC_LINK_NO_REASON;
+    return dac_store_info(l->config->store, slot, info) ? load_bytes(l, slot, info)
+                                                        : dac_link_because(DAC_LINK_NO_NUMBER, 0);
 }
+#endif
 
 /* Requests. */
 

@@ -5,6 +5,9 @@
 #if DAC_LIBRARY
 
 enum { SHORTEST = 12 }; /* digits of a hash that name a program */
+#if DAC_LIBRARY > 1
+enum { LONGEST = 200, LISTING = 38, LISTED_HASH = 6 }; /* bytes of a name, and of an answer to LIST in front of it */
+#endif
 
 static const char digits[] = "0123456789abcdef";
 
@@ -134,37 +137,33 @@ static void put_crc(dac_link *l)
     dac_link_put(l->image[l->idle].info + DAC_LINK_IMAGE_CRC, ~crc);
 }
 
-/* Whether a program has words that are not put into its image here: those of a slow part. */
-static bool has_further_words(const dac_program *program)
-{
-#if DAC_SLOW_PART
-    return program->x.slow != NULL || program->y.slow != NULL;
-#else
-    (void)program;
-    return false;
-#endif
-}
-
 /* A compiled program goes the way of an upload too. The sequencer checks what an image does not have: the coding of the
- * converter, and the table in flash. */
-static bool load_compiled(dac_link *l, const dac_library_entry *entry)
+ * converter, and the table in flash. The words of a slow part are not put into an image here. */
+static dac_link_finding load_compiled(dac_link *l, const dac_library_entry *entry)
 {
     uint8_t info[DAC_LINK_INFO], payload[4];
     dac_link_answer a = {0, 0, 0, 0, payload};
 
-    if (has_further_words(&entry->program) || dac_sequencer_load(l->sequencer, &entry->program) != DAC_LOADED)
-        return false;
+#if DAC_SLOW_PART
+    if (entry->program.x.slow != NULL || entry->program.y.slow != NULL)
+        return dac_link_because(DAC_LINK_SHAPE, entry->program.x.slow == NULL);
+#endif
+    const dac_loaded loaded = dac_sequencer_load(l->sequencer, &entry->program);
+    if (loaded != DAC_LOADED)
+        return dac_link_because(DAC_LINK_REFUSED, (uint32_t)loaded);
     announce(entry, info);
-    if (dac_link_begin(l, info, &a).reason != DAC_LINK_NO_REASON
-        || store_program(l, &entry->program).reason != DAC_LINK_NO_REASON)
-        return false;
+    dac_link_finding found = dac_link_begin(l, info, &a);
+    if (found.reason == DAC_LINK_NO_REASON)
+        found = store_program(l, &entry->program);
+    if (found.reason != DAC_LINK_NO_REASON)
+        return found;
     store_table(l, &entry->program.x);
     store_table(l, &entry->program.y);
 #if DAC_PIXEL_TABLE
     store_pixels(l, &entry->program.schedule);
 #endif
     put_crc(l);
-    return true;
+    return found;
 }
 
 /* The index. */
@@ -247,35 +246,117 @@ int32_t dac_link_find(const dac_link *l, const char *name)
     return -1;
 }
 
-static bool load(dac_link *l, uint32_t number)
+static dac_link_finding load(dac_link *l, uint32_t number)
 {
     const dac_library_entry *const entry = compiled(l, number);
 
     if (entry != NULL)
         return load_compiled(l, entry);
 #if DAC_STORE
-    return l->config->store != NULL && dac_link_load_slot(l, slot_of(l, number));
-#else
-    return false;
+    if (l->config->store != NULL)
+        return dac_link_load_slot(l, slot_of(l, number));
 #endif
+    return dac_link_because(DAC_LINK_NO_NUMBER, 0);
 }
 
-bool dac_link_play(dac_link *l, uint32_t number)
+/* Puts a program where an upload goes, to be checked by dac_link_work(). */
+static dac_link_finding start(dac_link *l, uint32_t number, uint8_t mode)
 {
-    if (l->config == NULL || l->upload != DAC_LINK_NONE || !dac_link_permits(l))
-        return false;
-    if (!load(l, number)) {
+    const dac_link_finding found = load(l, number);
+
+    if (found.reason != DAC_LINK_NO_REASON) {
         l->upload = DAC_LINK_NONE;
-        return false;
+        return found;
     }
     l->upload = DAC_LINK_CHECKING;
     l->committing = l->loading = true;
     l->commit_is_last = false;
 #if DAC_COMMIT_MODES
-    l->commit_mode = DAC_COMMIT_LINE;
+    l->commit_mode = mode;
+#else
+    (void)mode;
 #endif
     dac_link_start_check(&l->check);
-    return true;
+    return found;
 }
+
+static bool play(dac_link *l, uint32_t number, uint8_t mode)
+{
+    if (l->config == NULL || l->upload != DAC_LINK_NONE || !dac_link_permits(l))
+        return false;
+    return start(l, number, mode).reason == DAC_LINK_NO_REASON;
+}
+
+bool dac_link_play(dac_link *l, uint32_t number)
+{
+    return play(l, number, 0);
+}
+
+#if DAC_COMMIT_MODES
+bool dac_link_play_at(dac_link *l, uint32_t number, dac_commit_mode mode)
+{
+    return play(l, number, (uint8_t)mode);
+}
+#endif
+
+#if DAC_LIBRARY > 1
+/* Requests of a host (docs/protocol.md, "Programs by number"). */
+
+static uint32_t number_of(const uint8_t *payload)
+{
+    return payload[0] | (uint32_t)payload[1] << 8;
+}
+
+static void put_number(uint8_t *at, uint32_t number)
+{
+    const uint32_t most = number < 0xFFFFu ? number : 0xFFFFu;
+
+    at[0] = (uint8_t)most;
+    at[1] = (uint8_t)(most >> 8);
+}
+
+dac_link_finding dac_link_list_number(const dac_link *l, const uint8_t *payload, dac_link_answer *a)
+{
+    const uint32_t number = number_of(payload);
+    dac_link_listing listing;
+    uint8_t length = 0;
+
+    if (number >= dac_link_numbers(l))
+        return dac_link_because(DAC_LINK_NO_NUMBER, dac_link_numbers(l));
+    const bool listed = dac_link_list(l, number, &listing);
+    for (; listed && listing.name != NULL && length < LONGEST && listing.name[length] != '\0'; length++)
+        a->payload[LISTING + length] = (uint8_t)listing.name[length];
+    put_number(a->payload, dac_link_numbers(l));
+    put_number(a->payload + 2, l->config->library_programs);
+    a->payload[4] = listed ? 1 : 0;
+    a->payload[5] = length;
+    for (unsigned i = 0; i < sizeof listing.hash; i++)
+        a->payload[LISTED_HASH + i] = listed ? listing.hash[i] : 0;
+    a->length = (uint8_t)(LISTING + length);
+    return dac_link_fine();
+}
+
+dac_link_finding dac_link_play_number(dac_link *l, const uint8_t *payload, dac_link_answer *a)
+{
+    const uint32_t number = number_of(payload);
+    dac_link_listing listing;
+
+    if (l->upload > DAC_LINK_RECEIVING || !dac_sequencer_writable(l->sequencer))
+        return dac_link_because(DAC_LINK_BUSY, 0);
+    if (!dac_link_list(l, number, &listing))
+        return dac_link_because(DAC_LINK_NO_NUMBER, dac_link_numbers(l));
+    if (!dac_link_permits(l))
+        return dac_link_because(DAC_LINK_INTERLOCK, 0);
+    l->upload = DAC_LINK_NONE; /* what was received is forgotten, as by the BEGIN of another image */
+    const dac_link_finding found = start(l, number, payload[2]);
+    if (found.reason == DAC_LINK_NO_REASON) {
+        l->asked = l->commit_is_last = true;
+        l->commit_seq = l->last.seq;
+        l->commit_session = l->session;
+        a->type = DAC_LINK_SILENT;
+    }
+    return found;
+}
+#endif
 
 #endif

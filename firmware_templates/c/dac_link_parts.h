@@ -7,7 +7,7 @@
 enum { DAC_LINK_HELLO = 1, DAC_LINK_BEGIN, DAC_LINK_DATA, DAC_LINK_COMMIT, DAC_LINK_ABORT, DAC_LINK_STATUS,
        DAC_LINK_READ, DAC_LINK_PARK, DAC_LINK_ARM, DAC_LINK_TRIGGER, DAC_LINK_CLEAR, DAC_LINK_CHALLENGE,
        DAC_LINK_LIMITS, DAC_LINK_SLOT, DAC_LINK_SAVE, DAC_LINK_SELECT, DAC_LINK_CONFIRM, DAC_LINK_DELETE,
-       DAC_LINK_MOVE };
+       DAC_LINK_MOVE, DAC_LINK_LIST, DAC_LINK_PLAY };
 enum { DAC_LINK_ANSWER = 0x80, DAC_LINK_REFUSAL = 0xFF };
 
 /* Why a request is refused; docs/protocol.md, "Reasons". */
@@ -50,7 +50,8 @@ enum {
     DAC_LINK_NO_TRIAL,
     DAC_LINK_FLASH,
     DAC_LINK_PIXEL_TICKS,
-    DAC_LINK_SLOW_PART
+    DAC_LINK_SLOW_PART,
+    DAC_LINK_NO_NUMBER
 };
 
 typedef struct {
@@ -260,14 +261,22 @@ void dac_link_end_move(dac_link *l, bool withdrawn);
 #if DAC_STORE
 /* dac_link_kept.c */
 
+#if DAC_LIBRARY
 /* Puts the image of a slot where an upload goes. */
-bool dac_link_load_slot(dac_link *l, uint8_t slot);
+dac_link_finding dac_link_load_slot(dac_link *l, uint8_t slot);
+#endif
 
 dac_link_finding dac_link_slot(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
 dac_link_finding dac_link_save(dac_link *l, const uint8_t *payload);
 dac_link_finding dac_link_select(dac_link *l, const uint8_t *payload);
 dac_link_finding dac_link_confirm(dac_link *l);
 dac_link_finding dac_link_delete(dac_link *l, const uint8_t *payload);
+#endif
+
+#if DAC_LIBRARY > 1
+/* dac_link_library.c */
+dac_link_finding dac_link_list_number(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
+dac_link_finding dac_link_play_number(dac_link *l, const uint8_t *payload, dac_link_answer *a);
 #endif
 
 /* dac_link_upload.c */

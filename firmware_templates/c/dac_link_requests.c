@@ -17,7 +17,14 @@ enum { PLAYS_SLOW_PARTS = 1 };
 #if DAC_PIXEL_TABLE
 enum { PLAYS_PIXEL_TABLES = 4 };
 #endif
-#define FURTHER (DAC_MOVE ? 2u : 0u) /* further features, by the options; HELLO ends with them if there are any */
+/* Further features, by the options; HELLO ends with them if there are any. */
+#define TAKES_MOVE (DAC_MOVE ? 2u : 0u)
+#if DAC_LIBRARY > 1
+enum { PLAYS_NUMBERS = 8 };
+#define FURTHER(l) (TAKES_MOVE | (dac_link_numbers(l) != 0 ? (uint32_t)PLAYS_NUMBERS : 0u))
+#else
+#define FURTHER(l) TAKES_MOVE
+#endif
 #if DAC_MOVE
 enum { MOVED = 2 }; /* behind PERMITS */
 #endif
@@ -111,9 +118,9 @@ static void put_status(const dac_link *l, uint8_t *at)
 
 #if DAC_PIXEL_TABLE
 /* Further features of a link with tables of pixels; returns their bytes. Those of slow parts are 0 without them. */
-static uint8_t put_further(const dac_link_config *c, uint8_t *at)
+static uint8_t put_further(const dac_link_config *c, uint32_t further, uint8_t *at)
 {
-    uint32_t further = FURTHER | PLAYS_PIXEL_TABLES;
+    further |= PLAYS_PIXEL_TABLES;
 
     at[4] = at[5] = 0;
 #if DAC_SLOW_PART
@@ -145,22 +152,24 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     put_status(l, a->payload + DEVICE);
 #if DAC_PIXEL_TABLE
     if (l->config->table_pixels != 0) {
-        a->length = (uint8_t)(DEVICE + STATUS + put_further(l->config, a->payload + DEVICE + STATUS));
+        a->length = (uint8_t)(DEVICE + STATUS + put_further(l->config, FURTHER(l), a->payload + DEVICE + STATUS));
         return dac_link_fine();
     }
 #endif
 #if DAC_SLOW_PART
     if (l->config->slow_knots != 0) {
-        dac_link_put(a->payload + DEVICE + STATUS, FURTHER | PLAYS_SLOW_PARTS);
+        dac_link_put(a->payload + DEVICE + STATUS, FURTHER(l) | PLAYS_SLOW_PARTS);
         a->payload[DEVICE + STATUS + 4] = l->config->slow_knots;
         a->payload[DEVICE + STATUS + 5] = l->config->slow_index_bits;
         a->length = DEVICE + STATUS + 6;
         return dac_link_fine();
     }
 #endif
-#if FURTHER != 0
-    dac_link_put(a->payload + DEVICE + STATUS, FURTHER);
-    a->length = DEVICE + STATUS + 4;
+#if DAC_MOVE || DAC_LIBRARY > 1
+    if (FURTHER(l) != 0) {
+        dac_link_put(a->payload + DEVICE + STATUS, FURTHER(l));
+        a->length = DEVICE + STATUS + 4;
+    }
 #endif
     return dac_link_fine();
 }

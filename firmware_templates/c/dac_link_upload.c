@@ -120,6 +120,12 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
 /* The COMMIT in progress has an answer; the upload is kept or discarded. */
 static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *payload, uint8_t length)
 {
+#if DAC_LIBRARY > 1
+    if (l->asked) { /* by a PLAY, whose program is no upload that a host could continue */
+        upload = DAC_LINK_NONE;
+        l->loading = l->asked = false;
+    }
+#endif
 #if DAC_LIBRARY
     if (l->loading) { /* no host waits for this */
         l->upload = DAC_LINK_NONE;
@@ -149,6 +155,10 @@ static void conclude_refused(dac_link *l, dac_link_finding why)
         l->last = l->before_commit;
         l->commit_is_last = false;
     }
+#if DAC_LIBRARY > 1
+    if (l->asked)
+        request = DAC_LINK_PLAY;
+#endif
 #if DAC_MOVE
     if (l->moving) {
         dac_link_end_move(l, why.reason == DAC_LINK_WITHDRAWN);
@@ -224,6 +234,10 @@ void dac_link_settle(dac_link *l)
         uint8_t payload[8], upload = DAC_LINK_NONE, request = DAC_LINK_COMMIT;
         l->taken_generation = l->swaps + 1;
         l->taken_line = l->line;
+#if DAC_LIBRARY > 1
+        if (l->asked)
+            request = DAC_LINK_PLAY;
+#endif
 #if DAC_MOVE
         if (l->moving) {
             dac_link_take_move(l);

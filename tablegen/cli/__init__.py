@@ -51,6 +51,7 @@ _COMMANDS = {
     "select": ("device.kept", "select"),
     "confirm": ("device.kept", "confirm"),
     "delete": ("device.kept", "delete"),
+    "play": ("device.play", "play"),
     "ports": ("device.ports", "ports"),
     "init": ("init", "init"),
     "runtime": ("runtime", "runtime"),

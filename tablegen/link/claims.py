@@ -15,6 +15,7 @@ from tablegen.link.messages import (
     AxisShape,
     DeviceInfo,
     DeviceStatus,
+    Listing,
     More,
     SlotContent,
     StoreStatus,
@@ -25,6 +26,7 @@ MAXIMUM_INDEX_BITS = 16
 MAXIMUM_HARMONICS = 4096
 MAXIMUM_LINE = (1 << 31) - 1
 MAXIMUM_SLOTS = 15
+MAXIMUM_NUMBERS = 0xFFFF
 _WORD_BITS = range(8, 25)  # of table words and of codes
 _CONVERTER_BITS = 63  # mask of the word's bits in AxisShape.converter
 _MAXIMUM_CONVERTER_BITS = 32
@@ -35,6 +37,7 @@ MAXIMUM_KNOTS = 65  # as in tablegen.fixedpoint.frame_program
 _SLOW_INDEX_BITS = range(3, 15)
 _SLOW_PART_BYTES = (112, 176)  # where an image has the words slow_part of x and y
 _KNOT_BYTES = 3 + 2  # a gain and a ratio
+_PRINTABLE = range(0x20, 0x7F)  # characters of a name
 _PIXEL_BYTES = 2 * 2  # the ticks of a pixel in trace and retrace
 MAXIMUM_TABLE_PIXELS = 65535
 # Of both axes: a word more for each of the table, the slow table and the knots.
@@ -171,6 +174,25 @@ def check_store(status: StoreStatus) -> None:
             _check("SLOT", field, value, 0, MAXIMUM_SLOTS)
     _check("SLOT", "started", status.started, 0, 1)
     _check("SLOT", "content", status.content, 0, max(SlotContent))
+
+
+def check_listing(listing: Listing, first: Listing | None) -> None:
+    """Check what a device answers to LIST; ``first`` is what it said of another number before.
+
+    Raises
+    ------
+    NotUnderstood
+        For the first field that no device can have, or that differs from what it said before.
+    """
+    if first is None:
+        _check("LIST", "numbers", listing.numbers, 1, MAXIMUM_NUMBERS)
+        _check("LIST", "compiled", listing.compiled, 0, listing.numbers)
+    else:
+        _check("LIST", "numbers", listing.numbers, first.numbers, first.numbers)
+        _check("LIST", "compiled", listing.compiled, first.compiled, first.compiled)
+    _check("LIST", "content", listing.content, 0, 1)
+    for character in listing.name:
+        _check("LIST", "a character of the name", character, _PRINTABLE[0], _PRINTABLE[-1])
 
 
 def check_length(source: str, payload: bytes, size: int) -> None:

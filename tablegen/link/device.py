@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.link.claims import check_length, check_limits, has_restarted, has_slow_parts, most_bytes
+from tablegen.link.claims import MAXIMUM_NUMBERS, check_length, check_limits, has_restarted, has_slow_parts, most_bytes
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused, Unsuitable
 from tablegen.link.kept import CHANGE_S, KeptPrograms, change_kept, read_kept, require_store
 from tablegen.link.messages import (
@@ -26,8 +26,9 @@ from tablegen.link.messages import (
     Reason,
     Request,
 )
-from tablegen.link.outcome import MoveResult, ProgressCall, UploadResult, UploadState, restart_count
+from tablegen.link.outcome import MoveResult, PlayResult, ProgressCall, UploadResult, UploadState, restart_count
 from tablegen.link.pace import LATENCY_S, Deadline
+from tablegen.link.programs import DeviceProgram, play_number, read_programs
 from tablegen.link.readback import read_back
 from tablegen.link.refusal_reasons import Limits, lacks_move
 from tablegen.link.session import LinkSession
@@ -45,6 +46,8 @@ _MAX_LATE_SUM_S = 900.0  # total lateness of the answers of a transfer that time
 _MAX_LINE_S = 600.0  # a device that announces a rate of 1 Hz must not hold the host for months
 _MAX_TRIES = 8  # tries that fit into a time-out when answers are late
 _MOVE_S = 60.0  # a move waits for the start of a line
+_PLAY_S = 60.0  # a program waits for the start of a line
+_PLAY_AT_FRAME_S = 600.0  # or of a frame, which may take minutes
 _MOVED = struct.Struct("<2I")
 _CHECK_FRAMES = 8  # frames that the checks of slow parts may take: a tick is checked slower than it is played
 _POLL_S = 0.05
@@ -308,6 +311,51 @@ class Device:
         answer = session.act(Request.MOVE, payload, _MOVED.size, deadline, tries=tries, one_session=True)
         check_length("MOVE", answer, _MOVED.size)
         return MoveResult(*_MOVED.unpack_from(answer))
+
+    def programs(self) -> tuple[DeviceProgram, ...]:
+        """Ask for the programs that the device plays by number: compiled ones, and those that it keeps.
+
+        Raises
+        ------
+        Unsuitable
+            If it plays none (``More.PLAY``).
+        """
+        return read_programs(self._session, self._until(None))
+
+    def play(self, number: int, *, swap: CommitMode = CommitMode.LINE, timeout_s: float | None = None) -> PlayResult:
+        """Play a program that the device has itself; return when it plays.
+
+        It takes the place of the one that plays as an upload would, after the same checks. An upload that the device
+        has received in part is forgotten.
+
+        Parameters
+        ----------
+        number
+            As ``programs`` has it.
+        swap
+            Where in a running scan the program is swapped in, as in ``upload``.
+        timeout_s
+            Bound in s; by default 1 minute, and 10 for a swap at a frame start.
+
+        Raises
+        ------
+        ValueError
+            If ``number`` does not fit 16 bits.
+        Unsuitable
+            If the device plays no programs by number, or does not have this mode; nothing was sent.
+        Refused
+            If there is no such program, or it fails a check; the device plays as before.
+        OutOfTime
+            If the program still waits; it may become active.
+        LinkLost
+            If the device is gone.
+        """
+        if not 0 <= number <= MAXIMUM_NUMBERS:
+            raise ValueError(f"number {number}; programs have numbers from 0 to {MAXIMUM_NUMBERS}")
+        if timeout_s is None:
+            timeout_s = _PLAY_AT_FRAME_S if swap is CommitMode.FRAME else _PLAY_S
+        self._session.status_at = -math.inf  # the status changes
+        return play_number(self._session, number, swap, timeout_s)
 
     def park(self) -> None:
         """Park: end the scan, ramp to the park codes and hold them; ``wait_for(State.PARKED)`` waits for the end."""

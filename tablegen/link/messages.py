@@ -38,6 +38,8 @@ class Request(IntEnum):
     CONFIRM = 17
     DELETE = 18
     MOVE = 19
+    LIST = 20
+    PLAY = 21
 
 
 class Reason(IntEnum):
@@ -81,6 +83,7 @@ class Reason(IntEnum):
     FLASH = 36
     PIXEL_TICKS = 37
     SLOW_PART = 38
+    NUMBER = 39
 
 
 class Feature(IntFlag):
@@ -102,6 +105,7 @@ class More(IntFlag):
     SLOW_PARTS = 1
     MOVE = 2
     PIXEL_TABLES = 4
+    PLAY = 8
 
 
 NO_MORE = More(0)
@@ -449,6 +453,67 @@ class StoreStatus(_Struct):
     content: int
     flags: int
     room: int
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """The answer to LIST: how many programs a device plays by number, and one of them (38 bytes and its name).
+
+    Attributes
+    ----------
+    numbers
+        How many numbers there are: compiled programs, then slots.
+    compiled
+        How many of them are compiled programs.
+    content
+        1 if the number has a program, 0 if not.
+    hash
+        Of its plan; zeros without a program.
+    name
+        Of a compiled program; empty for a slot.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<2H2B32s")
+
+    numbers: int
+    compiled: int
+    content: int
+    hash: bytes
+    name: bytes
+
+    def pack(self) -> bytes:
+        """Return the answer."""
+        return self.LAYOUT.pack(self.numbers, self.compiled, self.content, len(self.name), self.hash) + self.name
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> "Listing":
+        """Read the answer.
+
+        Raises
+        ------
+        ValueError
+            If it is too short.
+        """
+        size = cls.LAYOUT.size
+        if len(payload) < size or len(payload) < size + cls.name_bytes(payload):
+            raise ValueError(f"{len(payload)} bytes, too few for a program of a device")
+        numbers, compiled, content, name_bytes, digest = cls.LAYOUT.unpack_from(payload)
+        return cls(numbers, compiled, content, digest, payload[size : size + name_bytes])
+
+    @classmethod
+    def name_bytes(cls, payload: bytes) -> int:
+        """Return the bytes of the name, by an answer that has at least its fixed part."""
+        return payload[cls.LAYOUT.size - HASH_BYTES - 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Play(_Struct):
+    """The payload of PLAY (3 bytes): the number of a program, and the mode in which it is committed."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<HB")
+
+    number: int
+    mode: int
 
 
 @dataclass(frozen=True, slots=True)

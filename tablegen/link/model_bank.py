@@ -130,8 +130,7 @@ class Bank:
         """
         info = ImageInfo.unpack(payload)
         incoming = self.incoming
-        if self._is_at_work() or not self._player.writable:
-            raise RequestRefused(Reason.BUSY)
+        self.check_idle()
         self._check_announcement(info)
         if incoming is None or incoming.announcement != payload:
             self._stage_is_whole = False
@@ -281,8 +280,7 @@ class Bank:
             If another program is checked, waits or plays, or none that could be moved.
         """
         active, (generation,) = self.active, struct.unpack_from("<I", payload)
-        if self._is_at_work() or not self._player.writable:
-            raise RequestRefused(Reason.BUSY)
+        self.check_idle()
         if active is None:
             raise RequestRefused(Reason.READBACK)
         if generation != self._player.swaps:
@@ -329,14 +327,31 @@ class Bank:
         return program_of(contents, self._info.update_rate_hz)
 
     def put(self, image: ProgramImage) -> IncomingUpload | None:
-        """Make a kept image the upload that is checked; None if it does not suit the device, or not now."""
-        if self.incoming is not None or self._is_at_work() or not self._player.writable:
+        """Make an image of the device the upload that is checked; None if it does not suit it, or not now."""
+        if self.incoming is not None:
             return None
         try:
-            self._check_announcement(image.info)
-            self._check_words(image.info, image.data)
+            self.check_idle()
+            return self.replace(image)
         except RequestRefused:
             return None
+
+    def check_idle(self) -> None:
+        """Raise ``RequestRefused`` while a program is checked or waits."""
+        if self._is_at_work() or not self._player.writable:
+            raise RequestRefused(Reason.BUSY)
+
+    def replace(self, image: ProgramImage) -> IncomingUpload:
+        """Make an image of the device the upload that is checked, in place of one that is received.
+
+        Raises
+        ------
+        RequestRefused
+            If it does not suit the device.
+        """
+        self.incoming = None
+        self._check_announcement(image.info)
+        self._check_words(image.info, image.data)
         self.incoming = IncomingUpload(image.info, image.info.pack(), bytearray(image.data), Upload.CHECKING)
         return self.incoming
 

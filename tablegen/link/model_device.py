@@ -3,7 +3,7 @@
 import hashlib
 import hmac
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tablegen.device.commit_mode import CommitMode
@@ -23,8 +23,10 @@ from tablegen.link.messages import (
     DeviceStatus,
     Feature,
     ImageInfo,
+    Listing,
     More,
     Move,
+    Play,
     Reason,
     Refusal,
     Request,
@@ -37,7 +39,7 @@ from tablegen.link.program_image import ProgramImage
 from tablegen.link.store import Flash, Layout, Store
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
-_TAGGED |= {Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE, Request.MOVE}
+_TAGGED |= {Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE, Request.MOVE, Request.PLAY}
 _ACTING = _TAGGED | {Request.ABORT}
 _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.BEGIN: ImageInfo.LAYOUT.size,
@@ -49,8 +51,12 @@ _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.SELECT: 2,
     Request.DELETE: 1,
     Request.MOVE: Move.LAYOUT.size,
+    Request.LIST: 2,
+    Request.PLAY: Play.LAYOUT.size,
 }
 _COMMIT_WITH_MODE = 5  # bytes
+_LONGEST_NAME = 200  # bytes of a name in an answer to LIST
+_NUMBERS = 0xFFFF  # at most, over the link
 _MAX_FRAMES = 1 << 31
 CHALLENGE_MS = 10_000  # how long a nonce may be used
 IDENTITY_BYTES = range(4, 33)
@@ -67,7 +73,7 @@ class _LastRequest:
 
 @dataclass
 class _PendingRequest:
-    """A COMMIT, MOVE or ABORT that has not been answered yet; without a request a kept program, which has no answer."""
+    """A COMMIT, MOVE, PLAY or ABORT without an answer yet; without a request a program that the application plays."""
 
     request: Frame | None
     memory: _LastRequest | None
@@ -93,7 +99,8 @@ class ModelDevice:
     ``boot`` on, as a device does that keeps its count without power. ``staged``: the image is kept, as in Verilog, and
     not its tables. ``checking``: ticks that the checks take.
     ``flash`` with its layout, for the feature STORE, keeps programs, ``stores_while_playing`` even while a scan plays;
-    ``compiled`` are images of the programs that come with the firmware.
+    ``compiled`` are images of the programs that come with the firmware, by their names; over the link they are played
+    with ``More.PLAY``.
     ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
     """
 
@@ -113,7 +120,7 @@ class ModelDevice:
         most_frames: int = _MAX_FRAMES,
         flash: tuple[Flash, Layout] | None = None,
         stores_while_playing: bool = False,
-        compiled: Sequence[ProgramImage] = (),
+        compiled: Mapping[str, ProgramImage] | None = None,
     ) -> None:
         if bool(key) != (Feature.KEY in info.features):
             raise ValueError("a key and the feature go together")
@@ -121,6 +128,8 @@ class ModelDevice:
             raise ValueError("a flash and the feature go together")
         if More.MOVE in info.more and (staged or Feature.COMMIT_MODES not in info.features):
             raise ValueError("a device that takes MOVE keeps tables and has modes of a COMMIT")
+        if More.PLAY in info.more and (staged or (not compiled and flash is None)):
+            raise ValueError("a device that takes PLAY keeps tables and has programs")
         self.info, self.player, self.boot = info, player, boot
         self.permits = True
         if key and len(identity) not in IDENTITY_BYTES:
@@ -159,8 +168,11 @@ class ModelDevice:
             }
         if More.MOVE in info.more:
             self._requests[Request.MOVE] = self._move
+        if More.PLAY in info.more:
+            self._requests[Request.LIST] = self._list
+            self._requests[Request.PLAY] = self._play
         self._flash, self._stores_while_playing = flash, stores_while_playing
-        self._compiled = compiled
+        self._compiled = dict(compiled or {})
         self._store: ModelStore
         self._power_up()
         if flash is not None:
@@ -217,8 +229,12 @@ class ModelDevice:
         """Return the image of a compiled or kept program."""
         slot = number - len(self._compiled)
         if slot < 0:
-            return self._compiled[number]
+            return list(self._compiled.values())[number]
         return None if self._flash is None else self._store.image(slot)
+
+    def _numbers(self) -> int:
+        """Return how many compiled programs and slots there are."""
+        return len(self._compiled) + (0 if self._flash is None else self._flash[1].slots)
 
     @property
     def memory(self) -> bytearray:
@@ -329,6 +345,9 @@ class ModelDevice:
             good = int(struct.unpack_from("<I", payload)[0]) <= self._most_frames
         elif good and kind == Request.COMMIT and _plain_bytes(frame) == _COMMIT_WITH_MODE:
             good = payload[4] in list(CommitMode)
+        elif good and kind == Request.PLAY:
+            modes = list(CommitMode) if Feature.COMMIT_MODES in self.info.features else [CommitMode.LINE]
+            good = Play.unpack(payload).mode in modes
         elif good and kind == Request.SELECT:
             good = payload[1] <= 1
         if not good:
@@ -402,13 +421,41 @@ class ModelDevice:
         if self._checking == 0:
             self._check(self._pending, move)
 
+    def _list(self, frame: Frame) -> bytes:
+        """Return what a number has."""
+        (number,) = struct.unpack("<H", frame.payload)
+        if number >= self._numbers():
+            raise RequestRefused(Reason.NUMBER, self._numbers())
+        image, names = self._program(number), list(self._compiled)
+        name = names[number].encode()[:_LONGEST_NAME] if number < len(names) else b""
+        digest = bytes(messages.HASH_BYTES) if image is None else image.info.hash
+        numbers, compiled = min(self._numbers(), _NUMBERS), min(len(names), _NUMBERS)
+        return Listing(numbers, compiled, int(image is not None), digest, name).pack()
+
+    def _play(self, frame: Frame) -> None:
+        """Begin the checks of a program of the device."""
+        self._bank.check_idle()
+        image = self._program(Play.unpack(frame.payload).number)
+        if image is None:
+            raise RequestRefused(Reason.NUMBER, self._numbers())
+        if not self.permits:
+            raise RequestRefused(Reason.INTERLOCK)
+        incoming = self._bank.replace(image)
+        assert self._last is not None
+        self._pending = _PendingRequest(frame, self._last, self._before, ticks=self._checking)
+        if self._checking == 0:
+            self._check(self._pending, incoming)
+
     def _check(self, commit: _PendingRequest, incoming: IncomingUpload) -> None:
         """Check an image, and bring it into the idle bank."""
+        request = commit.request
+        is_upload = request is not None and request.type == Request.COMMIT
         try:
-            program = self._bank.accept(incoming, lambda image: self._check_tag(commit.request, commit.nonce, image))
+            tagged = request if is_upload else None
+            program = self._bank.accept(incoming, lambda image: self._check_tag(tagged, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
-            mode = _mode_of(commit.request)
+            mode = _mode_of(request)
             if mode is CommitMode.KEEP and not self._can_keep(program):
                 raise RequestRefused(Reason.KEEP)
             if not self.player.commit(program, mode):
@@ -418,14 +465,14 @@ class ModelDevice:
             stays = refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP)
             if incoming is self._bank.move:
                 self._bank.move = None
-            elif stays and commit.request is not None:
+            elif stays and is_upload:
                 incoming.state = Upload.RECEIVING
             else:
                 self._bank.incoming = None
             is_used = refused.reason != Reason.KEY
             if not is_used and self._last is commit.memory:
                 self._last = commit.before
-            self._refuse(commit.request, refused, commit.memory if is_used else None)
+            self._refuse(request, refused, commit.memory if is_used else None)
             return
         incoming.state = Upload.WAITING
         commit.swaps = self.player.swaps
@@ -495,11 +542,13 @@ def _plain_bytes(frame: Frame) -> int:
 
 
 def _mode_of(frame: Frame | None) -> CommitMode:
-    """Return the mode of a COMMIT or a MOVE; without a request that of a kept program."""
+    """Return the mode of a COMMIT, a MOVE or a PLAY; without a request that of a program of the device."""
     if frame is None:
         return CommitMode.LINE
     if frame.type == Request.MOVE:
         return CommitMode.KEEP
+    if frame.type == Request.PLAY:
+        return CommitMode(Play.unpack(frame.payload).mode)
     return CommitMode(frame.payload[4]) if _plain_bytes(frame) == _COMMIT_WITH_MODE else CommitMode.LINE
 
 

@@ -42,6 +42,14 @@ class MoveResult:
 
 
 @dataclass(frozen=True, slots=True)
+class PlayResult:
+    """The result of a request for a program by number: the generation that it has begun, and the last line before."""
+
+    generation: int
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
 class UploadState:
     """The progress of an upload: the bytes that the device confirmed, all bytes, and whether a COMMIT was sent."""
 

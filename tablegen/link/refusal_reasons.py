@@ -81,6 +81,16 @@ def lacks_move(info: DeviceInfo) -> str | None:
     return "the device takes no MOVE: build its firmware with DAC_MOVE=1 and DAC_COMMIT_MODES=1; FPGAs take none"
 
 
+def lacks_play(info: DeviceInfo) -> str | None:
+    """Return why a device plays no programs by number; None if it does."""
+    if More.PLAY in info.more:
+        return None
+    return (
+        "the device plays no programs by number: build its firmware with DAC_LIBRARY=2, and with compiled programs or "
+        "slots; FPGAs play none"
+    )
+
+
 def keyless(request: Request) -> Refused:
     """Return the error where a device has a key and the host has none; nothing was sent."""
     why = f"the device has a key, and refuses {request.name} without it; give the key of this device (--key-file FILE)"
@@ -142,6 +152,10 @@ def _slot(detail: int, info: DeviceInfo | None) -> str:
     return f"there is no such slot, or no program in it; the device has slots 0 to {detail - 1} (`tablegen slots`)"
 
 
+def _number(detail: int, info: DeviceInfo | None) -> str:
+    return f"there is no program of this number; the device has numbers 0 to {detail - 1} (`tablegen slots`)"
+
+
 def _room(detail: int, info: DeviceInfo | None) -> str:
     return f"a slot has room for {detail} bytes, its tables included; make the tables shorter, or its slots larger"
 
@@ -171,6 +185,7 @@ _SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {
     Reason.REFUSED: _other,
     Reason.SHAPING: _shaping,
     Reason.SLOT: _slot,
+    Reason.NUMBER: _number,
     Reason.ROOM: _room,
     Reason.GENERATION: _generation,
 }

@@ -23,7 +23,7 @@ from tablegen import __version__
 
 COMMANDS = ("build", "sweep", "check", "show", "report", "compare", "verify", "init", "paths", "schema")
 COMMANDS += ("upload", "live", "status", "readback", "park", "trigger", "clear", "ports")
-COMMANDS += ("save", "slots", "select", "confirm", "delete")
+COMMANDS += ("save", "slots", "select", "confirm", "delete", "play")
 OWN_FILES = [
     "annexin_200nm.c",
     "annexin_200nm.h",

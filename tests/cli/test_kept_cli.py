@@ -1,4 +1,4 @@
-"""``tablegen save``, ``slots``, ``select``, ``confirm``, ``delete`` and ``upload --store`` on a model of a device."""
+"""``tablegen save``, ``slots``, ``select``, ``confirm``, ``delete``, ``play`` and ``upload --store`` on a model."""
 
 import json
 from pathlib import Path
@@ -7,9 +7,10 @@ import pytest
 from building import Variant, build
 from client_rig import BOOT, KEY, Bench, info_for, model
 from cut_flash import CutFlash
+from link_images import resealed
 from replacing import replace
 
-from tablegen.link.messages import DeviceInfo, Feature
+from tablegen.link.messages import DeviceInfo, Feature, More
 from tablegen.link.prepare import PreparedScan
 from tablegen.link.store import Layout
 
@@ -94,6 +95,7 @@ def test_slots_as_json(bench: Bench, folder: Path, scan: PreparedScan) -> None:
     empty = {"content": "empty", "hash": None, "image_bytes": None, "image_crc": None}
     kept = {"content": "program", "hash": scan.digest, "image_bytes": len(image.data)}
     assert found == {
+        "programs": [],
         "slots": [
             {"slot": 0, **kept, "image_crc": image.info.image_crc},
             {"slot": 1, **empty},
@@ -166,6 +168,52 @@ def test_a_device_that_keeps_nothing(scan: PreparedScan, folder: Path) -> None:
         assert (refused.status, refused.out) == (9, "")
         assert "the device keeps no programs: its firmware was built without DAC_STORE" in refused.err
     assert bench.device.player.swaps == 1
+
+
+def with_programs(scan: PreparedScan, slots: bool) -> Bench:
+    """A device with a compiled program, and one more in its slot 2."""
+    info = replace(info_for(scan), more=More.PLAY)
+    kept = {}
+    if slots:
+        flash = CutFlash(LAYOUT.place(LAYOUT.slots + 1), LAYOUT.sector_bytes)
+        info = replace(info, features=info.features | Feature.STORE)
+        kept = {"flash": (flash, LAYOUT)}
+    image = scan.image("table")
+    other = resealed(replace(image, info=replace(image.info, hash=bytes(range(32)))), image.data)
+    return Bench(model(info, boot=BOOT, compiled={"square_40": other}, **kept))
+
+
+def test_programs_play_by_number_name_and_hash(scan: PreparedScan, folder: Path) -> None:
+    bench = with_programs(scan, slots=True)
+    assert bench.run("upload", folder, "--store", "2").status == 0
+    shown = bench.run("slots").out.splitlines()
+    rows = ["number  program", "     0  square_40, 000102030405", f"     3  slot 2, {scan.digest[:12]}", ""]
+    assert shown[:5] == [*rows, "slot  content"]
+    assert json.loads(bench.run("slots", "--json").out)["programs"] == [
+        {"number": 0, "name": "square_40", "slot": None, "hash": bytes(range(32)).hex()},
+        {"number": 3, "name": None, "slot": 2, "hash": scan.digest},
+    ]
+    parked = "the device is parked; start the scan with `tablegen trigger`\n"
+    for generation, (program, number, digest) in enumerate(
+        (("0", 0, "000102030405"), (scan.digest[:12], 3, scan.digest[:12]), ("square_40", 0, "000102030405")), 3
+    ):
+        played = bench.run("play", program)
+        assert (played.status, played.err) == (0, "")
+        assert played.out == f"program {number} ({digest}) is active, generation {generation}\n{parked}"
+    for program, message in (
+        ("1", "refused PLAY (number): there is no program of this number; the device has numbers 0 to 3"),
+        ("square_4", "the device has no program 'square_4'; `tablegen slots` lists those that it has"),
+    ):
+        refused = bench.run("play", program)
+        assert (refused.status, refused.out) == (9, "")
+        assert message in refused.err
+    assert "--swap keep: the device starts a new scan at the next line" in bench.run("play", "0", "--swap", "keep").err
+
+
+def test_programs_of_a_device_without_slots(scan: PreparedScan) -> None:
+    bench = with_programs(scan, slots=False)
+    assert bench.run("slots").out == "number  program\n     0  square_40, 000102030405\n"
+    assert json.loads(bench.run("slots", "--json").out)["slots"] == []
 
 
 @pytest.mark.parametrize(

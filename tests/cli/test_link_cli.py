@@ -19,7 +19,7 @@ from tablegen.link.messages import DeviceInfo, Feature, Reason, Request
 from tablegen.link.prepare import PreparedScan
 
 COMMANDS = ("upload", "live", "status", "readback", "park", "trigger", "clear", "ports")
-COMMANDS += ("save", "slots", "select", "confirm", "delete")
+COMMANDS += ("save", "slots", "select", "confirm", "delete", "play")
 
 
 @pytest.fixture(scope="module")

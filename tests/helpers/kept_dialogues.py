@@ -50,6 +50,7 @@ class StoreDevice:
     key: bytes = b""
     while_playing: bool = False
     compiled: tuple[CompiledProgram, ...] = ()
+    by_number: bool = False
 
     def __post_init__(self) -> None:
         program = FIRMWARE.program
@@ -63,6 +64,7 @@ class StoreDevice:
             flash=(self.flash, LAYOUT),
             stores_while_playing=self.while_playing,
             compiled=self.compiled,
+            plays=self.by_number,
         )
         self._begin()
 

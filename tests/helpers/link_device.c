@@ -179,6 +179,14 @@ bool device_play(device *d, uint32_t number)
     return dac_link_play(&d->link, number);
 }
 
+#if DAC_COMMIT_MODES
+bool device_play_at(device *d, uint32_t number, uint32_t mode)
+{
+    permits_now = d->permits;
+    return dac_link_play_at(&d->link, number, (dac_commit_mode)mode);
+}
+#endif
+
 uint32_t device_numbers(const device *d)
 {
     return dac_link_numbers(&d->link);

@@ -58,6 +58,9 @@ void device_keep(device *d, const dac_store_flash *flash, bool while_playing);
 #if DAC_LIBRARY
 void device_compile(device *d, const char *name, const char *hash, const dac_program *program);
 bool device_play(device *d, uint32_t number);
+#if DAC_COMMIT_MODES
+bool device_play_at(device *d, uint32_t number, uint32_t mode);
+#endif
 uint32_t device_numbers(const device *d);
 bool device_list(const device *d, uint32_t number, dac_link_listing *listing);
 int32_t device_find(const device *d, const char *name);

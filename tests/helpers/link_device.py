@@ -35,6 +35,7 @@ from cut_flash import CutFlash
 from link_talk import IDENTITY, Talk, derived_nonce
 
 from tablegen.base.resources import c_link, c_runtime, c_store
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
@@ -155,6 +156,8 @@ class DeviceLibrary(Library):
         self.dll.device_table.restype = c_int32
         if hasattr(self.dll, "device_play"):
             self.dll.device_play.restype = self.dll.device_list.restype = c_bool
+            if hasattr(self.dll, "device_play_at"):
+                self.dll.device_play_at.restype = c_bool
             self.dll.device_numbers.restype, self.dll.device_find.restype = c_uint32, c_int32
         assert self.dll.device_sizes(0) == ctypes.sizeof(_Record)
         assert self.dll.device_sizes(1) == ctypes.sizeof(_Setup)
@@ -175,11 +178,13 @@ def device_library(
     moves: bool = False,
     slow: bool = False,
     pixels: bool = False,
+    plays: bool = False,
 ) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
     ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept and played
-    by number, with ``slow`` they may have slow parts, with ``pixels`` a table of pixels; one that ``moves`` takes MOVE.
+    by number, with ``slow`` they may have slow parts, with ``pixels`` a table of pixels; one that ``moves`` takes MOVE,
+    one that ``plays`` LIST and PLAY.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -187,7 +192,8 @@ def device_library(
     more += ["-DDAC_SPLINE=1"] if spline else []
     more += ["-DDAC_COMMIT_MODES=1"] if modes or moves else []
     more += ["-DDAC_MOVE=1"] if moves else []
-    more += ["-DDAC_STORE=1", "-DDAC_LIBRARY=1"] if store else []
+    more += ["-DDAC_STORE=1"] if store else []
+    more += [f"-DDAC_LIBRARY={1 + plays}"] if store or plays else []
     more += ["-DDAC_SLOW_PART=1"] if slow else []
     more += ["-DDAC_PIXEL_TABLE=1"] if pixels else []
     sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
@@ -204,8 +210,8 @@ class HostDevice:
 
     ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
     can do, ``library`` to that of ``device_library`` with the order ``shaping``, ``modes`` of a COMMIT, or ``moves``,
-    ``slow`` parts, and tables of ``pixels``. Nonces are those of ``derived_nonce``, changed by what ``random`` gives,
-    or ``nonces``; ``started`` is why the link was not.
+    ``slow`` parts, tables of ``pixels``, and LIST and PLAY where it ``plays``. Nonces are those of ``derived_nonce``,
+    changed by what ``random`` gives, or ``nonces``; ``started`` is why the link was not.
     ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout; its library
     has the programs ``compiled``.
     """
@@ -235,6 +241,7 @@ class HostDevice:
         moves: bool = False,
         slow: bool = False,
         pixels: bool = False,
+        plays: bool = False,
         flash: tuple[CutFlash, Layout] | None = None,
         stores_while_playing: bool = False,
         compiled: Sequence[CompiledProgram] = (),
@@ -242,7 +249,7 @@ class HostDevice:
         x, y = fast_of(like.x), fast_of(like.y)
         bits = 16 if max(x.bits, y.bits, x.output.word_bits, y.output.word_bits) <= 16 else 32
         spline, store = "cubic" in (x.mode, y.mode), flash is not None
-        self.library = library or device_library(bits, shaping, spline, modes, store, moves, slow, pixels)
+        self.library = library or device_library(bits, shaping, spline, modes, store, moves, slow, pixels, plays)
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True
@@ -349,7 +356,8 @@ class HostDevice:
             " ".join(map(str, ["Q", *self._sine])),
         ]
         # In front of the program of the boot, while nothing waits for a tick.
-        for _, digest, program, _ in self._compiled:
+        for name, digest, program, _ in self._compiled:
+            self.notes.append(f"N {name.decode()}")
             talk = Talk()
             upload = b"".join([talk.hello(), *talk.upload(make_image(program, digest.decode()))])
             self.notes.append(f"L {upload.hex()}")
@@ -411,9 +419,12 @@ class HostDevice:
         self._note(f"p {int(permits)}")
         self._dll.device_permit(self._device, c_bool(permits))
 
-    def play(self, number: int) -> bool:
-        """The application plays a program of the device; whether it is on its way."""
-        begun = bool(self._dll.device_play(self._device, c_uint32(number)))
+    def play(self, number: int, mode: CommitMode = CommitMode.LINE) -> bool:
+        """The application plays a program of the device; whether it is on its way. Other modes have no note."""
+        if mode is CommitMode.LINE:
+            begun = bool(self._dll.device_play(self._device, c_uint32(number)))
+        else:
+            begun = bool(self._dll.device_play_at(self._device, c_uint32(number), c_uint32(mode)))
         self._work()
         self._note(f"P {number}")
         return begun

@@ -41,6 +41,7 @@ HARMONICS = 4
 KEY = bytes(range(32))
 BOOT_HASH = bytes(range(100, 132))
 SLOTS, COMPILED = 3, 2
+LONG_NAME = "program_1" + 200 * "_"  # longer than an answer to LIST has room for
 KEEPING = (Request.SLOT, Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE)
 CERTAIN_MODES = tuple(mode for mode in MODES if mode != "unstable")  # whatever is read, and how often
 TAGGED = (Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS)
@@ -63,6 +64,7 @@ class Dialogue:
         store: bool = False,
         slow: bool = False,
         pixels: bool = False,
+        plays: bool = False,
         **how: Any,
     ) -> None:
         self.slow, self.pixels = slow, pixels
@@ -76,17 +78,22 @@ class Dialogue:
         index = tuple(max(bits, 3) for bits in (shape.x_index_bits, shape.y_index_bits))
         self.flashes: list[CutFlash] = []
         kept: dict[str, Any] = {}
+        if plays:
+            how["plays"] = True
         if store:
             layout = _some_layout(seed)
             self.flashes = [CutFlash(layout.place(layout.slots + 1), layout.sector_bytes) for _ in range(2)]
             kept = {"stores_while_playing": bool(self.rng.random() < 0.5)}
             how |= {"flash": (self.flashes[0], layout), **kept}
             kept |= {"flash": (self.flashes[1], layout)}
+        if store or plays:
             compiled = [random_image(self.rng, shape, 0, "smooth", order) for _ in range(COMPILED)]
-            kept |= {"compiled": [image for image, _ in compiled]}
+            names = ("program_0", LONG_NAME)
+            kept |= {"compiled": {name: image for name, (image, _) in zip(names, compiled, strict=True)}}
             how |= {
                 "compiled": [
-                    CompiledProgram(b"program", image.info.hash.hex().encode(), program) for image, program in compiled
+                    CompiledProgram(name.encode(), image.info.hash.hex().encode(), program)
+                    for name, (image, program) in zip(names, compiled, strict=True)
                 ]
             }
         self.device = HostDevice(
@@ -109,7 +116,7 @@ class Dialogue:
         if notes:
             self.device.take_notes()
         features = Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.NARROWS
-        self._moves = bool(how.get("moves"))
+        self._moves, self._plays = bool(how.get("moves")), plays
         self._modes = bool(how.get("modes")) or self._moves
         features |= Feature.COMMIT_MODES if self._modes else Feature(0)
         features |= Feature.STORE if store else Feature(0)
@@ -140,7 +147,8 @@ class Dialogue:
             degree,
             (More.MOVE if self._moves else More(0))
             | (More.SLOW_PARTS if slow else More(0))
-            | (More.PIXEL_TABLES if pixels else More(0)),
+            | (More.PIXEL_TABLES if pixels else More(0))
+            | (More.PLAY if plays else More(0)),
             *((SLOW_KNOTS, SLOW_INDEX_BITS) if slow else (0, 0)),
             TABLE_PIXELS if pixels else 0,
         )
@@ -271,6 +279,8 @@ class Dialogue:
         if self.flashes:
             doings += [(12, self._keep), (2, self._cut), (1, self._reboot), (4, self._whole), (3, self._trial)]
             doings += [(3, self._play)]
+        if self._plays:
+            doings += [(12, self._play_number), (4, self._whole)]
         if self._moves:
             doings += [(15, self._move), (2, self._whole)]
         if self.pixels:
@@ -405,7 +415,7 @@ class Dialogue:
 
     def _odd(self) -> None:
         """Frames that no host sends."""
-        kind = int(self.rng.choice([*range(20), 0x81, 0xFF]))
+        kind = int(self.rng.choice([*range(23 if self._plays else 20), 0x81, 0xFF]))
         payload = bytes(self.rng.integers(0, 256, int(self.rng.integers(0, 244)), dtype=np.uint8).tolist())
         session = self.talk.session if self.rng.random() < 0.7 else 1
         seq = int(self.rng.integers(0, 256)) if kind in (Request.STATUS, Request.BEGIN) else self.talk.seq
@@ -442,6 +452,23 @@ class Dialogue:
         self.seen["played" if begun else "not played", "compiled" if slot < 0 else "kept"] += 1
         self._hear()
         self._tick(int(self.rng.choice([0, 0, 1, 20])))
+
+    def _play_number(self) -> None:
+        """A host asks for a program of the device, or what it is."""
+        slots = SLOTS if self.flashes else 0
+        held = [COMPILED + slot for slot in range(slots) if self.model.keeps(slot)]
+        number = int(self.rng.choice([*range(COMPILED + slots + 1), *held, *range(COMPILED), 0x100, 0xFFFF]))
+        if self.rng.random() < 0.4:
+            self._send(self.talk.request(Request.LIST, struct.pack("<H", number)))
+            return
+        if self.rng.random() < 0.3:
+            self._act()
+        mode = int(self.rng.choice([0, 0, *CommitMode, 3]))
+        self._send(self._tagged(Request.PLAY, struct.pack("<HB", number, mode)))
+        self._received = 0
+        if self.rng.random() < 0.2:
+            self._send(self.talk.acting(Request.ABORT))
+        self._tick(int(self.rng.choice([0, 0, 1, 20, 60])))
 
     def _trial(self) -> None:
         """Keep what plays, try it after a start, and confirm it."""

@@ -116,6 +116,16 @@ static void keep_boot(device *d, size_t count)
 }
 
 #if DAC_LIBRARY
+static char names[COMPILED][256];
+
+static void name_next(const device *d)
+{
+    char *const name = names[d->config.library_programs];
+
+    (void)snprintf(name, sizeof names[0], "%s", at + 1);
+    name[strcspn(name, "\n")] = '\0';
+}
+
 static void add_program(device *d, size_t count)
 {
     static dac_program programs[COMPILED];
@@ -125,7 +135,7 @@ static void add_program(device *d, size_t count)
     programs[number] = read_program(d, count);
     for (unsigned i = 0; i < 32; i++)
         (void)sprintf(hashes[number] + 2 * i, "%02x", d->link.image[d->link.idle].info[i]);
-    device_compile(d, "program", hashes[number], &programs[number]);
+    device_compile(d, names[number], hashes[number], &programs[number]);
     device_start(d, d->boot);
 }
 #endif
@@ -194,6 +204,8 @@ int main(void)
         } else if (what == 'P') {
             (void)device_play(d, (uint32_t)number());
             device_run(d, UINT32_MAX);
+        } else if (what == 'N') {
+            name_next(d);
         } else if (what == 'L') {
             add_program(d, hexadecimal());
 #endif

@@ -46,9 +46,13 @@ def random_replay(
     modes: bool = False,
     store: bool = False,
     moves: bool = False,
+    plays: bool = False,
 ) -> Replay:
-    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, kept programs, moves."""
-    dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True, store=store, modes=modes, moves=moves)
+    """Of a random dialogue, which the model has told to be right; with ``modes`` of a COMMIT, kept programs, moves, and
+    programs that a host plays by number.
+    """
+    key, how = KEY if keyed else b"", {"store": store, "modes": modes, "moves": moves, "plays": plays}
+    dialogue = Dialogue(shape, seed, key, notes=True, **how)
     dialogue.play(STEPS)
     return replay_of(dialogue.device, bytes(dialogue.heard))
 

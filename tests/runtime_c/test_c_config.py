@@ -22,7 +22,7 @@ OTHER_VALUES = {
     "DAC_PIXEL_TABLE": 1,
     "DAC_STORE": 1,
     "DAC_MOVE": 1,
-    "DAC_LIBRARY": 1,
+    "DAC_LIBRARY": 2,
     "DAC_REQUESTS": 128,
     "DAC_LONG_MULTIPLY": 0,
     "DAC_LINK_RING": 512,

@@ -24,7 +24,7 @@ CHOICES = {
     "shaped": ["-DDAC_SHAPING=3"],
     "commit_modes": ["-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1"],
-    "store": ["-DDAC_STORE=1", "-DDAC_LIBRARY=1"],
+    "store": ["-DDAC_STORE=1", "-DDAC_LIBRARY=2"],
     "moves": ["-DDAC_MOVE=1"],
 }
 

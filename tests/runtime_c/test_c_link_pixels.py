@@ -271,7 +271,7 @@ MUTANTS = {
     "the other table is read back": (IMAGE, THIS.format(PLAYING), OTHER.format(PLAYING)),
     "a readback ends before the table": (IMAGE, "y[DAC_LINK_PARTS] = pixels_of(l, image);", "y[1].words = 0;"),
     "images may not be longer": (IMAGE, "UINT32_C(4) * config->table_pixels", "0 * config->table_pixels"),
-    "HELLO does not say it": (REQUESTS, "FURTHER | PLAYS_PIXEL_TABLES", "FURTHER"),
+    "HELLO does not say it": (REQUESTS, "    further |= PLAYS_PIXEL_TABLES;\n", ""),
     "HELLO says too few pixels": (REQUESTS, "(uint8_t)c->table_pixels;", "(uint8_t)(c->table_pixels / 2);"),
     "HELLO has slow parts": (REQUESTS, "at[4] = at[5] = 0;", "at[4] = at[5] = 1;"),
 }

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.rest
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 MODES = "-DDAC_COMMIT_MODES=1"
 MOVES = "-DDAC_MOVE=1"
-STORE = ("-DDAC_STORE=1", "-DDAC_LIBRARY=1")
+STORE = ("-DDAC_STORE=1", "-DDAC_LIBRARY=2")
 WAYS = {
     "gcc": (("gcc",), SANITIZED),
     "clang": (("clang",), SANITIZED),
@@ -51,9 +51,10 @@ def replays_with_moves() -> list[Replay]:
 
 @pytest.fixture(scope="module")
 def replays_with_a_store() -> list[Replay]:
-    """Of devices that keep programs."""
+    """Of devices that keep programs, and play them by number."""
     kinds = [SequencerShape(16, 1, 5, 16, 1, 4, 16), SequencerShape(24, 1, 4, 18, 1, 3, 24)]
-    return [random_replay(shape, seed, keyed, store=True) for shape in kinds for seed, keyed in ((6, False), (7, True))]
+    how = {"store": True, "plays": True}
+    return [random_replay(shape, seed, keyed, **how) for shape in kinds for seed, keyed in ((6, False), (7, True))]
 
 
 def hold(replays: list[Replay], folder: Path, emulator: str | None = None, **how: tuple[str, ...]) -> None:

@@ -60,14 +60,15 @@ MUTANTS = {
     "a program of the device ignores the interlock": (LIBRARY, " || !dac_link_permits(l))\n", ")\n"),
     "a host hears of a program of the device": (UPLOAD, "if (l->loading) {", "if (false) {"),
     "a program of the device is not checked against what plays": (
-        LIBRARY, "    dac_link_start_check(&l->check);\n    return true;",
-        "    dac_link_start_check(&l->check);\n    l->check.stage = 7;\n    return true;"),
+        LIBRARY, "    dac_link_start_check(&l->check);\n    return found;",
+        "    dac_link_start_check(&l->check);\n    l->check.stage = 7;\n    return found;"),
     "a compiled program for another converter plays": (
-        LIBRARY, "|| dac_sequencer_load(l->sequencer, &entry->program) != DAC_LOADED", ""),
+        LIBRARY, "    if (loaded != DAC_LOADED)\n        return", "    if (false)\n        return"),
     "a compiled program of another shape plays": (
-        LIBRARY, "dac_link_begin(l, info, &a).reason != DAC_LINK_NO_REASON", "(dac_link_begin(l, info, &a), false)"),
+        LIBRARY,
+        "    if (found.reason == DAC_LINK_NO_REASON)\n        found = store_program", "    found = store_program"),
     "a compiled program that was refused is an upload": (
-        LIBRARY, "        l->upload = DAC_LINK_NONE;\n        return false;", "        return false;"),
+        LIBRARY, "        l->upload = DAC_LINK_NONE;\n        return found;", "        return found;"),
     "a compiled program has no CRC": (LIBRARY, "    put_crc(l);\n", ""),
     "the y of a compiled program never steps": (
         LIBRARY, "DAC_LINK_Y_STEPS, p->y.hold_ticks != 1", "DAC_LINK_Y_STEPS, 0"),

@@ -13,8 +13,8 @@ pytestmark = pytest.mark.rest
 OPTIONS = (
     (),
     ("-DDAC_TABLE_STORAGE_BITS=32",),
-    ("-DDAC_SPLINE=1", "-DDAC_STORE=1", "-DDAC_LIBRARY=1"),
-    ("-DDAC_COMMIT_MODES=1",),
+    ("-DDAC_SPLINE=1", "-DDAC_STORE=1", "-DDAC_LIBRARY=2"),
+    ("-DDAC_COMMIT_MODES=1", "-DDAC_LIBRARY=1"),
     ("-DDAC_MOVE=1",),
     ("-DDAC_SLOW_PART=1", "-DDAC_SPLINE=1"),
     ("-DDAC_SLOW_PART=1", "-DDAC_LONG_MULTIPLY=0"),

@@ -27,6 +27,7 @@ CHOICES = {
     "small": ["-DDAC_SMALL=1", "-Os"],
     "spline": ["-DDAC_SPLINE=1", "-DDAC_STORE=1", "-DDAC_LIBRARY=1"],
     "library": ["-DDAC_LIBRARY=1", "-DDAC_COMMIT_MODES=1"],
+    "library_of_hosts": ["-DDAC_LIBRARY=2", "-DDAC_STORE=1", "-DDAC_SLOW_PART=1"],
     "spline_wide": ["-DDAC_SPLINE=1", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
     "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
     "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
@@ -147,7 +148,7 @@ def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     assert run([*ANALYSERS[analyser], source]).returncode != 0
 
 
-OF_THE_LINK = ("-DDAC_STORE=1", "-DDAC_LIBRARY=1", "-DDAC_MOVE=1", "-DDAC_COMMIT_MODES=1")  # a move has a mode
+OF_THE_LINK = ("-DDAC_STORE=1", "-DDAC_LIBRARY=2", "-DDAC_MOVE=1", "-DDAC_COMMIT_MODES=1")  # a move has a mode
 ALL_FUNCTIONS = ("-DDAC_SHAPING=3", *OF_THE_LINK)
 
 
@@ -161,7 +162,7 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
         ("DAC_SLOW_PART", "-DDAC_SLOW_PART=1"),
         ("DAC_STORE", "-DDAC_STORE=1"),
         ("DAC_MOVE", "-DDAC_MOVE=1"),
-        ("DAC_LIBRARY", "-DDAC_LIBRARY=1"),
+        ("DAC_LIBRARY", "-DDAC_LIBRARY=2"),
     ):
         if given not in options:
             text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
@@ -202,7 +203,7 @@ def test_public_names_have_the_prefix_of_the_sequencer() -> None:
     assert {name for name in public if not name.startswith("dac_sequencer_")} == {"dac_synthesize"}
     assert all(name.startswith("dac_axis_") for name in declared("dac_axis.h"))
     link = [name for name in HEADERS if name.startswith("dac_link")]
-    assert len(declared("dac_link.h")) == 9
+    assert len(declared("dac_link.h")) == 10
     assert all(name.startswith("dac_link_") for name in declared(*link))
 
 

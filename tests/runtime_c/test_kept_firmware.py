@@ -70,7 +70,7 @@ def _plays(machine: LinkMachine, digest: str) -> None:
         assert time.monotonic() < until, "the program does not play"
 
 
-def test_a_button_plays_compiled_and_kept_programs(tmp_path: Path) -> None:
+def test_a_button_and_a_host_play_compiled_and_kept_programs(tmp_path: Path) -> None:
     """Of three compiled ones one is too large: its first line would jump, which the checks of an upload find."""
     boot = write_variant(tmp_path / "boot", Variant(SCAN))
     sizes = ("--set", "x.size_nm=30,40,1000")
@@ -100,6 +100,13 @@ def test_a_button_plays_compiled_and_kept_programs(tmp_path: Path) -> None:
         machine.press_up()
         _plays(machine, kept)
         _tablegen(machine, "readback", kept_file, *_PATIENT)
+        programs = json.loads(_tablegen(machine, "slots", "--json"))["programs"]
+        assert [(each["number"], each["name"], each["hash"]) for each in programs] == [
+            *((entry["number"], entry["name"], entry["hash"]) for entry in entries),
+            (len(entries) + 1, None, kept),
+        ]
+        assert small[:12] in _tablegen(machine, "play", entries[0]["name"], *_PATIENT)
+        assert kept[:12] in _tablegen(machine, "play", str(len(entries) + 1), *_PATIENT)
 
 
 @pytest.mark.parametrize(("board", "name"), [("lm3s6965evb", "lm3s6965evb"), ("mps2_an386", "mps2-an386")])

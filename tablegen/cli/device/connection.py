@@ -59,6 +59,16 @@ def timeout_option(what: str) -> Callable[[Command], Command]:
     return click.option("--timeout", type=click.FloatRange(min=0.1, max=1e6), metavar="S", help=what)
 
 
+swap_option = click.option(
+    "--swap",
+    type=click.Choice(("line", "keep", "frame")),
+    default="line",
+    show_default=True,
+    help="When a running device starts the new scan. line: at the next line start, from the first line of a frame. "
+    "keep: at the next line start, and the frame goes on with its next line. frame: at the next frame start.",
+)
+
+
 @contextmanager
 def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as before") -> "Iterator[Device]":
     """Connect to a device until the end of the block; an error in the block ends the command with its status.

@@ -1,4 +1,4 @@
-"""``tablegen save``, ``slots``, ``select``, ``confirm`` and ``delete``: the scans that a device keeps without power."""
+"""``tablegen save``, ``slots``, ``select``, ``confirm`` and ``delete``: the scans that a device has without power."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.link.device import Device
     from tablegen.link.kept import KeptPrograms, Slot
+    from tablegen.link.programs import DeviceProgram
 
 _HASH_DIGITS = 12  # digits of a hash in messages
 _FIRMWARE = "firmware"
@@ -65,13 +66,16 @@ def saved(device: "Device", slot: int) -> str:
     return f"{text}; `tablegen select {slot}` lets it play after a start"
 
 
-@click.command(short_help="List the scans that a device keeps without power.")
+@click.command(short_help="List the scans that a device has without power.")
 @port_option()
 @baud_option
 @key_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def slots(port: str, baud: int, key_file: Path | None, as_json: bool) -> int:
     """List the slots of a device: which scan each keeps, which one plays after a start, and whether one is on trial.
+
+    Of a device that plays scans by number (`tablegen play`), also the numbers: of those that were compiled with its
+    firmware, with their names, and of those that its slots keep.
 
     \b
     Examples:
@@ -82,18 +86,36 @@ def slots(port: str, baud: int, key_file: Path | None, as_json: bool) -> int:
     Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused (the device keeps
     no scans), 10 link lost, 12 invalid answers.
     """
+    from tablegen.link.messages import Feature, More
+
     with connected(port, baud, key_file) as device:
-        programs = device.slots()
+        numbered = device.programs() if More.PLAY in device.info.more else ()
+        has_slots = Feature.STORE in device.info.features
+        kept = device.slots() if has_slots or More.PLAY not in device.info.more else None
     if as_json:
         import json
 
-        click.echo(json.dumps(_record(programs), indent=2))
+        click.echo(json.dumps({"programs": _programs(numbered), **_record(kept)}, indent=2))
         return ExitStatus.OK
-    click.echo("slot  content")
-    for slot in programs.slots:
-        click.echo(f"{slot.number:>4}  {_scan(slot)}")
-    click.echo("\n".join(["", *_sentences(programs)]))
+    parts = []
+    if numbered:
+        parts.append(["number  program", *map(_program, numbered)])
+    if kept is not None:
+        parts.append(["slot  content", *(f"{slot.number:>4}  {_scan(slot)}" for slot in kept.slots)])
+        parts.append(_sentences(kept))
+    click.echo("\n\n".join("\n".join(part) for part in parts))
     return ExitStatus.OK
+
+
+def _program(program: "DeviceProgram") -> str:
+    name = program.name if program.slot is None else _name(program.slot)
+    return f"{program.number:>6}  {name}, {program.hash[:_HASH_DIGITS]}"
+
+
+def _programs(programs: "tuple[DeviceProgram, ...]") -> list[dict[str, Any]]:
+    return [
+        {"number": each.number, "name": each.name or None, "slot": each.slot, "hash": each.hash} for each in programs
+    ]
 
 
 def _scan(slot: "Slot") -> str:
@@ -128,8 +150,10 @@ def _reason(reason: int) -> str:
     return Reason(reason).name.lower() if reason in list(Reason) else str(reason)
 
 
-def _record(programs: "KeptPrograms") -> dict[str, Any]:
-    """Return all values, by the names of docs/protocol.md; null is no slot, or the firmware."""
+def _record(programs: "KeptPrograms | None") -> dict[str, Any]:
+    """Return all values, by the names of docs/protocol.md; null is no slot, or the firmware. Nothing without slots."""
+    if programs is None:
+        return {"slots": []}
     return {
         "slots": [
             {

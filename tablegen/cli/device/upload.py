@@ -12,6 +12,7 @@ from tablegen.cli.device.connection import (
     port_option,
     read_scan,
     source_argument,
+    swap_option,
     timeout_option,
 )
 from tablegen.cli.device.kept import SLOT, saved
@@ -48,14 +49,7 @@ _BITS_PER_BYTE = 10
     is_flag=True,
     help="Send nothing. Print sizes and transfer times; with --port, also whether the device would accept the scan.",
 )
-@click.option(
-    "--swap",
-    type=click.Choice(("line", "keep", "frame")),
-    default="line",
-    show_default=True,
-    help="When a running device starts the new scan. line: at the next line start, from the first line of a frame. "
-    "keep: at the next line start, and the frame goes on with its next line. frame: at the next frame start.",
-)
+@swap_option
 @click.option(
     "--store",
     type=SLOT,
