@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, program_words
+from tablegen.device.schedule import Schedule
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
@@ -13,7 +14,13 @@ from tablegen.verification.play.variation import Kind, variation
 from tablegen.verification.play.wide_program import Part, wide_program
 
 _LOADING_PACE, _LOADING_TICKS = 7, 60  # clocks between ticks while words are written, at least, and how many at most
+_CHECK_CLOCKS = 6  # of a table of pixels, beside its words
 VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
+
+
+def check_clocks(schedule: Schedule) -> int:
+    """Return the clocks by which the check of a table of pixels delays a commit; 0 without a table."""
+    return 0 if schedule.pixel_table is None else 2 * schedule.pixels + _CHECK_CLOCKS
 
 
 @dataclass(frozen=True)
