@@ -56,6 +56,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
     "slow_boot": ("dac_slow_boot", {}),
+    "pixel_boot": ("dac_pixel_boot", {}),
     "loader": ("program_loader", {"FOURIER": 1, "UPDATE_RATE": 500_000}),
     "loader_direct": (
         "program_loader",
