@@ -265,4 +265,5 @@ def _memories(folder: Path, work: Path, stored: StoredBuild, placement: Placemen
             wrong.append(f"{name}_sine.mem cannot be read: {error.strerror or error}")
     if wrong:
         return None, wrong
-    return Memories(*words[:3], *harmonics, pixels=words[3] if len(words) > 3 else ()), wrong
+    pixels = words[3] if len(words) > 3 else ()
+    return Memories(words[0], words[1], words[2], harmonics[0], harmonics[1], pixels), wrong
