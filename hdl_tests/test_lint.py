@@ -76,6 +76,8 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
         }
         for degree, words, index_bits, converter in ((3, 16, 6, 16), (1, 21, 3, 8), (3, 8, 14, 24))
     },
+    "pixels": {"PIXEL_INDEX_BITS": 9},
+    "pixels_alternate": {"PIXEL_INDEX_BITS": 4, "ALTERNATE": 1},
     "alternate": {"ALTERNATE": 1},
     "alternate_direct_y": {"ALTERNATE": 1, "Y_INTERPOLATED": 0, "X_INDEX_BITS": 16, "Y_INDEX_BITS": 2},
     "alternate_words_24_converter_22": {"ALTERNATE": 1, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "DAC_BITS": 22},

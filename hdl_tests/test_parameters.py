@@ -16,8 +16,8 @@ from test_lint import MODULES, NEEDED, SOURCES, lint, path_of
 MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
 PUBLIC = (
-    "dac_sequencer", "program_loader", "dac_boot", "dac_slow_boot", "dac_fourier", "dac_coding", "dac_spi",
-    "dac_axi_stream", "dac_bus", "dac_synchronise", "adc_pixels", "dac_marker_delay",
+    "dac_sequencer", "program_loader", "dac_boot", "dac_slow_boot", "dac_pixel_boot", "dac_fourier", "dac_coding",
+    "dac_spi", "dac_axi_stream", "dac_bus", "dac_synchronise", "adc_pixels", "dac_marker_delay",
 )  # fmt: skip
 Values = Mapping[str, int | str]
 SLOW_PART = {"SLOW_PART": 1, "LOW_AREA": 1}
@@ -76,6 +76,9 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({**SLOW_PART, "X_INDEX_BITS": 15}, "X_or_Y_INDEX_BITS_with_SLOW_PART_are_more_than_14"),
         ({**SLOW_PART, "SLOW_INDEX_BITS": 2}, "SLOW_INDEX_BITS_is_not_3_to_14"),
         ({**SLOW_PART, "SLOW_INDEX_BITS": 15}, "SLOW_INDEX_BITS_is_not_3_to_14"),
+        ({"PIXEL_INDEX_BITS": 1}, "PIXEL_INDEX_BITS_is_not_0_or_2_to_16"),
+        ({"PIXEL_INDEX_BITS": 17}, "PIXEL_INDEX_BITS_is_not_0_or_2_to_16"),
+        ({**SLOW_PART, "PIXEL_INDEX_BITS": 9}, "PIXEL_INDEX_BITS_has_no_SLOW_PART"),
         ({"ALTERNATE": 2}, "ALTERNATE_is_not_0_to_1"),
         ({**ALTERNATE, "LOW_AREA": 1}, ALTERNATE_HAS_NO),
         ({**ALTERNATE, "PLAIN_MULTIPLIER": 1}, ALTERNATE_HAS_NO),
@@ -140,6 +143,11 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"Y_SLOW_WORDS": 7}, "Y_SLOW_WORDS_is_not_8_to_16384"),
         ({"Y_KNOTS": 66}, "Y_KNOTS_is_not_2_to_65"),
         ({"WORD_BITS": 17}, "WORD_BITS_is_not_18_to_21"),
+        ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
+    ],
+    "dac_pixel_boot": [
+        ({"PIXELS": 0}, "PIXELS_is_not_1_to_32768"),
+        ({"PIXELS": 32769}, "PIXELS_is_not_1_to_32768"),
         ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
     ],
     "dac_fourier": [
@@ -234,6 +242,8 @@ LEGAL: dict[str, list[Values]] = {
         {"LOW_AREA": 1, "PLAIN_MULTIPLIER": 1, "FOURIER": 1, "COMMIT_MODES": 1},
         {**SMALL, **SLOW_PART, "SLOW_INDEX_BITS": 3, "LINE_BITS": 1},
         {**LARGE, **SLOW_PART, **CUBIC, **LONG_SPLINE, "SLOW_INDEX_BITS": 14},
+        {**SMALL, "TICK_BITS": 3, "PIXEL_INDEX_BITS": 2, "COMMIT_MODES": 1},
+        {**LARGE, "TICK_BITS": 30, "PIXEL_INDEX_BITS": 16, "LOW_AREA": 1},
         {**SMALL, **ALTERNATE, "TICK_BITS": 3, "LINE_BITS": 1, "PERIOD_BITS": 1, "COUNT_BITS": 2},
         {**LARGE, **ALTERNATE, "DAC_BITS": 22, "TICK_BITS": 30, "COMMIT_MODES": 1},
         {**SMALL, "SHAPING": 1},
@@ -268,6 +278,7 @@ LEGAL: dict[str, list[Values]] = {
             "START_CLOCKS": 0,
         }
     ],
+    "dac_pixel_boot": [{"PIXELS": 1, "START_CLOCKS": 0}, {"PIXELS": 32768}],
     "dac_fourier": [
         {"X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "HARMONICS": 1},
         {"X_INDEX_BITS": 16, "Y_INDEX_BITS": 16, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "HARMONICS": 512},

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import Kind, random_dual, random_fourier, rendered, shaped
+from programs import Kind, random_dual, random_fourier, rendered, shaped, with_table
 from replacing import replace
 from sets import common
 from stream_benches import HARMONICS, equal, with_sine
@@ -36,8 +36,13 @@ def swaps_of(capture: np.ndarray) -> Counter[str]:
     return seen
 
 
-def random_commits(rng: np.random.Generator, script: Script, configuration: Configuration, samples: int) -> None:
-    """Commits of every mode at any tick of a scan that seldom stops; most programs have the frame of the last one."""
+def random_commits(
+    rng: np.random.Generator, script: Script, configuration: Configuration, samples: int, pixels: bool = False
+) -> None:
+    """Commits of every mode at any tick of a scan that seldom stops; most programs have the frame of the last one.
+
+    With ``pixels`` most have a table of pixels.
+    """
     ticks, lines = configuration.ticks, (2, max(configuration.lines[1], 3))
     shape, (pace, *_) = configuration.shape, configuration.paces
     size = ticks, lines
@@ -49,6 +54,8 @@ def random_commits(rng: np.random.Generator, script: Script, configuration: Conf
         program = random_dual(rng, shape, size[0], kind=_KINDS[int(rng.integers(3))], lines=size[1])
         if configuration.shaping:
             program = shaped(rng, program, configuration.shaping)
+        if pixels and rng.random() < 0.7:
+            program = replace(program, schedule=with_table(rng, program.schedule))
         own = program.schedule.ticks, program.schedule.lines
         size = ((own[0],) * 2, (own[1],) * 2) if rng.random() < 0.9 else (ticks, lines)
         script.load(program)

@@ -40,6 +40,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "cubic_y_plain": ("dac_sequencer", {"Y_INTERPOLATED": 3, "PLAIN_MULTIPLIER": 1, "SHAPING": 3}),
     "cubic_low_area": ("dac_sequencer", {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3, "LOW_AREA": 1}),
     "slow_part": ("dac_sequencer", {"SLOW_PART": 1, "LOW_AREA": 1, "X_INTERPOLATED": 3, "X_INDEX_BITS": 6}),
+    "pixels": ("dac_sequencer", {"PIXEL_INDEX_BITS": 9, "LOW_AREA": 1}),
     "alternate": ("dac_sequencer", {"ALTERNATE": 1, "X_INTERPOLATED": 0, "X_POWER_UP_CODE": 32768}),
     "spi": ("dac_spi", {}),
     "spi_chain": ("dac_spi", {"TOPOLOGY": 3, "FRAME_BITS": 24, "WORD_BITS": 20, "HALF_PERIOD": 3, "CPHA": 1}),
@@ -55,6 +56,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
     "slow_boot": ("dac_slow_boot", {}),
+    "pixel_boot": ("dac_pixel_boot", {}),
     "loader": ("program_loader", {"FOURIER": 1, "UPDATE_RATE": 500_000}),
     "loader_direct": (
         "program_loader",

@@ -168,6 +168,9 @@ module linked_scanner_serves #(
             if (ANNEXIN_200NM_SHAPING > SHAPING) begin : guard_4
                 linked_scanner_SHAPING_is_less_than_that_of_the_scan stop ();
             end
+            if (ANNEXIN_200NM_PIXEL_INDEX_BITS != 0) begin : guard_6
+                linked_scanner_plays_no_table_of_pixels stop ();
+            end
             if (CLOCKS_PER_TICK < CLOCKS) begin : guard_5
                 linked_scanner_CLOCKS_PER_TICK_is_less_than_the_sequencer_takes stop ();
             end

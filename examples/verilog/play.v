@@ -39,6 +39,7 @@ endmodule
 
 
 // A shaped scan is none for it: the output of `play_axis` is rounded, and no remainder is fed back.
+// Nor is a sine: its pixels are not equal.
 module play_serves;
     generate
         if (1) begin : scan
@@ -46,6 +47,9 @@ module play_serves;
 
             if (ANNEXIN_200NM_SHAPING != 0) begin : guard
                 play_plays_no_shaped_scan stop ();
+            end
+            if (ANNEXIN_200NM_PIXEL_INDEX_BITS != 0) begin : guard_pixels
+                play_plays_no_table_of_pixels stop ();
             end
         end
     endgenerate

@@ -1,13 +1,15 @@
 // The markers of a tick, three clocks after it: line, frame, pixel, direction, imaging.
 //
-// The outputs hold from tick to tick. Windows of x count ticks of a line, windows of y count lines of a frame.
+// The outputs hold from tick to tick. Windows of x count ticks of a line, windows of y count lines of a frame. With
+// PIXEL_INDEX_BITS the pixel comes two clocks later, and a commit passes through here: dac_pixel_table.v says how long.
 
 `default_nettype none
 
 module dac_markers #(
     parameter TICK_BITS = 24,
     parameter LINE_BITS = 16,
-    parameter COMMIT_MODES = 0  // 1: a new program may begin with any line
+    parameter COMMIT_MODES = 0,     // 1: a new program may begin with any line
+    parameter PIXEL_INDEX_BITS = 0  // of a table of pixels; 0: there is none
 ) (
     input  wire                 clock,
     input  wire                 write,
@@ -26,11 +28,20 @@ module dac_markers #(
     output reg                  frame_marker,
     output wire                 pixel_marker,
     output reg                  backward_marker,
-    output reg                  images           // the tick is inside both windows, after the settling lines
+    output reg                  images,          // the tick is inside both windows, after the settling lines
+    // with PIXEL_INDEX_BITS
+    input  wire                 table_write,
+    input  wire [15:0]          table_address,
+    input  wire                 discard,
+    input  wire                 commit,
+    input  wire                 bank,
+    output wire                 accepted,
+    output wire                 checking,
+    output wire                 refused
 );
     localparam [3:0] SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, FORWARD_FIRST = 4'd4, FORWARD_COUNT = 4'd5;
     localparam [3:0] BACKWARD_FIRST = 4'd6, BACKWARD_COUNT = 4'd7, UP_FIRST = 4'd8, UP_COUNT = 4'd9;
-    localparam [3:0] DOWN_FIRST = 4'd10, DOWN_COUNT = 4'd11, PIXELS = 4'd12;
+    localparam [3:0] DOWN_FIRST = 4'd10, DOWN_COUNT = 4'd11, PIXELS = 4'd12, PIXEL_TABLE = 4'd14;
 
     // Clock 1: equalities. Clock 2: states. Clock 3: pixels and outputs.
     reg tick_1, tick_2, load_1;
@@ -118,11 +129,30 @@ module dac_markers #(
             backward_less <= $signed({1'b0, idle_pixels}) - $signed({1'b0, backward_count});
         end
     end
+    wire images_pixels = runs_2 && (forward_imaging || backward_imaging);
+    wire counted;
     dac_pixels #(.BITS(TICK_BITS)) pixel_starts (
-        .clock(clock), .tick(tick_2), .opens(forward_opens || backward_opens),
-        .imaging(runs_2 && (forward_imaging || backward_imaging)), .pixels(pixels),
-        .pixels_less_count(forward_imaging ? forward_less : backward_less), .pixel(pixel_marker)
+        .clock(clock), .tick(tick_2), .opens(forward_opens || backward_opens), .imaging(images_pixels),
+        .pixels(pixels), .pixels_less_count(forward_imaging ? forward_less : backward_less), .pixel(counted)
     );
+    generate
+        if (PIXEL_INDEX_BITS != 0) begin : pixel_table
+            dac_pixel_table #(.TICK_BITS(TICK_BITS), .INDEX_BITS(PIXEL_INDEX_BITS)) ticks (
+                .clock(clock), .write_word(write && write_address == PIXEL_TABLE), .write_table(table_write),
+                .table_address(table_address[PIXEL_INDEX_BITS-1:0]), .write_data(write_data),
+                .idle_pixels(idle_pixels), .forward_count(forward_count), .backward_count(backward_count),
+                .discard(discard), .commit(commit), .accepted(accepted), .checking(checking), .refused(refused),
+                .bank(bank), .take(take), .load(load_1), .tick(tick_2), .forward_opens(forward_opens),
+                .backward_opens(backward_opens), .imaging(images_pixels), .pixels(pixels), .counted(counted),
+                .pixel(pixel_marker)
+            );
+            wire unused_address = &table_address;
+        end else begin : equal_pixels
+            assign pixel_marker = counted;
+            assign {accepted, checking, refused} = {commit, 2'b00};
+            wire unused_table = &{PIXEL_TABLE, table_write, table_address, discard, bank};
+        end
+    endgenerate
 
     reg [7:0] settle_left;  // settling lines left, including this one
     initial settle_left = 0;

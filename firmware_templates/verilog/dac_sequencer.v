@@ -39,6 +39,7 @@ module dac_sequencer #(
     parameter SHAPING = 0,           // highest order of shaping: 0 none, 1 first, 2 second, 3 scanner
     parameter SLOW_PART = 0,         // 1: plays programs with a slow part on both axes, and no others
     parameter SLOW_INDEX_BITS = 7,   // with SLOW_PART: a slow table has at most 2^SLOW_INDEX_BITS words
+    parameter PIXEL_INDEX_BITS = 0,  // a bank holds the ticks of 2^(PIXEL_INDEX_BITS - 1) pixels a sweep; 0: of none
     parameter [63:0] X_POWER_UP_CODE = 0,  // output code before the first program
     parameter [63:0] Y_POWER_UP_CODE = 0
 ) (
@@ -46,7 +47,7 @@ module dac_sequencer #(
     input  wire                    reset,
     // writes to the idle program
     input  wire                    write,
-    input  wire [2:0]              write_region,   // 0 program, 1, 2 tables, 3, 4 Fourier words, 5, 6 slow parts; x, y
+    input  wire [2:0]              write_region,   // 0 program, 1, 2 tables, 3, 4 Fourier, 5, 6 slow parts; 7 pixels
     input  wire [15:0]             write_address,
     input  wire [31:0]             write_data,
     output wire                    writable,       // low: a write is refused
@@ -83,6 +84,7 @@ module dac_sequencer #(
     output wire [4*COUNT_BITS-1:0] fault_counts
 );
     localparam [2:0] PROGRAM = 3'd0, X_TABLE = 3'd1, Y_TABLE = 3'd2, X_FOURIER = 3'd3, Y_FOURIER = 3'd4;
+    localparam [2:0] PIXEL_TICKS = 3'd7;
     localparam [3:0] AXIS_HARMONICS = 4'd10;
     localparam [15:0] PROGRAM_WORDS = 16'd48;
     localparam [31:0] LAST = 2 * HARMONICS;
@@ -92,7 +94,7 @@ module dac_sequencer #(
     localparam LATENCY =
         (SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15) + (PLAIN_MULTIPLIER ? 12 : 19) + (SHAPING != 0 ? 1 : 0);
     localparam SPACING = SPLINE ? 11 : SHAPING == 3 ? 6 : 1;  // least clocks from tick to tick
-    localparam MARKERS_AT = 3;
+    localparam MARKERS_AT = 3, PIXELS_AT = PIXEL_INDEX_BITS != 0 ? 5 : MARKERS_AT;
     localparam LONGER_BITS = X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS;
     localparam X_PERIOD_BITS = TICK_BITS + 1;  // the period of x is a line
 
@@ -209,13 +211,19 @@ module dac_sequencer #(
         if (ALTERNATE != 0 && (X_WORD_BITS > 21 ? 25 : X_WORD_BITS + 4) < DAC_BITS + 3) begin : guard_36
             dac_sequencer_X_WORD_BITS_with_ALTERNATE_are_less_than_DAC_BITS_takes stop ();
         end
+        if (PIXEL_INDEX_BITS != 0 && (PIXEL_INDEX_BITS < 2 || PIXEL_INDEX_BITS > 16)) begin : guard_37
+            dac_sequencer_PIXEL_INDEX_BITS_is_not_0_or_2_to_16 stop ();
+        end
+        if (PIXEL_INDEX_BITS != 0 && SLOW_PART != 0) begin : guard_38
+            dac_sequencer_PIXEL_INDEX_BITS_has_no_SLOW_PART stop ();
+        end
         if (SLOW_PART != 0 && (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14)) begin : guard_30
             dac_sequencer_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
         end
     endgenerate
 
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
-    wire idle_writable, rendered, rendering, unrendered, slow_exists, slow_fits;
+    wire idle_writable, rendered, rendering, unrendered, slow_exists, slow_fits, checking, misfilled;
     reg host_write, host_commit;
     initial begin
         host_write = 0;
@@ -227,6 +235,7 @@ module dac_sequencer #(
         write_region == X_TABLE ? write_address >> X_INDEX_BITS == 0 :
         write_region == Y_TABLE ? write_address >> Y_INDEX_BITS == 0 :
         slow_exists ||
+        (PIXEL_INDEX_BITS != 0 && write_region == PIXEL_TICKS && write_address >> PIXEL_INDEX_BITS == 0) ||
         (FOURIER != 0 && (write_region == X_FOURIER || write_region == Y_FOURIER) && write_address <= LAST_FOURIER);
     wire accepted_write = write && writable && exists;
     reg scan_write, x_write, y_write;
@@ -241,7 +250,7 @@ module dac_sequencer #(
     initial address = 0;
     reg [31:0] data;
     initial data = 0;
-    assign writable = idle_writable && !rendering && !host_commit;
+    assign writable = !checking && idle_writable && !rendering && !host_commit;
     initial refused = 1'b0;
     always @(posedge clock) begin
         host_write <= accepted_write;
@@ -252,7 +261,7 @@ module dac_sequencer #(
         region <= write_region;
         address <= write_address;
         data <= write_data;
-        if ((write && !(writable && exists)) || (host_commit && !fits) || unrendered)
+        if ((write && !(writable && exists)) || (host_commit && !fits) || misfilled || unrendered)
             refused <= 1'b1;
         else if (clear_faults || reset)
             refused <= 1'b0;
@@ -265,7 +274,7 @@ module dac_sequencer #(
     // A program with a word that does not fit its register is not committed, nor is a part of a program.
     wire words_fit, whole;
     wire fits = words_fit && whole && slow_fits;
-    wire sound_commit = host_commit && fits;
+    wire sound_commit;  // later where a table of pixels has to be read
     dac_fit #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
@@ -335,11 +344,15 @@ module dac_sequencer #(
     end
 
     wire line_3, frame_3, pixel_3, backward_3, images_3;
-    dac_markers #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .COMMIT_MODES(COMMIT_MODES)) markers (
+    dac_markers #(
+        .TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .COMMIT_MODES(COMMIT_MODES), .PIXEL_INDEX_BITS(PIXEL_INDEX_BITS)
+    ) markers (
         .clock(clock), .write(scan_write), .write_address(address[3:0]), .write_data(data), .take(take), .load(load_0),
         .tick(tick_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0), .tick_number(tick_number),
         .line_number(line_number), .line_marker(line_3), .frame_marker(frame_3), .pixel_marker(pixel_3),
-        .backward_marker(backward_3), .images(images_3)
+        .backward_marker(backward_3), .images(images_3), .table_write(host_write && region == PIXEL_TICKS),
+        .table_address(address), .discard(reset || withdraw), .commit(host_commit && fits), .bank(bank),
+        .accepted(sound_commit), .checking(checking), .refused(misfilled)
     );
 
     wire done, x_reached, y_reached, x_clamped, y_clamped, overrun;
@@ -423,7 +436,7 @@ module dac_sequencer #(
             end
         end
         if (ALTERNATE) begin : alternating
-            localparam FLAGS_AT = 46, MARKERS_LEFT = 43;  // clocks from a tick's flags and markers to its codes
+            localparam FLAGS_AT = 46;  // clocks from a tick's flags to its codes
             reg [5:0] at;  // counts clocks
             reg works;
             initial begin
@@ -442,8 +455,13 @@ module dac_sequencer #(
                 .clock(clock), .at(at), .in({tick_0, runs_0, begins_0, load_0, clears_0}),
                 .out({done, runs_done, begins_done, swapped_done, clears_done})
             );
-            dac_pair_delay #(.BITS(5), .CLOCKS(MARKERS_LEFT)) with_markers (
-                .clock(clock), .at(at), .in({line_3, frame_3, pixel_3, backward_3, images_3}),
+            wire line_5, frame_5, backward_5, images_5;  // together with the pixel
+            dac_delay #(.BITS(4), .CLOCKS(PIXELS_AT - MARKERS_AT)) to_pixels (
+                .clock(clock), .in({line_3, frame_3, backward_3, images_3}),
+                .out({line_5, frame_5, backward_5, images_5})
+            );
+            dac_pair_delay #(.BITS(5), .CLOCKS(FLAGS_AT - PIXELS_AT)) with_markers (
+                .clock(clock), .at(at), .in({line_5, frame_5, pixel_3, backward_5, images_5}),
                 .out({line_done, frame_done, pixel_done, backward_done, images_done})
             );
             wire reached, clamped;
@@ -506,9 +524,12 @@ module dac_sequencer #(
             dac_delay #(.BITS(1), .CLOCKS(11)) from_shapers (
                 .clock(clock), .in(begins_shaping), .out(begins_done)
             );
-            dac_delay #(.BITS(5), .CLOCKS(LATENCY - MARKERS_AT)) with_markers (
-                .clock(clock), .in({line_3, frame_3, pixel_3, backward_3, images_3}),
-                .out({line_done, frame_done, pixel_done, backward_done, images_done})
+            dac_delay #(.BITS(4), .CLOCKS(LATENCY - MARKERS_AT)) with_markers (
+                .clock(clock), .in({line_3, frame_3, backward_3, images_3}),
+                .out({line_done, frame_done, backward_done, images_done})
+            );
+            dac_delay #(.BITS(1), .CLOCKS(LATENCY - PIXELS_AT)) with_pixels (
+                .clock(clock), .in(pixel_3), .out(pixel_done)
             );
             dac_axis #(
                 .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),

@@ -55,6 +55,22 @@ def random_schedule(rng: Generator, ticks: int, lines: int) -> Schedule:
     )
 
 
+def parts(rng: Generator, pixels: int, ticks: int) -> tuple[int, ...]:
+    """Divide ticks at random into so many pixels."""
+    cuts = np.sort(rng.choice(np.arange(1, ticks), pixels - 1, replace=False))
+    return tuple(np.diff([0, *cuts.tolist(), ticks]).tolist())
+
+
+def with_table(rng: Generator, schedule: Schedule) -> Schedule:
+    """Give a schedule a table of pixels, where both windows have ticks."""
+    fewest = min(schedule.forward.count, schedule.backward.count)
+    if not fewest:
+        return schedule
+    pixels = int(rng.choice([1, fewest, (fewest + 2) // 3]))
+    table = parts(rng, pixels, schedule.forward.count), parts(rng, pixels, schedule.backward.count)
+    return replace(schedule, pixels=pixels, pixel_table=table)
+
+
 MODES: dict[int, Mode] = {degree: mode for mode, degree in DEGREES.items()}  # of a shape
 
 

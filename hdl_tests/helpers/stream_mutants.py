@@ -16,6 +16,7 @@ from building import run_clean, tool
 from limits import ENDED, within
 from mutants import Verdict
 from pair_play import ALTERNATE, PAIR_PACES, pair_script, pair_sources
+from pixel_scripts import PIXEL_TABLE, PixelScript, full_lines, refuse_tables
 from programs import random_dual
 from slow_scripts import SLOW_PART, SlowScript, slow_play, slow_sources
 from stream_benches import with_sine
@@ -36,7 +37,7 @@ from tablegen.base.resources import verilog_runtime
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.play.stream import Script
+from tablegen.verification.play.stream import Script, read_capture, read_states
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, SequencerBench
 
 HARMONICS = 4
@@ -64,6 +65,8 @@ SHAPES = {
     "pair direct": SequencerShape(8, 0, 6, 8, 1, 2, 8),
     "pair long table": SequencerShape(20, 1, 12, 20, 1, 2, 20),
     "pair sweep": SequencerShape(16, 1, 3, 16, 1, 2, 16),
+    "pixels": SequencerShape(16, 1, 3, 16, 1, 2, 16),
+    "pixel tables": SequencerShape(16, 1, 3, 16, 1, 2, 16),
 }
 SHAPED = {  # parameters, paces, samples
     "second": ({"SHAPING": 2}, (1, 3), 5000),
@@ -74,6 +77,7 @@ SPLINES = {  # parameters, how it is placed, samples
     "cubic": ({}, Placement(spline=True), 1500),
     "cubic low area": ({"LOW_AREA": 1}, Placement("serial", spline=True), 300),
 }
+PIXELS = ("pixels", "pixel tables")
 PAIRS = ("pair", "pair direct", "pair long table", "pair sweep")
 BENCHES = tuple(SHAPES)
 
@@ -87,6 +91,16 @@ class Mutant(mutants.Mutant):
     @property
     def path(self) -> Path:
         return next(path for path in (*slow_sources(), *pair_sources()) if path.stem == self.file)
+
+
+def _pixel_script(rng: np.random.Generator, shape: SequencerShape, bench: str) -> Script:
+    script = PixelScript()
+    if bench == "pixel tables":
+        refuse_tables(rng, script, shape)
+    else:
+        full_lines(rng, script, shape)
+        random_play(rng, script, shape, 6000, (1, 2, 3), (8, 32), (1, 3), pixels=True)
+    return script
 
 
 @cache
@@ -103,6 +117,8 @@ def script_of(bench: str) -> Script:
         _, placement, samples = SPLINES[bench]
         script = Script(drain=placement.drain_clocks)
         random_play(rng, script, shape, samples, (placement.tick_clocks, placement.tick_clocks + 9), (8, 20))
+    elif bench in PIXELS:
+        script = _pixel_script(rng, shape, bench)
     elif bench == "modes":
         script.tick_every(1)
         modes(rng, script, shape)
@@ -164,6 +180,8 @@ def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[l
         parameters |= ALTERNATE
     if bench == "slow":
         parameters |= SLOW_PART
+    if bench in PIXELS:
+        parameters |= PIXEL_TABLE | {"PLAIN_MULTIPLIER": 1}
     if bench == "fourier":
         parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
     return sources, parameters
@@ -188,6 +206,8 @@ def judge(mutant: Mutant | None, folder: Path, bench: str = "") -> Verdict:
     files["EXPECTED"].write_text("".join(f"{word:016x}\n" for word in script.expected), "ascii")
     parameters |= SHAPES[bench].parameters()
     parameters |= {"SCRIPT": str(files["SCRIPT"]), "CAPTURE": str(folder / "capture.hex")}
+    states = folder / "states.hex"
+    parameters |= {"STATES": str(states)} if script.states else {}
     watched = {"EXPECTED": str(files["EXPECTED"]), "SAMPLES": len(script.expected)}
     given = [
         f"-P{top}.{name}=" + (f'"{value}"' if isinstance(value, str) else str(value))
@@ -214,6 +234,11 @@ def judge(mutant: Mutant | None, folder: Path, bench: str = "") -> Verdict:
         return Verdict(True, f"tick {samples}")
     if jitter != "0":
         return Verdict(True, "latency")
+    if script.states:
+        stored = read_states([int(word) for word in read_capture(states)])
+        for (when, expected), state in zip(script.states, stored, strict=True):
+            if state.flags != expected.flags:
+                return Verdict(True, when)
     if refused != str(int(script.refused)):
         return Verdict(True, "refused writes")
     differs = counts[-16:] != f"{script.counts[1]:08x}{script.counts[0]:08x}"
@@ -650,8 +675,8 @@ def _markers() -> Iterator[Mutant]:
     yield Mutant(
         "pixels start where nothing plays",
         "dac_markers",
-        ".imaging(runs_2 && (forward_imaging || backward_imaging))",
-        ".imaging(forward_imaging || backward_imaging)",
+        "images_pixels = runs_2 && (forward_imaging || backward_imaging)",
+        "images_pixels = forward_imaging || backward_imaging",
     )
     yield Mutant("the backward marker stays", "dac_markers", "runs_2 && backward_2", "backward_2")
     yield Mutant(
@@ -1112,9 +1137,79 @@ def _pair() -> Iterator[Mutant]:
         yield Mutant(breaks, "dac_pair", old, new, "pair direct")
 
 
+def _pixels() -> Iterator[Mutant]:
+    """Tables of pixels: what is played of them, and which of them are refused."""
+    table = "dac_pixel_table"
+    for breaks, file, old, new in (
+        ("the pixel comes a clock late", "dac_sequencer", "LATENCY - PIXELS_AT", "LATENCY - PIXELS_AT + 1"),
+        ("every program has a table", table, "uses_table ? imaging_3", "1'b1 ? imaging_3"),
+        ("none has a table", table, "uses_table ? imaging_3", "1'b0 ? imaging_3"),
+        ("the last program has a table still", table, "if (load_3) uses_table", "if (load_3 && reading) uses_table"),
+        ("the new program has a table a clock early", table, "if (load_3) uses_table", "if (load_2) uses_table"),
+        ("a table is that of the idle program", table, "if (take) next_uses_table", "if (load) next_uses_table"),
+        ("a table that was taken is one of the next program", table, "has_table_now && !take", "has_table_now"),
+        ("the bank is read a clock late", table, "if (load_2) reading", "if (load_3) reading"),
+        ("the bank that plays is written", table, "write_table && reading)", "write_table && !reading)"),
+        ("a word is that of the other bank", table, "word = reading ? word_1", "word = reading ? word_0"),
+        ("pixels begin outside windows", table, "imaging_3 && starts", "starts"),
+        ("a window goes on with the pixel before it", table, "starts = opens_3 || ended", "starts = ended"),
+        ("a pixel does not end", table, "starts = opens_3 || ended", "starts = opens_3"),
+        ("a pixel is a tick longer", table, "ended <= now == 16'd1", "ended <= now == 16'd0"),
+        ("a pixel of one tick has three", table, "now = starts ? word", "now = starts ? word | (word == 1) << 1"),
+        ("the first word is not read", table, "(tick_2 && opens_2) || (tick_3 && starts)", "(tick_3 && starts)"),
+        ("no word is read after it", table, "(tick_2 && opens_2) || (tick_3 && starts)", "(tick_2 && opens_2)"),
+        ("a word is read on each tick", table, "(tick_3 && starts);", "tick_3;"),
+        ("words are read without ticks", table, "(tick_3 && starts);", "starts;"),
+        ("the retrace has the words of the trace", table, "forward_opens ? {INDEX_BITS{1'b0}} : wide_pixels",
+         "1'b1 ? {INDEX_BITS{1'b0}} : wide_pixels"),
+        ("the trace has the words of the retrace", table, "forward_opens ? {INDEX_BITS{1'b0}} : wide_pixels",
+         "1'b0 ? {INDEX_BITS{1'b0}} : wide_pixels"),
+        ("the same word is read again", table, "ahead <= ahead + 1'b1", "ahead <= ahead"),
+        ("a pixel without a table is a clock late", table, "if (tick_2) begin", "if (tick_3) begin"),
+        ("a program without a table waits", table, "(commit && !has_table_now) ||", "1'b0 ||"),
+        ("the check is over at its start", table, "(commit && !has_table_now) ||", "commit ||"),
+        ("each word is tested", table, "tests <= !discard && fetched && !reads", "tests <= !discard && fetched"),
+    ):  # fmt: skip
+        yield Mutant(breaks, file, old, new, "pixels")
+    for breaks, file, old, new in (
+        ("a withdrawal does not end the check", table, "loads <= !discard && (", "loads <= ("),
+        ("a check goes on after a withdrawal", table, "reads <= !discard && (", "reads <= ("),
+        ("no table is refused", table, "(ends && is_wrong);", "1'b0;"),
+        ("a refused table is taken", table, "ends && !is_wrong)", "ends)"),
+        ("a refusal is not said", "dac_sequencer", "|| misfilled ||", "||"),
+        ("what is not complete is read", table, "(loads && !in_backward && !complete) ||", "1'b0 ||"),
+        ("a word may be missing", table, "written >= {wide_idle_pixels[INDEX_BITS-1:0], 1'b0}",
+         "written + 1'b1 >= {wide_idle_pixels[INDEX_BITS-1:0], 1'b0}"),
+        ("words that were taken count", table, "if (take)\n            written", "if (1'b0)\n            written"),
+        ("a program without pixels has a table", table, "idle_pixels != 0 && wide", "wide"),
+        ("a window has more pixels than a bank", table, "wide_idle_pixels <= MOST_PIXELS", "1'b1"),
+        ("a pixel may have no tick", table, "checked == 16'd0 || ", ""),
+        ("the trace may be longer than its window", table, "is_wrong = wrong || room != 0",
+         "is_wrong = wrong || (in_backward ? room != 0 : room > 0)"),
+        ("the trace may be shorter than its window", table, "is_wrong = wrong || room != 0",
+         "is_wrong = wrong || (in_backward ? room != 0 : room < 0)"),
+        ("the retrace may be longer than its window", table, "is_wrong = wrong || room != 0",
+         "is_wrong = wrong || (in_backward ? room > 0 : room != 0)"),
+        ("the retrace may be shorter than its window", table, "is_wrong = wrong || room != 0",
+         "is_wrong = wrong || (in_backward ? room < 0 : room != 0)"),
+        ("the retrace has the window of the trace", table, "in_backward ? backward_count : forward_count",
+         "1'b0 ? backward_count : forward_count"),
+        ("what was wrong with the trace is forgotten", table, "            wrong <= is_wrong;\n", ""),
+        ("the next table is wrong too", table, "            wrong <= 1'b0;\n", ""),
+        ("the next table is read from the end of the last", table, "            at <= 0;\n", ""),
+        ("ticks are cut to 16 bits", table, "(write_table && write_data[31:16] != 16'd0)", "1'b0"),
+        ("any word 14 is a table", table, "(write_word && write_data[31:1] != 31'd0) ||", "1'b0 ||"),
+        ("a spoilt table stays spoilt", table, "if (take || discard)", "if (1'b0)"),
+        ("writes meet the check", "dac_sequencer", "!checking && idle_writable", "idle_writable"),
+        ("no word has a place", "dac_sequencer", "write_address >> PIXEL_INDEX_BITS == 0", "1'b0"),
+        ("a table has no end", "dac_sequencer", "write_address >> PIXEL_INDEX_BITS == 0", "1'b1"),
+    ):  # fmt: skip
+        yield Mutant(breaks, file, old, new, "pixel tables")
+
+
 MUTANTS: tuple[Mutant, ...] = (
     *_axis(), *_output(), *_scan(), *_modes(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(),
-    *_cubic(), *_slow(), *_pair(),
+    *_cubic(), *_slow(), *_pair(), *_pixels(),
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.random import Generator
-from programs import Kind, random_dual, random_fourier, rendered, shaped
+from programs import Kind, random_dual, random_fourier, rendered, shaped, with_table
 from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode
@@ -104,10 +104,11 @@ def random_play(
     ticks: tuple[int, int] = (8, 40),
     lines: tuple[int, int] = (1, 5),
     shaping: int = 0,
+    pixels: bool = False,
 ) -> None:
     """Programs back to back, requests at any tick, ticks at all paces that stop and go on; until so many samples.
 
-    Those of a device that shapes have orders up to ``shaping``.
+    Those of a device that shapes have orders up to ``shaping``; with ``pixels`` most have a table of pixels.
     """
     pace = _change_pace(rng, script, paces)
     while len(script.expected) < samples:
@@ -119,6 +120,8 @@ def random_play(
             program = some_program(rng, shape, ticks, lines)
             if shaping:
                 program = shaped(rng, program, shaping)
+            if pixels and rng.random() < 0.7:
+                program = replace(program, schedule=with_table(rng, program.schedule))
             script.load(program)
             names = {"commit"} | ({"arm", "trigger"} if rng.random() < 0.4 else set())
             script.request(*names, program=program, frames=int(rng.integers(0, 3)))

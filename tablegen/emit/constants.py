@@ -29,9 +29,16 @@ def shaping_constants(content: Content) -> dict[str, int]:
     return {"SHAPING": highest} if highest else {}
 
 
+def pixel_constants(schedule: Schedule) -> dict[str, int]:
+    """Return the address bits of the memory of a table of pixels in Verilog; 0 where pixels are equal."""
+    bits = max((2 * schedule.pixels - 1).bit_length(), LEAST_INDEX_BITS)
+    return {"PIXEL_INDEX_BITS": 0 if schedule.pixel_table is None else bits}
+
+
 def verilog_constants(content: Content) -> dict[str, int]:
     """Return all numbers of a build as Verilog takes them: ``SHAPING`` and those of axes are there where it is off."""
     constants = sequence_constants(content.schedule) | {"SHAPING": 0} | shaping_constants(content)
+    constants |= pixel_constants(content.schedule)
     for axis in content.axes:
         own = verilog_axis_constants(axis.program, axis.harmonics)
         constants |= {f"{axis.axis.upper()}_{key}": value for key, value in own.items()}

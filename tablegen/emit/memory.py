@@ -13,12 +13,15 @@ from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import WORD_BITS, sine_quarter
 from tablegen.numerics.arrays import Ints
 
+PIXEL_BITS = 16  # of the ticks of a pixel
+
 
 class Memory(Struct, frozen=True, eq=False):
     """The words of one memory of a device.
 
-    ``name`` is x, y, x_fourier, y_fourier, program or sine; of a scan at an angle x, y, slow or program. ``words``
-    are integers of ``bits`` bits, in two's complement but for the program's registers, which are unsigned.
+    ``name`` is x, y, x_fourier, y_fourier, program, sine or pixels; of a scan at an angle x, y, slow or program.
+    ``words`` are integers of ``bits`` bits, in two's complement but for the program's registers and the ticks of
+    pixels, which are unsigned.
     """
 
     name: str
@@ -106,4 +109,11 @@ def _memories(schedule: Schedule, x: Program, y: Program, fourier: Mapping[Liter
     memories.append(Memory("program", program_words(schedule, x, y), WORD_BITS, "registers of the program"))
     if index_bits := max(x.index_bits, y.index_bits):
         memories.append(Memory("sine", sine_quarter(index_bits).tolist(), WORD_BITS, "quarter sine"))
+    if schedule.pixel_table is not None:
+        memories.append(Memory("pixels", pixel_words(schedule), PIXEL_BITS, "ticks of each pixel"))
     return memories
+
+
+def pixel_words(schedule: Schedule) -> list[int]:
+    """Return the ticks of each pixel, of the forward window and then of the backward one; none where they are equal."""
+    return [ticks for window in schedule.pixel_table or () for ticks in window]

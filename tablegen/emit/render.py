@@ -59,7 +59,7 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in chosen_formats:
         if plan.schedule.pixel_table is not None and each.name not in PIXEL_FORMATS:
-            raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take the format c")
+            raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take c or verilog")
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each)

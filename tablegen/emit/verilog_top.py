@@ -3,7 +3,7 @@
 from typing import Any
 
 from tablegen.device.widths import least_widths
-from tablegen.emit.constants import DEGREES, memory_index_bits, shaping_constants
+from tablegen.emit.constants import DEGREES, memory_index_bits, pixel_constants, shaping_constants
 from tablegen.emit.content import MAX_RENDERED_HARMONICS, AxisContent, Content
 from tablegen.emit.templates import template
 
@@ -18,6 +18,11 @@ def top_file(content: Content) -> dict[str, bytes]:
 def sine_memory(content: Content) -> str:
     """Return the name of the file of the sine; empty where no table is rendered."""
     return f"{content.name}_sine.mem" if content.sine_index_bits else ""
+
+
+def pixel_memory(content: Content) -> str:
+    """Return the name of the file of the ticks of each pixel; empty where pixels are equal."""
+    return f"{content.name}_pixels.mem" if content.schedule.pixel_table else ""
 
 
 def _context(content: Content) -> dict[str, Any]:
@@ -38,6 +43,9 @@ def _context(content: Content) -> dict[str, Any]:
         "harmonics": min((1 << highest.bit_length()) - 1, MAX_RENDERED_HARMONICS),  # what fills the memories
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": sine_memory(content),
+        "pixels": content.schedule.pixels if content.schedule.pixel_table else 0,
+        "pixel_index_bits": pixel_constants(content.schedule)["PIXEL_INDEX_BITS"],
+        "pixel_memory": pixel_memory(content),
         "dac_bits": dac_bits,
         "code_range": port_range(dac_bits),
         "axes": [_axis(content, axis) for axis in content.axes],

@@ -9,16 +9,17 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, Scan
 
 SINE = (
-    "a sine is for `check`, `show`, `build` with the format c, `verify`, `upload`, `readback`, `live` and `simulate`; "
-    "leave this out, or take 'line', for anything else"
+    "a sine is for `check`, `show`, `build` with the formats c and verilog, `verify`, `upload`, `readback`, `live` "
+    "and `simulate`; leave this out, or take 'line', for anything else"
 )
-PIXEL_FORMATS = ("c",)  # which play a table of pixels
+PIXEL_FORMATS = ("c", "verilog")  # which play a table of pixels
+_DEFAULT_PIXEL_FORMATS = ("c",)  # a build of today keeps its files
 _HARMONICS = "a sine has one harmonic of the drive; leave this out, or take motion = 'line'"
 
 
 def default_formats(scan: Scan) -> tuple[str, ...]:
     """Return the formats of a build: as written, or those that play its motion."""
-    return tuple(scan.emit.formats or (DEFAULT_FORMATS if scan.x.motion == "line" else PIXEL_FORMATS))
+    return tuple(scan.emit.formats or (DEFAULT_FORMATS if scan.x.motion == "line" else _DEFAULT_PIXEL_FORMATS))
 
 
 def with_motion(setup: Setup, motion: Literal["line", "sine"]) -> Setup:
@@ -48,7 +49,10 @@ def sine_setup(setup: Setup, problems: Problems) -> Setup:
         )
     for i, name in enumerate(scan.emit.formats or ()):
         if name not in PIXEL_FORMATS:
-            why = f"{name!r} has no table of pixels, which a sine needs; take formats = ['c'], or motion = 'line'"
+            why = (
+                f"{name!r} has no table of pixels, which a sine needs; take formats = ['c', 'verilog'], "
+                "or motion = 'line'"
+            )
             problems.add(file, f"emit.formats[{i}]", why)
     x = replace(scan.x, band_limit=replace(limit, harmonics=1, max_scaling_error_percent=None, cutoff_hz=None))
     return replace(setup, scan=replace(scan, x=x))

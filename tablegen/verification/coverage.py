@@ -15,12 +15,14 @@ _SPLINE = {"dac_phase", "dac_spline", "dac_spline_step"}
 _LINES = {"dac_phase", "dac_table", "dac_interpolator"}
 
 
-def played_modules(placement: Placement, programs: Sequence[Program]) -> set[str]:
+def played_modules(placement: Placement, programs: Sequence[Program], has_pixel_table: bool = False) -> set[str]:
     """Return the Verilog modules that a session of programs of x and y elaborates."""
     modes = {program.mode for program in programs}
     played = set(_ALWAYS) | (_RENDERER if placement.fourier else set())
     if placement.shaping:
         played.add("dac_shaper")
+    if has_pixel_table:
+        played |= {"dac_pixel_table", "dac_pixel_boot"}
     if placement.axis == "serial":
         return played | {"dac_axis_serial"} | ({"dac_spline_terms"} if "cubic" in modes else set())
     played |= _PIPELINED | {"dac_multiply_plain" if placement.axis == "blocks" else "dac_multiply_digits"}
@@ -32,9 +34,11 @@ def played_modules(placement: Placement, programs: Sequence[Program]) -> set[str
     return played
 
 
-def unplayed_verilog(files: Iterable[str], placements: Sequence[Placement], programs: Sequence[Program]) -> list[str]:
+def unplayed_verilog(
+    files: Iterable[str], placements: Sequence[Placement], programs: Sequence[Program], has_pixel_table: bool = False
+) -> list[str]:
     """List the files of a runtime, and the options of its sequencer, that no session of these placements plays."""
-    played = set().union(*(played_modules(placement, programs) for placement in placements))
+    played = set().union(*(played_modules(placement, programs, has_pixel_table) for placement in placements))
     unplayed = sorted(name for name in files if name.removesuffix(".v") not in played)
     options = [
         f"PLAIN_MULTIPLIER = {int(axis == 'blocks')}"

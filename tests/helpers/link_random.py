@@ -10,8 +10,8 @@ from cut_flash import MODES, CutFlash
 from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, TABLE_PIXELS, CompiledProgram, HostDevice, Started, widest
 from link_images import damaged, damaged_slow, digest, random_image, random_limits, random_slow_program, resealed
 from link_talk import IDENTITY, Talk
-from pixel_tables import PIXELS, damaged_table, long_windows, table_image, with_table
-from programs import random_dual
+from pixel_tables import PIXELS, damaged_table, long_windows, table_image
+from programs import random_dual, with_table
 from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode

@@ -1,9 +1,8 @@
-"""Random tables of pixels, and images of programs that have one."""
+"""Images of programs that have a table of pixels."""
 
-import numpy as np
 from link_images import digest, resealed
 from numpy.random import Generator
-from programs import random_schedule
+from programs import random_schedule, with_table
 from replacing import replace
 
 from tablegen.device.dual_program import ScanProgram
@@ -12,22 +11,6 @@ from tablegen.device.schedule import Schedule
 from tablegen.link.program_image import PIXEL_BYTES, ProgramImage, make_image
 
 PIXELS = SCAN_WORDS.index("pixels")
-
-
-def parts(rng: Generator, pixels: int, ticks: int) -> tuple[int, ...]:
-    """Divide ticks at random into so many pixels."""
-    cuts = np.sort(rng.choice(np.arange(1, ticks), pixels - 1, replace=False))
-    return tuple(np.diff([0, *cuts.tolist(), ticks]).tolist())
-
-
-def with_table(rng: Generator, schedule: Schedule) -> Schedule:
-    """Give a schedule a table of pixels, where both windows have ticks."""
-    fewest = min(schedule.forward.count, schedule.backward.count)
-    if not fewest:
-        return schedule
-    pixels = int(rng.choice([1, fewest, (fewest + 2) // 3]))
-    table = parts(rng, pixels, schedule.forward.count), parts(rng, pixels, schedule.backward.count)
-    return replace(schedule, pixels=pixels, pixel_table=table)
 
 
 def long_windows(rng: Generator, ticks: int, lines: int) -> Schedule:

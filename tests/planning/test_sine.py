@@ -77,7 +77,7 @@ REFUSED = {
     "timing.pixels": ("timing.pixels = 250", "about"),
     "x.turn": ("x.turn = 0.6", "half of it"),
     "x.band_limit.directions": ("x.band_limit.directions = 'forward'", "trace and retrace"),
-    "emit.formats[1]": ("+ [emit]\nformats = ['c', 'verilog']", "table of pixels"),
+    "emit.formats[1]": ("+ [emit]\nformats = ['c', 'vhdl']", "table of pixels"),
 }
 
 

@@ -20,7 +20,8 @@ from link_images import damaged, digest, random_image, resealed
 from link_programs import make_scan
 from link_random import KEY, Dialogue
 from link_talk import Talk
-from pixel_tables import PIXELS, damaged_table, long_windows, table_image, with_table
+from pixel_tables import PIXELS, damaged_table, long_windows, table_image
+from programs import with_table
 from replacing import replace
 from sets import long
 from test_c_link_acceptance import Bench

@@ -10,8 +10,7 @@ import pytest
 from building import run_clean
 from c_library import BAD_SCHEDULE, LOADED, Library, PixelCProgram, Twin, compile_library
 from c_scripts import long_dual
-from pixel_tables import with_table
-from programs import random_schedule
+from programs import random_schedule, with_table
 from replacing import replace
 
 from tablegen.base.resources import c_runtime

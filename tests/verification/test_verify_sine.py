@@ -17,6 +17,7 @@ from tablegen.manifest.read import parse_manifest, read_build
 from tablegen.verification.run import verify
 
 NAME = "annexin_200nm"
+TICKS = 3000  # that the Verilog plays of it: lines, swaps and a park
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "- x.band_limit.harmonics", "x.motion = 'sine'", "timing.line_rate_hz = 5e3", "dac.update_rate_hz = 2e6",
         "timing.pixels = 48", "timing.lines = 16", "y.band_limit.harmonics = 4",
     )  # fmt: skip
-    build_scan(setup, folder / "out")
+    build_scan(setup, folder / "out", formats=["c", "verilog"])
     return folder / "out"
 
 
@@ -39,9 +40,33 @@ def failures(folder: Path) -> str:
 @pytest.mark.common
 def test_a_build_verifies_in_c(build: Path) -> None:
     """The markers of the table as the emitted C plays them, tick by tick, and every figure of the certificate."""
-    report = verify(build)
+    report = verify(build, "c")
     assert report.failures == []
     assert any(check.subject == "markers" for check in report.checks)
+
+
+@pytest.mark.rest
+def test_it_verifies_in_verilog(build: Path) -> None:
+    """The markers of the table as the emitted modules play them, uploaded and booted by the emitted top."""
+    report = verify(build, "verilog", axis="blocks", ticks=TICKS)
+    assert report.failures == []
+    (top,) = (check for check in report.checks if check.subject == "top")
+    assert top.failure is None
+
+
+def test_tampering_of_a_memory_is_found(build: Path, tmp_path: Path) -> None:
+    """A pixel of the memory file gives a tick to the next one, and the manifest has the digest of that file."""
+    folder = copytree(build, tmp_path / "out")
+    path = folder / f"{NAME}_pixels.mem"
+    words = [int(word, 16) for word in path.read_text("ascii").split()]
+    words[3] -= 1
+    words[4] += 1
+    path.write_text("".join(f"{word:04x}\n" for word in words), "ascii")
+    manifest = folder / "manifest.json"
+    plain = json.loads(manifest.read_text("ascii"))
+    plain["files"][path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    manifest.write_text(json.dumps(plain), "ascii")
+    assert f"{path.name}: word 3 is" in failures(folder)
 
 
 def test_it_reads_back_as_it_was_built(build: Path) -> None:

@@ -7,12 +7,18 @@ from typing import Any
 from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.base.resources import resource_folder, verilog_runtime, verilog_slow_part
 from tablegen.device.widths import least_widths
-from tablegen.emit.constants import sequence_constants, shaping_constants, verilog_axis_constants, verilog_constants
+from tablegen.emit.constants import (
+    pixel_constants,
+    sequence_constants,
+    shaping_constants,
+    verilog_axis_constants,
+    verilog_constants,
+)
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
-from tablegen.emit.verilog_top import sine_memory, top_file
+from tablegen.emit.verilog_top import pixel_memory, sine_memory, top_file
 
 # Patterns of checks are compiled on first use, since a build needs none.
 _LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"
@@ -114,9 +120,13 @@ def _context(content: Content) -> dict[str, Any]:
         "scanner": comment_safe(content.scanner),
         "summary": content.summary,
         "sequence": sequence_constants(content.schedule),
-        "widths": least_widths(content.schedule, content.y.program) | {"SHAPING": 0} | shaping_constants(content),
+        "widths": least_widths(content.schedule, content.y.program)
+        | {"SHAPING": 0}
+        | shaping_constants(content)
+        | pixel_constants(content.schedule),
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": sine_memory(content),
+        "pixel_memory": pixel_memory(content),
         "axes": [_axis(content, axis) for axis in content.axes],
     }
 
@@ -139,6 +149,7 @@ def _constants(content: Content) -> dict[str, int | str]:
     own |= least_widths(content.schedule, content.y.program)
     own |= {"CLOCKS_PER_TICK": content.clocks_per_tick}
     own |= {"PROGRAM_FILE": f"{name}_program.mem", "SINE_FILE": sine_memory(content)}
+    own |= {"PIXEL_FILE": pixel_memory(content)} if content.schedule.pixel_table else {}
     for axis in "xy":
         own[f"{axis.upper()}_TABLE_FILE"] = f"{name}_{axis}.mem"
         own[f"{axis.upper()}_FOURIER_FILE"] = f"{name}_{axis}_fourier.mem"

@@ -5,15 +5,22 @@ from dataclasses import dataclass
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, program_words
+from tablegen.device.schedule import Schedule
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.play.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
+from tablegen.verification.play.stream import PIXEL_TICKS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
 from tablegen.verification.play.unfit_words import c_edges, device_widths, edges
 from tablegen.verification.play.variation import Kind, variation
 from tablegen.verification.play.wide_program import Part, wide_program
 
 _LOADING_PACE, _LOADING_TICKS = 7, 60  # clocks between ticks while words are written, at least, and how many at most
+_CHECK_CLOCKS = 6  # of a table of pixels, beside its words
 VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
+
+
+def check_clocks(schedule: Schedule) -> int:
+    """Return the clocks by which the check of a table of pixels delays a commit; 0 without a table."""
+    return 0 if schedule.pixel_table is None else 2 * schedule.pixels + _CHECK_CLOCKS
 
 
 @dataclass(frozen=True)
@@ -25,6 +32,7 @@ class Memories:
     y: Sequence[int]
     x_harmonics: int = 0  # where x has Fourier words
     y_harmonics: int = 0
+    pixels: Sequence[int] = ()  # the ticks of each pixel, forward and then backward, where the program has them
 
 
 @dataclass
@@ -51,6 +59,7 @@ class Loader:
         if memories is None:
             return
         script.write(PROGRAM, list(memories.program))
+        script.write(PIXEL_TICKS, list(memories.pixels))
         for words, harmonics, page, table, fourier in (
             (memories.x, memories.x_harmonics, 1, X_TABLE, X_FOURIER),
             (memories.y, memories.y_harmonics, 2, Y_TABLE, Y_FOURIER),
@@ -60,8 +69,10 @@ class Loader:
                 script.write(PROGRAM, [harmonics], first=page * PAGE_WORDS + AXIS_WORDS.index("harmonics"))
 
     def commit_own(self) -> None:
-        """Commit it; its tables are rendered first if they have to be."""
-        self.script.request("commit", program=self.own, commit_clocks=self.own_commit_clocks)
+        """Commit it; its table of pixels is read first, and its tables are rendered, if they have to be."""
+        checked = 0 if self.memories is None else check_clocks(self.own.schedule)
+        self.script.request("commit", program=self.own, commit_clocks=checked + self.own_commit_clocks)
+        self.script.wait(checked)
 
     def load(self, kind: Kind, longer: int = 0) -> DualProgram:
         """Write a variation: its registers and its tables, since a part of a program is refused."""

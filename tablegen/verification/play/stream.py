@@ -25,6 +25,7 @@ from tablegen.numerics.arrays import Ints
 
 _WAIT, _WRITE, _REQUEST, _PERIOD, _STATE, _EXTRA = (op << 60 for op in (1, 2, 3, 4, 6, 7))
 PROGRAM, X_TABLE, Y_TABLE, X_FOURIER, Y_FOURIER = range(5)
+PIXEL_TICKS = 7
 _REQUESTS = ("reset", "commit", "withdraw", "arm", "trigger", "park", "clear_faults", "underrun")
 _DRAIN_CLOCKS = 200  # more than any sample takes
 FLAGS = ("line", "frame", "pixel", "backward", "valid", "swapped", "playing", "parked")

@@ -49,7 +49,7 @@ module verify_bench #(
         .Y_INTERPOLATED({Y}_INTERPOLATED), .Y_INDEX_BITS({y_index_bits}), .Y_WORD_BITS({Y}_TABLE_BITS),
         .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .LOW_AREA(LOW_AREA), .FOURIER(FOURIER),
         .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE), .SHAPING(SHAPING), .X_POWER_UP_CODE(X_POWER_UP_CODE),
-        .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+        .Y_POWER_UP_CODE(Y_POWER_UP_CODE), .PIXEL_INDEX_BITS({pixel_index_bits})
     ) bench ();
 
     // For the cocotb side of the bench.
@@ -157,6 +157,7 @@ def bench_text(content: Content, index_bits: tuple[int, int], top: bool = False)
         x_index_bits=index_bits[0],
         y_index_bits=index_bits[1],
         spacing=SPACING_CLOCKS,
+        pixel_index_bits=f"{name}_PIXEL_INDEX_BITS",
         top=_TOP_PLAYS if top else _NO_TOP,
         constants=written_constants(content.name, expected_constants(content)),
     )

@@ -177,7 +177,10 @@ class VerilogTarget:
         programs = (stored.program.x, stored.program.y)
         whole = len(runs) > 1 and runs[1].session.whole_frame
         unplayed = unplayed_verilog(
-            (name for name in stored.manifest.files if name.endswith(".v")), [one.placement for one in runs], programs
+            (name for name in stored.manifest.files if name.endswith(".v")),
+            [one.placement for one in runs],
+            programs,
+            stored.program.schedule.pixel_table is not None,
         )
         if run.top is not None:
             unplayed = [name for name in unplayed if name != f"{stored.manifest.name}_top.v"]
@@ -247,6 +250,8 @@ def _memories(folder: Path, work: Path, stored: StoredBuild, placement: Placemen
         rendered = placement.renders(played)
         harmonics.append(content.fourier.harmonics if rendered else 0)
         files.append((f"{axis}_fourier", 2 * harmonics[-1] + 1) if rendered else (axis, len(played.words)))
+    if program.schedule.pixel_table is not None:
+        files.append(("pixels", 2 * program.schedule.pixels))
     words, wrong = [], []
     for suffix, count in files:
         try:
@@ -258,4 +263,7 @@ def _memories(folder: Path, work: Path, stored: StoredBuild, placement: Placemen
             shutil.copyfile(folder / f"{name}_sine.mem", work / _SINE)
         except OSError as error:
             wrong.append(f"{name}_sine.mem cannot be read: {error.strerror or error}")
-    return (None if wrong else Memories(words[0], words[1], words[2], *harmonics)), wrong
+    if wrong:
+        return None, wrong
+    pixels = words[3] if len(words) > 3 else ()
+    return Memories(words[0], words[1], words[2], harmonics[0], harmonics[1], pixels), wrong

@@ -17,11 +17,13 @@ from tablegen.device.dual_program import ScanProgram
 from tablegen.device.registers import program_words
 from tablegen.device.sequencer import Sequencer
 from tablegen.emit.content import Content
-from tablegen.emit.memory import memories
+from tablegen.emit.memory import memories, pixel_words
 from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.play.capture import UNDEFINED
+from tablegen.verification.play.loading import check_clocks
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.stream import (
+    PIXEL_TICKS,
     PROGRAM,
     X_FOURIER,
     X_TABLE,
@@ -38,6 +40,7 @@ _UPLOAD, _BOOTED, _PLAYED = "top_upload.hex", "top_booted.hex", "top_played.hex"
 _CLOCKS = 6000  # that ticks take, unless a line takes more
 _MAX_TICKS = 20_000
 _OTHER_CLOCKS = 2000  # to boot, to withdraw and to drain, beside the words
+_REST_CLOCKS = 100  # before the tick that takes the program, and before the trigger
 _WORD = (1 << 32) - 1
 
 _OTHER_SINE = 'device.sequencer.SINE_FILE != "{}_sine.mem"'  # which only a rendering would read
@@ -170,7 +173,8 @@ class TopPlay:
     @property
     def clocks(self) -> int:
         """The clocks that the play takes at most."""
-        return self._boot_clocks + len(self._tables()) + self.ticks * self.pace + _OTHER_CLOCKS
+        other = 2 * check_clocks(self.content.schedule) + _OTHER_CLOCKS
+        return self._boot_clocks + len(self._tables()) + self.ticks * self.pace + other
 
     @property
     def _boot_clocks(self) -> int:
@@ -198,6 +202,7 @@ class TopPlay:
             ticks=self.ticks,
             pace=self.pace,
             settings=".PLAIN_MULTIPLIER(1), ",
+            rest=_REST_CLOCKS + check_clocks(self.content.schedule),
             other_sine=_OTHER_SINE.format(self.content.name) if self.content.renders_tables else "1'b0",
             withdraws=self.content.renders_tables,
         )
@@ -217,7 +222,8 @@ class TopPlay:
     def _registers(self, harmonics: tuple[int, int]) -> list[Write]:
         x, y = (axis.program for axis in self.content.axes)
         words = program_words(self.content.schedule, x, y, harmonics)
-        return [Write(PROGRAM, address, word) for address, word in enumerate(words)]
+        pixels = [Write(PIXEL_TICKS, at, ticks) for at, ticks in enumerate(pixel_words(self.content.schedule))]
+        return pixels + [Write(PROGRAM, address, word) for address, word in enumerate(words)]
 
 
 def writes(regions: "list[tuple[int, np.ndarray]]", address: int = 0) -> list[Write]:
@@ -235,7 +241,7 @@ def top_bench_text(
     ticks: int,
     pace: int,
     settings: str = "",
-    rest: int = 100,
+    rest: int = _REST_CLOCKS,
     other_sine: str = "1'b0",
     withdraws: bool = False,
 ) -> str:
