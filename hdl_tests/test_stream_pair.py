@@ -3,6 +3,7 @@
 Both axes go by turns through one pipeline, so a tick of either parity of the clock is played, at even and odd paces.
 """
 
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, occurrences, random_play, swaps_at_every_tick
 from test_stream_modes import MODES, random_commits, swaps_of
 
+from tablegen.device.by_turns import not_by_turns
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import FLAGS
 from tablegen.verification.verilog.sequencer_bench import SequencerBench
@@ -56,6 +58,36 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
     capture = equal(bench_of(shape, tmp_path), script).capture
     assert np.sum(flag(capture, "swapped") & flag(capture, "playing")) == max(p.schedule.ticks for p in pair)
     follow_their_programs(capture, script.swapped_programs)
+
+
+REFUSED = {
+    "two widths": (SequencerShape(16, 1, 3, 16, 1, 3, 18), "give both tables 18 bits"),
+    "short words": (SequencerShape(18, 1, 3, 16, 1, 3, 16), "give both tables 17 bits"),
+    "wide codes": (SequencerShape(23, 1, 3, 24, 1, 3, 24), "LOW_AREA does"),
+    "cubic": (SequencerShape(16, 1, 3, 16, 3, 3, 16), "LOW_AREA does"),
+}
+
+
+def test_programs_that_it_does_not_play_have_a_reason_and_a_remedy() -> None:
+    def obstacle(shape: SequencerShape) -> tuple[str, str] | None:
+        program = random_dual(np.random.default_rng(1), shape, (16, 20), kind="smooth")
+        return not_by_turns(program.x, program.y)
+
+    assert all(obstacle(shape) is None for shape in PAIR_SHAPES.values())
+    for name, (shape, remedy) in REFUSED.items():
+        found = obstacle(shape)
+        assert found is not None, name
+        assert found[1] == remedy, name
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", REFUSED)
+def test_the_sequencer_refuses_them(name: str) -> None:
+    given = [f"-Pdac_sequencer.{key}={value}" for key, value in (REFUSED[name][0].parameters() | ALTERNATE).items()]
+    command = ["iverilog", "-g2005", "-t", "null", "-s", "dac_sequencer", *given, *map(str, pair_sources())]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "ALTERNATE" in done.stderr
 
 
 @pytest.mark.rest

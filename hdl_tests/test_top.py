@@ -20,6 +20,7 @@ SCANS: dict[str, dict[str, object]] = {
     "shaped": {"dac.shaping": "second"},
     "y at rest": {"y": {"motion": "off", "offset_v": 50.0}},
 }
+BY_TURNS = {"ALTERNATE": 1}
 REFUSED: dict[str, tuple[dict[str, object], dict[str, int], str]] = {
     "shaping": ({"dac.shaping": "second"}, {"SHAPING": 1}, "SHAPING_is_less_than_that_of_the_scan"),
     "harmonics": ({}, {"HARMONICS": 4}, "HARMONICS_is_less_than_those_of_the_scan"),
@@ -29,6 +30,14 @@ REFUSED: dict[str, tuple[dict[str, object], dict[str, int], str]] = {
     "low area": ({}, {"LOW_AREA": 1, "CLOCKS_PER_TICK": 40}, "CLOCKS_PER_TICK_is_less_than_the_sequencer_takes"),
     "scanner": ({}, {"SHAPING": 3, "CLOCKS_PER_TICK": 5}, "CLOCKS_PER_TICK_is_less_than_the_sequencer_takes"),
     "cubic": ({"x.table": CUBIC}, {"CLOCKS_PER_TICK": 10}, "CLOCKS_PER_TICK_is_less_than_the_sequencer_takes"),
+    "by turns": ({}, BY_TURNS | {"CLOCKS_PER_TICK": 1}, "CLOCKS_PER_TICK_is_less_than_the_sequencer_takes"),
+    "cubic by turns": ({"x.table": CUBIC}, BY_TURNS, "ALTERNATE_plays_no_cubic_table_LOW_AREA_does"),
+    "shaped by turns": ({"dac.shaping": "second"}, BY_TURNS, "ALTERNATE_plays_no_shaped_output_LOW_AREA_does"),
+    "two widths by turns": (
+        {"y.table": {"bits": 18}},
+        BY_TURNS,
+        "ALTERNATE_plays_table_words_of_the_same_bits_give_both_tables_18_bits",
+    ),
 }
 LINES = 2
 
@@ -40,15 +49,28 @@ def runtime(built: Build) -> list[Path]:
 @pytest.mark.common
 @pytest.mark.parametrize("name", common(("direct x", "cubic", "shaped"), SCANS))
 def test_it_plays_the_words_of_the_model(name: str, tmp_path: Path) -> None:
-    built = short(tmp_path, SCANS[name])
+    plays_the_model(short(tmp_path, SCANS[name]), tmp_path)
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", common(("Fourier",), ("Fourier", "direct x", "direct", "y at rest")))
+def test_it_plays_them_by_turns(name: str, tmp_path: Path) -> None:
+    """Of tables that are rendered otherwise it boots the words."""
+    plays_the_model(short(tmp_path, SCANS[name]), tmp_path, pace=2, by_turns=1)
+
+
+def plays_the_model(built: Build, tmp_path: Path, pace: int = 11, by_turns: int = 0) -> None:
+    """Hold what a top plays, with a tick every so many clocks, against the integer model."""
     program, simulation = built.plan.program, tmp_path / "top.vvp"
     count = LINES * built.plan.schedule.ticks
-    sources = [f"-I{built.folder}", "-Wall", "-s", "top_bench", f"-Ptop_bench.TICKS={count}", BENCH, *runtime(built)]
-    run_clean(["iverilog", "-g2005", *sources, "-o", simulation])
+    sources = [f"-I{built.folder}", "-Wall", "-s", "top_bench", BENCH, *runtime(built)]
+    parameters = {"TICKS": count, "CLOCKS_PER_TICK": pace, "ALTERNATE": by_turns}
+    given = [f"-Ptop_bench.{key}={value}" for key, value in parameters.items()]
+    run_clean(["iverilog", "-g2005", *given, *sources, "-o", simulation])
     rows = [line.split() for line in run_clean(["vvp", "-n", simulation], built.folder).splitlines()]
     x, y = program.x.output, program.y.output
     parked = len(rows) - count
-    assert 0 < parked < 10
+    assert 0 < parked * pace < 110
     assert rows == [
         [str(x.word(tick.x)), str(y.word(tick.y)), f"{at >= parked:b}{tick.line:b}{tick.frame:b}{tick.valid:b}"]
         for at, tick in enumerate(model_ticks(program, count, parked))
@@ -61,6 +83,14 @@ def test_no_tool_warns_of_it(name: str, tmp_path: Path) -> None:
     built = short(tmp_path, SCANS[name])
     run_clean(["iverilog", "-g2005", "-Wall", "-t", "null", "-s", TOP, *runtime(built)])
     assert lint(TOP, {}, built.folder) == ""
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("name", ["Fourier", "direct x"])
+def test_no_tool_warns_of_it_by_turns(name: str, tmp_path: Path) -> None:
+    built = short(tmp_path, SCANS[name])
+    run_clean(["iverilog", "-g2005", "-Wall", "-t", "null", "-s", TOP, f"-P{TOP}.ALTERNATE=1", *runtime(built)])
+    assert lint(TOP, BY_TURNS, built.folder) == ""
 
 
 @pytest.mark.parametrize("name", quick(("shaping", "ticks"), REFUSED))

@@ -6,6 +6,7 @@
 module top_bench;
     parameter CLOCKS_PER_TICK = 11;
     parameter TICKS = 1;
+    parameter ALTERNATE = 0;
     `include "annexin_200nm.vh"
 
     reg clock = 0, tick = 0, start = 0, taken = 0;
@@ -15,7 +16,7 @@ module top_bench;
     wire [ANNEXIN_200NM_Y_DAC_WORD_BITS-1:0] y_word;
     integer clocks = 0, played = 0;
 
-    annexin_200nm_top #(.START_CLOCKS(50)) dut (
+    annexin_200nm_top #(.START_CLOCKS(50), .ALTERNATE(ALTERNATE)) dut (
         .clock(clock), .reset(1'b0), .write(1'b0), .write_region(3'd0), .write_address(16'd0), .write_data(32'd0),
         .writable(), .refused(refused), .commit(1'b0), .withdraw(1'b0), .committed(), .booting(), .missing(missing),
         .arm(start), .arm_frames(16'd0), .trigger(start), .park(1'b0), .clear_faults(1'b0), .armed(), .running(),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from building import REPOSITORY
 
-from tablegen.base.resources import verilog_runtime
+from tablegen.base.resources import verilog_by_turns, verilog_runtime
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script
 
@@ -27,7 +27,7 @@ PAIR_SHAPES = {
 
 def pair_sources() -> list[Path]:
     """The modules of a sequencer with ALTERNATE."""
-    return [*verilog_runtime(), *sorted(PAIR_FOLDER.glob("*.v"))]
+    return [*verilog_runtime(), *verilog_by_turns()]
 
 
 def pair_script(codes: tuple[int, int] = (0, 0)) -> Script:

@@ -26,6 +26,12 @@ def verilog_slow_part() -> list[Path]:
     return sorted(folder.glob("*.v"))
 
 
+def verilog_by_turns() -> list[Path]:
+    """Return the modules that play both axes by turns, in order of name; builds copy them, except at an angle."""
+    folder = resource_folder("firmware_templates") / "verilog" / "pair"
+    return sorted(folder.glob("*.v"))
+
+
 def c_runtime() -> list[Path]:
     """Return the C sequencer, headers and sources, in order of name; every build copies it."""
     return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith((_C_LINK, _C_STORE))]

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from tablegen.device.by_turns import LEAST_CLOCKS, not_by_turns
 from tablegen.device.widths import least_widths
 from tablegen.emit.constants import DEGREES, memory_index_bits, pixel_constants, shaping_constants
 from tablegen.emit.content import MAX_RENDERED_HARMONICS, AxisContent, Content
@@ -30,6 +31,7 @@ def _context(content: Content) -> dict[str, Any]:
     highest = max(axis.harmonics for axis in content.axes)
     modes = {axis.program.mode for axis in content.axes}
     dac_bits = content.x.program.output.dac_bits
+    obstacle = not_by_turns(content.x.program, content.y.program)
     return {
         "version": content.version,
         "name": content.name,
@@ -38,6 +40,8 @@ def _context(content: Content) -> dict[str, Any]:
         "widths": least_widths(content.schedule, content.y.program),
         "shaping": shaping_constants(content).get("SHAPING", 0),
         "cubic": "cubic" in modes,
+        "not_by_turns": obstacle and "_".join(obstacle).replace(" ", "_"),
+        "clocks_by_turns": LEAST_CLOCKS,
         "fourier": int(content.renders_tables),
         "least_harmonics": highest,
         "harmonics": min((1 << highest.bit_length()) - 1, MAX_RENDERED_HARMONICS),  # what fills the memories

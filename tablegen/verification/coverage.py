@@ -10,6 +10,10 @@ _ALWAYS = {
     "dac_verdict", "dac_faults", "dac_whole", "dac_whole_table", "dac_coding", "dac_spi", "dac_axi_stream", "dac_boot",
 }  # fmt: skip
 _PIPELINED = {"dac_axis", "dac_output", "dac_offset", "dac_slew", "dac_delay"}
+_BY_TURNS = {
+    "dac_pair", "dac_pair_delay", "dac_pair_interpolator", "dac_pair_output", "dac_pair_phase", "dac_pair_ring",
+    "dac_pair_slew", "dac_pair_table", "dac_pair_words", "dac_delay", "dac_skew", "dac_multiply_digits",
+}  # fmt: skip
 _RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}
 _SPLINE = {"dac_phase", "dac_spline", "dac_spline_step"}
 _LINES = {"dac_phase", "dac_table", "dac_interpolator"}
@@ -25,6 +29,8 @@ def played_modules(placement: Placement, programs: Sequence[Program], has_pixel_
         played |= {"dac_pixel_table", "dac_pixel_boot"}
     if placement.axis == "serial":
         return played | {"dac_axis_serial"} | ({"dac_spline_terms"} if "cubic" in modes else set())
+    if placement.axis == "alternate":
+        return played | _BY_TURNS
     played |= _PIPELINED | {"dac_multiply_plain" if placement.axis == "blocks" else "dac_multiply_digits"}
     for mode, modules in (("interpolated", _LINES), ("cubic", _SPLINE), ("direct", {"dac_direct_table"})):
         if mode in modes:
@@ -47,6 +53,8 @@ def unplayed_verilog(
     ]
     if "serial" not in {one.axis for one in placements}:
         options.append("LOW_AREA = 1")
+    if "alternate" not in {one.axis for one in placements}:
+        options.append("ALTERNATE = 1")
     if not any(one.fourier for one in placements):
         options.append("FOURIER = 1")
     highest = max(one.shaping for one in placements)

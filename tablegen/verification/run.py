@@ -23,7 +23,7 @@ def verify(
     target: TargetName | None = None,
     *,
     simulator: Literal["icarus", "verilator"] = "icarus",
-    axis: Literal["pipelined", "blocks", "serial"] = "pipelined",
+    axis: Literal["pipelined", "blocks", "serial", "alternate"] = "pipelined",
     fourier: bool = False,
     ticks: int | None = None,
     seed: int = 1,
@@ -112,7 +112,7 @@ def default_target(folder: Path) -> TargetName:
     return "verilog" if "verilog" in formats else "c" if "c" in formats else "files"
 
 
-def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
+def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial", "alternate"]) -> int:
     """Return the clocks in which the Verilog of a build, or of all programs of a library, renders its tables once.
 
     Raises
@@ -136,7 +136,7 @@ def _target(
     folder: Path,
     name: TargetName,
     simulator: Literal["icarus", "verilator"],
-    axis: Literal["pipelined", "blocks", "serial"],
+    axis: Literal["pipelined", "blocks", "serial", "alternate"],
     fourier: bool,
     as_usual: bool,
 ) -> tuple[Target, int]:

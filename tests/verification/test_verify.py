@@ -573,6 +573,7 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
     [
         pytest.param(["--axis", "blocks"], 24, marks=pytest.mark.rest),
         pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
+        pytest.param(["--axis", "alternate"], 48, marks=pytest.mark.rest),
         (["--axis", "blocks", "--fourier"], 24),
         pytest.param(["--axis", "serial", "--fourier"], 41, marks=LONG_TEST),
         pytest.param(["--fourier"], 36, marks=pytest.mark.rest),
@@ -580,7 +581,8 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str], late: int) -> None:
-    tables = {"x.table": {"length": 128, "bits": 20}, "y.table": {"length": 64, "bits": 18}}
+    y_bits = 20 if "alternate" in arguments else 18
+    tables = {"x.table": {"length": 128, "bits": 20}, "y.table": {"length": 64, "bits": y_bits}}
     small = Variant({**VARIANTS["short_frame"].scan, **tables})
     built = build(tmp_path / "out", small)
     outcome = verify(built.folder, *arguments)
@@ -594,6 +596,18 @@ def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str]
     assert (("markers", "integer model") in failed(outcome) or ("x", "integer model") in failed(outcome)) == (
         "--fourier" in arguments
     )
+
+
+@pytest.mark.common
+def test_by_turns_nothing_is_rendered_and_both_words_have_the_same_bits(tmp_path: Path) -> None:
+    scan = VARIANTS["short_frame"].scan
+    built = build(tmp_path / "out", Variant({**scan, "y.table": {"bits": 18}}))
+    outcome = verify(built.folder, "--axis", "alternate")
+    assert outcome.status == 2
+    assert "ALTERNATE plays table words of the same bits: give both tables 18 bits; or verify it with" in outcome.err
+    outcome = verify(built.folder, "--axis", "alternate", "--fourier")
+    assert outcome.status == 2
+    assert "verify it without --fourier, or with --axis serial" in outcome.err
 
 
 @pytest.mark.common

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import ceil, floor
 from pathlib import Path
 
-from tablegen.base.resources import resource_folder, verilog_runtime
+from tablegen.base.resources import resource_folder
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.verilog import FORMAT as VERILOG
@@ -102,7 +102,7 @@ def _frequency(content: Content) -> list[str]:
 
 def _build_files(content: Content) -> dict[str, list[str]]:
     """Return the files of the build that a tool reads, by their ending."""
-    runtime = [path.name for path in (*verilog_runtime(), *FORMAT.runtime())]
+    runtime = [path.name for path in (*VERILOG.runtime(), *FORMAT.runtime())]
     written = sorted(VERILOG.files(content))
     modules = [*(each for each in written if each.endswith(".v")), *sorted(runtime)]
     return {ending: [each for each in written if each.endswith(ending)] for ending in (".vh", ".mem")} | {".v": modules}

@@ -1,6 +1,5 @@
 """A core description for FuseSoC, in its CAPI 2, which names the files of the Verilog format."""
 
-from tablegen.base.resources import verilog_runtime
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.verilog import FORMAT as VERILOG
@@ -19,7 +18,7 @@ class FuseSoC(Format):
         """Render the core."""
         name = content.name
         written = sorted(VERILOG.files(content))
-        sources = [*(each for each in written if each.endswith(".v")), *sorted(path.name for path in verilog_runtime())]
+        sources = [*(each for each in written if each.endswith(".v")), *sorted(path.name for path in VERILOG.runtime())]
         lines = [
             "CAPI=2:",
             f"# {name}, tablegen {content.version}, build {content.hash}",

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.base.reading import BUILD_FILE, read_text
-from tablegen.base.resources import resource_folder, verilog_runtime, verilog_slow_part
+from tablegen.base.resources import resource_folder, verilog_by_turns, verilog_runtime, verilog_slow_part
 from tablegen.device.widths import least_widths
 from tablegen.emit.constants import (
     pixel_constants,
@@ -38,8 +38,8 @@ class Verilog(Format):
         return {f"{content.name}.vh": header, **top_file(content), **_memories(content)}
 
     def runtime(self) -> list[Path]:
-        """List the files of the Verilog sequencer and the loader."""
-        return verilog_runtime()
+        """List the files of the Verilog sequencer, with those of ``ALTERNATE``, and the loader."""
+        return [*verilog_runtime(), *verilog_by_turns()]
 
     def sources(self) -> list[Path]:
         """Return the runtime, also that of a scan at an angle, and the templates."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from tablegen.device.by_turns import LEAST_CLOCKS
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.program import Program
 
@@ -10,17 +11,21 @@ _SERIAL_CLOCKS, _SPLINE_SERIAL_CLOCKS = 41, 90  # clocks per sample
 _SHAPING_SERIAL_CLOCKS = 2  # more
 _SCANNER_CLOCKS = 6  # of a sample whose remainder is multiplied
 _SPLINE_CLOCKS = 11  # of a product of a spline
+_BY_TURNS_LATENCY = 48  # clocks from a tick to its sample where x and y go by turns
+_BY_TURNS_DRAIN = 58  # more than that
 _LATENCY, _SPLINE_LATENCY = 48, 76  # clocks: more than a sample takes, if it is not serial
+
+Axis = Literal["pipelined", "blocks", "serial", "alternate"]
 
 
 @dataclass(frozen=True)
 class Placement:
-    """A placement: ``axis`` is a sample a clock in look-up tables or with multiplier blocks, or low area.
+    """A placement: a sample a clock in look-up tables or with multiplier blocks, low area, or both axes by turns.
 
     ``shaping`` is the highest order of shaping that it has, 0 to 3; ``spline``: it plays a cubic table.
     """
 
-    axis: Literal["pipelined", "blocks", "serial"] = "pipelined"
+    axis: Axis = "pipelined"
     fourier: bool = False
     shaping: int = 0
     spline: bool = False
@@ -37,6 +42,8 @@ class Placement:
         if self.axis == "serial":
             clocks = _SPLINE_SERIAL_CLOCKS if self.spline else _SERIAL_CLOCKS
             return clocks + (_SHAPING_SERIAL_CLOCKS if self.shaping else 0)
+        if self.axis == "alternate":
+            return LEAST_CLOCKS
         return _SPLINE_CLOCKS if self.spline else _SCANNER_CLOCKS if self.shaping == 3 else 1
 
     @property
@@ -44,12 +51,16 @@ class Placement:
         """The clocks from a tick to its sample."""
         if self.axis == "serial":
             return self.tick_clocks
+        if self.axis == "alternate":
+            return _BY_TURNS_LATENCY
         spline, plain = self.spline, self.axis == "blocks"
         return (45 if spline else 12 if plain else 17) + (12 if plain else 19) + (1 if self.shaping else 0)
 
     @property
     def drain_clocks(self) -> int:
         """The clocks after which a sample has left: more than its latency."""
+        if self.axis == "alternate":
+            return _BY_TURNS_DRAIN + self.tick_clocks
         return (_SPLINE_LATENCY if self.spline else _LATENCY) + self.tick_clocks
 
     def renders(self, program: Program) -> bool:
@@ -61,6 +72,7 @@ class Placement:
         parameters: dict[str, int | str] = {
             "PLAIN_MULTIPLIER": int(self.axis == "blocks"),
             "LOW_AREA": int(self.axis == "serial"),
+            "ALTERNATE": int(self.axis == "alternate"),
             "SHAPING": self.shaping,
         }
         if self.fourier:

@@ -36,8 +36,8 @@ module verify_bench #(
     parameter CONSTANTS = "", parameter OUTPUTS = "", parameter UPLOAD = "", parameter BOOTED = "",
     parameter PLAYED = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
     parameter BOOT_Y = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
-    parameter LOW_AREA = 0, parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "",
-    parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
+    parameter LOW_AREA = 0, parameter ALTERNATE = 0, parameter FOURIER = 0, parameter HARMONICS = 64,
+    parameter SINE_FILE = "", parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
 );
 `include "{header}"
     // Both words come over wires of the same length, the narrower one behind zeros.
@@ -47,9 +47,10 @@ module verify_bench #(
         .SCRIPT(SCRIPT), .CAPTURE(CAPTURE), .STATES(STATES), .DAC_BITS({X}_DAC_BITS),
         .X_INTERPOLATED({X}_INTERPOLATED), .X_INDEX_BITS({x_index_bits}), .X_WORD_BITS({X}_TABLE_BITS),
         .Y_INTERPOLATED({Y}_INTERPOLATED), .Y_INDEX_BITS({y_index_bits}), .Y_WORD_BITS({Y}_TABLE_BITS),
-        .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .LOW_AREA(LOW_AREA), .FOURIER(FOURIER),
-        .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE), .SHAPING(SHAPING), .X_POWER_UP_CODE(X_POWER_UP_CODE),
-        .Y_POWER_UP_CODE(Y_POWER_UP_CODE), .PIXEL_INDEX_BITS({pixel_index_bits})
+        .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .LOW_AREA(LOW_AREA), .ALTERNATE(ALTERNATE),
+        .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE), .SHAPING(SHAPING),
+        .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE),
+        .PIXEL_INDEX_BITS({pixel_index_bits})
     ) bench ();
 
     // For the cocotb side of the bench.

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tablegen.device.by_turns import not_by_turns
 from tablegen.device.registers import program_words
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild
@@ -81,7 +82,8 @@ class VerilogTarget:
         Raises
         ------
         NotABuild
-            If a table is too long, or Fourier words are to be rendered and both tables are direct.
+            If a table is too long, Fourier words are to be rendered and both tables are direct, or both axes are to
+            play by turns and cannot.
         """
         for name, axis in stored.axes:
             if len(axis.table.words) > _MAX_TABLE_WORDS:
@@ -94,6 +96,14 @@ class VerilogTarget:
             raise NotABuild(
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
+        if placement.axis == "alternate":
+            if placement.fourier:
+                raise NotABuild(
+                    f"{folder}: ALTERNATE renders no Fourier words; verify it without --fourier, or with --axis serial"
+                )
+            obstacle = not_by_turns(stored.program.x, stored.program.y)
+            if obstacle:
+                raise NotABuild(f"{folder}: ALTERNATE {obstacle[0]}: {obstacle[1]}; or verify it with --axis serial")
 
     def play(self, job: PlayJob) -> Outcome:
         """Play a session on the simulator, and a frame beside it where that takes too long."""
@@ -111,7 +121,7 @@ class VerilogTarget:
         job.progress("playing the integer model")
         runs = self._runs(job, memories)
         if (job.folder / f"{name}_top.v").is_file():
-            runs[0].top = TopPlay.of(stored_content(stored), job.most_ticks)
+            runs[0].top = TopPlay.of(stored_content(stored), job.most_ticks, self.placement.axis)
         for run in runs:
             run.prepare(self.simulator, stored, sources[:-1], job.folder)
         job.progress(lambda: ", ".join(run.progress(self.simulator) for run in runs))

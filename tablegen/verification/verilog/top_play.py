@@ -21,7 +21,7 @@ from tablegen.emit.memory import memories, pixel_words
 from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.play.capture import UNDEFINED
 from tablegen.verification.play.loading import check_clocks
-from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.placement import Axis, Placement
 from tablegen.verification.play.stream import (
     PIXEL_TICKS,
     PROGRAM,
@@ -157,18 +157,23 @@ class Write(NamedTuple):
 
 @dataclass(frozen=True)
 class TopPlay:
-    """A play of the top of a build, of ``ticks`` ticks that are ``pace`` clocks apart."""
+    """A play of the top of a build, of ``ticks`` ticks that are ``pace`` clocks apart.
+
+    With ``by_turns`` it is the top with ``ALTERNATE``, which boots tables; otherwise the one with multiplier blocks.
+    """
 
     content: Content
     ticks: int
     pace: int
+    by_turns: bool = False
 
     @classmethod
-    def of(cls, content: Content, most_ticks: int) -> "TopPlay":
-        """Return a play of a line at least, within ``most_ticks``."""
-        pace = Placement("blocks").playing(content.program).tick_clocks
+    def of(cls, content: Content, most_ticks: int, axis: Axis = "blocks") -> "TopPlay":
+        """Return a play of a line at least, within ``most_ticks``: by turns if the ``axis`` is, else in blocks."""
+        by_turns = axis == "alternate"
+        pace = Placement("alternate" if by_turns else "blocks").playing(content.program).tick_clocks
         ticks = max(content.schedule.ticks, _CLOCKS // pace)
-        return cls(content, min(ticks, most_ticks, _MAX_TICKS), pace)
+        return cls(content, min(ticks, most_ticks, _MAX_TICKS), pace, by_turns)
 
     @property
     def clocks(self) -> int:
@@ -177,12 +182,16 @@ class TopPlay:
         return self._boot_clocks + len(self._tables()) + self.ticks * self.pace + other
 
     @property
+    def _renders(self) -> bool:
+        return self.content.renders_tables and not self.by_turns
+
+    @property
     def _boot_clocks(self) -> int:
         return len(self._boot()) + _OTHER_CLOCKS // 2
 
     def prepare(self, build: Path, folder: Path, model: Path) -> list[Path]:
         """Copy the top of a build into ``folder``, memory files to where the ``model`` runs; return top and bench."""
-        upload = self._tables() if self.content.renders_tables else []
+        upload = self._tables() if self._renders else []
         names = [f"{self.content.name}_{memory.name}.mem" for memory in memories(self.content)]
         return write_top(self.content.name, names, self._bench_text(), build, folder, model, upload)
 
@@ -201,15 +210,15 @@ class TopPlay:
             boot_clocks=self._boot_clocks,
             ticks=self.ticks,
             pace=self.pace,
-            settings=".PLAIN_MULTIPLIER(1), ",
+            settings=".ALTERNATE(1), " if self.by_turns else ".PLAIN_MULTIPLIER(1), ",
             rest=_REST_CLOCKS + check_clocks(self.content.schedule),
-            other_sine=_OTHER_SINE.format(self.content.name) if self.content.renders_tables else "1'b0",
-            withdraws=self.content.renders_tables,
+            other_sine=_OTHER_SINE.format(self.content.name) if self._renders else "1'b0",
+            withdraws=self._renders,
         )
 
     def _boot(self) -> list[Write]:
         """Return what the top writes at power-up."""
-        if not self.content.renders_tables:
+        if not self._renders:
             return self._tables()
         x, y = self.content.axes
         words = [(X_FOURIER, x.fourier_words), (Y_FOURIER, y.fourier_words)]
