@@ -13,14 +13,31 @@ uint32_t refused;
 
 void bench_main(void) {}
 
-void count_start(void)
+/* Both axes play x. Codes are two's complement if `coded`; there are no runs if `ticks`, as of a program that allows
+ * none. */
+void count_start(uint32_t coded, uint32_t ticks)
 {
+    dac_converter x = x_converter, y = y_converter;
+    dac_program program = scan;
     dac_tick tick;
 
-    dac_sequencer_init(&sequencer, &x_converter, &y_converter);
-    refused = (uint32_t)dac_sequencer_load(&sequencer, &scan);
+    x.twos_complement = y.twos_complement = program.x.twos_complement = program.y.twos_complement = coded != 0;
+#if DAC_SHAPING
+    program.x.shaping_order = program.y.shaping_order = DAC_SHAPING;
+    program.x.shaping_zero = program.y.shaping_zero = DAC_SHAPING == 3 ? 100 : 0;
+#endif
+    dac_sequencer_init(&sequencer, &x, &y);
+    refused = (uint32_t)dac_sequencer_load(&sequencer, &program);
     (void)dac_sequencer_commit(&sequencer);
     dac_sequencer_step(&sequencer, &tick); /* takes the program */
+    for (unsigned i = 0; i < 2; i++) {
+        dac_bank *bank = &sequencer.bank[i];
+        if (ticks != 0)
+            bank->x.run_most = 0;
+        bank->y = bank->x;
+    }
+    sequencer.y.at = sequencer.x.at;
+    sequencer.y.code = sequencer.x.code;
     (void)dac_sequencer_arm(&sequencer, 0);
     (void)dac_sequencer_trigger(&sequencer);
 }

@@ -1,55 +1,46 @@
 """The memory that an error takes, for docs/tables.md, and what modes take on devices, for `tablegen tables`.
 
 ``python benchmarks/tables.py`` prints the memory, ``--write`` puts it into the page and draws its figure. ``--costs``
-measures what each mode takes: instructions in emulation as ``firmware.py`` does, cells by yosys and nextpnr as
-``resources.py`` does, and writes them where the command reads them.
+measures what each mode takes: instructions in emulation by ``mode_costs.py``, cells by yosys and nextpnr as
+``resources.py`` does, and writes them where the package reads them.
 """
 
 import argparse
 import os
 import re
-import tempfile
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import firmware
+import mode_costs
 import resources
-from msgspec import structs
+from mode_costs import MEASURED
 
-from tablegen.base.resources import c_runtime
-from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.charts.picture_file import picture
 from tablegen.config.load import from_values, load
 from tablegen.config.schema import Table
-from tablegen.emit.render import render
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import MODES, TableShape
 from tablegen.html_report.table_charts import table_charts
-from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
 from tablegen.html_report.table_rows import axis_tables
 from tablegen.html_report.tables_text import tables_text
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.other_table import maker_of, with_table
 from tablegen.planning.table_choice import possible_shapes
+from tablegen.planning.table_costs import FILE, PROCESSORS, MeasuredRun, counts
 from tablegen.planning.table_search import TableSearch
-from tablegen.verification.c.emulate import Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
 PAGE = HERE.parent / "docs" / "tables.md"
 FIGURE = HERE.parent / "docs" / "figures" / "tables.svg"
-COSTS = HERE.parent / "tablegen" / "html_report" / "table_costs.py"
-CORES = ("cortex-m4", "cortex-m0plus", "riscv32")
 ERRORS = (2.0, 1.0, 0.75, 0.6, 0.55)
 SINES = ((16, 1000, 1.0), (16, 65536, 1.0), (18, 1000, 0.6), (18, 65536, 0.6))
-NARROW = MeasuredRun(16, 16, False)
 _WORDS = {16: "to 16 bits", 32: "above"}
-# Words of the tables that are counted: how many changes nothing.
-_LENGTHS: dict[Mode, int | None] = {"direct": None, "interpolated": 512, "cubic": 128}
+_SHAPING = {1: "first", 2: "second", 3: "scanner"}
+_MODE = {"interpolated": "`direct`, `interpolated`", "cubic": "`cubic`"}
 
 
 def sine(bits: int, ticks: int) -> LinePlan:
@@ -95,16 +86,38 @@ def memory() -> str:
 
 
 def costs() -> str:
-    """What the modes take, as a table of the page."""
-    head = "| mode | words | converter's word | " + " | ".join(f"instructions, {core}" for core in CORES)
-    rows = [
-        f"| `{mode}` | {_WORDS[run.table_storage_bits]} | {_WORDS[run.output_storage_bits]}"
-        f"{', coded' if run.coded else ''} | {' | '.join(f'{COUNTS[run][mode][core]:g}' for core in CORES)} "
-        f"| {CELLS[mode]} |"
-        for mode in MODES
-        for run in COUNTS
+    """What the modes take, as tables of the page: by words and coding, and what shaping takes."""
+    cores, blank = " | ".join(f"instructions, {core}" for core in PROCESSORS), "---|"
+    plain = [
+        f"| {_MODE[mode]} | {_WORDS[run.table_storage_bits]} | {_WORDS[run.output_storage_bits]}"
+        f"{', coded' if run.coded else ''} | {_takes(run, mode)} |"
+        for mode in MEASURED
+        for run in counts()
+        if not run.shaping_order
     ]
-    return "\n".join([f"{head} | cells, HX8K |", f"|{'---|' * (len(CORES) + 4)}", *rows, ""])
+    shaped = [
+        f"| {_MODE[mode]} | `{_SHAPING[run.shaping_order]}` | {_WORDS[run.table_storage_bits]} "
+        f"| {'16 bits' if run.output_storage_bits == 16 else 'other'} | {_takes(run, mode)} |"
+        for mode in MEASURED
+        for run in counts()
+        if run.shaping_order and not run.coded
+    ]
+    return "\n".join(
+        [
+            f"| mode | words | converter's word | {cores} |",
+            f"|{blank * (len(PROCESSORS) + 3)}",
+            *plain,
+            "",
+            f"| mode | shaping | words | converter | {cores} |",
+            f"|{blank * (len(PROCESSORS) + 4)}",
+            *shaped,
+            "",
+        ]
+    )
+
+
+def _takes(run: MeasuredRun, mode: Mode) -> str:
+    return " | ".join("{:g}, {:g}".format(*counts()[run][mode][core]) for core in PROCESSORS)
 
 
 def output() -> str:
@@ -123,43 +136,7 @@ def figure() -> bytes:
     return picture(charts.charts, "svg", "", charts.columns)
 
 
-def instructions(core: str, run: MeasuredRun = NARROW) -> dict[Mode, float]:
-    """Count an axis sample of ``fill`` by mode: of x alone, since y keeps lines between its words."""
-    counts: dict[Mode, float] = {}
-    for mode in MODES:
-        spline = mode == "cubic"  # the runtime plays it only if it is compiled for it
-        counts[mode] = round(2.0 * _fill(core, mode, spline, run) - _fill(core, "interpolated", spline, run), 1)
-    return counts
-
-
-@cache
-def _fill(core: str, mode: Mode, spline: bool, run: MeasuredRun) -> float:
-    """Mean of a frame of the example, of samples of both axes."""
-    setup, wide = load(EXAMPLE), run.table_storage_bits > 16
-    x = structs.replace(setup.scan.x, table=Table(mode=mode, length=_LENGTHS[mode], bits=18 if wide else 16))
-    assert setup.scan.dac is not None
-    dac = structs.replace(setup.scan.dac, coding="twos-complement" if run.coded else "offset-binary")
-    plan = make_plan(structs.replace(setup, scan=structs.replace(setup.scan, x=x, dac=dac)))
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for file, content in render(plan, certify(plan), ["c"]).items():
-            (folder / file).write_bytes(content)
-        sources = [HERE / "table_count.c", firmware.MEMORY, folder / f"{plan.name}.c", folder / f"{plan.name}.h"]
-        options = ("-std=c99", "-O2", f"-DDAC_SPLINE={int(spline)}")
-        widths = {
-            "DAC_TABLE_STORAGE_BITS": run.table_storage_bits,
-            "DAC_OUTPUT_STORAGE_BITS": run.output_storage_bits,
-        }
-        program = compile_bare(folder / "count.elf", [*c_runtime(), *sources], core, None, options, widths)
-        machine = Processor(program, core)
-        machine.call("count_start")
-        if int.from_bytes(machine.read("refused", 4), "little"):
-            raise RuntimeError(f"the runtime refuses the program with a {mode} table")
-        fills = plan.schedule.frame_ticks // firmware.TICKS
-        return sum(machine.call("count_fill").instructions for _ in range(fills)) / fills / firmware.TICKS / 2.0
-
-
-def cells() -> dict[Mode, int | None]:
+def cells() -> dict[Mode, int]:
     """Return the cells of one axis on an HX8K, by mode: a sample a clock, of a cubic table one in 11.
 
     A direct table is measured, the others are rows of docs/resources.md.
@@ -175,36 +152,14 @@ def cells() -> dict[Mode, int | None]:
     return {mode: measured[mode] for mode in MODES}
 
 
-def write_costs() -> None:
-    """Measure what the modes take, and put it where the command reads it."""
-    lines = ["COUNTS: dict[MeasuredRun, dict[Mode, dict[str, float]]] = {"]
-    for run in COUNTS:
-        by_core = {core: instructions(core, run) for core in CORES}
-        lines.append(f"    MeasuredRun({run.table_storage_bits}, {run.output_storage_bits}, {run.coded}): {{")
-        for mode in MODES:
-            counts = ", ".join(f'"{core}": {by_core[core][mode]}' for core in CORES)
-            lines.append(f'        "{mode}": {{{counts}}},')
-        lines.append("    },")
-    lines += ["}", "INSTRUCTIONS = COUNTS[MeasuredRun(16, 16, False)]"]
-    lines += ["# Cells of one axis in Verilog on an iCE40 HX8K, a sample a clock, of a cubic table one in 11."]
-    lines += [
-        "CELLS: dict[Mode, int] = {",
-        *(f'    "{mode}": {count},' for mode, count in cells().items()),
-        "}",
-        "",
-    ]
-    before = COSTS.read_text("utf-8").partition("COUNTS: ")[0]
-    COSTS.write_text(before + "\n".join(lines), "utf-8")
-
-
 def main() -> None:
     """Print, or write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.name}, and draw {FIGURE.name}")
-    parser.add_argument("--costs", action="store_true", help=f"measure what the modes take, and write {COSTS.name}")
+    parser.add_argument("--costs", action="store_true", help=f"measure what the modes take, and write {FILE.name}")
     given = parser.parse_args()
     if given.costs:
-        write_costs()
+        mode_costs.write(cells())
         return
     found = {"memory": memory(), "costs": costs(), "output": output()}
     print(*found.values(), sep="\n")

@@ -60,7 +60,7 @@ def tables(
     for line in lines:
         progress(f"measuring tables of {line.axis}")
         with problems.at(setup.scan_file, f"{line.axis}.table"):
-            axes.append(axis_tables(setup, line))
+            axes.append(axis_tables(setup, line, plan.y if line.axis == "x" else plan.x))
     problems.stop_if_any()
     return FeasibleTables(plan.name, tuple(axes))
 

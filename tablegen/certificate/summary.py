@@ -47,6 +47,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
         ),
         ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}{_chosen(line)}"),
         *_needs_of_table(line),
+        *([] if line.sample_cost is None else [("", f"{line.sample_cost}, in C")]),
         ("gain, offset", f"{output.gain_word} / 2^{output.gain_q}, code {output.offset_code}"),
     ]
     if line.layer is not None:

@@ -39,10 +39,10 @@ def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_jso
     so it has an error of up to 0.5 LSB with any table.
 
     Each line is one table; a table is left out if a smaller one, as simple to play, is better by 5 %. The columns are
-    memory in bits, the largest and the rms error of a code over all ticks, and the device resources that the mode takes
-    for a sample. * is the least memory within [x.table] max_error_lsb of the scan file; without that key within
-    limits.max_error_lsb, or within 1 LSB if that is less. A table that some format of the scan file cannot play is
-    marked - and not chosen.
+    memory in bits, the largest and the rms error of a code over all ticks, and the device resources that a sample
+    takes; [cost] processor of the scan file selects one processor. * is the least memory within [x.table]
+    max_error_lsb of the scan file; without that key within limits.max_error_lsb, or within 1 LSB if that is less. A
+    table that some format of the scan file cannot play is marked - and not chosen.
     """
     check_plot(plot, as_json)
     feasible = _feasible(scan, axis)

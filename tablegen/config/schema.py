@@ -398,6 +398,30 @@ class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
 
 
+ProcessorName = Literal["cortex-m4", "cortex-m0plus", "riscv32"]
+
+
+class Cost(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The processor that plays the scan in C, and the instructions that a sample may take."""
+
+    processor: Annotated[
+        ProcessorName,
+        Meta(description="processor whose measured instructions `tables`, `show` and the choice of a table use"),
+    ]
+    max_instructions: (
+        Annotated[
+            float,
+            Meta(
+                gt=0.0,
+                le=1e6,
+                description="most instructions for a sample of an axis: a table that the build chooses takes no more, "
+                "and any other that does is refused; default: no limit",
+            ),
+        ]
+        | None
+    ) = None
+
+
 DEFAULT_FORMATS = ("c", "verilog")
 
 
@@ -478,6 +502,7 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     x: LineAxis
     y: SlowAxis
     limits: Limits = Limits()
+    cost: Cost | None = None
     emit: Emit = Emit()
     scans: (
         Annotated[list[ScanOfMany], Meta(min_length=1, description="scans of a library; `name` above is then its name")]

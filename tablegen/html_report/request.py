@@ -77,6 +77,8 @@ def _table(axis: str, entry: ManifestAxis) -> list[tuple[TableCell, ...]]:
     if table.asked is None:
         return []
     request = f"the least memory within {table.asked.max_error_lsb:g} LSB"
+    if table.asked.max_instructions is not None:
+        request += f" and {table.asked.max_instructions:g} instructions on {table.asked.processor}"
     played = f"{len(table.words)} words of {table.bits} bits, {table.mode}: {len(table.words) * table.bits} bits"
     return [row(f"{axis} table", request, played)]
 

@@ -6,17 +6,20 @@ from math import sqrt
 from typing import Any, Literal
 
 import numpy as np
+from msgspec import structs
 
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import Setup
+from tablegen.config.schema import Cost
 from tablegen.emit.constants import storage_bits
-from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import WORD_BITS
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.html_report.table_costs import CELLS, COUNTS, MeasuredRun
+from tablegen.planning.cost_choice import played_table
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
+from tablegen.planning.table_costs import PROCESSORS, cells, sample_costs
 from tablegen.planning.table_front import table_front
 from tablegen.waveform.sampler import Sampler
 
@@ -28,8 +31,9 @@ class TableRow:
     """A table with its errors over all ticks, in LSB of the converter; of shaped output before the rounding.
 
     ``stored_bits`` is its memory in C: in words of 16 or 32 bits, with the first ones repeated behind the last.
-    ``smallest`` marks the least memory within the requested error. ``run`` are the conditions of its instructions, if
-    no word of the other axis is wider.
+    ``smallest`` marks the least memory within the requested error. ``instructions`` are those for a sample in C by
+    processor, if no word of the other axis is wider; of a scan file with a processor those of this one beside the
+    table of the other axis.
     """
 
     shape: TableShape
@@ -38,17 +42,12 @@ class TableRow:
     stored_bits: int
     smallest: bool
     planned: bool
-    run: MeasuredRun
-
-    @property
-    def instructions(self) -> dict[str, float]:
-        """Instructions per sample in C, without shaping, by processor."""
-        return COUNTS[self.run][self.shape.mode]
+    instructions: dict[str, float]
 
     @property
     def cells(self) -> int:
         """Cells of one axis in Verilog."""
-        return CELLS[self.shape.mode]
+        return cells()[self.shape.mode]
 
 
 @dataclass(frozen=True)
@@ -65,6 +64,7 @@ class AxisTables:
     rows: tuple[TableRow, ...]
     rendered: TableShape | None
     shaped: bool
+    cost: Cost | None = None
 
     @property
     def chosen(self) -> TableRow:
@@ -87,6 +87,7 @@ class AxisTables:
             "ticks": self.ticks,
             "max_error_lsb": self.max_error_lsb,
             "shaped": self.shaped,
+            **({} if self.cost is None else {"cost": structs.asdict(self.cost)}),
             "tables": [
                 {
                     **_shape(row.shape),
@@ -113,32 +114,33 @@ def _behind(shape: TableShape) -> int:
     return WORDS_BEHIND if shape.mode == "cubic" else 1
 
 
-def _run(shape: TableShape, output: Output) -> MeasuredRun:
-    """Return the class of a table and a converter by which instructions are measured."""
-    shifted = output.align == "left" and output.word_bits > output.dac_bits
-    coded = shifted or output.coding == "twos-complement"
-    return MeasuredRun(storage_bits(shape.bits), storage_bits(output.word_bits), coded)
-
-
-def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
-    """List the tables of a planned axis.
+def axis_tables(setup: Setup, line: LinePlan, other: LinePlan | None = None) -> AxisTables:
+    """List the tables of a planned axis; beside the one of the ``other`` axis if the scan file names a processor.
 
     Raises
     ------
     Unphysical
         If none keeps the requested error.
     """
-    front = table_front(setup, line)
+    cost = setup.scan.cost
+    beside = None if other is None or cost is None else played_table(other.program)
+    front = table_front(setup, line, beside)
+    processors = PROCESSORS if cost is None else (cost.processor,)
+
+    def instructions(program: Program) -> dict[str, float]:
+        played = [played_table(program), *([] if beside is None else [beside])]
+        return {name: sample_costs(played, name)[0] for name in processors}
 
     def rows() -> Iterator[TableRow]:
         for shape in front.shapes:
+            its = with_table(line, shape)
             yield TableRow(
                 shape,
-                *_errors(with_table(line, shape)),
+                *_errors(its),
                 (shape.length + _behind(shape)) * storage_bits(shape.bits),
                 shape == front.chosen,
                 shape == front.planned,
-                _run(shape, line.program.output),
+                instructions(its.program),
             )
 
     return AxisTables(
@@ -149,6 +151,7 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
         tuple(rows()),
         front.rendered,
         line.program.output.shaping.order > 0,
+        cost,
     )
 
 

@@ -4,17 +4,18 @@ from collections.abc import Iterator
 
 from tablegen.html_report.table_rows import AxisTables, TableRow
 
-_HEAD = (
-    "     mode           words  bits     packed       in C   error [LSB]         instructions       cells",
-    "                                    [bits]     [bits]     max    rms      M4    M0+   RV32    HX8K",
-)
+_TABLE = "     mode           words  bits     packed       in C   error [LSB] "
+_UNITS = "                                    [bits]     [bits]     max    rms"
+_HEAD = (f"{_TABLE}        instructions       cells", f"{_UNITS}      M4    M0+   RV32    HX8K")
+_HEAD_OF_ONE = (f"{_TABLE} instructions   cells", f"{_UNITS}{{:>15}}    HX8K")
 
 
 def tables_text(tables: AxisTables) -> Iterator[str]:
     """Yield a title, a line per table, and the keys for the scan file."""
-    shaped = "; shaped: errors are those before the rounding, instructions without it" if tables.shaped else ""
+    shaped = "; shaped: errors are those before the rounding" if tables.shaped else ""
     yield f"{tables.axis}: {tables.harmonics} harmonics, {tables.ticks} ticks{shaped}"
-    yield from _HEAD
+    cost = tables.cost
+    yield from _HEAD if cost is None else (line.format(cost.processor) for line in _HEAD_OF_ONE)
     yield from (_row(row, 4 if tables.shaped else 3) for row in tables.rows)
     if tables.rendered is not None:
         into = f"rendered on the device into {tables.rendered}: {tables.rendered.memory_bits} bits"
@@ -22,7 +23,10 @@ def tables_text(tables: AxisTables) -> Iterator[str]:
     yield "     (cells: of words and codes of 16 bits, cubic of words of 14)"
     choice = tables.chosen.shape
     yield ""
-    yield f"* the least memory within {tables.max_error_lsb:g} LSB. In the scan file, so that each build finds it:"
+    within = f"{tables.max_error_lsb:g} LSB"
+    if cost is not None and cost.max_instructions is not None:
+        within += f" and {cost.max_instructions:g} instructions on {cost.processor}"
+    yield f"* the least memory within {within}. In the scan file, so that each build finds it:"
     yield from _keys(tables.axis, {"mode": '"auto"', "max_error_lsb": f"{tables.max_error_lsb:g}"})
     yield "or as it is:"
     yield from _keys(tables.axis, {"mode": f'"{choice.mode}"', "length": f"{choice.length}", "bits": f"{choice.bits}"})
@@ -38,8 +42,13 @@ def _keys(axis: str, keys: dict[str, str]) -> Iterator[str]:
 def _row(row: TableRow, digits: int) -> str:
     shape, takes = row.shape, row.instructions
     mark = "*" if row.smallest else "=" if row.planned else " "
+    counts = (
+        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{takes['riscv32']:>7.1f}"
+        if len(takes) > 1
+        else "".join(f"{count:>15.1f}" for count in takes.values())
+    )
     return (
         f"  {mark}  {shape.mode:<13}{shape.length:>7}{shape.bits:>6}{shape.memory_bits:>11}{row.stored_bits:>11}"
         f"{row.max_error_lsb:>8.{digits}f}{row.rms_error_lsb:>7.{digits}f}"
-        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{takes['riscv32']:>7.1f}{row.cells:>8}"
+        f"{counts}{row.cells:>8}"
     )

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import Meta, Struct
 
+from tablegen.config.schema import ProcessorName
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
@@ -123,6 +124,8 @@ class ManifestAskedTable(Struct):
 
     max_error_lsb: Annotated[float, Meta(gt=0.0, le=1e6)]
     free: list[Literal["mode", "length", "bits"]]
+    processor: ProcessorName | None = None
+    max_instructions: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
 
 
 class ManifestTable(Struct):

@@ -217,9 +217,12 @@ def _resonance(line: LinePlan) -> dict[str, Any]:
 
 def _asked_table(line: LinePlan) -> dict[str, Any]:
     """Return the request of a table that the build chose; nothing for one that was written."""
-    if line.table_request is None:
+    request = line.table_request
+    if request is None:
         return {}
-    return {"asked": {"max_error_lsb": line.table_request.max_error_lsb, "free": list(line.table_request.free)}}
+    cost = request.cost
+    limit = {} if cost is None else {"processor": cost.processor, "max_instructions": cost.max_instructions}
+    return {"asked": {"max_error_lsb": request.max_error_lsb, "free": list(request.free), **limit}}
 
 
 def _shaping(shaping: Shaping) -> dict[str, Any]:

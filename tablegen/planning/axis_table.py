@@ -1,5 +1,7 @@
 """From the waveform of an axis to the integers that play it: the table, gain, offset and limits."""
 
+from typing import TYPE_CHECKING
+
 from msgspec import Struct
 
 from tablegen.base.input_errors import Problems
@@ -17,6 +19,9 @@ from tablegen.planning.table_choice import TableRequest, choose, possible_shapes
 from tablegen.planning.table_maker import TableMaker
 from tablegen.planning.timing import AxisTiming
 from tablegen.waveform.series import FourierSeries
+
+if TYPE_CHECKING:
+    from tablegen.planning.table_costs import PlayedTable
 
 
 class AxisTable(Struct, frozen=True, eq=False):
@@ -37,8 +42,12 @@ def make_table(
     series: FourierSeries,
     feasible: Feasibility,
     problems: Problems,
+    beside: "PlayedTable | None" = None,
 ) -> AxisTable | None:
-    """Quantise a waveform; None where ``problems`` grew: converter, amplifier, driver or table cannot hold it."""
+    """Quantise a waveform; None where ``problems`` grew: converter, amplifier, driver or table cannot hold it.
+
+    ``beside`` is the table of the other axis, where a limit of instructions has to count with it.
+    """
     before = len(problems.entries)
     scan: FastAxis = getattr(setup.scan, axis)
     hardware = setup.hardware(axis)
@@ -55,10 +64,10 @@ def make_table(
     )
     feasible.check_words(maker.original)
     feasible.check_range(drive, converter, *maker.original.reach, shaping)
-    request = table_request(scan.table, setup.scan.limits, shaping.order > 0)
+    request = table_request(scan.table, setup.scan.limits, shaping.order > 0, setup.scan.cost)
     shape = written_shape(scan.table, timing.period)
     if request is not None and len(problems.entries) == before:
-        shape = _chosen(setup, axis, timing, request, shape, maker, drive, converter, feasible, problems)
+        shape = _chosen(setup, axis, timing, request, shape, maker, drive, converter, feasible, problems, beside)
     stored = maker.stored(shape)
     if shape.mode == "cubic" and len(problems.entries) == before:
         feasible.check_words(stored)
@@ -81,6 +90,7 @@ def _chosen(
     converter: Converter,
     feasible: Feasibility,
     problems: Problems,
+    beside: "PlayedTable | None",
 ) -> TableShape:
     """Return the table of least memory that keeps the requested error; ``shape`` where none does."""
     from tablegen.planning.table_search import TableSearch  # here: most tables are written
@@ -90,5 +100,10 @@ def _chosen(
     with problems.at(setup.scan_file, key):
         candidates = possible_shapes(table, timing.period, maker.series.harmonics)
         shapes = feasible.fitting(candidates, drive, converter, maker)
-        return choose(TableSearch(maker), shapes, request.max_error_lsb)
+        if request.cost is None:
+            return choose(TableSearch(maker), shapes, request.max_error_lsb)
+        from tablegen.planning.cost_choice import choose_within, costs_of  # here: most scans have no limit
+
+        costs = costs_of(shapes, maker, request.cost, beside)
+        return choose_within(TableSearch(maker), costs, request.max_error_lsb, request.cost)
     return shape

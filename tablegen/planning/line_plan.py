@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 from math import hypot, inf
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from msgspec import Struct
@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from tablegen.base.input_errors import Document, Problems, Rejected
 from tablegen.compensation.line import SineLine
 from tablegen.config.load import Setup
-from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, Limits
+from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, Limits, ProcessorName
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.converter import Converter
@@ -33,11 +33,25 @@ from tablegen.planning.voltages import axis_voltages
 from tablegen.planning.waveforms import make_waveforms
 from tablegen.waveform.series import FourierSeries
 
+if TYPE_CHECKING:
+    from tablegen.planning.table_costs import PlayedTable
+
 MIXED = (
     "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the formats c and "
     "verilog, `verify`, `upload`, `readback`, `live`, `simulate`, `report`, `compare` and `correct`; leave this out "
     "for anything else"
 )
+
+
+class SampleCost(Struct, frozen=True):
+    """The instructions for a sample of an axis in C on a processor, and the limit of the scan file."""
+
+    processor: ProcessorName
+    instructions: float
+    max_instructions: float | None
+
+    def __str__(self) -> str:
+        return f"{self.instructions:g} instructions for a sample on {self.processor}"
 
 
 class LinePlan(Struct, frozen=True, eq=False):
@@ -49,7 +63,8 @@ class LinePlan(Struct, frozen=True, eq=False):
     advance k of N is that of ``series`` at k / N. ``layer`` is the part of the target that was learnt from a
     measurement, added to the model's shape. ``kept_percent`` is the scaling error for which the target has minimum
     acceleration, None where it has another band limit. ``table_request`` is the request for a
-    table that the build chose, None where the scan file gives the table. ``imaged`` is the part of the line that the
+    table that the build chose, None where the scan file gives the table. ``sample_cost`` is there if the scan
+    file names a processor. ``imaged`` is the part of the line that the
     pixels of a sine are in; the window of its ``band_limit`` is then in shares of the time of a sweep.
     """
 
@@ -69,6 +84,7 @@ class LinePlan(Struct, frozen=True, eq=False):
     layer: FourierSeries | None = None
     kept_percent: float | None = None
     table_request: TableRequest | None = None
+    sample_cost: SampleCost | None = None
     imaged: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
@@ -190,6 +206,8 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
     problems.stop_if_any()
     assert x is not None
     assert y is not None
+    if setup.scan.cost is not None:
+        x, y = _within_cost(setup, x, y, schedule, problems)
     if isinstance(x.drive.shape, SineLine) and x.imaged is not None:
         with problems.at(setup.scan_file, "timing.pixels"):
             schedule = with_pixel_table(schedule, x.drive.shape, x.imaged)
@@ -209,6 +227,41 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         default_formats(scan),
         clocks,
     )
+
+
+def _within_cost(
+    setup: Setup, x: LinePlan, y: LinePlan, schedule: Schedule, problems: Problems
+) -> tuple[LinePlan, LinePlan]:
+    """Count what a sample of both axes takes.
+
+    A chosen table that takes more than its limit beside the one of the other axis, which has wide words or no runs, is
+    chosen again.
+
+    Raises
+    ------
+    Rejected
+        If no table of this axis keeps its limit beside that one.
+    """
+    from tablegen.planning.cost_choice import played_table  # here: most scans have no limit
+    from tablegen.planning.table_costs import sample_costs
+
+    cost = setup.scan.cost
+    assert cost is not None
+    lines = {"x": x, "y": y}
+    for line in (x, y):
+        other = played_table(lines["y" if line.axis == "x" else "x"].program)
+        alone = sample_costs([played_table(line.program), other], cost.processor)[0]
+        if line.table_request is not None and cost.max_instructions is not None and alone > cost.max_instructions:
+            again = _line_plan(setup, line.axis, schedule, problems, other)
+            problems.stop_if_any()
+            assert again is not None
+            lines[line.axis] = again
+    takes = sample_costs([played_table(line.program) for line in lines.values()], cost.processor)
+    x, y = (
+        replace(line, sample_cost=SampleCost(cost.processor, its, cost.max_instructions))
+        for line, its in zip(lines.values(), takes, strict=True)
+    )
+    return x, y
 
 
 def _better_motion(setup: Setup) -> Plan:
@@ -250,8 +303,17 @@ def mixing_key(setup: Setup) -> tuple[Document, str]:
     return (setup.scanner_file, "coupling") if setup.scanner.coupling else (setup.scan_file, "drift_nm_per_s")
 
 
-def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, problems: Problems) -> LinePlan | None:
-    """Plan one axis: clock, voltages, harmonics, shape, waveform, table; None where ``problems`` grew."""
+def _line_plan(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    schedule: Schedule,
+    problems: Problems,
+    beside: "PlayedTable | None" = None,
+) -> LinePlan | None:
+    """Plan one axis: clock, voltages, harmonics, shape, waveform, table; None where ``problems`` grew.
+
+    ``beside`` is the table of the other axis, where a limit of instructions has to count with it.
+    """
     before = len(problems.entries)
     timing = AxisTiming.of(setup, axis, schedule)
     feasible = Feasibility(setup, axis, problems)
@@ -267,7 +329,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     waveforms = make_waveforms(setup, axis, timing, drive, choice, harmonics, problems)
     if waveforms is None:
         return None
-    table = make_table(setup, axis, timing, drive, waveforms.series, feasible, problems)
+    table = make_table(setup, axis, timing, drive, waveforms.series, feasible, problems, beside)
     if table is None or len(problems.entries) > before:
         return None
     return LinePlan(

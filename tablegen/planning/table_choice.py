@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from tablegen.base.figures import at_least
 from tablegen.base.input_errors import Unphysical
-from tablegen.config.schema import DEFAULT_BITS, Limits, Table
+from tablegen.config.schema import DEFAULT_BITS, Cost, Limits, Table
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import LEAST_BITS, LEAST_LENGTH, MODES, MOST_BITS, MOST_LENGTH, TableShape
 from tablegen.planning.feasibility import DEFAULT_LENGTH
@@ -24,24 +24,28 @@ DEFAULT_SHAPED_ERROR_LSB = 0.01
 class TableRequest(Struct, frozen=True):
     """The request for a table that the build chooses: the worst error, and the keys that are free.
 
-    For ``shaped`` output it is the error before the rounding.
+    For ``shaped`` output it is the error before the rounding. ``cost`` is there if instructions are limited too.
     """
 
     max_error_lsb: float
     free: tuple[str, ...]
     shaped: bool = False
+    cost: Cost | None = None
 
     def __str__(self) -> str:
-        return f"the least memory within {self.max_error_lsb:g} LSB{' before the rounding' if self.shaped else ''}"
+        return f"the least memory within {self.max_error_lsb:g} LSB{' before the rounding' if self.shaped else ''}" + (
+            "" if self.cost is None else f" and {self.cost.max_instructions:g} instructions on {self.cost.processor}"
+        )
 
 
-def table_request(table: Table, limits: Limits, shaped: bool) -> TableRequest | None:
+def table_request(table: Table, limits: Limits, shaped: bool, cost: Cost | None = None) -> TableRequest | None:
     """Return the request for a table; None where the scan file gives the whole table."""
     if not table.chosen_by_build:
         return None
     written = {"mode": table.mode not in (None, "auto"), "length": table.length, "bits": table.bits}
     free = tuple(key for key, value in written.items() if not value)
-    return TableRequest(allowed_lsb(table, limits, shaped), free, shaped)
+    limited = None if cost is None or cost.max_instructions is None else cost
+    return TableRequest(allowed_lsb(table, limits, shaped), free, shaped, limited)
 
 
 def allowed_lsb(table: Table, limits: Limits, shaped: bool) -> float:

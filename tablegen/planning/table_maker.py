@@ -86,12 +86,16 @@ class TableMaker(Struct, frozen=True, eq=False):
 
     def quantise(self, shape: TableShape) -> QuantisedTable:
         """Return the table of a shape."""
-        gain_word, scale = self.gain(shape)
+        scale = self.gain(shape)[1]
         stored = self.stored(shape).series
         fourier = encode(stored.a0, stored.a, stored.b, scale)
         words = synthesize(fourier, shape.length, shape.bits)
-        output = scaled_output(self.output, self.offset, shape.bits, gain_word)
-        return QuantisedTable(Program(self.phase, self.hold, shape.mode, shape.bits, words, output), fourier, scale)
+        program = Program(self.phase, self.hold, shape.mode, shape.bits, words, self.scaled(shape))
+        return QuantisedTable(program, fourier, scale)
+
+    def scaled(self, shape: TableShape) -> Output:
+        """Return the output stage with the gain of a shape."""
+        return scaled_output(self.output, self.offset, shape.bits, self.gain(shape)[0])
 
     def limited(self, max_step: int) -> "TableMaker":
         """Return the maker with another slew guard, in codes a tick."""

@@ -151,6 +151,8 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     problems = Problems()
     if scan.y.motion != "ramp":
         problems.add(setup.scan_file, "y.motion", "a scan at an angle moves y on every tick; leave this out")
+    if scan.cost is not None:
+        problems.add(setup.scan_file, "cost", "instructions of a scan at an angle are not measured; leave this out")
     for axis in ("x", "y"):
         if getattr(scan, axis).refinement is not None:
             problems.add(setup.scan_file, f"{axis}.refinement", "was learnt at 0 degrees, and does not serve an angle")

@@ -217,8 +217,8 @@ KEYS = [
     case(
         "wholly_different = 1",
         says=(
-            "scan.toml:1: wholly_different: unknown key; known here: amplifier, angle_deg, dac, drift_nm_per_s, "
-            "emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y"
+            "scan.toml:1: wholly_different: unknown key; known here: amplifier, angle_deg, cost, dac, "
+            "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y"
         ),
     ),
     case("+ [emti]\nheader_only = true", says="scan.toml:57: emti: unknown key; did you mean emit?"),
@@ -226,8 +226,8 @@ KEYS = [
         "- [limits]",
         '+ ["we.ird \\"key\\""]\na = 1',
         says=(
-            'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, angle_deg, dac, drift_nm_per_s, '
-            "emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y"
+            'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, angle_deg, cost, dac, '
+            "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y"
         ),
     ),
     case(

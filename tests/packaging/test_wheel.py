@@ -19,6 +19,7 @@ def shipped_files() -> set[str]:
         "tablegen/py.typed",
         "tablegen/examples/__init__.py",
         "tablegen/firmware_templates/__init__.py",
+        "tablegen/planning/table_costs.json",
     }
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
     for kind in ("[chv]", "ld"):

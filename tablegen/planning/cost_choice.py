@@ -1,0 +1,64 @@
+"""The choice of a table within the instructions of a processor, and what both axes of a plan take."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.config.schema import Cost
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.table_choice import choose
+from tablegen.planning.table_costs import PlayedTable, sample_costs
+
+if TYPE_CHECKING:
+    from tablegen.planning.table_maker import TableMaker
+    from tablegen.planning.table_search import TableSearch
+
+
+def played_table(program: Program) -> PlayedTable:
+    """Return what decides the cost of a planned axis."""
+    shape = TableShape(program.mode, len(program.words), program.bits)
+    return PlayedTable(shape, program.phase.ticks, program.hold, program.output)
+
+
+def costs_of(
+    shapes: list[TableShape], maker: "TableMaker", cost: Cost, beside: PlayedTable | None
+) -> dict[TableShape, float]:
+    """Return the instructions for a sample of an axis with each table, in order of the shapes.
+
+    ``beside`` is the table of the other axis: where its words are wide, or where it has no runs, those of this axis
+    take more. With None it takes nothing.
+    """
+    others = [] if beside is None else [beside]
+    return {shape: sample_costs([_played(maker, shape), *others], cost.processor)[0] for shape in shapes}
+
+
+def _played(maker: "TableMaker", shape: TableShape) -> PlayedTable:
+    return PlayedTable(shape, maker.phase.ticks, maker.hold, maker.scaled(shape))
+
+
+def choose_within(
+    search: "TableSearch", costs: Mapping[TableShape, float], max_error_lsb: float, cost: Cost
+) -> TableShape:
+    """Return the table of least memory that keeps an error and takes no more than ``cost.max_instructions``.
+
+    Raises
+    ------
+    Unphysical
+        If none does; the message has the cheapest table that keeps the error, or the least error of any table.
+    """
+    most = cost.max_instructions
+    if most is None:
+        return choose(search, [*costs], max_error_lsb)
+    smallest = search.smallest([shape for shape, takes in costs.items() if takes <= most], max_error_lsb)
+    if smallest is not None:
+        return smallest
+    for takes in sorted({takes for takes in costs.values() if takes > most}):
+        cheapest = search.smallest([shape for shape, its in costs.items() if its == takes], max_error_lsb)
+        if cheapest is not None:
+            raise Unphysical(
+                f"no table keeps {max_error_lsb:g} LSB within the {most:g} instructions for a sample on "
+                f"{cost.processor} of cost.max_instructions; the cheapest, {cheapest}, takes {takes:g}; allow that "
+                "many, or a larger error"
+            )
+    return choose(search, [*costs], max_error_lsb)
