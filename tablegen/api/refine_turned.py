@@ -133,8 +133,8 @@ class RefinedTurned(Result):
     def earlier(self) -> list[str]:
         """The comments of the rounds before in the scan file."""
         axis = self.round.axis
-        known = axis.motion.layer is not None and self.text
-        return rounds_of(self.text, str(self.scan), axis.axis, FRAME_KEY) if known else []
+        has_layer = axis.motion.layer is not None and self.text
+        return rounds_of(self.text, str(self.scan), axis.axis, FRAME_KEY) if has_layer else []
 
     @property
     def refused(self) -> str:
@@ -241,9 +241,9 @@ class RefinedTurned(Result):
         line, frame = t[motion.inside(t)], t[motion.imaged[(t * motion.lines).astype(np.int64)]]
         charts = []
         for key, at, label in (("line", line, "time [line periods]"), ("frame", frame, "time [frames]")):
-            values = [getattr(layer, key).value(at) for layer in (self.round.measured, self.round.left)]
-            measured, left = (100.0 * (one - np.mean(one)) / motion.longest_nm for one in values)
-            curves = (DrawnCurve("measured", "before", at, measured), DrawnCurve("predicted", "forward", at, left))
+            values = [getattr(layer, key).value(at) for layer in (self.round.error, self.round.rest)]
+            before, after = (100.0 * (one - np.mean(one)) / motion.longest_nm for one in values)
+            curves = (DrawnCurve("measured", "before", at, before), DrawnCurve("predicted", "forward", at, after))
             charts.append(Chart(f"error-{key}", f"error over the {key}", label, "error [% of the motion]", curves))
         heading = f"{self.round.setup.scan.name}: refinement of {self.round.axis.axis}"
         return PlottedCharts(heading, tuple(charts), 2)

@@ -58,7 +58,7 @@ class FrameRound:
     can hold, ``after_percent`` is left of it if the model is right, ``noise_percent`` is its standard error, and
     ``beside_percent`` what the fit leaves: noise, and errors that are neither of the line nor of the frame.
     ``line_percent`` and ``frame_percent`` are by how much its shares of both motions are too large, None where it has
-    hardly any. ``measured`` is the error as a layer, ``left`` what is predicted of it. ``worse`` is why the round must
+    hardly any. ``error`` is it as a layer, ``rest`` what is predicted of it. ``worse`` is why the round must
     not be used, if so.
     """
 
@@ -73,8 +73,8 @@ class FrameRound:
     beside_percent: float
     line_percent: float | None
     frame_percent: float | None
-    measured: FrameLayer
-    left: FrameLayer
+    error: FrameLayer
+    rest: FrameLayer
     worse: str
     remarks: tuple[Remark, ...]
 
@@ -106,38 +106,38 @@ def refine_frame(setup: Setup, axis: str, time_s: Floats, displacement_nm: Float
     """
     check_spans(time_s, displacement_nm, None)
     plan = make_turned_plan(setup)
-    turned = plan.x if axis == "x" else plan.y
-    motion = turned.motion
+    own = plan.x if axis == "x" else plan.y
+    motion = own.motion
     harmonics = min(options.harmonics or _MOST_LINE_HARMONICS, motion.harmonics)
     period_s = options.period_s or motion.lines / motion.line_rate_hz
     turns = (time_s - options.delay_s) / period_s
     settle = options.settle_periods if options.settle_periods is not None else int(float(np.ptp(turns)) >= 3.0)
-    kept = turns >= settle
-    turns, displacement_nm = turns[kept], displacement_nm[kept]
-    bins, drifts = _binned(turned, turns, displacement_nm, harmonics)
+    settled = turns >= settle
+    turns, displacement_nm = turns[settled], displacement_nm[settled]
+    bins, drifts = _binned(own, turns, displacement_nm, harmonics)
     longest, mean = motion.longest_nm, float(np.average(bins.error, weights=bins.counts))
-    _refuse_foreign(turned, bins, _rms(bins.error - mean, bins.counts) / longest)
-    fit = _fitted(turned, bins, harmonics)
+    _refuse_foreign(own, bins, _rms(bins.error - mean, bins.counts) / longest)
+    fit = _fit_of(own, bins, harmonics)
     noise, before = fit.noise_nm, _rms(fit.whole_nm, bins.counts) / longest
-    layer = fit.learnt if fit.stands_out else None
-    change = fit.learnt.times(options.gain)
+    layer = fit.lasting if fit.stands_out else None
+    change = fit.lasting.times(options.gain)
     worse = _grew(setup, axis, 100.0 * before, 100.0 * noise / longest)
-    refinement, changed = _with_layer(setup, plan, turned, None if layer is None else change, before)
+    refinement, changed = _with_layer(setup, plan, own, None if layer is None else change, before)
     return FrameRound(
-        axis=turned,
+        axis=own,
         setup=changed,
         refinement=refinement,
         frames=float(np.ptp(turns)),
         samples=len(turns),
         before_percent=100.0 * before,
-        after_percent=100.0 * _rms(fit.whole_nm - options.gain * fit.learnt_nm, bins.counts) / longest,
+        after_percent=100.0 * _rms(fit.whole_nm - options.gain * fit.lasting_nm, bins.counts) / longest,
         noise_percent=100.0 * noise / longest,
         beside_percent=100.0 * _rms(bins.error - mean - fit.whole_nm, bins.counts) / longest,
-        measured=fit.whole,
-        left=fit.whole.plus(change.times(-1.0)),
+        error=fit.whole,
+        rest=fit.whole.plus(change.times(-1.0)),
         worse=worse,
         remarks=_remarks(turns, layer is not None, drifts),
-        **dict(zip(("line_percent", "frame_percent"), _shares(turned, bins), strict=True)),
+        **dict(zip(("line_percent", "frame_percent"), _shares(own, bins), strict=True)),
     )
 
 
@@ -147,42 +147,42 @@ def _binned(axis: TurnedAxis, turns: Floats, displacement_nm: Floats, harmonics:
     phase = (turns % 1.0) * motion.lines
     line = np.minimum(phase.astype(np.int64), motion.lines - 1)
     t = phase - line
-    imaged = motion.imaged[line] & motion.inside(t)
-    turns, line, t = turns[imaged], line[imaged], t[imaged]
+    inside = motion.imaged[line] & motion.inside(t)
+    turns, line, t = turns[inside], line[inside], t[inside]
     lines = int(np.sum(motion.imaged))
-    seen = np.bincount(line, minlength=motion.lines)[motion.imaged]
+    counts = np.bincount(line, minlength=motion.lines)[motion.imaged]
     least = _LEAST_SAMPLES * harmonics
-    if float(np.mean(seen >= least)) < _LEAST_COVERED:
+    if float(np.mean(counts >= least)) < _LEAST_COVERED:
         raise Unphysical(
-            f"the trace has {int(np.sum(seen >= least))} of the {lines} imaged lines of a frame, with {least} samples "
-            f"or more inside the imaging window: record one whole frame or more, faster, from a frame start"
+            f"the trace has {int(np.sum(counts >= least))} of the {lines} imaged lines of a frame, with {least} "
+            f"samples or more inside the imaging window: record one whole frame or more, faster, from a frame start"
         )
-    wanted = motion.fast_nm * (motion.fast(t) - 0.5) + motion.slow_nm * (motion.slow((line + t) / motion.lines) - 0.5)
-    error = displacement_nm[imaged] - wanted
+    target = motion.fast_nm * (motion.fast(t) - 0.5) + motion.slow_nm * (motion.slow((line + t) / motion.lines) - 0.5)
+    error = displacement_nm[inside] - target
     count = _BINS_A_HARMONIC * motion.harmonics
     at = line * count + np.minimum((t * count).astype(np.int64), count - 1)
-    counts = np.bincount(at, minlength=motion.lines * count).astype(np.float64)
-    used = counts > 0.0
+    in_bins = np.bincount(at, minlength=motion.lines * count).astype(np.float64)
+    filled = in_bins > 0.0
 
     def means(values: Floats) -> Floats:
-        return np.asarray(np.bincount(at, values, len(counts))[used] / counts[used])
+        return np.asarray(np.bincount(at, values, len(in_bins))[filled] / in_bins[filled])
 
     drifts = float(np.ptp(turns)) >= 1.5
     if drifts:  # what differs between frames is of the sensor
-        number = np.cumsum(used) - 1
+        number = np.cumsum(filled) - 1
         apart, later = error - means(error)[number[at]], turns - means(turns)[number[at]]
         error = error - float(apart @ later) / max(float(later @ later), 1e-300) * (turns - float(np.mean(turns)))
-    return _Bins(means(error), np.flatnonzero(used) // count, means(t), counts[used]), drifts
+    return _Bins(means(error), np.flatnonzero(filled) // count, means(t), in_bins[filled]), drifts
 
 
 def _refuse_foreign(axis: TurnedAxis, bins: _Bins, before: float) -> None:
     """Refuse a trace that is far from the scan, with what it looks like."""
     if before < _FOREIGN:
         return
-    wanted = _wanted(axis, bins)
-    wanted = wanted - float(np.average(wanted, weights=bins.counts))
-    measured = wanted + bins.error
-    ratio = float(np.sum(bins.counts * measured * wanted) / np.sum(bins.counts * wanted * wanted))
+    target = _target(axis, bins)
+    target = target - float(np.average(target, weights=bins.counts))
+    position = target + bins.error
+    ratio = float(np.sum(bins.counts * position * target) / np.sum(bins.counts * target * target))
     looks = "it starts elsewhere in the frame, or another scan was running"
     if ratio < -0.5:
         looks = "the sensor counts downwards, or the frame began elsewhere"
@@ -193,7 +193,7 @@ def _refuse_foreign(axis: TurnedAxis, bins: _Bins, before: float) -> None:
     )
 
 
-def _wanted(axis: TurnedAxis, bins: _Bins) -> Floats:
+def _target(axis: TurnedAxis, bins: _Bins) -> Floats:
     motion = axis.motion
     across = motion.slow((bins.lines + bins.t) / motion.lines) - 0.5
     return np.asarray(motion.fast_nm * (motion.fast(bins.t) - 0.5) + motion.slow_nm * across)
@@ -201,21 +201,21 @@ def _wanted(axis: TurnedAxis, bins: _Bins) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """An error as a layer: ``whole``, and ``learnt`` without what may be noise, which is nothing unless it stands out.
+    """An error as a layer: ``whole``, and ``lasting`` without what may be noise, which is nothing unless it stands out.
 
-    ``whole_nm`` and ``learnt_nm`` are both at the bins, shape (bins,) each; ``noise_nm`` is the standard error of the
+    ``whole_nm`` and ``lasting_nm`` are both at the bins, shape (bins,) each; ``noise_nm`` is the standard error of the
     first, rms.
     """
 
     whole: FrameLayer
-    learnt: FrameLayer
+    lasting: FrameLayer
     stands_out: bool
     whole_nm: Floats
-    learnt_nm: Floats
+    lasting_nm: Floats
     noise_nm: float
 
 
-def _fitted(axis: TurnedAxis, bins: _Bins, harmonics: int) -> _Fit:
+def _fit_of(axis: TurnedAxis, bins: _Bins, harmonics: int) -> _Fit:
     """Fit the error by harmonics of line and frame.
 
     The fit is computed in modes that are independent of each other in the data, so that the noise of each is known: a
@@ -232,22 +232,22 @@ def _fitted(axis: TurnedAxis, bins: _Bins, harmonics: int) -> _Fit:
     mean = design.T @ weight
     centred = bins.error - float(bins.error @ weight)
     u, singular, v = np.linalg.svd(root * (design - mean) * scale, full_matrices=False)
-    seen = u.T @ (root[:, 0] * centred)
-    filtered = singular / (singular * singular + _SMOOTHNESS)
+    modes = u.T @ (root[:, 0] * centred)
+    filter_ = singular / (singular * singular + _SMOOTHNESS)
 
     def result(shares: Floats) -> tuple[FrameLayer, Floats]:
-        solution = scale * (v.T @ (filtered * shares * seen))
+        solution = scale * (v.T @ (filter_ * shares * modes))
         a, b, frame_a, frame_b = np.split(solution, np.cumsum([harmonics, harmonics, frame_harmonics]))
         layer = FrameLayer(FourierSeries(0.0, a, b), FourierSeries(0.0, frame_a, frame_b))
         return layer, (design - mean) @ solution
 
-    whole, whole_nm = result(np.ones(len(seen)))
+    whole, whole_nm = result(np.ones(len(modes)))
     left = centred - whole_nm
     variance = float(left * weight @ left) * correlation_length(left) / len(left)
-    passes = seen * seen > _COST * variance
-    learnt, learnt_nm = result(passes.astype(np.float64))
-    noise = float(np.sqrt(variance * float(np.sum((singular * filtered) ** 2))))
-    return _Fit(whole, learnt, bool(passes.any()), whole_nm, learnt_nm, noise)
+    passes = modes * modes > _COST * variance
+    lasting, lasting_nm = result(passes.astype(np.float64))
+    noise = float(np.sqrt(variance * float(np.sum((singular * filter_) ** 2))))
+    return _Fit(whole, lasting, bool(passes.any()), whole_nm, lasting_nm, noise)
 
 
 def _waves(t: Floats, harmonics: int) -> Floats:
@@ -318,9 +318,9 @@ def _with_layer(
     return refinement, changed
 
 
-def _remarks(turns: Floats, learnt: bool, drifts: bool) -> tuple[Remark, ...]:
+def _remarks(turns: Floats, has_layer: bool, drifts: bool) -> tuple[Remark, ...]:
     remarks = []
-    if not learnt:
+    if not has_layer:
         remarks.append(Remark("the error is within the noise of the sensor", code="noise-limit"))
     if not drifts:
         why = "drift of the sensor cannot be told from the motion of a single frame: record two or more"
