@@ -26,6 +26,7 @@ from tablegen.api.read_image import (
 from tablegen.api.lattice import lattice as lattice
 from tablegen.api.drift import drift as drift
 from tablegen.api.refine import refine as refine
+from tablegen.api.refine_turned import refine_turned as refine_turned
 from tablegen.api.correct import correct as correct
 from tablegen.api.simulate import simulate as simulate
 from tablegen.api.simulate_turned import simulate_turned as simulate_turned
@@ -66,6 +67,7 @@ from tablegen.api.read_image import (
 from tablegen.api.lattice import ImageLattice as ImageLattice
 from tablegen.api.drift import ImageDrift as ImageDrift
 from tablegen.api.refine import RefinedScan as RefinedScan
+from tablegen.api.refine_turned import RefinedTurned as RefinedTurned
 from tablegen.api.correct import Corrected as Corrected
 from tablegen.api.simulate import SimulatedScan as SimulatedScan
 from tablegen.api.simulate_turned import SimulatedTurned as SimulatedTurned

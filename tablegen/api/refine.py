@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import msgspec
 
@@ -29,7 +29,7 @@ from tablegen.refinement.lattice_line import ImageOptions
 from tablegen.refinement.round import Options, Round, with_refinement
 from tablegen.refinement.round import refine as learn_from
 from tablegen.refinement.round_text import refine_record, refine_text, round_answer
-from tablegen.refinement.scan_file import rounds_of, with_layer
+from tablegen.refinement.scan_file import KEY, rounds_of, with_layer
 
 
 @one_blas_thread
@@ -95,6 +95,9 @@ def refine(
         raise TypeError("give trace, of a sensor, or images; one of them")
     check_names(how, (*_LEARNING, *(_OF_IMAGES if images else _OF_TRACES)))
     setup = scan if isinstance(scan, Setup) else load(scan)
+    if setup.mixes_motions:
+        why = "a scan at an angle, on coupled axes or with drift is refined by `refine_turned`"
+        raise Rejected([setup.scan_file.problem("name", why)])
     path = None if isinstance(scan, Setup) else Path(scan)
     text = "" if path is None else read_text(path, CONFIGURATION)
     options = Options(**{name: how[name] for name in (*_LEARNING, *_OF_TRACES) if name in how})
@@ -168,6 +171,7 @@ class RefinedScan(Result):
     sources: tuple[Source, ...]
     scan: Path | None = None
     text: str = ""
+    key: ClassVar[str] = KEY
 
     @property
     def setup(self) -> Setup:

@@ -88,7 +88,7 @@ def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
 
 
 def played_position(axis: TurnedAxis, codes: Ints, ticks: Ints, line_ticks: int) -> Floats:
-    """Return the position in nm in the middle of ticks of a frame that repeats.
+    """Return the position in nm in the middle of ticks of a frame that repeats: by the operator, and what was learnt.
 
     Parameters
     ----------
@@ -104,7 +104,9 @@ def played_position(axis: TurnedAxis, codes: Ints, ticks: Ints, line_ticks: int)
     time_s = ((np.arange(lines)[:, None] * line_ticks + ticks) * tick_s).ravel()
     u = axis.share(codes).ravel()
     closed = np.append(time_s, lines * line_ticks * tick_s)
-    return axis.piezo.position(closed, np.append(u, u[0]))[:-1].reshape(codes.shape)
+    position = axis.piezo.position(closed, np.append(u, u[0]))[:-1].reshape(codes.shape)
+    layer = axis.motion.layer
+    return position if layer is None else np.asarray(position + layer.at(lines, (ticks + 0.5) / line_ticks))
 
 
 class ImagedFrame(Struct, frozen=True, eq=False):

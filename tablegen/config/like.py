@@ -32,7 +32,7 @@ _INSTEAD: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "response": ("frequency_hz", "quality", "delay_s"),
     },
 }
-_NEVER = ("refinement", "motion")  # learnt on x itself; of its line
+_NEVER = ("refinement", "frame_refinement", "motion")  # learnt on x itself; of its line
 
 
 def inherited(values: Mapping[str, Any], document: Document) -> tuple[dict[str, Any], Document]:

@@ -14,6 +14,7 @@ from tablegen.base.quantities import FileName, Hertz, Micrometres, Nanometres, N
 MAXIMUM_NAME = 48
 Identifier = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_NAME, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
 Percent = Annotated[float, Meta(gt=0.0, le=1000.0)]
+LayerNm = Annotated[list[Annotated[float, Meta(ge=-1e6, le=1e6)]], Meta(min_length=1, max_length=512)]
 Harmonics = Annotated[list[Annotated[float, Meta(ge=-0.5, le=0.5)]], Meta(min_length=1, max_length=512)]
 DEFAULT_BITS = 16  # of a table word
 Window = tuple[Annotated[float, Meta(ge=0.0, le=1.0)], Annotated[float, Meta(ge=0.0, le=1.0)]]
@@ -170,6 +171,35 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
 
 
+class FrameRefinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What `tablegen refine` learnt of an axis at an angle, and the scan to which it belongs."""
+
+    line_a: Annotated[LayerNm, Meta(description="cosine terms of harmonics 1, 2, ... of the line, in nm")]
+    line_b: Annotated[LayerNm, Meta(description="sine terms of the same harmonics")]
+    frame_a: Annotated[LayerNm, Meta(description="cosine terms of harmonics 1, 2, ... of the frame, in nm")]
+    frame_b: Annotated[LayerNm, Meta(description="sine terms of the same harmonics")]
+    line_nm: Annotated[float, Meta(ge=-1e9, le=1e9, description="share of the line's motion at which it was learnt")]
+    frame_nm: Annotated[float, Meta(ge=-1e9, le=1e9, description="share of the frame's motion at which it was learnt")]
+    v_offset: Annotated[Volts, Meta(description="offset voltage at which it was learnt")]
+    rate_hz: Annotated[Hertz, Meta(description="line rate at which it was learnt")]
+    lines: Annotated[int, Meta(ge=1, description="line periods of the frame at which it was learnt")]
+    turn: Annotated[Normalised, Meta(description="turning point of the line at which it was learnt")]
+    window: Annotated[Window, Meta(description="imaging window of the line that was measured")]
+    model: (
+        Annotated[
+            str,
+            Meta(
+                pattern="^[0-9a-f]{16}$",
+                description="digest of the scanner's hysteresis and resonance; not compared if missing",
+            ),
+        ]
+        | None
+    ) = None
+    before_percent: (
+        Annotated[float, Meta(ge=0.0, le=100.0, description="rms error of the trace from which it was learnt")] | None
+    ) = None
+
+
 class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The axis that moves once a line."""
 
@@ -192,6 +222,7 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     band_limit: BandLimit = BandLimit()
     table: Table = Table()
     refinement: Refinement | None = None
+    frame_refinement: FrameRefinement | None = None
 
 
 class LineAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -189,6 +189,11 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
     problems = Problems()
     if setup.mixes_motions:
         problems.add(*mixing_key(setup), MIXED)
+    for axis in ("x", "y"):
+        if getattr(setup.scan, axis).frame_refinement is not None:
+            problems.add(
+                setup.scan_file, f"{axis}.frame_refinement", "was learnt at an angle, and does not serve 0 degrees"
+            )
     if setup.scan.x.motion != "line":
         if not sines:
             problems.add(setup.scan_file, "x.motion", SINE)

@@ -1,5 +1,6 @@
 """Plan a scan at an angle: each axis follows a share of the line's motion and one of the frame's."""
 
+import dataclasses
 from collections.abc import Callable
 from math import floor
 from typing import Literal
@@ -26,6 +27,7 @@ from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.fixedpoint.frame_words import FrameParts, quantise_frame
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
+from tablegen.planning.frame_refinement import learnt_frame_layer
 from tablegen.planning.known_axis import KnownAxis
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan, mixing_key
 from tablegen.waveform.series import FourierSeries
@@ -176,6 +178,8 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     for line in straight.lines:
         progress(f"learning a frame of {schedule.lines} lines on the operator of {line.axis}")
         motion = _motion(setup, straight, line, *shares[line.axis])
+        motion = dataclasses.replace(motion, layer=learnt_frame_layer(setup, line, motion, problems))
+        problems.stop_if_any()
         axes[line.axis] = _axis(setup, straight, line, known[line.axis], motion, problems)
     problems.stop_if_any()
     x, y = axes["x"], axes["y"]
@@ -186,7 +190,14 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
 
 def _at_0_degrees(setup: Setup) -> Setup:
     """Return the setup without an angle, coupling and drift, and without a clock, which a slow part takes others of."""
-    scan = replace(setup.scan, angle_deg=0.0, drift_nm_per_s=(0.0, 0.0), emit=replace(setup.scan.emit, clock_hz=None))
+    scan = replace(
+        setup.scan,
+        angle_deg=0.0,
+        drift_nm_per_s=(0.0, 0.0),
+        emit=replace(setup.scan.emit, clock_hz=None),
+        x=replace(setup.scan.x, frame_refinement=None),
+        y=replace(setup.scan.y, frame_refinement=None),
+    )
     return replace(setup, scan=scan, scanner=replace(setup.scanner, coupling=Coupling()))
 
 

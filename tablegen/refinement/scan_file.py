@@ -11,14 +11,14 @@ from tomlkit.items import Array, InlineTable, Table
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.toml import parse_toml
 
-KEY = "refinement"
-COEFFICIENTS = ("a", "b", "previous_a", "previous_b")
+KEY, FRAME_KEY = "refinement", "frame_refinement"
+COEFFICIENTS = ("a", "b", "previous_a", "previous_b", "line_a", "line_b", "frame_a", "frame_b")
 _COEFFICIENTS_PER_ROW = 6
 _ROUND_MARK = re.compile(r"# refine (\d+): ")
 
 
-def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], provenance: str) -> str:
-    """Put ``[AXIS.refinement]`` into the text of a scan file; messages call the file ``name``.
+def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], provenance: str, key: str = KEY) -> str:
+    """Put ``[AXIS.refinement]``, or another table of an axis, into the text of a scan file, whose name is ``name``.
 
     ``provenance`` becomes a line of the comment above the table, below those of earlier rounds, numbered.
 
@@ -31,10 +31,10 @@ def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], prove
     windows = "\r\n" in text
     text = text.replace("\r\n", "\n")
     expected = tomllib.loads(text)
-    expected[axis][KEY] = dict(values)
+    expected[axis][key] = dict(values)
     try:
-        changed = _put(text, name, axis, values)
-        at = parse_toml(changed, name)[1].line_of(f"{axis}.{KEY}") - 1
+        changed = _put(text, name, axis, key, values)
+        at = parse_toml(changed, name)[1].line_of(f"{axis}.{key}") - 1
         changed = _commented(changed, at, provenance)
         preserved = tomllib.loads(changed) == expected
     except (Rejected, ValueError):  # the result is no TOML
@@ -45,33 +45,33 @@ def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], prove
     return changed.replace("\n", "\r\n") if windows else changed
 
 
-def rounds_of(text: str, name: str, axis: str) -> list[str]:
+def rounds_of(text: str, name: str, axis: str, key: str = KEY) -> list[str]:
     """Return the provenance of each round of ``[AXIS.refinement]``, which the text has, oldest first."""
     rows = text.split("\n")
-    at = first = parse_toml(text, name)[1].line_of(f"{axis}.{KEY}") - 1
+    at = first = parse_toml(text, name)[1].line_of(f"{axis}.{key}") - 1
     while first > 0 and _ROUND_MARK.match(rows[first - 1]):
         first -= 1
     return [_ROUND_MARK.sub("", row).rstrip("\r") for row in rows[first:at]]
 
 
-def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
+def _put(text: str, name: str, axis: str, key: str, values: Mapping[str, Any]) -> str:
     """Put the values of the table into the text, which may have the table already."""
     document = tomlkit.parse(text)
     parent: Any = document[axis]
-    if KEY in parent:
-        _update(parent[KEY], values)
+    if key in parent:
+        _update(parent[key], values)
     elif isinstance(parent, InlineTable):
-        parent[KEY] = dict(values)
+        parent[key] = dict(values)
     else:  # a new table by hand, since tomlkit would put it between the next table and its comment
         rows = text.split("\n")
         places = parse_toml(text, name)[1].lines or {}
-        lines = [line for key, line in places.items() if key.split(".")[0] == axis]
+        lines = [line for place, line in places.items() if place.split(".")[0] == axis]
         end = next((i for i in range(max(lines), len(rows)) if rows[i].startswith("[")), len(rows))
         while end > max(lines) and (not rows[end - 1] or rows[end - 1].startswith("#")):
             end -= 1
         table = tomlkit.table()
         _update(table, values)
-        header = f"[{axis}.{KEY}]\n{table.as_string()}".split("\n")
+        header = f"[{axis}.{key}]\n{table.as_string()}".split("\n")
         return "\n".join([*rows[:end], "", *header[:-1], *(rows[end:] if any(rows[end:]) else [""])])
     return tomlkit.dumps(document)
 

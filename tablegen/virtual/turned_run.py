@@ -10,6 +10,7 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.certificate.turned_errors import ImagedFrame, errors_of, frame_codes
 from tablegen.compensation.identification import SettledAxis
 from tablegen.compensation.models import IDENTIFIED
+from tablegen.compensation.operator.frame_layer import FrameLayer
 from tablegen.compensation.operator.in_time import OperatorInTime
 from tablegen.compensation.operator.piezo import departing
 from tablegen.config.load import Setup
@@ -87,16 +88,22 @@ class FrameRow:
 
 @dataclass(frozen=True, eq=False)
 class OwnFrameAxis:
-    """The operator of an axis as a piezo: linear between the middles of ticks."""
+    """The operator of an axis as a piezo, linear between the middles of ticks, and what was learnt of its frame."""
 
     piezo: OperatorInTime
     driver: Driver
+    layer: FrameLayer | None = None
+    lines: int = 1
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Return the displacement in nm in the middle of each tick of a drive that repeats, shape (ticks,)."""
         time_s = np.asarray(np.arange(len(volts) + 1) * tick_s, dtype=np.float64)
         u: Floats = self.driver.share(np.asarray(volts, dtype=np.float64))
-        return self.piezo.position(time_s, np.append(u, u[0]))[:-1]
+        position = self.piezo.position(time_s, np.append(u, u[0]))[:-1]
+        if self.layer is None:
+            return position
+        count = len(volts) // self.lines
+        return np.asarray(position + self.layer.at(self.lines, (np.arange(count) + 0.5) / count).ravel())
 
 
 def emitted_volts(plan: TurnedPlan, most_samples: int = MAX_TICKS) -> FrameVolts:
@@ -213,4 +220,4 @@ def own_samples(plan: TurnedPlan) -> int:
 
 def _departing(axis: TurnedAxis, seed: tuple[int, ...]) -> OwnFrameAxis:
     piezo = replace(axis.piezo, operator=departing(axis.piezo.operator, seed))
-    return OwnFrameAxis(piezo, axis.known.driver)
+    return OwnFrameAxis(piezo, axis.known.driver, axis.motion.layer, axis.motion.lines)

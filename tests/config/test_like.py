@@ -91,8 +91,8 @@ def checked(folder: Path, scan: str = SCAN, scanner: str = SCANNER) -> list[str]
 def test_a_fault_of_x_is_told_once(tmp_path: Path) -> None:
     scan = with_like(edited(SCAN, "x.turn = 1.5", "x.table.bits = 99", "x.hue = 1"), "[y.band_limit]\nharmonics = 0\n")
     assert checked(tmp_path, scan) == [
-        "scan.toml:23: x.hue: unknown key; known here: band_limit, motion, offset_nm, offset_um, offset_v, park_v, "
-        "refinement, size_nm, size_of, size_um, size_v, table, turn",
+        "scan.toml:23: x.hue: unknown key; known here: band_limit, frame_refinement, motion, offset_nm, offset_um, "
+        "offset_v, park_v, refinement, size_nm, size_of, size_um, size_v, table, turn",
         "scan.toml:26: x.turn: 1.5 is not below 1",
         "scan.toml:37: x.table.bits: 99 is above 24",
         "scan.toml:42: y.band_limit.harmonics: 0 is below 1",

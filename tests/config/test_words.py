@@ -231,8 +231,8 @@ MIXED = {
     ],
     ("image_nm = 0.1", "y.size_of = 'window'", "x.tilt = 1", "timing.pixels = 0", "- x.size_nm", "- y.size_nm"): [
         "scan.toml:19: timing.pixels: 0 is below 1",
-        "scan.toml:24: x.tilt: unknown key; known here: band_limit, motion, offset_nm, offset_um, offset_v, park_v, "
-        "refinement, size_nm, size_of, size_um, size_v, table, turn",
+        "scan.toml:24: x.tilt: unknown key; known here: band_limit, frame_refinement, motion, offset_nm, offset_um, "
+        "offset_v, park_v, refinement, size_nm, size_of, size_um, size_v, table, turn",
         "scan.toml:40: y.size_of: image_nm on line 1 sets the size of both axes already, as that of the imaging "
         "windows; leave out one of the two",
     ],

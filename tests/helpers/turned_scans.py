@@ -16,6 +16,7 @@ from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.certificate.turned_errors import frame_codes, frame_errors
 from tablegen.compensation.operator.file import operator_text
 from tablegen.config.load import Setup, load
+from tablegen.numerics.arrays import Ints
 from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.virtual.preisach import Preisach
 
@@ -82,13 +83,33 @@ def turned_setup(folder: Path, angle_deg: float, *edits: str, piezo: str = SIMPL
 
 def on_the_piezo(plan: TurnedPlan, piezo: str) -> dict[str, float]:
     """Errors of the emitted integers on the piezo itself: stepped over the frame, with its creep and dynamics."""
-    stride = max(plan.schedule.ticks // SAMPLES, 1)
-    ticks = np.arange(0, plan.schedule.ticks, stride)
-    positions = [
-        moved_by(core, axis.share(frame_codes(axis, ticks)), plan.x.motion.line_rate_hz)
-        for core, axis in zip(PIEZOS[piezo], plan.axes, strict=True)
-    ]
-    return frame_errors(plan, *positions, (ticks + 0.5) / plan.schedule.ticks)
+    return frame_errors(plan, *(moved(plan, piezo, axis) for axis in "xy"), _phases(plan))
+
+
+def moved(plan: TurnedPlan, piezo: str, axis: str) -> Floats:
+    """Position in nm of an axis over a frame, shape (lines, samples)."""
+    number = "xy".index(axis)
+    u = plan.axes[number].share(frame_codes(plan.axes[number], _ticks(plan)))
+    return moved_by(PIEZOS[piezo][number], u, plan.x.motion.line_rate_hz)
+
+
+def sensor_trace(
+    plan: TurnedPlan, piezo: str, axis: str, frames: int = 4, noise_nm: float = 0.3, drift_nm: float = 2.0
+) -> tuple[Floats, Floats]:
+    """Times and displacements of frames, read by a sensor with noise, a drift a frame, and an origin of its own."""
+    every = (np.arange(plan.schedule.lines)[:, None] + _phases(plan)).ravel() / plan.x.motion.line_rate_hz
+    period_s = plan.schedule.lines / plan.x.motion.line_rate_hz
+    time_s = np.concatenate([every + k * period_s for k in range(frames)])
+    noise = np.random.default_rng("xy".index(axis)).normal(0.0, noise_nm, len(time_s))
+    return time_s, np.tile(moved(plan, piezo, axis).ravel(), frames) + noise + drift_nm * time_s / period_s + 500.0
+
+
+def _ticks(plan: TurnedPlan) -> Ints:
+    return np.arange(0, plan.schedule.ticks, max(plan.schedule.ticks // SAMPLES, 1))
+
+
+def _phases(plan: TurnedPlan) -> Floats:
+    return np.asarray((_ticks(plan) + 0.5) / plan.schedule.ticks)
 
 
 def moved_by(core: Core, u: Floats, line_rate_hz: float) -> Floats:

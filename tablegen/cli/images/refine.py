@@ -15,7 +15,10 @@ from tablegen.cli.shared.plot import check_plot, plot_option, show_plot
 from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from tablegen.api.refine import RefinedScan
+    from tablegen.api.refine_turned import RefinedTurned
     from tablegen.calibration.tables.recorder import Recorder
 
 
@@ -121,6 +124,8 @@ def refine(
        Or take trace and retrace images of a grating or a lattice: --images.
     2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
     3. Build, upload, and record again. Two or three rounds are usually enough.
+
+    Of a scan at an angle record whole frames from a frame start on, with --triggered.
     """
     of_traces = [
         name
@@ -142,16 +147,22 @@ def refine(
     if write:
         check_place(scan.resolve() if scan.is_symlink() else scan)
     files = images.names if trace is None else str(trace)
+    turned = _is_turned(scan)
+    if turned:
+        _check_turned(files, trace is None, {"--report": report, "--drift": drift}, triggered)
     with Progress() as progress:
         progress.now("reading and learning")
         if trace is None:
             refuse_recorder(recorder)
             refined = _learn(scan, files, axis=axis, gain=gain, harmonics=harmonics, **images.keywords())
         else:
-            times = {"period_s": period_s, "delay_s": delay_s, "settle_periods": settle, "drift_order": drift}
-            volts = {"drive_gain": recorder.drive_gain, "drive_offset": recorder.drive_offset}
-            how = {"trace": trace, "gain": gain, "harmonics": harmonics, "columns": recorder.columns, **times, **volts}
-            refined = _learn(scan, files, axis=axis, triggered=triggered, **how)
+            how: dict[str, Any] = {"trace": trace, "gain": gain, "harmonics": harmonics, "columns": recorder.columns}
+            how.update(period_s=period_s, delay_s=delay_s, settle_periods=settle)
+            if turned:
+                refined = _learn_turned(scan, files, axis=axis, **how)
+            else:
+                how.update(drift_order=drift, drive_gain=recorder.drive_gain, drive_offset=recorder.drive_offset)
+                refined = _learn(scan, files, axis=axis, triggered=triggered, **how)
     if as_json:
         click.echo(refined.to_json())
     else:
@@ -161,8 +172,7 @@ def refine(
         for finding in refined.findings():
             click.echo(finding.line)
     refused = refined.refused
-    if report is not None:
-        written(report.parent, {report.name: refined.page()})
+    _write_report(report, refined)
     if refused and not force:
         fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
     if refined.stopped and not force:
@@ -172,9 +182,55 @@ def refine(
     return ExitStatus.OK
 
 
-def _learn(scan: Path, files: str, **how: Any) -> "RefinedScan":
+def _write_report(report: Path | None, refined: "RefinedScan | RefinedTurned") -> None:
+    from tablegen.api.refine import RefinedScan
+
+    if report is not None and isinstance(refined, RefinedScan):
+        written(report.parent, {report.name: refined.page()})
+
+
+def _is_turned(scan: Path) -> bool:
+    """Return True if the scan is at an angle, on coupled axes or with drift; a wrong file ends the command."""
+    from tablegen.base.input_errors import Rejected
+    from tablegen.config.load import load
+
+    try:
+        return load(scan).mixes_motions
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    except OSError as error:
+        fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+
+
+def _check_turned(files: str, of_images: bool, options: "Mapping[str, object]", triggered: bool) -> None:
+    """End the command if a scan at an angle cannot be refined in this way."""
+    if of_images:
+        why = "images do not show what one axis does at an angle; give a trace of the axis, with --triggered"
+        fail([f"{files}: {why}"], ExitStatus.WRONG_INPUT)
+    for name, value in options.items():
+        if value is not None:
+            raise click.UsageError(f"{name} is for scans at 0 degrees, without coupling and drift")
+    if not triggered:
+        raise click.UsageError("a scan at an angle is refined from a trace whose time 0 is a frame start: --triggered")
+
+
+def _learn(scan: Path, files: str, **how: Any) -> "RefinedScan | RefinedTurned":
     """Refine the scan; wrong input ends the command."""
     from tablegen.api.refine import refine as learn
+
+    return _learnt(learn, scan, files, how)
+
+
+def _learn_turned(scan: Path, files: str, **how: Any) -> "RefinedScan | RefinedTurned":
+    """Refine a scan at an angle; wrong input ends the command."""
+    from tablegen.api.refine_turned import refine_turned
+
+    return _learnt(refine_turned, scan, files, how)
+
+
+def _learnt(
+    learn: "Callable[..., RefinedScan | RefinedTurned]", scan: Path, files: str, how: dict[str, Any]
+) -> "RefinedScan | RefinedTurned":
     from tablegen.base.input_errors import Rejected, Unphysical
 
     try:
@@ -187,7 +243,7 @@ def _learn(scan: Path, files: str, **how: Any) -> "RefinedScan":
         fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
 
 
-def _write(scan: Path, axis: str, refined: "RefinedScan", force: bool, quiet: bool) -> None:
+def _write(scan: Path, axis: str, refined: "RefinedScan | RefinedTurned", force: bool, quiet: bool) -> None:
     from tablegen.base.input_errors import Rejected
 
     try:
@@ -202,4 +258,4 @@ def _write(scan: Path, axis: str, refined: "RefinedScan", force: bool, quiet: bo
     if refined.stopped and not force:
         click.echo(f"{scan}: {axis}.refinement written, with the best layer; build and upload", err=quiet)
     else:
-        click.echo(f"{scan}: {axis}.refinement written; build, upload and record again", err=quiet)
+        click.echo(f"{scan}: {axis}.{refined.key} written; build, upload and record again", err=quiet)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.operator.frame_layer import FrameLayer
 from tablegen.compensation.operator.in_time import OperatorInTime
 from tablegen.numerics.arrays import Bools, Floats, Ints, tree_sum
 from tablegen.numerics.linear import Cholesky
@@ -52,7 +53,7 @@ class FrameMotion:
 
     ``fast_nm`` and ``slow_nm`` are from x = 0 to 1 of each. Turns are in periods; the line is imaged over
     ``fast_window``, backward too if ``both``; ``imaged`` says which lines of a frame are, shape (lines,). ``centre`` is
-    the middle of the drive, of v_max.
+    the middle of the drive, of v_max. ``layer`` is what the axis was measured to go further than its operator says.
     """
 
     fast_nm: float
@@ -66,6 +67,7 @@ class FrameMotion:
     harmonics: int
     slow_harmonics: int
     centre: float
+    layer: FrameLayer | None = None
 
     @property
     def lines(self) -> int:
@@ -76,6 +78,11 @@ class FrameMotion:
     def longest_nm(self) -> float:
         """The longer of both motions."""
         return max(abs(self.fast_nm), abs(self.slow_nm))
+
+    def wanted_nm(self, t: Floats) -> Floats:
+        """Return the wanted position in nm at phases ``t`` of each line, shape (lines, len(t))."""
+        phase = (np.arange(self.lines)[:, None] + t) / self.lines
+        return np.asarray(self.fast_nm * (self.fast(t) - 0.5) + self.slow_nm * (self.slow(phase) - 0.5))
 
     def fast(self, t: Floats) -> Floats:
         """Return x of the line from 0 to 1 at its phases ``t``, of any shape."""
@@ -202,8 +209,9 @@ class _FrameLearner:
         self._count = count
         self._t = np.arange(count) / count
         self._inside = motion.inside(self._t)
-        phase = (np.arange(lines)[:, None] + self._t) / lines
-        target = motion.fast_nm * (motion.fast(self._t) - 0.5) + motion.slow_nm * (motion.slow(phase) - 0.5)
+        target = motion.wanted_nm(self._t)
+        if motion.layer is not None:  # the operator has to stay behind by what the piezo goes further
+            target = target - motion.layer.at(lines, self._t)
         self._target = target[motion.imaged][:, self._inside]
         self._time_s = np.arange(lines * count + 1) / (count * motion.line_rate_hz)
         self._basis = _waves(self._t, motion.harmonics)
