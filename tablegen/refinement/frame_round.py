@@ -262,9 +262,9 @@ def _shares(axis: TurnedAxis, bins: _Bins) -> list[float | None]:
     across = motion.slow((bins.lines + bins.t) / motion.lines)
     design = np.stack([np.ones(len(bins.t)), motion.fast(bins.t), across], axis=1)
     root = np.sqrt(bins.counts)
-    solved = np.linalg.lstsq(design * root[:, None], bins.error * root, rcond=None)[0]
-    found = zip(solved[1:].tolist(), (motion.fast_nm, motion.slow_nm), strict=True)
-    return [100.0 * more / nm if abs(nm) > 0.1 * motion.longest_nm else None for more, nm in found]
+    shares = np.linalg.lstsq(design * root[:, None], bins.error * root, rcond=None)[0]
+    pairs = zip(shares[1:].tolist(), (motion.fast_nm, motion.slow_nm), strict=True)
+    return [100.0 * more / nm if abs(nm) > 0.1 * motion.longest_nm else None for more, nm in pairs]
 
 
 def _rms(values: Floats, counts: Floats) -> float:

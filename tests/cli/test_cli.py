@@ -39,7 +39,8 @@ OWN_FILES = [
     "annexin_200nm_y_fourier.mem",
     "manifest.json",
 ]
-RUNTIME = [path.name for path in (REPOSITORY / "firmware_templates").glob("*/*.[chv]")]
+_TEMPLATES = REPOSITORY / "firmware_templates"
+RUNTIME = [path.name for path in (*_TEMPLATES.glob("*/*.[chv]"), *_TEMPLATES.glob("verilog/pair/*.v"))]
 FILES = sorted(OWN_FILES + RUNTIME)
 
 
@@ -248,7 +249,7 @@ def test_the_runtime_is_copied_byte_for_byte(scan: Path) -> None:
     assert all(name.endswith("_top.v") for name in modules)
     assert not any(name.endswith("_top.v") for name in RUNTIME)
     for name in RUNTIME:
-        (source,) = (REPOSITORY / "firmware_templates").glob(f"*/{name}")
+        (source,) = _TEMPLATES.glob(f"**/{name}")
         assert (out / name).read_bytes() == source.read_bytes()
 
 

@@ -91,18 +91,18 @@ def slots(port: str, baud: int, key_file: Path | None, as_json: bool) -> int:
     with connected(port, baud, key_file) as device:
         numbered = device.programs() if More.PLAY in device.info.more else ()
         has_slots = Feature.STORE in device.info.features
-        kept = device.slots() if has_slots or More.PLAY not in device.info.more else None
+        slots = device.slots() if has_slots or More.PLAY not in device.info.more else None
     if as_json:
         import json
 
-        click.echo(json.dumps({"programs": _programs(numbered), **_record(kept)}, indent=2))
+        click.echo(json.dumps({"programs": _programs(numbered), **_record(slots)}, indent=2))
         return ExitStatus.OK
     parts = []
     if numbered:
         parts.append(["number  program", *map(_program, numbered)])
-    if kept is not None:
-        parts.append(["slot  content", *(f"{slot.number:>4}  {_scan(slot)}" for slot in kept.slots)])
-        parts.append(_sentences(kept))
+    if slots is not None:
+        parts.append(["slot  content", *(f"{slot.number:>4}  {_scan(slot)}" for slot in slots.slots)])
+        parts.append(_sentences(slots))
     click.echo("\n\n".join("\n".join(part) for part in parts))
     return ExitStatus.OK
 

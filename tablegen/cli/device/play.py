@@ -66,7 +66,7 @@ def _number(device: "Device", program: str) -> int:
 
     if program.isascii() and program.isdigit() and len(program) <= _NUMBER_DIGITS:
         return int(program)
-    found = named(device.programs(), program)
-    if found is None:
+    entry = named(device.programs(), program)
+    if entry is None:
         fail([f"the device has no program '{program}'; `tablegen slots` lists those that it has"], ExitStatus.REFUSED)
-    return found.number
+    return entry.number

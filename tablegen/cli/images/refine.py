@@ -125,7 +125,7 @@ def refine(
     2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
     3. Build, upload, and record again. Two or three rounds are usually enough.
 
-    Of a scan at an angle record whole frames from a frame start on, with --triggered.
+    At an angle: --triggered, and whole frames from a frame start on.
     """
     of_traces = [
         name
