@@ -167,7 +167,7 @@ CASES = {
 # sequencer are measured without the files of modules that it alone has, what does not shape without that of
 # dac_shaper, and what has no cubic table without those of dac_spline. Were one of them to have one, yosys would miss
 # the module, and say so.
-OF_THE_SEQUENCER = ("dac_fit", "dac_whole", "dac_whole_table")
+OF_THE_SEQUENCER = ("dac_fit", "dac_pixel_boot", "dac_pixel_table", "dac_whole", "dac_whole_table")
 FLAGS = HERE / "axis_flags.v"  # around an axis with a cubic table, whose flags are more than a part has pins
 
 

@@ -325,7 +325,6 @@ def _remarks(turns: Floats, has_layer: bool, drifts: bool) -> tuple[Remark, ...]
     if not drifts:
         why = "drift of the sensor cannot be told from the motion of a single frame: record two or more"
         remarks.append(Remark(why, code="few-periods"))
-    remarks.append(Remark("it is not checked that the trace belongs to this build", code="unverified-build"))
     return tuple(remarks)
 
 
