@@ -80,7 +80,7 @@ def manifest_words(built: Build) -> list[int]:
 
 def verilog_constants(manifest: dict[str, Any]) -> dict[str, int]:
     """All constants but names of files; those of shaping are 0 in these scans, a direct table has address bits."""
-    numbers = constants(manifest) | widths(manifest) | {"SHAPING": 0, "CLOCKS_PER_TICK": 0}
+    numbers = constants(manifest) | widths(manifest) | {"SHAPING": 0, "PIXEL_INDEX_BITS": 0, "CLOCKS_PER_TICK": 0}
     for axis in "XY":
         numbers |= {f"{axis}_SHAPING_ORDER": 0, f"{axis}_SHAPING_ZERO": 0}
         if not numbers[f"{axis}_INTERPOLATED"]:
