@@ -122,7 +122,7 @@ static void name_next(const device *d)
 {
     char *const name = names[d->config.library_programs];
 
-    (void)snprintf(name, sizeof names[0], "%s", at + 1);
+    (void)snprintf(name, sizeof names[0], "%.255s", at + 1);
     name[strcspn(name, "\n")] = '\0';
 }
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from sets import long
+from sets import LONG_TEST
 from turned_scans import on_the_piezo, turned_setup
 
 from tablegen.planning.turned_plan import make_turned_plan
@@ -21,10 +21,12 @@ def errors(piezo: str, angle_deg: float) -> dict[str, float]:
 @pytest.mark.rest
 @pytest.mark.parametrize(
     ("piezo", "angle_deg"),
-    long(
-        [("plays", 30.0), ("preisach", 77.0)],
-        [("plays", 30.0), ("plays", 77.0), ("preisach", 30.0), ("preisach", 77.0)],
-    ),
+    [
+        ("plays", 30.0),
+        ("preisach", 77.0),
+        pytest.param("plays", 77.0, marks=LONG_TEST),
+        pytest.param("preisach", 30.0, marks=LONG_TEST),
+    ],
 )
 def test_a_turned_scan_is_nearly_as_good_as_a_straight_one(piezo: str, angle_deg: float) -> None:
     """Measured .029 to .036 rms at an angle, .016 and .021 at 0 degrees; size across within .37."""
