@@ -289,14 +289,14 @@ SEQUENCER: tuple[Edit, ...] = (
     Edit(
         "an unfit program is committed",
         "dac_sequencer",
-        "wire sound_commit = host_commit && fits;",
-        "wire sound_commit = host_commit;",
+        ".commit(host_commit && fits), .bank(bank),",
+        ".commit(host_commit), .bank(bank),",
     ),
     Edit(
         "an unfit commit is not said",
         "dac_sequencer",
-        "(write && !(writable && exists)) || (host_commit && !fits) || unrendered",
-        "(write && !(writable && exists)) || unrendered",
+        "(write && !(writable && exists)) || (host_commit && !fits) || misfilled || unrendered",
+        "(write && !(writable && exists)) || misfilled || unrendered",
     ),
     Edit(
         "registers of y are those of x too",
@@ -313,8 +313,8 @@ SEQUENCER: tuple[Edit, ...] = (
     Edit(
         "writable while a commit is on its way",
         "dac_sequencer",
-        "assign writable = idle_writable && !rendering && !host_commit;",
-        "assign writable = idle_writable && !rendering;",
+        "assign writable = !checking && idle_writable && !rendering && !host_commit;",
+        "assign writable = !checking && idle_writable && !rendering;",
     ),
     Edit("any order of shaping", "dac_fit", "(data & 32'd3) <= HIGHEST_ORDER &&", "1'b1 &&"),
     Edit("offset of x too wide", "dac_fit", "(of_high && !is_x_high)", "1'b0"),
