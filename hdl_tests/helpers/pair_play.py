@@ -2,13 +2,10 @@
 
 from pathlib import Path
 
-from building import REPOSITORY
-
 from tablegen.base.resources import verilog_by_turns, verilog_runtime
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script
 
-PAIR_FOLDER = REPOSITORY / "firmware_templates" / "verilog" / "pair"
 ALTERNATE: dict[str, int | str] = {"ALTERNATE": 1}
 PAIR_PACES = (2, 3, 5, 8)  # clocks from tick to tick: even ones and odd ones, which change the turn
 DRAIN = 60  # clocks, more than a sample takes

@@ -1,5 +1,6 @@
 """Correct images of a scan at an angle: the frame that was played, on the operators of a scanner file."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,7 @@ def by_turned_scan(images: Images, setup: Setup, scan: Path, model: ScannerModel
     rows, columns = images.shape
     if rows != part.count:
         raise Unphysical(f"{rows} rows, and {scan.name} images {part.count} lines a frame; give a whole frame of it")
-    x_nm, y_nm = _positions(plan, model)
+    x_nm, y_nm = _positions(setup, plan, model)
     ways = tuple(sorted(set(images.forward), reverse=True))
     distortion = _distortion(plan, model, (x_nm, y_nm), part, columns, ways, conditions)
     size = distortion.x_range[1] - distortion.x_range[0], distortion.y_range[1] - distortion.y_range[0]
@@ -75,7 +76,7 @@ def by_turned_scan(images: Images, setup: Setup, scan: Path, model: ScannerModel
     return corrected(images, distortion, size, record)
 
 
-def _positions(plan: TurnedPlan, model: ScannerModel) -> tuple[Floats, Floats]:
+def _positions(setup: Setup, plan: TurnedPlan, model: ScannerModel) -> tuple[Floats, Floats]:
     """Return the positions of both axes over a frame on the operators of a scanner file, (lines, samples) each."""
     schedule = plan.schedule
     ticks = np.arange(0, schedule.ticks, -(-schedule.ticks // _MOST_SAMPLES))
@@ -84,8 +85,14 @@ def _positions(plan: TurnedPlan, model: ScannerModel) -> tuple[Floats, Floats]:
         known = KnownAxis.of(model.scanner, model.file, model.folder, axis.axis)
         its = model.scanner.x if axis.axis == "x" else model.scanner.y
         piezo = piezo_in_time(known, its, float(schedule.line_rate), float(schedule.frame_rate))
-        codes = frame_codes(axis, ticks)
-        positions.append(played_position(replace(axis, known=known, piezo=piezo), codes, ticks, schedule.ticks))
+        codes, motion = frame_codes(axis, ticks), axis.motion
+        planned = setup.scanner.x if axis.axis == "x" else setup.scanner.y
+        assert its.hysteresis is not None  # an axis without an operator was refused
+        assert planned.hysteresis is not None
+        if its.hysteresis.contents(model.folder) != planned.hysteresis.contents(setup.scanner_folder):
+            motion = dataclasses.replace(motion, layer=None)  # it was learnt beside another operator
+        played = replace(axis, known=known, piezo=piezo, motion=motion)
+        positions.append(played_position(played, codes, ticks, schedule.ticks))
     return positions[0], positions[1]
 
 

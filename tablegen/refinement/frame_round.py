@@ -136,7 +136,7 @@ def refine_frame(setup: Setup, axis: str, time_s: Floats, displacement_nm: Float
         error=fit.whole,
         rest=fit.whole.plus(change.times(-1.0)),
         worse=worse,
-        remarks=_remarks(turns, layer is not None, drifts),
+        remarks=_remarks(layer is not None, drifts),
         **dict(zip(("line_percent", "frame_percent"), _shares(own, bins), strict=True)),
     )
 
@@ -157,8 +157,7 @@ def _binned(axis: TurnedAxis, turns: Floats, displacement_nm: Floats, harmonics:
             f"the trace has {int(np.sum(counts >= least))} of the {lines} imaged lines of a frame, with {least} "
             f"samples or more inside the imaging window: record one whole frame or more, faster, from a frame start"
         )
-    target = motion.fast_nm * (motion.fast(t) - 0.5) + motion.slow_nm * (motion.slow((line + t) / motion.lines) - 0.5)
-    error = displacement_nm[inside] - target
+    error = displacement_nm[inside] - motion.wanted_nm(line, t)
     count = _BINS_A_HARMONIC * motion.harmonics
     at = line * count + np.minimum((t * count).astype(np.int64), count - 1)
     in_bins = np.bincount(at, minlength=motion.lines * count).astype(np.float64)
@@ -179,7 +178,7 @@ def _refuse_foreign(axis: TurnedAxis, bins: _Bins, before: float) -> None:
     """Refuse a trace that is far from the scan, with what it looks like."""
     if before < _FOREIGN:
         return
-    target = _target(axis, bins)
+    target = axis.motion.wanted_nm(bins.lines, bins.t)
     target = target - float(np.average(target, weights=bins.counts))
     position = target + bins.error
     ratio = float(np.sum(bins.counts * position * target) / np.sum(bins.counts * target * target))
@@ -191,12 +190,6 @@ def _refuse_foreign(axis: TurnedAxis, bins: _Bins, before: float) -> None:
     raise Unphysical(
         f"the displacement is {100.0 * before:.3g} % of the motion off the scan, {ratio:.3g} times as large: {looks}"
     )
-
-
-def _target(axis: TurnedAxis, bins: _Bins) -> Floats:
-    motion = axis.motion
-    across = motion.slow((bins.lines + bins.t) / motion.lines) - 0.5
-    return np.asarray(motion.fast_nm * (motion.fast(bins.t) - 0.5) + motion.slow_nm * across)
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +311,7 @@ def _with_layer(
     return refinement, changed
 
 
-def _remarks(turns: Floats, has_layer: bool, drifts: bool) -> tuple[Remark, ...]:
+def _remarks(has_layer: bool, drifts: bool) -> tuple[Remark, ...]:
     remarks = []
     if not has_layer:
         remarks.append(Remark("the error is within the noise of the sensor", code="noise-limit"))

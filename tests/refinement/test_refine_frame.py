@@ -21,6 +21,7 @@ from tablegen.planning.frame_refinement import learnt_frame_layer
 from tablegen.planning.line_plan import make_plan
 from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan, make_turned_plan
 from tablegen.refinement.frame_round import FrameOptions, FrameRound, refine_frame
+from tablegen.virtual.turned_run import OwnFrameAxis
 
 SHORT = ("timing.lines = 16", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400")
 FRAMES = 3
@@ -113,6 +114,18 @@ def test_the_certificate_knows_what_was_learnt(first: FrameRound, plan: TurnedPl
     before, after = (certify_turned(one).errors for one in (plan, planned(first.setup)))
     assert after.rms < before.rms + 0.01
     assert after.slow_size == pytest.approx(before.slow_size, abs=0.05)
+
+
+@pytest.mark.common
+def test_a_simulation_on_the_own_operators_knows_it_too(first: FrameRound) -> None:
+    axis = planned(first.setup).y
+    assert axis.motion.layer is not None
+    volts = 50.0 + 10.0 * np.sin(2.0 * np.pi * np.arange(16 * 40) / 640)
+    bare = OwnFrameAxis(axis.piezo, axis.known.driver)
+    learnt = dataclasses.replace(bare, layer=axis.motion.layer, lines=16)
+    further = learnt.settled(volts, 1e-4) - bare.settled(volts, 1e-4)
+    assert np.allclose(further.reshape(16, 40), axis.motion.layer.at(16, (np.arange(40) + 0.5) / 40))
+    assert np.ptp(further) > 1.0
 
 
 @pytest.mark.common

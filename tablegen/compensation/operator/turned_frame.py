@@ -79,9 +79,9 @@ class FrameMotion:
         """The longer of both motions."""
         return max(abs(self.fast_nm), abs(self.slow_nm))
 
-    def wanted_nm(self, t: Floats) -> Floats:
-        """Return the wanted position in nm at phases ``t`` of each line, shape (lines, len(t))."""
-        phase = (np.arange(self.lines)[:, None] + t) / self.lines
+    def wanted_nm(self, lines: Ints, t: Floats) -> Floats:
+        """Return the wanted position in nm at phases ``t`` of lines, of the shape to which both broadcast."""
+        phase = (lines + t) / self.lines
         return np.asarray(self.fast_nm * (self.fast(t) - 0.5) + self.slow_nm * (self.slow(phase) - 0.5))
 
     def fast(self, t: Floats) -> Floats:
@@ -209,7 +209,7 @@ class _FrameLearner:
         self._count = count
         self._t = np.arange(count) / count
         self._inside = motion.inside(self._t)
-        target = motion.wanted_nm(self._t)
+        target = motion.wanted_nm(np.arange(lines)[:, None], self._t)
         if motion.layer is not None:  # the operator has to stay behind by what the piezo goes further
             target = target - motion.layer.at(lines, self._t)
         self._target = target[motion.imaged][:, self._inside]
