@@ -17,6 +17,7 @@ from tablegen.fixedpoint.table_shape import TableShape
 FILE = Path(__file__).with_name("table_costs.json")
 PROCESSORS: tuple[ProcessorName, ...] = get_args(ProcessorName)
 _NARROW_BITS = 16
+_LEAST_SHAPED_WINDOW = 15  # codes: what is fed back may leave half of a smaller one
 
 
 class MeasuredRun(NamedTuple):
@@ -53,8 +54,8 @@ class PlayedTable(NamedTuple):
     def has_runs(self, processor: ProcessorName, table_storage_bits: int) -> bool:
         """Return True if ``fill`` of the C can play runs of it; else each tick is played by itself.
 
-        The rules are those of ``allow_runs`` in dac_program.c. Codes near a limit, and lines that move by more than a
-        64th of the range in 16 ticks, have no runs either, with any table.
+        The rules are those of ``allow_runs`` in dac_program.c, which tests compare on random programs. Codes near a
+        limit, and lines that move by more than a 64th of the range in 16 ticks, have no runs either, with any table.
         """
         shape, output = self.shape, self.output
         if ((1 << 32) - 1) // self.period <= 2:
@@ -62,7 +63,8 @@ class PlayedTable(NamedTuple):
         if shape.mode == "cubic" and self.hold == 1 and self.period <= 2 * shape.length:
             return False
         if not _multiplies_long(processor, table_storage_bits):
-            return True
+            window = min((output.code_max - output.code_min) // 32, output.max_step)
+            return not output.shaping.order or window >= _LEAST_SHAPED_WINDOW
         if output.shaping.order:
             up = 29 - shape.bits
             most = 1 << (31 - up if up > 14 else 17)
