@@ -36,6 +36,12 @@ def long(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
     return _divided(few, parameters, *LONG_TEST)
 
 
+def every_second(parameters: Iterable[Any], names: int = 1) -> list[Any]:
+    """Return parameters of which every other one is of ``make test-long``, for a test with this number of names."""
+    values = [tuple(each) if names > 1 else (each,) for each in parameters]
+    return [pytest.param(*each, marks=LONG_TEST if index % 2 else ()) for index, each in enumerate(values)]
+
+
 def in_pairs(names: Sequence[str], others: Sequence[str], whole: Collection[str], always: str) -> list[Any]:
     """Return pairs of a name and another, marked for the sets of both.
 

@@ -25,7 +25,7 @@ from frame_programs import scan_program, shaped_scan
 from limits import limit
 from programs import random_schedule
 from replacing import replace
-from sets import common
+from sets import common, every_second
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.commit_mode import CommitMode
@@ -554,12 +554,15 @@ def differs(path: Path, option: str) -> bool:
 @pytest.mark.rest
 @pytest.mark.parametrize(
     ("option", "breaks"),
-    [
-        *(("plain", breaks) for breaks in MUTANTS),
-        *(("short", breaks) for breaks in SHORT_MUTANTS),
-        *(("shaping", breaks) for breaks in SHAPED_MUTANTS),
-        *(("short_shaping", breaks) for breaks in SHORT_SHAPED_MUTANTS),
-    ],
+    every_second(
+        [
+            *(("plain", breaks) for breaks in MUTANTS),
+            *(("short", breaks) for breaks in SHORT_MUTANTS),
+            *(("shaping", breaks) for breaks in SHAPED_MUTANTS),
+            *(("short_shaping", breaks) for breaks in SHORT_SHAPED_MUTANTS),
+        ],
+        2,
+    ),
 )
 def test_every_mutant_is_found(option: str, breaks: str, tmp_path: Path) -> None:
     old, new = (MUTANTS | SHORT_MUTANTS | SHAPED_MUTANTS | SHORT_SHAPED_MUTANTS)[breaks]

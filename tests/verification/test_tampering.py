@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from building import NAME, Variant, build
 from editing import Outcome, run
+from sets import every_second
 from verifying import edit_manifest, failed, make_right
 
 from tablegen.manifest.read import NotABuild
@@ -51,7 +52,7 @@ VERILOG = [
 
 @pytest.mark.parametrize(
     ("file", "pattern", "new", "finds"),
-    [row[1:] for row in VERILOG],
+    every_second((row[1:] for row in VERILOG), 4),
     ids=[row[0] for row in VERILOG],
 )
 @pytest.mark.rest
@@ -121,7 +122,7 @@ C = [
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(("file", "pattern", "new"), [row[1:] for row in C], ids=[row[0] for row in C])
+@pytest.mark.parametrize(("file", "pattern", "new"), every_second((row[1:] for row in C), 3), ids=[row[0] for row in C])
 def test_c_that_is_tampered_with_is_heard(folder: Path, file: str, pattern: str, new: str) -> None:
     substitute(folder / f"dac_{file}", pattern, new)
     make_right(folder, OTHER)
