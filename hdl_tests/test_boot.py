@@ -13,10 +13,10 @@ from pathlib import Path
 import mutants
 import numpy as np
 import pytest
+from boot_play import AFTER, BOOT, COMMIT, Clock, Played, Setup, Wrong, check_boots, hosts, play_boots
 from building import BENCHES, REPOSITORY
 from programs import random_dual, random_fourier
 
-from tablegen.base.resources import verilog_runtime
 from tablegen.device.registers import program_words
 from tablegen.emit.memory import memory_files
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -25,25 +25,8 @@ from tablegen.verification.verilog.simulate import Design, compile_design
 pytestmark = pytest.mark.common
 
 BENCH = BENCHES / "boot_bench.v"
-BOOT = next(path for path in verilog_runtime() if path.name == "dac_boot.v")
 X_TABLE, X_FOURIER = 1, 3  # regions; those of y are one more
 AT_BOTH_ENDS = 2  # clocks on which a boot that is not held up writes nothing: it reads the first word, it has ended
-AFTER = 6  # clocks of the host before the next reset
-Write = tuple[int, int, int]  # region, address, data
-COMMIT: Write = (-1, 0, 0)
-
-
-class Wrong(Exception):
-    """What left is not what was to leave."""
-
-
-@dataclass(frozen=True)
-class Setup:
-    """The memory files of a program by their parameters, the parameters to go with them, and the writes of a boot."""
-
-    files: Mapping[str, bytes]
-    parameters: Mapping[str, int]
-    writes: Sequence[Write]
 
 
 def setup(seed: int, shape: SequencerShape, harmonics: tuple[int, int] | None = None, start_clocks: int = 0) -> Setup:
@@ -63,7 +46,7 @@ def setup(seed: int, shape: SequencerShape, harmonics: tuple[int, int] | None = 
         parameters[f"{name}_WORD_BITS"] = 32 if tables else axis.bits
         parameters[f"{name}_HARMONICS"] = harmonics[index] if harmonics else 7  # which no table has
     files = {"PROGRAM": "boot_program.mem", "X": f"boot_x{kind}.mem", "Y": f"boot_y{kind}.mem"}
-    return Setup({key: made[file] for key, file in files.items()}, parameters, [*writes, COMMIT])
+    return Setup({f"{key}_FILE": made[file] for key, file in files.items()}, parameters, [*writes, COMMIT])
 
 
 SETUPS = {
@@ -73,24 +56,6 @@ SETUPS = {
     "late": setup(5, SequencerShape(16, 1, 4, 16, 1, 3, 12), start_clocks=37),
     "longest": setup(4, SequencerShape(16, 1, 16, 16, 1, 3, 16)),
 }
-
-
-@dataclass(frozen=True)
-class Clock:
-    """What goes in on a clock."""
-
-    reset: int
-    writable: int
-    host_write: int
-    host_commit: int
-    host: Write
-
-    @property
-    def word(self) -> int:
-        """As the bench reads it."""
-        flags = self.reset << 3 | self.writable << 2 | self.host_write << 1 | self.host_commit
-        region, address, data = self.host
-        return flags << 51 | region << 48 | address << 32 | data
 
 
 def boots(clocks: int) -> Iterator[tuple[int, int]]:
@@ -113,16 +78,9 @@ def boots(clocks: int) -> Iterator[tuple[int, int]]:
 def stimulus(name: str) -> list[Clock]:
     """For a setup; the host asks for something on most clocks. It ends with a boot and some clocks of the host."""
     clocks = len(SETUPS[name].writes) + AT_BOTH_ENDS
-    rng = random.Random(name)
     levels = list(boots(clocks)) if name != "longest" else []
     start = [(int(clock == 10), clock % 2) for clock in range(SETUPS[name].parameters["START_CLOCKS"])]
-    return [
-        Clock(
-            reset, writable, rng.getrandbits(1), int(rng.random() < 0.2),
-            (rng.getrandbits(3), rng.getrandbits(16), rng.getrandbits(32)),
-        )
-        for reset, writable in [*start, *levels, *[(0, 1)] * (clocks + AFTER)]
-    ]  # fmt: skip
+    return hosts(name, [*start, *levels, *[(0, 1)] * (clocks + AFTER)])
 
 
 @dataclass(frozen=True)
@@ -169,101 +127,17 @@ MUTANTS = {name: Mutant(name, BOOT.name, *fault) for name, fault in FAULTS.items
 
 
 def play(folder: Path, played: Mapping[str, tuple[str, Mutant | None]]) -> dict[str, list[str]]:
-    """Setups by the names of benches, all in one simulation; those with a mutant have a module of their own."""
-    (folder / "build").mkdir(parents=True)
-    sources, instances = [BENCH, BOOT], []
-    for index, (bench, (name, mutant)) in enumerate(played.items()):
-        module, files, clocks = "boot_bench", SETUPS[name].files, stimulus(name)
-        if mutant is not None:
-            module = f"boot_bench_{bench}"
-            for path, text in ((BENCH, BENCH.read_text("utf-8")), (BOOT, mutant.source)):
-                sources.append(folder / f"{path.stem}_{bench}.v")
-                renamed = text.replace("dac_boot ", f"dac_boot_{bench} ").replace("boot_bench ", f"{module} ")
-                sources[-1].write_text(renamed, "utf-8")
-        for key, content in files.items():
-            (folder / "build" / f"{bench}_{key}.mem").write_bytes(content)
-        (folder / "build" / f"{bench}.hex").write_text("".join(f"{each.word:x}\n" for each in clocks), "ascii")
-        given = [f".{key}({value})" for key, value in {**SETUPS[name].parameters, "DEPTH": len(clocks)}.items()]
-        given += [f'.{key}_FILE("{bench}_{key}.mem")' for key in files]
-        given += [f'.STIMULUS("{bench}.hex")', f'.CAPTURE("{bench}.txt")']
-        instances.append(f"    {module} #({', '.join(given)}) bench_{index} (.clock(clock), .done(done[{index}]));\n")
-    top = folder / "boot_top.v"
-    top.write_text(
-        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
-        f"    wire [{len(instances) - 1}:0] done;\n    wire all_done = &done;\n{''.join(instances)}endmodule\n",
-        "ascii",
-    )
-    compiled = compile_design("icarus", Design([top, *sources], "boot_top"), folder / "build")
-    assert compiled.run("cocotb_outputs") == (1, 0)
-    return {bench: (compiled.folder / f"{bench}.txt").read_text("ascii").splitlines() for bench in played}
-
-
-def hexadecimal(digits: str) -> int:
-    """Of what a simulator prints; a level that is none is ``Wrong``."""
-    try:
-        return int(digits, 16)
-    except ValueError:
-        raise Wrong(f"undefined: {digits}") from None
-
-
-def check_word(
-    at: int, writes: Sequence[tuple[int, int, int]], writable: bool, write: bool, commit: bool, where: Sequence[str]
-) -> None:
-    """Hold a word of a boot against the one that is due."""
-    word = (-1, 0, 0) if commit else tuple(map(hexadecimal, where))
-    if write and commit:
-        raise Wrong("two things at once")
-    if not writable:
-        raise Wrong(f"refused word {at}")
-    if at == len(writes) or word != writes[at]:
-        raise Wrong(f"word {at}")
-
-
-def check_start(start: int, lines: Sequence[str]) -> None:
-    """Hold the clocks before the first read against the law."""
-    if any(line.split()[0] != "4" for line in lines[:start]):  # booting, and nothing else
-        raise Wrong("a boot before the memories can be read")
+    """Return what each bench captures of its setup, with a mutant or without, by the names of benches."""
+    boots = {
+        bench: Played(SETUPS[name], stimulus(name), None if mutant is None else mutant.source)
+        for bench, (name, mutant) in played.items()
+    }
+    return play_boots(folder, BENCH, BOOT, boots)
 
 
 def check(name: str, lines: Sequence[str]) -> int:
     """Hold what left against the law; returns how many boots came to their end."""
-    one = SETUPS[name]
-    return check_boots(one.writes, stimulus(name), lines, one.parameters["START_CLOCKS"], AT_BOTH_ENDS)
-
-
-def check_boots(
-    writes: Sequence[Write], clocks: Sequence[Clock], lines: Sequence[str], start: int, most_idle: int
-) -> int:
-    """The same of a boot of these writes, which waits for ``most_idle`` clocks of its own at most."""
-    if len(lines) != len(clocks):
-        raise Wrong("a capture of another length")
-    check_start(start, lines)
-    ended = at = idle = 0
-    for asked, line in zip(clocks[start:], lines[start:], strict=True):
-        flags, *where = line.split()
-        missing, booting, write, commit = (hexadecimal(flags) >> bit & 1 for bit in (3, 2, 1, 0))
-        if missing:
-            raise Wrong("a file was taken to be missing")
-        if not booting:
-            if at < len(writes):
-                raise Wrong(f"the host at word {at}")
-            got = (write, commit, *map(hexadecimal, where))
-            if got != (asked.host_write, asked.host_commit, *asked.host):
-                raise Wrong("the host is not heard")
-        elif write or commit:
-            check_word(at, writes, asked.writable, bool(write), bool(commit), where)
-            at += 1
-            ended += at == len(writes)
-        # A clock without a word is one that was held up, the first one, or after the commit, held up or not, the last.
-        elif asked.writable or at == len(writes):
-            idle += 1
-            if idle > most_idle:
-                raise Wrong(f"nothing at word {at}")
-        if asked.reset:
-            at = idle = 0
-    if at != len(writes):
-        raise Wrong("the last boot has no end")
-    return ended
+    return check_boots(SETUPS[name], stimulus(name), lines, AT_BOTH_ENDS)
 
 
 @pytest.fixture(scope="module")
@@ -321,11 +195,11 @@ def test_a_file_that_is_missing_or_short_is_never_committed(simulator: str, tmp_
         given = [f".{key}({value})" for key, value in SETUPS[name].parameters.items()]
         for key, content in SETUPS[name].files.items():
             lines = content.splitlines(keepends=True)
-            if key != file or words is not None:
-                kept = lines if key != file or words == 0 else lines[:words]
+            if key != f"{file}_FILE" or words is not None:
+                kept = lines if key != f"{file}_FILE" or words == 0 else lines[:words]
                 (tmp_path / "build" / f"{case}_{key}.mem").write_bytes(b"".join(kept))
-            if case != "unnamed" or key != file:
-                given.append(f'.{key}_FILE("{case}_{key}.mem")')
+            if case != "unnamed" or key != f"{file}_FILE":
+                given.append(f'.{key}("{case}_{key}.mem")')
         instances.append(
             f"    missing_bench #({', '.join(given)}) bench_{index} (.clock(clock), .committed(committed[{index}]),\n"
             f"        .missing(missing[{index}]), .ended(ended[{index}]));\n"

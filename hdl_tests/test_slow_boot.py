@@ -1,19 +1,18 @@
 """dac_slow_boot before a dac_boot: the slow parts, then the program and a commit, wherever it waits or begins again.
 
-What is written follows from random programs, not from the files that are read. ``test_boot.py`` has the stimulus.
+What is written follows from random programs, not from the files that are read.
 """
 
-import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import mutants
 import numpy as np
 import pytest
+from boot_play import COMMIT, Clock, Played, Setup, Write, Wrong, check_boots, flags_without, play_boots, some_clocks
 from building import BENCHES, REPOSITORY
 from slow_scripts import SLOW_FOLDER, X_PARTS, Y_PARTS, random_scan
-from test_boot import BOOT, COMMIT, Clock, Write, Wrong, check_boots
 
 from tablegen.device.registers import program_words
 from tablegen.emit.memory import memory_file
@@ -21,23 +20,12 @@ from tablegen.emit.turned_content import TurnedContent
 from tablegen.emit.turned_verilog import turned_memories
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
 
 BENCH = BENCHES / "slow_boot_bench.v"
 SLOW_BOOT = SLOW_FOLDER / "dac_slow_boot.v"
 MOST_IDLE = 5  # clocks on which a boot that is not held up writes nothing: both modules begin, and end
-AFTER = 6  # clocks of the host before the next reset
-
-
-@dataclass(frozen=True)
-class Setup:
-    """The memory files of a program by their parameters, the parameters to go with them, and the writes of a boot."""
-
-    files: Mapping[str, bytes]
-    parameters: Mapping[str, int]
-    writes: Sequence[Write]
 
 
 def setup(seed: int, shape: SequencerShape, start_clocks: int = 0) -> Setup:
@@ -73,30 +61,9 @@ SETUPS = {
 }
 
 
-def boots(clocks: int) -> Iterator[tuple[int, int]]:
-    """Reset and writable by clocks: held up at random, reset at each eleventh clock of a boot, and at random."""
-    for last in range(0, clocks + AFTER, 11):
-        for at in range(last):
-            yield 0, int(at % 7 != last % 7)
-        yield 1, last % 2
-    rng = random.Random(clocks)
-    for often in (0.5, 0.1, 0.9):
-        for _ in range(6 * clocks):
-            yield int(rng.random() < 0.3 / clocks), int(rng.random() < often)
-
-
 def stimulus(name: str) -> list[Clock]:
-    """For a setup; the host asks for something on most clocks. It ends with a boot and some clocks of the host."""
-    clocks = len(SETUPS[name].writes) + MOST_IDLE
-    rng = random.Random(name)
-    start = [(int(clock == 10), clock % 2) for clock in range(SETUPS[name].parameters["START_CLOCKS"])]
-    return [
-        Clock(
-            reset, writable, rng.getrandbits(1), int(rng.random() < 0.2),
-            (rng.getrandbits(3), rng.getrandbits(16), rng.getrandbits(32)),
-        )
-        for reset, writable in [*start, *boots(clocks), (1, 1), *[(0, 1)] * (clocks + AFTER)]
-    ]  # fmt: skip
+    """Return what goes in on the clocks of a setup."""
+    return some_clocks(name, SETUPS[name], MOST_IDLE)
 
 
 @dataclass(frozen=True)
@@ -137,39 +104,17 @@ MUTANTS = {name: Mutant(name, SLOW_BOOT.name, *fault) for name, fault in FAULTS.
 
 
 def play(folder: Path, played: Mapping[str, tuple[str, Mutant | None]]) -> dict[str, list[str]]:
-    """Setups by the names of benches, all in one simulation; those with a mutant have a module of their own."""
-    (folder / "build").mkdir(parents=True)
-    sources, instances = [BENCH, SLOW_BOOT, BOOT], []
-    for index, (bench, (name, mutant)) in enumerate(played.items()):
-        module, clocks = "slow_boot_bench", stimulus(name)
-        if mutant is not None:
-            module = f"slow_boot_bench_{bench}"
-            for path, text in ((BENCH, BENCH.read_text("utf-8")), (SLOW_BOOT, mutant.source)):
-                sources.append(folder / f"{path.stem}_{bench}.v")
-                renamed = text.replace("dac_slow_boot #(", f"dac_slow_boot_{bench} #(")
-                sources[-1].write_text(renamed.replace("slow_boot_bench #(", f"{module} #("), "utf-8")
-        for key, content in SETUPS[name].files.items():
-            (folder / "build" / f"{bench}_{key}.mem").write_bytes(content)
-        (folder / "build" / f"{bench}.hex").write_text("".join(f"{each.word:x}\n" for each in clocks), "ascii")
-        given = [f".{key}({value})" for key, value in {**SETUPS[name].parameters, "DEPTH": len(clocks)}.items()]
-        given += [f'.{key}("{bench}_{key}.mem")' for key in SETUPS[name].files]
-        given += [f'.STIMULUS("{bench}.hex")', f'.CAPTURE("{bench}.txt")']
-        instances.append(f"    {module} #({', '.join(given)}) bench_{index} (.clock(clock), .done(done[{index}]));\n")
-    top = folder / "boot_top.v"
-    top.write_text(
-        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
-        f"    wire [{len(instances) - 1}:0] done;\n    wire all_done = &done;\n{''.join(instances)}endmodule\n",
-        "ascii",
-    )
-    compiled = compile_design("icarus", Design([top, *sources], "boot_top"), folder / "build")
-    assert compiled.run("cocotb_outputs") == (1, 0)
-    return {bench: (compiled.folder / f"{bench}.txt").read_text("ascii").splitlines() for bench in played}
+    """Return what each bench captures of its setup, with a mutant or without, by the names of benches."""
+    boots = {
+        bench: Played(SETUPS[name], stimulus(name), None if mutant is None else mutant.source)
+        for bench, (name, mutant) in played.items()
+    }
+    return play_boots(folder, BENCH, SLOW_BOOT, boots)
 
 
 def check(name: str, lines: Sequence[str]) -> int:
     """Hold what left against the law; returns how many boots came to their end."""
-    one = SETUPS[name]
-    return check_boots(one.writes, stimulus(name), lines, one.parameters["START_CLOCKS"], MOST_IDLE)
+    return check_boots(SETUPS[name], stimulus(name), lines, MOST_IDLE)
 
 
 @pytest.fixture(scope="module")
@@ -188,27 +133,7 @@ def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[
 @pytest.mark.parametrize("words", [None, -1, 3])
 def test_a_file_that_is_missing_or_short_is_said(words: int | None, tmp_path: Path) -> None:
     """The boot goes on to its end, for what stands before the sequencer to withdraw it."""
-    (tmp_path / "build").mkdir()
-    one = SETUPS["cubic"]
-    for key, content in one.files.items():
-        lines = content.splitlines(keepends=True)
-        if key != "SLOW_FILE" or words is not None:
-            kept = lines[:words] if key == "SLOW_FILE" else lines
-            (tmp_path / "build" / f"{key}.mem").write_bytes(b"".join(kept))
-    depth = len(one.writes) + 2 * MOST_IDLE
-    (tmp_path / "build" / "stimulus.hex").write_text(f"{1 << 53:x}\n" * depth, "ascii")
-    given = [f".{key}({value})" for key, value in {**one.parameters, "DEPTH": depth}.items()]
-    given += [f'.{key}("{key}.mem")' for key in one.files]
-    top = tmp_path / "boot_top.v"
-    top.write_text(
-        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
-        f"    wire all_done;\n    slow_boot_bench #({', '.join(given)}) bench (.clock(clock), .done(all_done));\n"
-        "endmodule\n",
-        "ascii",
-    )
-    compiled = compile_design("icarus", Design([top, BENCH, SLOW_BOOT, BOOT], "boot_top"), tmp_path / "build")
-    assert compiled.run("cocotb_outputs") == (1, 0)
-    flags = [line.split()[0] for line in (compiled.folder / "capture.txt").read_text("ascii").splitlines()]
+    flags = flags_without(tmp_path / "boot", BENCH, SLOW_BOOT, SETUPS["cubic"], "SLOW_FILE", words)
     assert flags.count("d") == 1  # missing, booting, and a commit; where there are no words, flags are undefined
     assert not {"5", "1"} & set(flags)
     assert flags[-1] == "8"
