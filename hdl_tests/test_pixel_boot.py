@@ -29,11 +29,13 @@ MOST_IDLE = 5  # clocks on which a boot that is not held up writes nothing: both
 
 def setup(seed: int, ticks: int, start_clocks: int = 0) -> Setup:
     """Make a random program with a table of pixels, and lines of this number of ticks."""
-    rng, table = np.random.default_rng(seed), None
-    while table is None or schedule.pixels < 2:  # a window without ticks has no table
+    rng = np.random.default_rng(seed)
+    while True:
         program = random_dual(rng, SequencerShape(16, 1, 3, 16, 1, 3, 12), (ticks, ticks))
         schedule = with_table(rng, program.schedule)
         table = schedule.pixel_table
+        if table is not None and schedule.pixels > 1:  # a window without ticks has no table
+            break
     none = np.zeros(3, np.int64)
     made = memory_files("boot", schedule, program.x, program.y, {"x": none, "y": none})
     parameters = {"PIXELS": schedule.pixels, "START_CLOCKS": start_clocks}
