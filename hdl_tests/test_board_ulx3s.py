@@ -42,7 +42,8 @@ def test_the_bitstream_is_made(board: Path) -> None:
     assert (board / "build" / "ulx3s.bit").read_bytes()[:2] == b"\xff\x00"
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_the_cells_play_the_model_once_they_are_triggered(board: Path, cells: Path) -> None:
     fault, answers, words = ULX3S.played(cells)
     assert all(is_answer(*pair) for pair in zip(answers, (Request.HELLO, Request.ARM, Request.TRIGGER), strict=False))

@@ -7,7 +7,7 @@ import pytest
 from building import REPOSITORY
 from mutants import Verdict
 from programs import random_dual
-from sets import every_second
+from sets import one_of
 from stream_mutants import BENCHES, MUTANTS, SHAPES, Mutant, bench_of, judge, script_of
 
 from tablegen.verification.play.stream import Script
@@ -32,7 +32,7 @@ def test_no_mutant_is_listed_twice() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("mutant", every_second(MUTANTS), ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
+@pytest.mark.parametrize("mutant", one_of(4, MUTANTS), ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
 def test_every_mutant_is_found(mutant: Mutant, tmp_path: Path) -> None:
     assert judge(mutant, tmp_path).killed
 

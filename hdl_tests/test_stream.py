@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from programs import extreme, random_dual, shaped
 from replacing import replace
-from sets import common
+from sets import common, common_of
 from stream_benches import HARMONICS, equal, with_sine
 from stream_configurations import (
     CONFIGURATIONS,
@@ -55,7 +55,7 @@ def test_enough_is_played_on_icarus() -> None:
 @pytest.mark.common
 @pytest.mark.parametrize(
     "name",
-    common(FEW[:3], CONFIGURATIONS),
+    common_of(2, FEW[:3], CONFIGURATIONS),
 )
 def test_random_programs(name: str, tmp_path: Path) -> None:
     configuration = CONFIGURATIONS[name]

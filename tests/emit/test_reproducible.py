@@ -220,7 +220,8 @@ def test_bytes_do_not_depend_on_environments_together(reference: dict[str, bytes
     assert differing_lines(reference, built_files(tmp_path)) == []
 
 
-@pytest.mark.rest  # which of them it is, where the tests above and below find a difference
+@pytest.mark.long  # which of them it is, where the tests above and below find a difference
+@pytest.mark.timeout(86_400)
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_bytes_do_not_depend_on_the_environment(reference: dict[str, bytes], tmp_path: Path, name: str) -> None:
     build_elsewhere(tmp_path, write_scans(tmp_path), ENVIRONMENTS[name])

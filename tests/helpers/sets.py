@@ -36,10 +36,24 @@ def long(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
     return _divided(few, parameters, *LONG_TEST)
 
 
-def every_second(parameters: Iterable[Any], names: int = 1) -> list[Any]:
-    """Return parameters of which every other one is of ``make test-long``, for a test with this number of names."""
+def one_of(number: int, parameters: Iterable[Any], names: int = 1) -> list[Any]:
+    """Return parameters of which each first of a number is as the test is; with the others it is of ``make test-long``.
+
+    ``names`` is the number of names that the test gives to a parameter.
+    """
     values = [tuple(each) if names > 1 else (each,) for each in parameters]
-    return [pytest.param(*each, marks=LONG_TEST if index % 2 else ()) for index, each in enumerate(values)]
+    return [pytest.param(*each, marks=LONG_TEST if index % number else ()) for index, each in enumerate(values)]
+
+
+def common_of(number: int, few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
+    """Return parameters of which a few are as the test is, and of the others one of a number is of the rest.
+
+    With all further ones the test is of ``make test-long``.
+    """
+    every = list(parameters)
+    others = [each for each in every if each not in few]
+    marked = _divided(few, [each for each in every if each in few or each in others[::number]], pytest.mark.rest)
+    return marked + _divided((), [each for each in others if each not in others[::number]], *LONG_TEST)
 
 
 def in_pairs(names: Sequence[str], others: Sequence[str], whole: Collection[str], always: str) -> list[Any]:

@@ -12,7 +12,7 @@ from link_random import KEY, Dialogue, Differs
 from link_replay import Replay, compile_replay, differs, line_text
 from link_talk import Talk
 from moved_scans import BOOT, SCAN, MovedScan
-from sets import LONG_TEST, every_second
+from sets import LONG_TEST, one_of
 from test_c_link import SHAPES, STEPS
 
 from tablegen.base.resources import c_link, c_runtime
@@ -175,7 +175,7 @@ def test_a_program_with_a_slow_part_is_not_moved() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", every_second(MUTANTS))
+@pytest.mark.parametrize("name", one_of(2, MUTANTS))
 def test_a_wrong_link_is_noticed(name: str, tmp_path: Path) -> None:
     file, old, new = MUTANTS[name]
     sources = []

@@ -7,7 +7,7 @@ from building import REPOSITORY
 from c_faults import Mutant
 from c_mutants import EQUIVALENT, MUTANTS, PLACES, judge
 from mutants import Verdict
-from sets import every_second
+from sets import one_of
 
 # By name in the requirements: they have to be among the mutants.
 CONTROLS = (
@@ -42,7 +42,7 @@ def test_no_mutant_is_listed_twice() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("mutant", every_second(MUTANTS), ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
+@pytest.mark.parametrize("mutant", one_of(4, MUTANTS), ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
 def test_every_mutant_is_found(mutant: Mutant, tmp_path: Path) -> None:
     assert judge(mutant, tmp_path).killed
 

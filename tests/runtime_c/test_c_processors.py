@@ -17,7 +17,7 @@ from c_faults import Mutant
 from c_mutants import runtime_with
 from c_scripts import IN_C, LONG, long_play, renderings, shape_in_c
 from programs import random_dual
-from sets import long
+from sets import long, one_of
 from stream_scripts import sweep
 
 from tablegen.verification.c.bench import OPTIONS, CBench, CRecord, defines
@@ -94,7 +94,7 @@ def test_cortex_m_plays_everything_that_a_host_may_ask(
         hold(bench.run(words_of(script, shape)), script, fill)
 
 
-@pytest.mark.parametrize("name", IN_C)
+@pytest.mark.parametrize("name", one_of(3, IN_C))
 def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, benches: Compile) -> None:
     configuration = IN_C[name]
     script = configuration.script(name)
@@ -103,7 +103,7 @@ def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, b
         hold(benches(configuration.shape, core, fill, shaping).run(words), script, fill)
 
 
-@pytest.mark.parametrize("name", LONG)
+@pytest.mark.parametrize("name", one_of(3, LONG))
 def test_cortex_m_plays_long_lines(name: str, benches: Compile) -> None:
     """Those that are played many ticks at once."""
     shape, script = LONG[name][0], long_play(name, 8000)
@@ -113,7 +113,7 @@ def test_cortex_m_plays_long_lines(name: str, benches: Compile) -> None:
 
 
 @pytest.mark.parametrize("fills", long(["by turns"], ["by turns", "both"]))
-@pytest.mark.parametrize("level", ["-O2", "-Os"])
+@pytest.mark.parametrize("level", long(["-O2"], ["-O2", "-Os"]))
 @pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
 def test_shaped_output(core: str, level: str, fills: str, benches: Compile) -> None:
     """By turns half of the converters are played by fills and half by steps; at the other level the other half."""

@@ -31,7 +31,7 @@ from c_scripts import (
     renderings,
 )
 from replacing import replace
-from sets import LONG_TEST, common
+from sets import LONG_TEST, common, common_of
 from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
@@ -59,7 +59,7 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape, fourier:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(FEW[:3], IN_C))
+@pytest.mark.parametrize("name", common_of(2, FEW[:3], IN_C))
 def test_random_programs(name: str, benches: Benches, tmp_path: Path) -> None:
     configuration = IN_C[name]
     if configuration.shaping:
@@ -190,7 +190,7 @@ def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(("short_frame", "direct_steps"), VARIANTS))
+@pytest.mark.parametrize("name", common_of(2, ("short_frame", "direct_steps"), VARIANTS))
 def test_a_build_s_header_plays_a_frame_a_swap_and_parks(name: str, tmp_path: Path) -> None:
     """The words that the converter gets, by ``DAC_PROGRAM`` and ``DAC_CONVERTER`` of the emitted header."""
     built = build(tmp_path, VARIANTS[name])

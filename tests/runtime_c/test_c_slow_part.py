@@ -25,7 +25,7 @@ from frame_programs import scan_program, shaped_scan
 from limits import limit
 from programs import random_schedule
 from replacing import replace
-from sets import common, every_second
+from sets import common, one_of
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.commit_mode import CommitMode
@@ -554,7 +554,8 @@ def differs(path: Path, option: str) -> bool:
 @pytest.mark.rest
 @pytest.mark.parametrize(
     ("option", "breaks"),
-    every_second(
+    one_of(
+        2,
         [
             *(("plain", breaks) for breaks in MUTANTS),
             *(("short", breaks) for breaks in SHORT_MUTANTS),

@@ -25,7 +25,7 @@ from limits import PATIENCE_S
 from link_line import FarEnd, Line
 from link_qemu import LinkMachine
 from pipe_board import PipeBoard
-from sets import every_second
+from sets import one_of
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
 from stm32h7_board import OFF, Stm32h7Board
@@ -260,7 +260,7 @@ def _faulty(folder: Path, port: str, old: str, new: str) -> Path:
     return ports
 
 
-@pytest.mark.parametrize("fault", every_second(H7_FAULTS))
+@pytest.mark.parametrize("fault", one_of(5, H7_FAULTS))
 def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
     ports = _faulty(tmp_path, "stm32h7", *H7_FAULTS[fault])
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
@@ -368,7 +368,7 @@ TEENSY_FAULTS = {  # the first four are in what ports to a Cortex-M7 share
 }
 
 
-@pytest.mark.parametrize("fault", every_second(TEENSY_FAULTS))
+@pytest.mark.parametrize("fault", one_of(5, TEENSY_FAULTS))
 def test_a_fault_of_the_teensy41_port_is_found(fault: str, tmp_path: Path) -> None:
     ports = _faulty(tmp_path, "teensy41", *TEENSY_FAULTS[fault])
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)

@@ -16,7 +16,7 @@ import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from kept_plays import kept_plays, own_program_alone
-from sets import LONG_TEST, quick
+from sets import LONG_TEST, long, one_of, quick
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -67,7 +67,7 @@ MODES = (
 ON_BLOCKS = ("left_aligned", "narrow_table_wide_dac")
 PLACED = [
     *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "direct_steps")]),
-    *(pytest.param((name, "blocks"), marks=pytest.mark.rest) for name in ON_BLOCKS),
+    *(pytest.param((name, "blocks"), marks=LONG_TEST) for name in ON_BLOCKS),
     pytest.param(("bits_24", "pipelined"), marks=pytest.mark.rest),
 ]
 
@@ -117,7 +117,7 @@ def test_a_build_verifies(placed: tuple[str, str], tmp_path: Path) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", [name for name in MODES if name not in ("example", "direct_steps")])
+@pytest.mark.parametrize("name", one_of(3, (name for name in MODES if name not in ("example", "direct_steps"))))
 def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
     """The same of the others, without requests, which are the same for all."""
     built = build(tmp_path, VARIANTS[name])
@@ -127,8 +127,9 @@ def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
     assert {verdicts(outcome)[axis, "integer model"] for axis in "xy"} == {"ok"}
 
 
-@pytest.mark.rest
-@pytest.mark.parametrize(("seed", "placed"), [pytest.param(1, "pipelined", marks=LONG_TEST), (2, "blocks")], ids=str)
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+@pytest.mark.parametrize(("seed", "placed"), [(1, "pipelined"), (2, "blocks")], ids=str)
 def test_a_whole_frame_verifies(short: Build, seed: int, placed: str) -> None:
     """Codes of all of a line and of a frame, frames that follow, a swap in mid-frame; by any seed."""
     outcome = verify(short.folder, "--seed", seed, "--axis", placed, ticks=300000)
@@ -145,11 +146,17 @@ def test_a_whole_frame_verifies(short: Build, seed: int, placed: str) -> None:
 
 
 @pytest.mark.rest
-def test_verilator_finds_the_same(folder: Path, tmp_path: Path) -> None:
-    """A wrong rounding, at the same first tick, and nothing else; also after the same build was compiled and kept."""
+def test_a_build_verifies_on_verilator(folder: Path, tmp_path: Path) -> None:
+    """Also after the same build was compiled and kept."""
     for kept, made in ("first", True), ("second", False):
         assert verify(folder, "--sim", "verilator", "--keep", tmp_path / kept).status == 0
         assert (tmp_path / kept / "verilator" / "build.log").is_file() == made
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_verilator_finds_a_wrong_rounding_as_icarus_does(folder: Path) -> None:
+    """It is the same first tick, and nothing else."""
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
     outcome = verify(folder, "--sim", "verilator")
     assert outcome.status == 5
@@ -214,7 +221,7 @@ def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("suffix", ["sine.mem", "x_fourier.mem", "y_fourier.mem"])
+@pytest.mark.parametrize("suffix", long(["x_fourier.mem"], ["sine.mem", "x_fourier.mem", "y_fourier.mem"]))
 def test_a_flipped_bit_of_what_the_session_does_not_play_is_found(folder: Path, suffix: str) -> None:
     flip(folder / f"{NAME}_{suffix}", 3, 0)
     outcome = verify(folder)
