@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from building import REPOSITORY
 from editing import edited
 from replacing import replace
 from tilted_scans import (
@@ -81,6 +82,7 @@ def test_z_follows_the_sample_and_not_the_axes() -> None:
     assert plain.on_a_plane(0.02, -0.05) == mixed.on_a_plane(0.02, -0.05)
 
 
+@pytest.mark.common
 def test_a_window_off_the_middle_a_falling_piezo_and_a_level(tmp_path: Path) -> None:
     """Lines whose window has a mean of its own; a gain below 0, by another converter; slopes of 0 play the offset."""
     own = "+ [z]\nnm_per_v = -5.0\nv_max = 100.0\n[z.dac]\nbits = 18\ninverted = true"
@@ -126,10 +128,12 @@ def test_a_wrong_key_is_named(
     assert re.match(says, refused(path))
 
 
+@pytest.mark.common
 def test_a_tilt_that_leaves_the_range_says_what_fits(tmp_path: Path) -> None:
-    """The slopes of the message fit, and some more do not."""
-    path = write_tilted(tmp_path, 20.0, "z.slope_x = 0.5", "z.slope_y = -0.6")
+    """The slopes of the message fit, and some more do not; the page shows this message."""
+    path = write_tilted(tmp_path, 0.0, "z.slope_x = 0.5", "z.slope_y = -0.6")
     message = refused(path)
+    assert message in (REPOSITORY / "docs" / "tilt.md").read_text("utf-8").replace("\n", " ")
     says = r"scan\.toml:\d+: z\.slope_y: the tilt leaves the 0\.\.99\.9985 V of z; the largest that fits here is "
     fits = re.match(says + r"slope_x = (\S+) and slope_y = (\S+)$", message)
     assert fits, message
@@ -143,6 +147,7 @@ def test_a_tilt_that_leaves_the_range_says_what_fits(tmp_path: Path) -> None:
             assert re.match(says, refused(path))
 
 
+@pytest.mark.common
 def test_a_slew_rate_of_z_says_what_fits(tmp_path: Path) -> None:
     own = "+ [z]\nnm_per_v = 5.0\nv_max = 100.0\n[z.amplifier]\nmax_slew_v_per_s = 20000"
     path = write_tilted(tmp_path, 0.0, "z.slope_x = 0.5", "z.slope_y = 0", scanner=(own,))
