@@ -235,6 +235,9 @@ class Live:
             why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
             raise Rejected([Problem(str(self._path), 0, "scans", why)])
         setup = scans[0].setup
+        if setup.scan.z is not None:
+            why = "`live` sends no output z; leave [z] out, or build the C into the firmware"
+            raise Rejected([setup.scan_file.problem("z", why)])
         built = build_turned(setup, progress=self._on_stage) if setup.mixes_motions else build(setup)
         return _Scan(settings, scans[0], built)
 

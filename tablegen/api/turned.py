@@ -16,6 +16,7 @@ from tablegen.config.load import Setup
 from tablegen.emit.turned import turned_runtime
 from tablegen.emit.turned_scan import formats_of_turned, render_turned, turned_clocks
 from tablegen.emit.write import leftover_files, outdated_files, write_files
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
 
@@ -37,6 +38,8 @@ def build_turned(
 ) -> "TurnedBuild":
     """Plan and certify a scan at an angle, on coupled axes or with drift, and write it into ``out`` if one is given.
 
+    So is a scan with the output z, at any angle.
+
     Parameters
     ----------
     source, scan, scanner
@@ -44,7 +47,7 @@ def build_turned(
     out : str or Path, optional
         Directory; files of an earlier build there are removed.
     formats : sequence of str, optional
-        "c" and "verilog"; by default those of the scan, or "c" alone.
+        "c" and, without z, "verilog"; by default those of the scan, or "c" alone.
     progress : callable
         Called with a text for each stage.
 
@@ -117,10 +120,13 @@ class TurnedBuild(Result):
     @property
     def choices(self) -> tuple[str, ...]:
         """Settings that the build chose, in sentences."""
+        programs: dict[str, FrameProgram] = {axis.axis: axis.program for axis in self.plan.axes}
+        if self.plan.z is not None:
+            programs["z"] = self.plan.z.program
         tables = [
-            f"{axis.axis}: cubic tables of {len(axis.program.fast.words)} words for the line and "
-            f"{len(axis.program.slow.words)} for the frame, {axis.program.memory_bits // 8} bytes in all"
-            for axis in self.plan.axes
+            f"{name}: cubic tables of {len(program.fast.words)} words for the line and "
+            f"{len(program.slow.words)} for the frame, {program.memory_bits // 8} bytes in all"
+            for name, program in programs.items()
         ]
         return (*self.setup.choices, *tables)
 
@@ -161,7 +167,7 @@ class TurnedBuild(Result):
         return "\n".join(turned_summary(self.plan, self.certificate))
 
     def charts(self) -> "PlottedCharts":
-        """Return the drive of both axes on the first, a middle and the last imaged line, and over the frame."""
+        """Return the drives over the frame, and those of both axes on the first, a middle and the last imaged line."""
         from tablegen.charts.chart import Chart, DrawnCurve
         from tablegen.charts.picture_file import PlottedCharts
 
@@ -178,6 +184,12 @@ class TurnedBuild(Result):
             charts.append(Chart(f"{axis.axis}_line", f"{axis.axis}: lines", "line period", "drive [V]", curves))
             frame = DrawnCurve(f"{axis.axis}", "other", np.arange(u.size) / _POINTS, driver.volts(u.ravel()))
             charts.append(Chart(f"{axis.axis}_frame", f"{axis.axis}: frame", "line", "drive [V]", (frame,)))
+        if (z := self.plan.z) is not None:
+            ticks = np.arange(_POINTS) * self.plan.schedule.ticks // _POINTS
+            codes = np.stack([z.program.at(line, ticks) for line in range(self.plan.schedule.lines)]).ravel()
+            volts = np.asarray(z.converter.v_zero + z.converter.v_per_code * codes, dtype=np.float64)
+            frame = DrawnCurve("z", "other", np.arange(codes.size) / _POINTS, volts)
+            charts.append(Chart("z_frame", "z: frame", "line", "drive [V]", (frame,)))
         return PlottedCharts(self.name, tuple(charts))
 
     def write(self, folder: str | Path) -> list[str]:

@@ -82,7 +82,7 @@ def build(
     A scaling error above 1 %, or above that of the uncompensated line, is a warning on stderr, with its cause and with
     remedies that were tried.
 
-    A scan at an angle, on coupled axes or with drift is built in C, and with -f verilog in Verilog.
+    A scan at an angle, on coupled axes or with drift is built in C, and with -f verilog in Verilog; one with [z] in C.
 
     \b
     Examples:

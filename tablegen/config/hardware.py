@@ -1,7 +1,8 @@
 """The converter and the amplifier of each axis, combined from the keys of the scanner file and of the scan file.
 
 The hardware belongs to the instrument: in the scanner file ``[x.dac]`` goes before ``[dac]``, which serves both axes.
-``[dac]`` of the scan file serves both axes too; keys that both files have must be equal.
+``[dac]`` of the scan file serves both axes too; keys that both files have must be equal. The output z takes what it
+does not have in ``[z.dac]`` from ``[dac]`` of the scanner file, then from that of the scan file.
 """
 
 from collections.abc import Mapping
@@ -15,6 +16,10 @@ from tablegen.config.scanner import Scanner
 from tablegen.config.schema import Amplifier, Dac, WrittenScan
 
 _AXES = ("x", "y")
+_NOT_OF_Z = {
+    "shaping": "the output z is not shaped; leave this out",
+    "output": "x and y are the outputs of a dual converter; leave this out",
+}
 _KINDS: Mapping[str, type[Dac] | type[Amplifier]] = {"dac": Dac, "amplifier": Amplifier}
 _REQUIRED = {"dac": ("bits", "v_min", "v_max", "update_rate_hz"), "amplifier": ("gain",)}
 
@@ -80,7 +85,7 @@ class AxisHardware(Struct, frozen=True):
 
 
 def hardware_of(scan: WrittenScan, scanner: Scanner, axis: str) -> AxisHardware:
-    """Return the hardware of one axis ("x" or "y") of validated files."""
+    """Return the hardware of one axis ("x" or "y"), or of "z" of a scanner that has it, of validated files."""
     tables: dict[Place, Dac | Amplifier] = {}
     for part in _KINDS:
         tables[Place(False, part)] = getattr(scan, part)
@@ -104,8 +109,13 @@ def _combined(tables: _Tables, axis: str) -> AxisHardware:
 
 
 def _places(tables: _Tables, axis: str, part: str, name: str) -> list[Place]:
-    """Return the tables with a key of one axis: that of the scan file, and the first one of the scanner file."""
+    """Return the tables with a key of one axis: that of the scan file, and the first one of the scanner file.
+
+    Of z it is one table: that of the scan file is of x and y, and may have other values.
+    """
     scans, own, common = Place(False, part), Place(True, f"{axis}.{part}"), Place(True, part)
+    if axis == "z":
+        return [place for place in (own, common, scans) if getattr(tables[place], name) is not None][:1]
     defined = [place for place in (scans, own, common) if getattr(tables[place], name) is not None]
     return defined[:2] if defined[:1] == [scans] else defined[:1]
 
@@ -118,11 +128,11 @@ def check_hardware(
     problems: Problems,
 ) -> None:
     """Report contradictions of the hardware in both files; faults of single keys were reported before."""
-    written = _written(scan, scanner)
+    written, has_z = _written(scan, scanner), isinstance(scanner.get("z"), dict)
     if not all(isinstance(table, dict) for table in written.values()):
         return
     files = {False: scan_file, True: scanner_file}
-    missing = _missing(written)
+    missing = _missing(written) or (_missing_of_z(written) if has_z else [])
     for place, why in missing:
         problems.add(files[place.in_scanner], place.key, why)
     tables = _decoded(written, files)
@@ -132,13 +142,12 @@ def check_hardware(
         for key, why in contradictions:
             problems.add(scan_file, key, why)
         return
-    both = {axis: _combined(tables, axis) for axis in _AXES}
-    for hardware in both.values():
-        for key, why in _faults(hardware):
-            place = hardware.where(key)[0]
-            problems.add(files[place.in_scanner], place.key, why)
-    for key, why in _differences(both["x"], both["y"], files):
-        place = both["y"].where(key)[0]
+    each = {axis: _combined(tables, axis) for axis in (*_AXES, *("z" if has_z else ""))}
+    faults = [(hardware, fault) for hardware in each.values() for fault in _faults(hardware)]
+    faults += [(each["y"], fault) for fault in _differences(each["x"], each["y"], files)]
+    faults += [(each["z"], fault) for fault in (_faults_of_z(each["x"], each["z"], files) if has_z else ())]
+    for hardware, (key, why) in faults:
+        place = hardware.where(key)[0]
         problems.add(files[place.in_scanner], place.key, why)
 
 
@@ -148,7 +157,7 @@ def _written(scan: Mapping[str, Any], scanner: Mapping[str, Any]) -> dict[Place,
     for part in _KINDS:
         written[Place(False, part)] = scan.get(part, {})
         written[Place(True, part)] = scanner.get(part, {})
-        for axis in _AXES:
+        for axis in (*_AXES, "z"):
             its = scanner.get(axis)
             written[Place(True, f"{axis}.{part}")] = its.get(part, {}) if isinstance(its, dict) else {}
     return written
@@ -194,6 +203,40 @@ def _missing(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, st
             else:
                 why = f"missing; this key is required, here or in [{part}]"
                 faults += [(Place(True, f"{axis}.{part}.{name}"), why) for axis in axes_without]
+    return faults
+
+
+def _missing_of_z(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, str]]:
+    """Return required keys that only x and y have, in tables of their own."""
+    faults: list[tuple[Place, str]] = []
+    for part, kind in _KINDS.items():
+        known = [*kind.__struct_fields__]
+        tables = written[Place(True, f"z.{part}")], written[Place(True, part)], written[Place(False, part)]
+        there = {key for table in tables for key in table}
+        there |= {other for key in there if key not in known for other in meant(key, known)}
+        faults += [
+            (Place(True, f"z.{part}.{name}"), f"missing; this key is required, here or in [{part}]")
+            for name in _REQUIRED[part]
+            if name not in there
+        ]
+    return faults
+
+
+def _faults_of_z(x: AxisHardware, z: AxisHardware, files: Mapping[bool, Document]) -> list[tuple[str, str]]:
+    """Return the keys of z that it cannot have, or that have to equal those of x and differ."""
+    faults = [
+        (key, why)
+        for name, why in _NOT_OF_Z.items()
+        if (key := f"dac.{name}") in z.places and z.where(key)[0].key == f"z.{key}"
+    ]
+    if x.dac.update_rate_hz != z.dac.update_rate_hz:
+        faults.append(
+            (
+                "dac.update_rate_hz",
+                f"{z.dac.update_rate_hz:.12g} of z, and {_place_text(x, 'dac.update_rate_hz', files)} is "
+                f"{x.dac.update_rate_hz:.12g} of x; z moves on the ticks of x and y: leave this out",
+            )
+        )
     return faults
 
 

@@ -19,7 +19,7 @@ from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardwa
 from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES, check_image_keys, solve_scan
 from tablegen.config.like import inherited, warn_inherited_once
 from tablegen.config.names import why_not_a_name
-from tablegen.config.scanner import Offset, Resonance, Scanner
+from tablegen.config.scanner import Offset, Resonance, Scanner, ScannerZ
 from tablegen.config.schema import (
     MAXIMUM_NAME,
     MAXIMUM_SPLINE_BITS,
@@ -33,6 +33,7 @@ from tablegen.config.schema import (
     WrittenTiming,
 )
 
+_LEAST_NM_PER_V = 1e-6  # of z
 _LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
 
 
@@ -53,12 +54,13 @@ class Setup(Struct, frozen=True, dict=True):
         return f"<tablegen setup {self.scan.name!r} on {self.scanner.name!r}, from {self.scan_file.name}>"
 
     def hardware(self, axis: str) -> AxisHardware:
-        """Return converter and amplifier of one axis ("x" or "y"), and where their keys stand."""
+        """Return converter and amplifier of "x", "y", or "z" of a scanner with it, and where their keys stand."""
         return self._hardware[axis]
 
     @cached_property
     def _hardware(self) -> dict[str, AxisHardware]:
-        return {axis: hardware_of(self.scan, self.scanner, axis) for axis in ("x", "y")}
+        axes = ("x", "y") if self.scanner.z is None else ("x", "y", "z")
+        return {axis: hardware_of(self.scan, self.scanner, axis) for axis in axes}
 
     def hardware_problem(self, axis: str, key: str, why: str) -> Problem:
         """Return a problem of a key of the hardware such as "amplifier.gain", at the place where the axis has it."""
@@ -76,8 +78,9 @@ class Setup(Struct, frozen=True, dict=True):
 
     @property
     def mixes_motions(self) -> bool:
-        """True if an axis follows the line and the frame: at an angle, on coupled axes, or with drift."""
-        return bool(self.scan.angle_deg % 360.0) or bool(self.scanner.coupling) or any(self.scan.drift_nm_per_s)
+        """True if an output follows the line and the frame: at an angle, on coupled axes, with drift, or with z."""
+        turned = bool(self.scan.angle_deg % 360.0) or self.scan.z is not None
+        return turned or bool(self.scanner.coupling) or any(self.scan.drift_nm_per_s)
 
     @property
     def files(self) -> list[Path]:
@@ -204,6 +207,9 @@ def _setup(
     assert written is not None
     assert scanner is not None
     update_rate_hz = hardware_of(written, scanner, "x").dac.update_rate_hz
+    if written.z is not None and scanner.z is None:
+        why = f"{scanner_file.name} has no [z]; give it nm_per_v and v_max of the piezo of z, and its converter"
+        problems.add(scan_file, "z", why)
     solution = solve_scan(written, update_rate_hz, values, scan_file, problems)
     problems.stop_if_any()
     assert solution is not None
@@ -388,6 +394,8 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
             return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
         case Offset():
             return _offset_faults(built)
+        case ScannerZ() if abs(built.nm_per_v) < _LEAST_NM_PER_V:
+            return [("nm_per_v", f"{built.nm_per_v:g} moves nothing; at least {_LEAST_NM_PER_V:g} in size is needed")]
         case Parameters():
             return built.faults()
         case _:

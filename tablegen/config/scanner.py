@@ -123,6 +123,34 @@ class SlowScannerAxis(ScannerAxis, frozen=True, kw_only=True, forbid_unknown_fie
     ) = None
 
 
+class ScannerZ(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The piezo of z, taken as linear, and its driver; for scans with `[z]`."""
+
+    nm_per_v: Annotated[
+        float,
+        Meta(ge=-1e6, le=1e6, description="nm of z for each V at the piezo; negative if a higher voltage lowers z"),
+    ]
+    v_max: Annotated[PositiveVolts, Meta(description="maximum output of the driver of z")]
+    v_min: Annotated[
+        float, Meta(ge=-1e5, le=0.0, description="minimum output of the driver of z; below 0 if it has both signs")
+    ] = 0.0
+    dac: Annotated[
+        Dac,
+        Meta(
+            description="The converter of z; its keys take precedence over `[dac]`. It has its own `bits`, and neither "
+            "`shaping` nor `output`."
+        ),
+    ] = Dac()
+    amplifier: Annotated[
+        Amplifier, Meta(description="The amplifier of z; its keys take precedence over `[amplifier]`.")
+    ] = Amplifier()
+
+    @property
+    def driver(self) -> Driver:
+        """The output range of the driver of z."""
+        return Driver(self.v_max, self.v_min)
+
+
 class Coupling(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Coupling of the axes: what each moves along the other. A scan on coupled axes needs an operator on both."""
 
@@ -154,6 +182,7 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     x: ScannerAxis
     y: SlowScannerAxis
     coupling: Coupling = Coupling()
+    z: ScannerZ | None = None
 
     @property
     def driver(self) -> Driver:

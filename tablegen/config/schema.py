@@ -486,6 +486,19 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
 
 
+class Tilt(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The output z beside x and y, which follows a tilted sample: z = slope_x x + slope_y y from the scan's centre."""
+
+    slope_x: Annotated[
+        float, Meta(ge=-1.0, le=1.0, description="nm of z for each nm along x on the sample, for example 0.02")
+    ] = 0.0
+    slope_y: Annotated[float, Meta(ge=-1.0, le=1.0, description="nm of z for each nm along y on the sample")] = 0.0
+    offset_v: Annotated[Volts, Meta(description="voltage of z at the piezo in the centre of the scan")]
+    park_v: Annotated[Volts, Meta(description="voltage of z at the piezo after park; default: the offset")] | None = (
+        None
+    )
+
+
 class ScanOfMany(Struct, frozen=True, kw_only=True):
     """One scan of a library, for `tablegen sweep`: its name, and the keys of this file that differ for it."""
 
@@ -532,6 +545,7 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     timing: WrittenTiming
     x: LineAxis
     y: SlowAxis
+    z: Tilt | None = None
     limits: Limits = Limits()
     cost: Cost | None = None
     emit: Emit = Emit()

@@ -90,7 +90,7 @@ def _options(folder: Path) -> tuple[str, Options]:
         raise NotABuild("\n".join(f"{path}: is damaged: {why}; build it again" for why in damage.reasons)) from None
     name = stored.manifest.name
     if isinstance(stored, StoredTurned):
-        return name, turned_options(stored.program)
+        return name, turned_options(stored.program, stored.z)
     if f"{name}.h" not in stored.manifest.files:
         raise NotABuild(f'{folder}: has no C; add "c" to emit.formats of its scan, and build it again')
     return name, runtime_options(stored_content(stored))

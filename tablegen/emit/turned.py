@@ -48,30 +48,35 @@ def turned_runtime(formats: Iterable[str]) -> dict[str, bytes]:
 
 
 def _c_files(content: TurnedContent) -> dict[str, bytes]:
-    context = _context(content)
-    sources = {
-        f"{content.name}.h": "c/turned.h.j2",
-        f"{content.name}.c": "c/turned.c.j2",
-        f"{content.name}_program.h": "c/program.h.j2",
-        f"{content.name}_program.c": "c/turned_program.c.j2",
-    }
-    return {name: template(source, context, literal) for name, source in sources.items()}
+    storage = _storage(content.program, content.z)
+    files: dict[str, bytes] = {}
+    for each in (content, content.content_of_z):
+        if each is not None:
+            context = _context(each, storage)
+            sources = {
+                f"{each.name}.h": "c/turned.h.j2",
+                f"{each.name}.c": "c/turned.c.j2",
+                f"{each.name}_program.h": "c/program.h.j2",
+                f"{each.name}_program.c": "c/turned_program.c.j2",
+            }
+            files |= {name: template(source, context, literal) for name, source in sources.items()}
+    return files
 
 
-def turned_options(program: ScanProgram) -> dict[str, int]:
-    """Return the macros that the runtime and an application are compiled with."""
-    return {f"DAC_{key}": value for key, value in _storage(program).items()}
+def turned_options(program: ScanProgram, z: ScanProgram | None = None) -> dict[str, int]:
+    """Return the macros that the runtime and an application are compiled with; ``z`` is what plays beside a scan."""
+    return {f"DAC_{key}": value for key, value in _storage(program, z).items()}
 
 
-def _storage(program: ScanProgram) -> dict[str, int]:
-    outputs = program.x.output, program.y.output
+def _storage(program: ScanProgram, z: ScanProgram | None) -> dict[str, int]:
+    outputs = [axis.output for each in (program, z) if each is not None for axis in (each.x, each.y)]
     widest, order = max(each.word_bits for each in outputs), max(each.shaping.order for each in outputs)
     widths = {"TABLE_STORAGE_BITS": LEAST_STORAGE_BITS, "OUTPUT_STORAGE_BITS": storage_bits(widest)}
     options = widths | {"SPLINE": 1, "SLOW_PART": 1}
     return options | ({"SHAPING": order} if order else {})
 
 
-def _context(content: TurnedContent) -> dict[str, Any]:
+def _context(content: TurnedContent, storage: dict[str, int]) -> dict[str, Any]:
     return {
         "version": content.version,
         "name": content.name,
@@ -80,8 +85,8 @@ def _context(content: TurnedContent) -> dict[str, Any]:
         "scanner": comment_safe(content.scanner),
         "summary": content.summary,
         "sequence": sequence_constants(content.program.schedule),
-        "storage": _storage(content.program),
-        "needs": beyond_defaults(_storage(content.program)),
+        "storage": storage,
+        "needs": beyond_defaults(storage),
         "axes": [_axis(content, axis) for axis in "xy"],
     }
 

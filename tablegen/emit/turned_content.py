@@ -1,6 +1,7 @@
 """The content that the files of a scan at an angle render: its integers, and words for their comments."""
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.device.dual_program import ScanProgram
 from tablegen.fixedpoint.frame_program import FrameProgram
@@ -9,7 +10,8 @@ from tablegen.fixedpoint.frame_program import FrameProgram
 class TurnedContent(Struct, frozen=True, eq=False):
     """A scan at an angle as its files have it; words of comments are empty where a manifest is the source.
 
-    ``clocks_per_tick`` are those of an FPGA, 0 where its clock is not known.
+    ``clocks_per_tick`` are those of an FPGA, 0 where its clock is not known. ``z`` is the program of a second sequencer
+    that plays the output z, where the scan has one; its files are those of a scan named ``name_of_z``.
     """
 
     name: str
@@ -19,6 +21,20 @@ class TurnedContent(Struct, frozen=True, eq=False):
     scanner: str = ""
     summary: tuple[str, ...] = ()
     clocks_per_tick: int = 0
+    z: ScanProgram | None = None
+
+    @property
+    def name_of_z(self) -> str:
+        """What names of files and identifiers of the second sequencer begin with."""
+        return f"{self.name}_z"
+
+    @property
+    def content_of_z(self) -> "TurnedContent | None":
+        """The content of the files of the second sequencer; None without z."""
+        if self.z is None:
+            return None
+        summary = (f"The output z of {self.name}, for a sequencer of its own: x is z here, y rests at its offset.",)
+        return replace(self, name=self.name_of_z, program=self.z, summary=summary, z=None)
 
     @property
     def axes(self) -> tuple[FrameProgram, FrameProgram]:

@@ -29,6 +29,9 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
     if not set(names) <= set(TURNED_FORMATS):
         why = "a scan at an angle, on coupled axes or with drift has the formats c and verilog"
         raise format_rejected(setup, why, explicit=formats is not None)
+    if setup.scan.z is not None and "verilog" in names:
+        why = "the Verilog sequencer plays no output z; take the format c, or leave [z] out"
+        raise format_rejected(setup, why, explicit=formats is not None)
     return names
 
 
@@ -58,7 +61,9 @@ def render_turned(
     names, record = list(formats), turned_record(plan)
     digest = content_hash(record)
     text = tuple(map(comment_safe, turned_summary(plan, certificate)))
-    content = TurnedContent(plan.name, digest, plan.program, __version__, plan.scanner, text, clocks_per_tick)
+    content = TurnedContent(
+        plan.name, digest, plan.program, __version__, plan.scanner, text, clocks_per_tick, plan.program_of_z
+    )
     files = turned_files(content, names) | turned_runtime(names)
     files[MANIFEST] = turned_manifest(record, digest, names, certificate, files, clocks_per_tick)
     return files

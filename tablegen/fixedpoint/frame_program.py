@@ -179,6 +179,10 @@ class FrameProgram(Struct, frozen=True, eq=False):
         """The output stage of the axis, whose gain and offset words do not play."""
         return self.fast.output
 
+    def guarded(self, max_step: int) -> "FrameProgram":
+        """Return the program with a slew guard of so many codes a tick, 1 at least."""
+        return replace(self, fast=replace(self.fast, output=replace(self.output, max_step=max(max_step, 1))))
+
     def ramps(self) -> Ints:
         """Return by how much the slow part moves in a tick of each line, in the units of an offset word.
 

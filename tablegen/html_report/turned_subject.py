@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from tablegen.base.input_errors import Problem
+from tablegen.base.input_errors import Problem, Rejected
 from tablegen.certificate.turned_errors import TurnedCertificate, certify_turned
 from tablegen.certificate.turned_summary import broken_limits
 from tablegen.config.load import Setup
@@ -15,8 +15,11 @@ from tablegen.html_report.ranking import without_folder
 from tablegen.html_report.subject import FileState, files_beside, manifest_digest
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.format import MANIFEST
+from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import StoredTurned, TurnedManifest, parse_turned, read_turned
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
+
+_Z = "`report` and `compare` show no scan with the output z"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +68,10 @@ def turned_scan(
     Raises
     ------
     Rejected
-        For wrong input.
+        For wrong input, or a scan with the output z.
     """
+    if setup.scan.z is not None:
+        raise Rejected([setup.scan_file.problem("z", f"{_Z}; leave [z] out")])
     formats = formats_of_turned(setup)
     plan = make_turned_plan(setup, progress)
     clocks = turned_clocks(setup, plan, formats)
@@ -86,9 +91,11 @@ def turned_directory(folder: Path, verified: VerifyRecord | None = None) -> Turn
     Raises
     ------
     NotABuild
-        If the directory is not such a build.
+        If the directory is not such a build, or its scan has the output z.
     """
     stored, digest = read_turned(folder), manifest_digest(folder)
+    if stored.z is not None:
+        raise NotABuild(f"{folder}: {_Z}")
     wrong = "" if stored.own_hash == stored.manifest.hash else "has a hash that is not that of its plan"
     states = (FileState(MANIFEST, digest, wrong), *files_beside(folder, stored.manifest.files))
     return TurnedSubject(stored, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)

@@ -36,6 +36,7 @@ from tablegen.planning.turned_plan import TurnedPlan
 
 Form = Literal["auto", "table", "fourier"]
 TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # bits of AxisShape.converter
+_Z = "the link sends no output z; build the C into the firmware, or leave [z] out of the scan"
 _RATE_TOLERANCE_HZ = 1.0  # a device states its rate to the nearest integer
 
 
@@ -61,7 +62,15 @@ class PreparedScan:
 
     @classmethod
     def of_turned(cls, plan: TurnedPlan) -> "PreparedScan":
-        """Prepare the scan of a plan at an angle."""
+        """Prepare the scan of a plan at an angle.
+
+        Raises
+        ------
+        Unsuitable
+            If it has the output z, which a device on a link does not play.
+        """
+        if plan.z is not None:
+            raise Unsuitable([f"{plan.name}: {_Z}"])
         return cls(plan.name, content_hash(turned_record(plan)), plan.program, None, None)
 
     @classmethod
@@ -71,13 +80,15 @@ class PreparedScan:
         Raises
         ------
         NotABuild
-            If the folder holds none, or its manifest was changed.
+            If the folder holds none, its manifest was changed, or its scan has the output z.
         """
         stored = read_turned(folder) if is_turned(folder) else read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
             raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")
         if isinstance(stored, StoredTurned):
+            if stored.z is not None:
+                raise NotABuild(f"{folder}: {_Z}")
             return cls(manifest.name, manifest.hash, stored.program, None, None)
         axes = stored.manifest.axes
         return cls(manifest.name, manifest.hash, stored.program, axes.x.fourier_words, axes.y.fourier_words)

@@ -10,6 +10,7 @@ from msgspec import Meta, Struct
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import read_bytes
 from tablegen.config.names import why_not_a_name
+from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.fixedpoint.frame_program import MOST_KNOTS, FrameProgram, Knots, SlowTable
 from tablegen.fixedpoint.phase import RationalPhase
@@ -73,6 +74,14 @@ class TurnedAxisFields(Struct, forbid_unknown_fields=True):
         )
 
 
+class TurnedZ(TurnedAxisFields, forbid_unknown_fields=True):
+    """The output z: its slopes, nm of z for each nm along x and y, and the nm of z for a volt at its piezo."""
+
+    slope_x: float
+    slope_y: float
+    nm_per_v: float
+
+
 class TurnedAxes(Struct, forbid_unknown_fields=True):
     """Both axes."""
 
@@ -88,6 +97,7 @@ class TurnedFields(Struct):
     coupling: tuple[float, float]
     drift_nm_per_s: tuple[float, float]
     axes: TurnedAxes
+    z: TurnedZ | None = None
 
 
 class TurnedCodes(Struct):
@@ -101,7 +111,7 @@ class TurnedCodes(Struct):
 class TurnedFigures(Struct):
     """The part of the certificate that follows from the integers alone."""
 
-    codes: dict[Literal["x", "y"], TurnedCodes]
+    codes: dict[Literal["x", "y", "z"], TurnedCodes]
 
 
 class TurnedManifest(Struct, kw_only=True):
@@ -122,11 +132,15 @@ class TurnedManifest(Struct, kw_only=True):
 
 
 class StoredTurned(Struct, frozen=True, eq=False):
-    """A build of a scan at an angle as its manifest has it; ``plain`` is the manifest as JSON."""
+    """A build of a scan at an angle as its manifest has it; ``plain`` is the manifest as JSON.
+
+    ``z`` is what a second sequencer plays, where the scan has the output z.
+    """
 
     manifest: TurnedManifest
     program: ScanProgram
     plain: dict[str, Any]
+    z: ScanProgram | None = None
 
     @property
     def own_hash(self) -> str:
@@ -134,7 +148,7 @@ class StoredTurned(Struct, frozen=True, eq=False):
         keys = "name", "scanner", "sequence", "turned"
         return content_hash({key: self.plain[key] for key in keys})
 
-    def certified(self, axis: Literal["x", "y"]) -> tuple[int, int, int] | None:
+    def certified(self, axis: Literal["x", "y", "z"]) -> tuple[int, int, int] | None:
         """Return the least and the greatest code, and the largest step, by the certificate; None if it has none."""
         codes = self.manifest.certificate.codes.get(axis)
         return None if codes is None else (codes.least, codes.most, codes.steepest)
@@ -197,8 +211,12 @@ def parse_turned(content: bytes) -> StoredTurned:
         program = ScanProgram(
             fields.x.program(manifest.sequence), fields.y.program(manifest.sequence), manifest.sequence.schedule
         )
+        of_z = manifest.turned.z
+        z = None if of_z is None else program_beside(of_z.program(manifest.sequence), manifest.sequence.schedule)
     except (msgspec.ValidationError, ValueError, OverflowError, RecursionError) as error:
         raise DamagedManifest([str(error)]) from None
     if (why := why_not_a_name(manifest.name)) is not None:
         raise DamagedManifest([f"name: {why}"])
-    return StoredTurned(manifest, program, plain)
+    if z is not None and manifest.formats != ["c"]:
+        raise DamagedManifest(["formats: a scan with the output z has the format c alone"])
+    return StoredTurned(manifest, program, plain, z)

@@ -9,6 +9,7 @@ from msgspec import structs
 from tablegen.certificate.turned_errors import TurnedCertificate
 from tablegen.manifest.record import output_record, sequence_record
 from tablegen.manifest.write import readable
+from tablegen.planning.tilt import TiltedOutput
 from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan
 from tablegen.version import __version__
 
@@ -26,6 +27,7 @@ def turned_record(plan: TurnedPlan) -> dict[str, Any]:
             "coupling": [geometry.x_per_y, geometry.y_per_x],
             "drift_nm_per_s": list(geometry.drift_nm_per_s),
             "axes": {axis.axis: _axis(axis) for axis in plan.axes},
+            **({} if plan.z is None else {"z": _z(plan.z)}),
         },
     }
 
@@ -64,10 +66,21 @@ def certificate_record(certificate: TurnedCertificate) -> dict[str, Any]:
 
     errors = {key: figure(value) for key, value in structs.asdict(certificate.errors).items()}
     codes = {axis: structs.asdict(one) for axis, one in zip("xy", certificate.codes, strict=True)}
-    return {"errors": errors, "codes": codes}
+    z = certificate.z
+    of_z = {} if z is None else {"error_lsb": figure(z.error_lsb), "error_nm": figure(z.error_nm)}
+    return {
+        "errors": errors,
+        "codes": codes if z is None else codes | {"z": structs.asdict(z.codes)},
+        **({"z": of_z} if of_z else {}),
+    }
 
 
-def _axis(axis: TurnedAxis) -> dict[str, Any]:
+def _z(z: TiltedOutput) -> dict[str, Any]:
+    slopes = {"slope_x": z.slope_x, "slope_y": z.slope_y, "nm_per_v": z.nm_per_v}
+    return slopes | _axis(z)
+
+
+def _axis(axis: TurnedAxis | TiltedOutput) -> dict[str, Any]:
     program = axis.program
     return {
         "fast_nm": axis.motion.fast_nm,

@@ -42,6 +42,11 @@ MIXED = (
     "this out for anything else"
 )
 
+TILTED = (
+    "a scan with the output z is for `check`, `show`, `build` with the format c, `verify`, `simulate`, `correct` and "
+    "`refine`; leave [z] out for anything else"
+)
+
 
 class SampleCost(Struct, frozen=True):
     """The instructions for a sample of an axis in C on a processor, and the limit of the scan file."""
@@ -188,7 +193,10 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         return _better_motion(setup)
     problems = Problems()
     if setup.mixes_motions:
-        problems.add(*mixing_key(setup), MIXED)
+        if setup.scan.z is None:
+            problems.add(*mixing_key(setup), MIXED)
+        else:
+            problems.add(setup.scan_file, "z", TILTED)
     for axis in ("x", "y"):
         if getattr(setup.scan, axis).frame_refinement is not None:
             problems.add(
@@ -302,10 +310,12 @@ def _left(plan: Plan) -> float:
 
 
 def mixing_key(setup: Setup) -> tuple[Document, str]:
-    """Return the place of what makes an axis follow both motions."""
+    """Return the place of what makes an output follow both motions."""
     if setup.scan.angle_deg % 360.0:
         return setup.scan_file, "angle_deg"
-    return (setup.scanner_file, "coupling") if setup.scanner.coupling else (setup.scan_file, "drift_nm_per_s")
+    if setup.scanner.coupling:
+        return setup.scanner_file, "coupling"
+    return setup.scan_file, "drift_nm_per_s" if any(setup.scan.drift_nm_per_s) else "z"
 
 
 def _line_plan(

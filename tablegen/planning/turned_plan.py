@@ -20,6 +20,7 @@ from tablegen.compensation.operator.turned_frame import BeyondDriver, FrameDrive
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Coupling, ScannerAxis
 from tablegen.config.schema import Limits
+from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.converter import Converter, make_output
@@ -30,6 +31,7 @@ from tablegen.numerics.turns import sine_and_cosine_of
 from tablegen.planning.frame_refinement import learnt_frame_layer
 from tablegen.planning.known_axis import KnownAxis
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan, mixing_key
+from tablegen.planning.tilt import TiltedOutput, plan_tilt
 from tablegen.waveform.series import FourierSeries
 
 KNOTS = 16  # intervals of gain and ratio over a frame
@@ -96,6 +98,20 @@ class FrameGeometry(Struct, frozen=True):
         y = tuple((v - self.y_per_x * u) / whole for u, v in (fast, slow))
         return {"x": (x[0], x[1]), "y": (y[0], y[1])}
 
+    def on_a_plane(self, slope_x: float, slope_y: float) -> tuple[float, float]:
+        """Return the nm of the line and of the frame that z moves on a tilted sample.
+
+        It follows the wanted position on the sample: coupling moves the axes alone, and drift the sample with its tilt.
+
+        Parameters
+        ----------
+        slope_x, slope_y
+            nm of z for each nm along x and along y.
+        """
+        sine, cosine = sine_and_cosine_of(self.angle_deg / 360.0)
+        fast_nm, slow_nm = self.size_nm
+        return (slope_x * cosine + slope_y * sine) * fast_nm, (slope_y * cosine - slope_x * sine) * slow_nm
+
     def on_the_sample(self, x_nm: Floats, y_nm: Floats, time_s: Floats) -> tuple[Floats, Floats]:
         """Return where positions of the axes are along the lines and across them, on a sample that drifts.
 
@@ -114,7 +130,10 @@ class FrameGeometry(Struct, frozen=True):
 
 
 class TurnedPlan(Struct, frozen=True, eq=False):
-    """A scan at an angle: both axes and their schedule. ``straight`` is the same scan at 0 degrees."""
+    """A scan at an angle: both axes and their schedule. ``straight`` is the same scan at 0 degrees.
+
+    ``z`` is the output beside both axes, where the scan has one.
+    """
 
     name: str
     scanner: str
@@ -124,6 +143,7 @@ class TurnedPlan(Struct, frozen=True, eq=False):
     y: TurnedAxis
     limits: Limits
     straight: Plan
+    z: TiltedOutput | None = None
 
     @property
     def axes(self) -> tuple[TurnedAxis, TurnedAxis]:
@@ -134,6 +154,11 @@ class TurnedPlan(Struct, frozen=True, eq=False):
     def program(self) -> ScanProgram:
         """The content of a bank of the device: the programs of both axes and their schedule."""
         return ScanProgram(self.x.program, self.y.program, self.schedule)
+
+    @property
+    def program_of_z(self) -> ScanProgram | None:
+        """What a second sequencer plays, whose x is z; None without z."""
+        return None if self.z is None else program_beside(self.z.program, self.schedule)
 
 
 def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _: None) -> TurnedPlan:
@@ -174,6 +199,8 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
             setup.scan_file, "drift_nm_per_s", "is followed in frames that go up alone; take timing.frame = 'flyback'"
         )
     shares = geometry.shares
+    z = plan_z(setup, straight, geometry, problems)
+    problems.stop_if_any()
     axes = {}
     for line in straight.lines:
         progress(f"learning a frame of {schedule.lines} lines on the operator of {line.axis}")
@@ -185,15 +212,28 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     x, y = axes["x"], axes["y"]
     assert x is not None
     assert y is not None
-    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight)
+    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight, z)
+
+
+def plan_z(setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Problems) -> TiltedOutput | None:
+    """Plan the output z of a scan whose plan at 0 degrees is known; None without it, or where ``problems`` grew."""
+    tilt = setup.scan.z
+    if tilt is None:
+        return None
+    motion = _motion(setup, straight, straight.x, *geometry.shares["x"])
+    with problems.at(setup.scan_file, "z"):
+        shares = geometry.on_a_plane(tilt.slope_x, tilt.slope_y)
+        return plan_tilt(setup, straight.schedule, motion, shares, problems)
+    return None
 
 
 def _at_0_degrees(setup: Setup) -> Setup:
-    """Return the setup without an angle, coupling and drift, and without a clock, which a slow part takes others of."""
+    """Return the setup without angle, coupling, drift and z, and without a clock, which a slow part takes others of."""
     scan = replace(
         setup.scan,
         angle_deg=0.0,
         drift_nm_per_s=(0.0, 0.0),
+        z=None,
         emit=replace(setup.scan.emit, clock_hz=None),
         x=replace(setup.scan.x, frame_refinement=None),
         y=replace(setup.scan.y, frame_refinement=None),
@@ -306,7 +346,7 @@ def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, pro
         problems.add(*mixing_key(setup), _what_fits(plan, setup.scan.angle_deg, line, room))
     slew, last = setup.hardware(line.axis).amplifier.max_slew_v_per_s, (1 << output.dac_bits) - 1
     if slew is None:
-        return _guarded(program, min(2 * steepest, last))
+        return program.guarded(min(2 * steepest, last))
     per_tick = slew / setup.hardware(line.axis).dac.update_rate_hz / abs(line.converter.v_per_code)
     allowed = min(floor(per_tick), last)
     if steepest > allowed:
@@ -317,12 +357,7 @@ def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, pro
             f"at {setup.scan.angle_deg:g} degrees {line.axis} steps by up to {steepest} codes a tick, {slew:.6g} V/s "
             f"allow {allowed}; about {slower} Hz would fit",
         )
-    return _guarded(program, max(allowed, 1))
-
-
-def _guarded(program: FrameProgram, max_step: int) -> FrameProgram:
-    fast = program.fast
-    return replace(program, fast=replace(fast, output=replace(fast.output, max_step=max(max_step, 1))))
+    return program.guarded(allowed)
 
 
 def _what_fits(plan: Plan, angle_deg: float, line: LinePlan, room: float) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical, shortened
 from tablegen.base.reading import BUILD_FILE, read_bytes
-from tablegen.device.dual_program import AxisProgram
+from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.emit.turned import require_format, turned_files, turned_options, turned_runtime
 from tablegen.emit.turned_content import TurnedContent
@@ -126,7 +126,9 @@ def _target(folder: Path, formats: Sequence[str], target: str | None) -> Literal
 
 def _content_of(stored: StoredTurned) -> TurnedContent:
     manifest = stored.manifest
-    return TurnedContent(manifest.name, manifest.hash, stored.program, clocks_per_tick=manifest.clocks_per_tick)
+    return TurnedContent(
+        manifest.name, manifest.hash, stored.program, clocks_per_tick=manifest.clocks_per_tick, z=stored.z
+    )
 
 
 def _file_checks(folder: Path, stored: StoredTurned, other_version: bool) -> list[Check]:
@@ -191,7 +193,9 @@ def _behind_banner(path: Path, text: str) -> list[str]:
 def _code_check(stored: StoredTurned) -> Check:
     """Check that no code of a frame is clamped, and no step held back."""
     wrong = []
-    axes: tuple[tuple[Literal["x", "y"], AxisProgram], ...] = ("x", stored.program.x), ("y", stored.program.y)
+    axes: list[tuple[Literal["x", "y", "z"], AxisProgram]] = [("x", stored.program.x), ("y", stored.program.y)]
+    if stored.z is not None:
+        axes.append(("z", stored.z.x))
     for name, axis in axes:
         assert isinstance(axis, FrameProgram)
         least, most, steepest = played_extremes(axis)
@@ -203,7 +207,8 @@ def _code_check(stored: StoredTurned) -> Check:
         certified = stored.certified(name)
         if certified is not None and certified != (least, most, steepest):
             wrong.append(f"{name}: codes {least}..{most}, steps of {steepest}; the certificate has {certified}")
-    return differing_check("codes", "limits, certificate", f"{2 * stored.program.schedule.frame_ticks} codes", wrong)
+    count = len(axes) * stored.program.schedule.frame_ticks
+    return differing_check("codes", "limits, certificate", f"{count} codes", wrong)
 
 
 def _played_checks(folder: Path, work: Path, stored: StoredTurned, ticks: int) -> tuple[list[Check], str | None]:
@@ -214,37 +219,46 @@ def _played_checks(folder: Path, work: Path, stored: StoredTurned, ticks: int) -
     files, missing = copies(folder, sorted({*names, f"{name}.h", f"{name}.c", f"{name}_program.c"}), work / "c")
     if missing:
         return [Check("c", "the model", "0 ticks", failure=f"c: {'; '.join(missing)}")], None
-    parked = (
-        2
-        * (1 << stored.program.x.output.dac_bits)
-        // min(stored.program.x.output.max_step, stored.program.y.output.max_step)
-    )
+    content = _content_of(stored)
+    checks, differences = [], []
+    for label, each in (("c", content), ("c, z", content.content_of_z)):
+        if each is not None:
+            played, difference = _checks_of(label, each, files, turned_options(stored.program, stored.z), work, ticks)
+            checks += played
+            differences.append(difference)
+    return checks, next(filter(None, differences), None)
+
+
+def _checks_of(
+    label: str, content: TurnedContent, files: list[Path], options: dict[str, int], work: Path, ticks: int
+) -> tuple[list[Check], str | None]:
+    """Compile the runtime with the program of one sequencer, and compare what it plays with the model."""
+    outputs = content.program.x.output, content.program.y.output
+    parked = 2 * (1 << max(each.dac_bits for each in outputs)) // min(each.max_step for each in outputs)
     parked = min(parked + 10, ticks)
-    expected = _model(stored, ticks, parked)
+    expected = _model(content.program, ticks, parked)
     checks, difference = [], None
     try:
-        program = _compiled(files, work, stored)
+        program = _compiled(content.name, files, options, work)
         for way in ("steps", "fills"):
             capture = work / f"{way}.bin"
             timeout = 60.0 + (ticks + parked) / _LEAST_TICKS_A_SECOND
             most = 2 * _TICK.itemsize * len(expected) + 1000
             record([str(program), way, str(ticks), str(parked)], b"", capture, most, timeout)
             played = np.frombuffer(read_bytes(capture, BUILD_FILE), dtype=_TICK)
-            differs = _first_difference(played, expected, way)
+            differs, what = _first_difference(played, expected, way), f"{label}, {way}"
             difference = difference or differs
-            checks.append(
-                Check(f"c, {way}", "the model", f"{len(expected)} ticks", failure=differs and f"c, {way}: {differs}")
-            )
+            failure = differs and f"{what}: {differs}"
+            checks.append(Check(what, "the model", f"{len(expected)} ticks", failure=failure))
     except SimulationFailed as error:
-        checks.append(Check("c", "the model", f"{len(expected)} ticks", failure=f"c: {error}"))
+        checks.append(Check(label, "the model", f"{len(expected)} ticks", failure=f"{label}: {error}"))
     return checks, difference
 
 
-def _compiled(files: list[Path], work: Path, stored: StoredTurned) -> Path:
+def _compiled(name: str, files: list[Path], options: dict[str, int], work: Path) -> Path:
     compiler = require_compiler(host_compiler())
-    name = stored.manifest.name
     macros = {
-        **turned_options(stored.program),
+        **options,
         "BENCH_PROGRAM_HEADER": f'"{name}_program.h"',
         "BENCH_PROGRAM": f"{name}_program",
         "BENCH_X_CONVERTER": f"{name}_x_converter",
@@ -261,10 +275,10 @@ def _compiled(files: list[Path], work: Path, stored: StoredTurned) -> Path:
     return program
 
 
-def _model(stored: StoredTurned, ticks: int, parked: int) -> Ints:
+def _model(program: ScanProgram, ticks: int, parked: int) -> Ints:
     """Return what the integer model plays: rows of converter words of x and y, markers, and faults."""
     model = Sequencer(None)
-    outputs = stored.program.x.output, stored.program.y.output
+    outputs = program.x.output, program.y.output
     parts: list[Ints] = []
 
     def put(tick: Tick) -> None:
@@ -274,7 +288,7 @@ def _model(stored: StoredTurned, ticks: int, parked: int) -> Ints:
 
     for _ in range(_REST):
         put(model.step())
-    model.commit(stored.program)
+    model.commit(program)
     model.arm()
     model.trigger()
     left = ticks

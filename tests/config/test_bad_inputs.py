@@ -218,7 +218,7 @@ KEYS = [
         "wholly_different = 1",
         says=(
             "scan.toml:1: wholly_different: unknown key; known here: amplifier, angle_deg, cost, dac, "
-            "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y"
+            "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y, z"
         ),
     ),
     case("+ [emti]\nheader_only = true", says="scan.toml:57: emti: unknown key; did you mean emit?"),
@@ -227,7 +227,7 @@ KEYS = [
         '+ ["we.ird \\"key\\""]\na = 1',
         says=(
             'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, angle_deg, cost, dac, '
-            "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y"
+            "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y, z"
         ),
     ),
     case(

@@ -142,12 +142,13 @@ def _read_key(path: Path) -> bytes:
 def read_scan(source: Path) -> "PreparedScan":
     """Read the scan of a TOML file, or of a directory that ``tablegen build`` wrote."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tablegen.link.errors import Unsuitable
     from tablegen.link.prepare import PreparedScan
     from tablegen.manifest.read import NotABuild
 
-    if not source.is_dir():
-        return planned_at_any_angle(source).prepared
     try:
+        if not source.is_dir():
+            return planned_at_any_angle(source).prepared
         return PreparedScan.of_build(source)
-    except NotABuild as error:
+    except (NotABuild, Unsuitable) as error:
         fail([error], ExitStatus.WRONG_INPUT)

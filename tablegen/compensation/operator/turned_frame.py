@@ -199,27 +199,47 @@ class BeyondDriver(Unphysical):
         super().__init__(f"the frame takes {100.0 * least:.3g} to {100.0 * most:.3g} % of the driver's range")
 
 
-class _FrameLearner:
-    """The data that the rounds share. Lines are rows of a1..aH, b1..bH, in shares of v_max at the piezo's input."""
+def linear_frame(motion: FrameMotion, nm_per_drive: float) -> tuple[FourierSeries, FourierSeries]:
+    """Return the drive of a linear piezo that follows both motions: its slow part, and that of every line.
 
-    def __init__(self, axis: OperatorInTime, motion: FrameMotion, inverse: Inverse) -> None:
-        self._axis, self._motion, self._rounds = axis, motion, 0
-        self._first_reach = 0.0, 1.0
-        lines, count = motion.lines, max(_LEAST_SAMPLES, 1 << (_SAMPLES_PER_HARMONIC * motion.harmonics).bit_length())
+    Parameters
+    ----------
+    motion
+        What the piezo is to do; its layer is not used.
+    nm_per_drive
+        Displacement in nm by a drive of v_max, signed.
+
+    Returns
+    -------
+    tuple of FourierSeries
+        The slow part over the frame, about the centre of the motion, and the line without its mean, of v_max.
+    """
+    line, half = _LinearFrame(motion, nm_per_drive).line(), motion.harmonics
+    # Within a line the slow part goes straight to the start of the next one: those behind imaged lines count as well.
+    ends = np.flatnonzero(motion.imaged | np.roll(motion.imaged, 1)) / motion.lines
+    heights = (motion.slow_nm / nm_per_drive) * (motion.slow(ends) - 0.5)
+    slow = _SlowFit(ends, motion.slow_harmonics).of(heights)
+    # A window that is not in the middle of a line gives the line a mean, which no table of a line has.
+    slow = FourierSeries(slow.a0 + motion.centre + float(line[0]), slow.a, slow.b)
+    fast = FourierSeries(0.0, line[1 : half + 1].copy(), line[half + 1 :].copy())
+    return _rounded_series(slow), _rounded_series(fast)
+
+
+class _LinearFrame:
+    """The fits of a frame's drive to its imaged samples, and the drive of a piezo without hysteresis.
+
+    Lines are rows of a1..aH, b1..bH, in shares of v_max at the piezo's input.
+    """
+
+    def __init__(self, motion: FrameMotion, nm_per_drive: float) -> None:
+        self._motion, self._nm = motion, nm_per_drive
+        count = max(_LEAST_SAMPLES, 1 << (_SAMPLES_PER_HARMONIC * motion.harmonics).bit_length())
         self._count = count
         self._t = np.arange(count) / count
         self._inside = motion.inside(self._t)
-        target = motion.wanted_nm(np.arange(lines)[:, None], self._t)
-        if motion.layer is not None:  # the operator has to stay behind by what the piezo goes further
-            target = target - motion.layer.at(lines, self._t)
-        self._target = target[motion.imaged][:, self._inside]
-        self._time_s = np.arange(lines * count + 1) / (count * motion.line_rate_hz)
-        self._basis = _waves(self._t, motion.harmonics)
-        self._inverse = inverse
-        self._project = _projection(self._basis[:, self._inside], self._edges(), motion.harmonics)
-        self._nm = axis.operator.nm_per_drive
-        mid, starts = (np.arange(lines) + 0.5) / lines, np.arange(lines) / lines
-        self._slow_fit = _SlowFit(mid[motion.imaged], motion.slow_harmonics)
+        basis = _waves(self._t, motion.harmonics)
+        self._project = _projection(basis[:, self._inside], self._edges(), motion.harmonics)
+        starts = np.arange(motion.lines) / motion.lines
         self._slow_start = _SlowFit(starts[motion.imaged], motion.slow_harmonics)
 
     def first(self) -> tuple[FourierSeries, Floats]:
@@ -227,8 +247,43 @@ class _FrameLearner:
         motion, starts = self._motion, np.arange(self._motion.lines) / self._motion.lines
         slow = self._slow_start.of((motion.slow_nm / self._nm) * (motion.slow(starts[motion.imaged]) - 0.5))
         slow = FourierSeries(slow.a0 + motion.centre, slow.a, slow.b)
-        line = self._projected((motion.fast_nm / self._nm) * (motion.fast(self._t[self._inside]) - 0.5)[None, :])[0]
-        return slow, np.tile(line[1:], (motion.lines, 1))
+        return slow, np.tile(self.line()[1:], (motion.lines, 1))
+
+    def line(self) -> Floats:
+        """Return the mean and the harmonics of a line of that piezo, shape (2 H + 1,)."""
+        motion = self._motion
+        target = (motion.fast_nm / self._nm) * (motion.fast(self._t[self._inside]) - 0.5)
+        return np.asarray(self._projected(target[None, :])[0])
+
+    def _projected(self, rows: Floats) -> Floats:
+        """Return the mean and the harmonics of rows of imaged samples, shape (rows, 2 H + 1)."""
+        return np.stack([tree_sum(rows * weights) for weights in self._project], axis=-1)
+
+    def _edges(self) -> Floats:
+        """Return weights of the imaged samples: denser towards the edges of a window, as Chebyshev's points are."""
+        low, high = self._motion.fast_window
+        x = self._motion.fast(self._t[self._inside])
+        edge = np.clip((x - low) / (high - low), 1e-3, 1.0 - 1e-3)
+        weight = 1.0 / np.sqrt(edge * (1.0 - edge))
+        return np.asarray(weight / float(tree_sum(weight)))
+
+
+class _FrameLearner(_LinearFrame):
+    """The data that the rounds share."""
+
+    def __init__(self, axis: OperatorInTime, motion: FrameMotion, inverse: Inverse) -> None:
+        super().__init__(motion, axis.operator.nm_per_drive)
+        self._axis, self._rounds = axis, 0
+        self._first_reach = 0.0, 1.0
+        lines, count = motion.lines, self._count
+        target = motion.wanted_nm(np.arange(lines)[:, None], self._t)
+        if motion.layer is not None:  # the operator has to stay behind by what the piezo goes further
+            target = target - motion.layer.at(lines, self._t)
+        self._target = target[motion.imaged][:, self._inside]
+        self._time_s = np.arange(lines * count + 1) / (count * motion.line_rate_hz)
+        self._inverse = inverse
+        mid = (np.arange(lines) + 0.5) / lines
+        self._slow_fit = _SlowFit(mid[motion.imaged], motion.slow_harmonics)
 
     def drive(self, slow: FourierSeries, lines: Floats) -> Floats:
         """Return the drive of a frame, shape (lines * count,)."""
@@ -295,23 +350,11 @@ class _FrameLearner:
         half = self._motion.harmonics
         return FourierSeries(0.0, row[:half].copy(), row[half:].copy())
 
-    def _projected(self, rows: Floats) -> Floats:
-        """Return the mean and the harmonics of rows of imaged samples, shape (rows, 2 H + 1)."""
-        return np.stack([tree_sum(rows * weights) for weights in self._project], axis=-1)
-
     def _over_frame(self, rows: Floats) -> Floats:
         """Return rows of all lines from those of the imaged ones, straight between them."""
         lines, at = self._motion.lines, np.flatnonzero(self._motion.imaged)
         around = np.concatenate([at - lines, at, at + lines])
         return np.stack([np.interp(np.arange(lines), around, np.tile(one, 3)) for one in rows.T], axis=-1)
-
-    def _edges(self) -> Floats:
-        """Return weights of the imaged samples: denser towards the edges of a window, as Chebyshev's points are."""
-        low, high = self._motion.fast_window
-        x = self._motion.fast(self._t[self._inside])
-        edge = np.clip((x - low) / (high - low), 1e-3, 1.0 - 1e-3)
-        weight = 1.0 / np.sqrt(edge * (1.0 - edge))
-        return np.asarray(weight / float(tree_sum(weight)))
 
 
 class _SlowFit:

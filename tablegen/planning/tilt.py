@@ -1,0 +1,180 @@
+"""Plan the output z of a scan on a tilted sample: a share of both motions, on a piezo that is taken as linear."""
+
+import dataclasses
+from math import floor
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from tablegen.base.figures import at_most
+from tablegen.base.input_errors import Problems
+from tablegen.compensation.hold import hold_inverse
+from tablegen.compensation.operator.turned_frame import FrameMotion, linear_frame
+from tablegen.config.load import Setup
+from tablegen.config.schema import Tilt
+from tablegen.device.schedule import Schedule
+from tablegen.fixedpoint.converter import Converter, code_limits, make_output
+from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
+from tablegen.fixedpoint.frame_words import FrameParts, quantise_frame
+from tablegen.fixedpoint.output import Output
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.driver import Driver
+from tablegen.waveform.series import FourierSeries
+
+_SAMPLES = 512  # of a line, at which the reach of z is taken
+_LEAST_STEPS = 0.5  # of a code a tick, where a slew rate allows fewer than two
+
+
+class TiltedOutput(Struct, frozen=True, eq=False):
+    """The output z: its slopes on the sample, its share of both motions, and its integers.
+
+    ``offset`` is the code in the centre of the scan, as a real number.
+    """
+
+    slope_x: float
+    slope_y: float
+    nm_per_v: float
+    converter: Converter
+    motion: FrameMotion
+    offset: float
+    program: FrameProgram
+
+    def wanted_codes(self, lines: Ints, t: Floats) -> Floats:
+        """Return the codes, as real numbers, of the wanted heights at phases of lines, broadcast."""
+        return np.asarray(self.offset + self.motion.wanted_nm(lines, t) / (self.nm_per_v * self.converter.v_per_code))
+
+
+def plan_tilt(
+    setup: Setup, schedule: Schedule, x_motion: FrameMotion, shares: tuple[float, float], problems: Problems
+) -> TiltedOutput | None:
+    """Plan the output z; None where ``problems`` grew.
+
+    Parameters
+    ----------
+    setup
+        A scan and a scanner that both have z.
+    x_motion
+        The motion of another axis of this scan.
+    shares
+        The nm that z moves along the line and along the frame, from x = 0 to 1 of each.
+    """
+    tilt, piezo, hardware = setup.scan.z, setup.scanner.z, setup.hardware("z")
+    assert tilt is not None
+    assert piezo is not None
+    driver, converter = piezo.driver, Converter.of(hardware.dac, hardware.amplifier)
+    before = len(problems.entries)
+    _check_rest(setup, tilt, converter, driver, problems)
+    if len(problems.entries) > before:
+        return None
+    centre, offset = driver.share(tilt.offset_v), converter.code(tilt.offset_v)
+    motion = dataclasses.replace(x_motion, fast_nm=shares[0], slow_nm=shares[1], centre=centre, layer=None)
+    slow, fast = linear_frame(motion, piezo.nm_per_v * driver.span)
+    park_v = tilt.offset_v if tilt.park_v is None else tilt.park_v
+    output = make_output(replace(hardware.dac, output=None), converter, driver, park_v)
+    volts = driver.volts(_on_grid(slow, fast, motion.lines))
+    ends: tuple[float, float] = _sorted(converter.code(float(np.min(volts))), converter.code(float(np.max(volts))))
+    program = None
+    if _fits(output, ends):
+        program = _quantised(output, converter, driver, slow, fast, schedule)
+        ends = played_extremes(program)[:2]
+    if program is None or not _fits(output, ends):
+        problems.add(setup.scan_file, _key(tilt), _what_fits(tilt, converter, output, offset, ends))
+        return None
+    program = _guarded(setup, tilt, converter, program, float(schedule.line_rate), problems)
+    return TiltedOutput(tilt.slope_x, tilt.slope_y, piezo.nm_per_v, converter, motion, offset, program)
+
+
+def _check_rest(setup: Setup, tilt: Tilt, converter: Converter, driver: Driver, problems: Problems) -> None:
+    """Check that offset and park voltage are in the range that the driver and the converter of z have in common."""
+    least, most = code_limits(converter, driver)
+    if least >= most:
+        why = f"the driver of z has {driver}, and its converter reaches none of it; correct it, or [z.amplifier]"
+        problems.add(setup.scanner_file, "z.v_max", why)
+        return
+    for key, volts in (("offset_v", tilt.offset_v), ("park_v", tilt.park_v)):
+        if volts is not None and not least - 0.5 <= converter.code(volts) <= most + 0.5:
+            why = f"{volts:g} V is outside the {_volts(converter, least, most)} of z"
+            problems.add(setup.scan_file, f"z.{key}", why)
+
+
+def _on_grid(slow: FourierSeries, fast: FourierSeries, lines: int) -> Floats:
+    """Return the drive of a frame, of v_max, shape (lines, samples of a line)."""
+    start = slow.on_grid(lines)
+    rise = np.roll(start, -1) - start
+    return np.asarray(start[:, None] + rise[:, None] * (np.arange(_SAMPLES) / _SAMPLES) + fast.on_grid(_SAMPLES))
+
+
+def _quantised(
+    output: Output, converter: Converter, driver: Driver, slow: FourierSeries, fast: FourierSeries, schedule: Schedule
+) -> FrameProgram:
+    """Return the integers of z, without a slew guard: one table a line, and a slow part."""
+    nothing = np.zeros(fast.harmonics)
+    parts = FrameParts(
+        fast=fast.times(*hold_inverse(fast.harmonics, schedule.ticks, steps=False)),
+        second=FourierSeries(0.0, nothing, nothing),
+        slow=FourierSeries(0.0, slow.a, slow.b),
+        gains=np.ones(2),
+        ratios=np.zeros(2),
+        spacing=schedule.lines,
+        codes=driver.span / converter.v_per_code,
+        offset=converter.code(driver.volts(slow.a0)),
+    )
+    return quantise_frame(parts, output, schedule.ticks, schedule.lines)
+
+
+def _fits(output: Output, ends: tuple[float, float]) -> bool:
+    return output.code_min <= ends[0] and ends[1] <= output.code_max
+
+
+def _what_fits(tilt: Tilt, converter: Converter, output: Output, offset: float, ends: tuple[float, float]) -> str:
+    """Return the slopes that would fit the range, a code for the rounding left."""
+    room = min(
+        max(offset - output.code_min - 1.0, 0.0) / max(offset - ends[0], 1.0),
+        max(output.code_max - offset - 1.0, 0.0) / max(ends[1] - offset, 1.0),
+    )
+    reach = _volts(converter, output.code_min, output.code_max)
+    return f"the tilt leaves the {reach} of z; the largest that fits here is {_slopes(tilt, room)}"
+
+
+def _guarded(
+    setup: Setup, tilt: Tilt, converter: Converter, program: FrameProgram, line_rate_hz: float, problems: Problems
+) -> FrameProgram:
+    """Return the program with its slew guard; steps that are too large go to ``problems``."""
+    hardware, (_, _, steepest) = setup.hardware("z"), played_extremes(program)
+    slew, last = hardware.amplifier.max_slew_v_per_s, (1 << hardware.dac.bits) - 1
+    if slew is None:
+        return program.guarded(min(2 * steepest, last))
+    allowed = min(floor(slew / hardware.dac.update_rate_hz / abs(converter.v_per_code)), last)
+    if steepest > allowed:
+        share = max(allowed - 1.0, _LEAST_STEPS) / steepest  # a code for the rounding
+        problems.add(
+            setup.scan_file,
+            _key(tilt),
+            f"z steps by up to {steepest} codes a tick, {slew:.6g} V/s allow {allowed}; {_slopes(tilt, share)} would "
+            f"fit, or lines at {at_most(line_rate_hz * share)} Hz",
+        )
+    return program.guarded(allowed)
+
+
+def _key(tilt: Tilt) -> str:
+    """Return the key of the larger slope."""
+    return "z.slope_x" if abs(tilt.slope_x) >= abs(tilt.slope_y) else "z.slope_y"
+
+
+def _slopes(tilt: Tilt, share: float) -> str:
+    """Return the slopes of a share of the tilt as they are written, rounded down in size."""
+    return " and ".join(
+        f"{name} = {'-' if slope < 0.0 else ''}{at_most(abs(slope) * share)}"
+        for name, slope in (("slope_x", tilt.slope_x), ("slope_y", tilt.slope_y))
+        if slope
+    )
+
+
+def _volts(converter: Converter, least: int, most: int) -> str:
+    low, high = _sorted(*(converter.v_zero + converter.v_per_code * code for code in (least, most)))
+    return f"{low:.6g}..{high:.6g} V"
+
+
+def _sorted(first: float, second: float) -> tuple[float, float]:
+    return (first, second) if first <= second else (second, first)

@@ -1,0 +1,181 @@
+"""``tablegen verify`` of a scan with the output z, what its C plays beside x and y, and commands that refuse it."""
+
+import hashlib
+import json
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from shutil import copytree
+
+import numpy as np
+import pytest
+from building import run_clean
+from editing import run
+from tilted_scans import (
+    LINES,
+    NM_PER_V,
+    OFFSET_V,
+    SIZE_NM,
+    SLOPE_X,
+    SLOPE_Y,
+    fitted_plane,
+    volts_of,
+    wanted_places,
+    write_tilted,
+)
+
+from tablegen.api.turned import TurnedBuild, build_turned
+from tablegen.emit.runtime_config import options_of_builds
+from tablegen.emit.turned import turned_options
+from tablegen.link.errors import Unsuitable
+from tablegen.manifest.format import content_hash
+from tablegen.manifest.turned import read_turned
+from tablegen.verification.run import verify
+
+ANGLE, NAME = 30.0, "annexin_200nm"
+VALID = 16  # of the markers
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short frame at 30 degrees, with z."""
+    return write_tilted(tmp_path_factory.mktemp("tilted"), ANGLE)
+
+
+@pytest.fixture(scope="module")
+def built(scan: Path) -> TurnedBuild:
+    """Its build, written beside the scan."""
+    return build_turned(scan, scan.parent / "out")
+
+
+@pytest.fixture(scope="module")
+def build(scan: Path, built: TurnedBuild) -> Path:
+    """The folder of its build."""
+    return scan.parent / ("out" if built.name == NAME else "")
+
+
+def edit(folder: Path, name: str, old: str, new: str) -> None:
+    """Replace a pattern that stands once in a file, and make hash and digests of the manifest right again."""
+    text = (folder / name).read_text("ascii")
+    changed, count = re.subn(old, new, text)
+    assert count == 1, (name, old, count)
+    (folder / name).write_text(changed, "ascii")
+    path = folder / "manifest.json"
+    plain = json.loads(path.read_text("ascii"))
+    plain["hash"] = content_hash({key: plain[key] for key in ("name", "scanner", "sequence", "turned")})
+    plain["files"] = {each: hashlib.sha256((folder / each).read_bytes()).hexdigest() for each in plain["files"]}
+    path.write_text(json.dumps(plain), "ascii")
+
+
+@pytest.mark.common
+def test_a_build_is_verified(build: Path) -> None:
+    report = verify(build)
+    assert report.failures == []
+    assert [check.subject for check in report.checks][-4:] == ["c, steps", "c, fills", "c, z, steps", "c, z, fills"]
+    stored = read_turned(build)
+    assert stored.z is not None
+    assert options_of_builds([build]) == {NAME: turned_options(stored.program, stored.z)}
+    certificate = stored.plain["certificate"]
+    assert certificate["z"]["error_lsb"] < 1.5
+    assert set(certificate["codes"]) == {"x", "y", "z"}
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize(
+    ("file", "old", "new", "says"),
+    [
+        (f"{NAME}_z.c", r"(_z_x_slow\[\] = \{\n    (?:-?\d+, ){5})3", r"\g<1>2", "c, z, steps: x of tick"),
+        (f"{NAME}_z_program.c", f"{NAME}_z_x_gains, ", f"{NAME}_x_gains, ", "c, z"),
+        (f"{NAME}_program.c", f"{NAME}_x_gains, ", f"{NAME}_y_gains, ", "c, steps: x of tick"),
+    ],
+)
+def test_a_changed_word_is_heard(file: str, old: str, new: str, says: str, build: Path, tmp_path: Path) -> None:
+    """Both in the files and in what is played, and of z where it is in z."""
+    copytree(build, tmp_path / "out")
+    edit(tmp_path / "out", file, old, new)
+    failures = verify(tmp_path / "out").failures
+    assert any(failure.startswith(f"c files: {file}: a line is") for failure in failures), failures
+    assert any(failure.startswith(says) for failure in failures), failures
+    assert any(failure.startswith("c, z") for failure in failures) == says.startswith("c, z")
+
+
+def change(*keys: str | int, by: int = 1) -> Callable[[Path], None]:
+    """Change a number of the manifest."""
+
+    def do(folder: Path) -> None:
+        path = folder / "manifest.json"
+        plain = place = json.loads(path.read_text("ascii"))
+        for key in keys[:-1]:
+            place = place[key]
+        place[keys[-1]] += by
+        path.write_text(json.dumps(plain), "ascii")
+
+    return do
+
+
+@pytest.mark.parametrize(
+    ("tampering", "says"),
+    [
+        (change("turned", "z", "slow", "words", 3), "its plan does not match its hash"),
+        (change("turned", "z", "slow", "words", 3), f"{NAME}_z.c: a line is"),
+        (change("certificate", "codes", "z", "most"), "z: codes"),
+    ],
+)
+def test_tampering_is_found_in_the_files(
+    tampering: Callable[[Path], None], says: str, build: Path, tmp_path: Path
+) -> None:
+    copytree(build, tmp_path / "out")
+    tampering(tmp_path / "out")
+    failures = verify(tmp_path / "out", "files").failures
+    assert any(says in failure for failure in failures), failures
+
+
+@pytest.mark.common
+def test_two_sequencers_stay_together_and_z_is_on_the_plane(build: Path, tmp_path: Path) -> None:
+    """Markers are on the same ticks; the plane through the words of the imaged ticks has the slopes."""
+    stored = read_turned(build)
+    schedule, sources = stored.program.schedule, sorted(build.glob("*.c"))
+    options = [f"-D{key}={value}" for key, value in turned_options(stored.program, stored.z).items()]
+    program = tmp_path / "two_sequencers"
+    code = Path(__file__).with_name("two_sequencers.c")
+    own = [path for path in sources if not path.name.startswith(("dac_link", "dac_store"))]
+    run_clean(["gcc", "-std=c99", "-O1", "-Wall", "-Wextra", *options, f"-I{build}", code, *own, "-o", program])
+    frame = schedule.frame_ticks
+    done = subprocess.run([program, str(2 * frame)], capture_output=True, text=True, check=True)
+    rows = np.array([line.split() for line in done.stdout.splitlines()], dtype=np.int64)
+    assert np.array_equal(rows[:, 1] | VALID, rows[:, 2] | VALID)
+    valid = (rows[frame:, 1] & rows[frame:, 2] & VALID).reshape(LINES, -1) != 0
+    assert np.count_nonzero(valid) > 0.5 * frame
+    line, tick = np.nonzero(valid)
+    x_nm, y_nm = wanted_places(ANGLE, line, (tick + 0.5) / schedule.ticks)
+    slope_x, slope_y, centre = fitted_plane(x_nm, y_nm, NM_PER_V * volts_of(rows[frame:, 0].reshape(LINES, -1)[valid]))
+    lsb_nm = NM_PER_V * 100.0 / 65536.0
+    assert max(abs(slope_x - SLOPE_X), abs(slope_y - SLOPE_Y)) * SIZE_NM < 0.2 * lsb_nm
+    assert abs(centre - NM_PER_V * OFFSET_V) < 0.2 * lsb_nm
+
+
+@pytest.mark.common
+def test_the_summary_has_a_row_of_z(built: TurnedBuild) -> None:
+    assert "z is +0.02 of x and -0.05 of y, by 5 nm/V; within " in built.summary()
+    assert any(line.startswith("z:") and "words for the line" in line for line in built.choices)
+    assert [chart.key for chart in built.charts().charts][-1] == "z_frame"
+
+
+@pytest.mark.common
+def test_what_does_not_take_z_says_so(scan: Path, built: TurnedBuild, build: Path, tmp_path: Path) -> None:
+    refusals = {
+        ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: the Verilog sequencer plays no output z",
+        ("tables", scan): "z: a scan with the output z is for `check`, `show`",
+        ("report", scan, "-o", tmp_path / "page.html"): "z: `report` and `compare` show no scan with the output z",
+        ("compare", build, scan): "out: `report` and `compare` show no scan with the output z",
+        ("upload", build, "--port", tmp_path / "none"): "out: the link sends no output z",
+        ("verify", build, "--target", "cortex-m"): "which no emulator plays",
+    }
+    for command, says in refusals.items():
+        outcome = run(*command)
+        assert outcome.status == 2, (command, outcome)
+        assert says in outcome.err, (command, outcome.err)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(Unsuitable, match=f"{NAME}: the link sends no output z"):
+        built.prepared.image()
