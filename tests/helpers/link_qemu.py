@@ -18,9 +18,21 @@ _PTY = re.compile(rb"redirected to (/dev/pts/\d+)")
 
 
 class LinkMachine:
-    """A board whose link is at ``url``, for pyserial: a socket, or a pseudo-terminal. Its log is read all the time."""
+    """A board whose link is at ``url``, for pyserial: a socket, or a pseudo-terminal. Its log is read all the time.
 
-    def __init__(self, machine: str, executable: Path, pty: bool = False, semihosting: bool = False) -> None:
+    ``one_uart``: the log comes by semihosting. An instruction takes 2 ** ``shift`` ns. ``executable`` may be what a
+    flash has from address 0 on.
+    """
+
+    def __init__(
+        self,
+        machine: str,
+        executable: Path,
+        pty: bool = False,
+        semihosting: bool = False,
+        one_uart: bool = False,
+        shift: int = 3,
+    ) -> None:
         self._text = b""
         self._lock = threading.Lock()
         log = socket.create_server(("127.0.0.1", 0))
@@ -30,12 +42,15 @@ class LinkMachine:
         self._log = socket.create_connection(log.getsockname())
         self._monitor = socket.create_connection(monitor.getsockname())
         way = "pty,id=u0" if pty else f"socket,id=u0,fd={link.fileno()},server=on,wait=off,nodelay=on"
-        # Time is what instructions take, 8 ns each.
-        command = [tool("qemu-system-arm"), "-M", machine, "-icount", "shift=3", "-nodefaults", "-display", "none"]
+        # Time is what instructions take.
+        command = [tool("qemu-system-arm"), "-M", machine, "-icount", f"shift={shift}"]
+        command += ["-nodefaults", "-display", "none"]
         command += ["-semihosting"] if semihosting else []
         command += ["-chardev", way, "-serial", "chardev:u0"]
         command += ["-chardev", f"socket,id=m0,fd={monitor.fileno()},server=on,wait=on", "-mon", "chardev=m0"]
-        command += ["-chardev", f"socket,id=u1,fd={log.fileno()},server=on,wait=on,nodelay=on", "-serial", "chardev:u1"]
+        command += ["-chardev", f"socket,id=u1,fd={log.fileno()},server=on,wait=on,nodelay=on"]
+        by_debugger = ["-semihosting-config", "enable=on,target=native,chardev=u1"]
+        command += by_debugger if one_uart else ["-serial", "chardev:u1"]
         self._process = subprocess.Popen(
             [*command, "-kernel", str(executable)],
             pass_fds=[one.fileno() for one in (log, link, monitor)],
@@ -81,6 +96,11 @@ class LinkMachine:
     def reset(self) -> None:
         """Pull the processor's reset."""
         self._monitor.sendall(b"system_reset\n")
+
+    def save_memory(self, address: int, count: int, file: Path) -> None:
+        """Write the bytes at an address, as the processor reads them, to a file."""
+        self._monitor.sendall(f'memsave {address:#x} {count} "{file}"\n'.encode())
+        self._word(address)  # answered when the file is written
 
     def press_up(self) -> None:
         """Press the button "up" of lm3s6965evb, and return when it is released: bit 0 of port E is high again."""

@@ -10,7 +10,7 @@ from cut_flash import MODES, CutFlash
 
 from tablegen.link.messages import AxisShape, ImageInfo
 from tablegen.link.program_image import ProgramImage
-from tablegen.link.store import NONE, Layout
+from tablegen.link.store import NONE, Layout, Store, StoreError
 
 LAYOUT = Layout(base=64, sector_bytes=64, place_sectors=2, slots=3)
 SIZE = LAYOUT.place(LAYOUT.slots + 1)
@@ -75,6 +75,23 @@ def take(store: CStore, step: Step) -> int:
         return store.confirm()
     store.start()
     return 0
+
+
+def take_by_model(store: Store, step: Step) -> bool:
+    """Take a step other than a start by the model; True if it is done."""
+    name, *rest = step
+    try:
+        if name == "save":
+            store.save(rest[0], image_of(rest[1]))
+        elif name in ("select", "try"):
+            store.select(rest[0], name == "try")
+        elif name == "delete":
+            store.delete(rest[0])
+        else:
+            store.confirm()
+    except StoreError:
+        return False
+    return True
 
 
 def kept(store: CStore) -> Kept:

@@ -11,9 +11,9 @@ from cut_flash import CutFlash
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sets import LONG_TEST
-from store_cuts import LAYOUT, SCRIPT, SIZE, Step, faults, image_of, kept, take
+from store_cuts import LAYOUT, SCRIPT, SIZE, Step, faults, image_of, kept, take, take_by_model
 
-from tablegen.link.store import NONE, Layout, Store, StoreError
+from tablegen.link.store import NONE, Layout, Store
 
 SLOT = st.integers(0, LAYOUT.slots)  # one more than there are
 STEPS = st.lists(
@@ -68,22 +68,6 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> CDLL:
     return compile_store(tmp_path_factory.mktemp("store"))
 
 
-def done_by_model(store: Store, step: Step) -> bool:
-    name, *rest = step
-    try:
-        if name == "save":
-            store.save(rest[0], image_of(rest[1]))
-        elif name in ("select", "try"):
-            store.select(rest[0], name == "try")
-        elif name == "delete":
-            store.delete(rest[0])
-        else:
-            store.confirm()
-    except StoreError:
-        return False
-    return True
-
-
 @settings(max_examples=15)
 @given(steps=STEPS)
 def test_the_c_is_the_model_on_every_operation_of_the_flash(library: CDLL, steps: list[Step]) -> None:
@@ -99,11 +83,11 @@ def test_the_c_is_the_model_on_every_operation_of_the_flash(library: CDLL, steps
         elif step[0] == "broken":  # a word fails, without a cut of the supply
             for flash in (ours, theirs):
                 flash.cut(3, "mixed")
-            assert done_by_model(model, ("save", 0, 3)) == (take(c, ("save", 0, 3)) == 0)
+            assert take_by_model(model, ("save", 0, 3)) == (take(c, ("save", 0, 3)) == 0)
             for flash in (ours, theirs):
                 flash.on = True
         else:
-            assert done_by_model(model, step) == (take(c, step) == 0), step
+            assert take_by_model(model, step) == (take(c, step) == 0), step
         assert ours.trace == theirs.trace
         assert bytes(c.state.place) == model.state.places
         state = model.state

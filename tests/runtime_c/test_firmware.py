@@ -238,6 +238,14 @@ def test_the_firmware_compiles_at_other_levels(level: str, tmp_path: Path) -> No
     make_firmware(tmp_path, EXAMPLE, "mps2_an386", "fill", f"CFLAGS={level}")
 
 
+def test_the_firmware_of_a_microbit_compiles_with_its_own_scan(tmp_path: Path) -> None:
+    run_warned(
+        ["make", "-C", FIRMWARE / "cortex_m", "BOARD=microbit", f"BUILD={tmp_path}", "CFLAGS=-Os",
+         f"TABLEGEN={sys.executable} -m tablegen"]
+    )  # fmt: skip
+    assert (tmp_path / "firmware.elf").is_file()
+
+
 # Ports: compiled as far as there are compilers, and the AVR simulated.
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Werror")

@@ -1,17 +1,14 @@
-/* A flash for kept programs (docs/c.md) in RAM that a reset leaves as it is: QEMU has no flash that can be written.
+/* A flash for kept programs (docs/c.md) in RAM that a reset leaves as it is, for boards without a flash that QEMU can
+ * write.
  *
  * On hardware these three functions call the driver of the flash controller, with the sectors that are left behind the
- * firmware. An erase that takes longer than half a buffer stops the samples where code runs from the same flash. */
-#include "names.h"
-#include "scan_link.h"
+ * firmware, as flash_microbit.c does. An erase that takes longer than half a buffer stops the samples where code runs
+ * from the same flash. */
+#include "kept_sectors.h"
 
-#include SCAN_HEADER
+enum { SECTOR = 1024 };
 
-enum { SECTOR = 1024, SLOTS = 2 };
-enum { PLACE = 64 + 192 + (CONSTANT(_X_TABLE_LENGTH) + CONSTANT(_Y_TABLE_LENGTH)) * (int)sizeof(dac_word) };
-enum { PLACE_SECTORS = (PLACE + SECTOR - 1) / SECTOR, SECTORS = DAC_STORE_RECORDS + (SLOTS + 1) * PLACE_SECTORS };
-
-static uint8_t cells[SECTORS * SECTOR] __attribute__((section(".noinit")));
+static uint8_t cells[KEPT_SECTORS(SECTOR) * SECTOR] __attribute__((section(".noinit")));
 
 static bool erase_sector(uint32_t address)
 {
@@ -35,4 +32,6 @@ static bool read_bytes(uint32_t address, uint8_t *bytes, uint32_t count)
     return true;
 }
 
-const dac_store_flash scan_flash = {erase_sector, write_line, read_bytes, 0, SECTOR, PLACE_SECTORS, SLOTS};
+const dac_store_flash scan_flash = {
+    erase_sector, write_line, read_bytes, 0, SECTOR, KEPT_PLACE_SECTORS(SECTOR), KEPT_SLOTS,
+};

@@ -45,6 +45,7 @@ __attribute__((section(".vectors"), used)) static const vector vectors[16 + 16] 
     [14] = {.handler = player_pended},
     [15] = {.handler = board_timer_interrupt},     /* SysTick */
     [16] = {.handler = board_uart_interrupt},      /* MPS2: UART 0 has received */
+    [16 + 2] = {.handler = board_uart_interrupt},  /* nRF51: UART 0 */
     [16 + 5] = {.handler = board_uart_interrupt},  /* LM3S6965: UART 0 */
-    [16 + 8] = {.handler = board_timer_interrupt}, /* MPS2: timer 0 */
+    [16 + 8] = {.handler = board_timer_interrupt}, /* MPS2, nRF51: timer 0 */
 };
