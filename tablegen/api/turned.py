@@ -120,6 +120,7 @@ class TurnedBuild(Result):
         tables = [
             f"{axis.axis}: cubic tables of {len(axis.program.fast.words)} words for the line and "
             f"{len(axis.program.slow.words)} for the frame, {axis.program.memory_bits // 8} bytes in all"
+            f"{f', {axis.choice}' if axis.choice else ''}"
             for axis in self.plan.axes
         ]
         return (*self.setup.choices, *tables)

@@ -75,7 +75,7 @@ def test_a_straight_build_takes_the_place_of_a_turned_one(scan: Path, tmp_path: 
 
 @pytest.mark.parametrize(
     "command",
-    [("tables",)],
+    [("sweep", "-o", "library")],
 )
 def test_other_commands_refuse_it(command: tuple[str, ...], scan: Path) -> None:
     name, *options = command
