@@ -169,7 +169,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
             problems.entries.extend(rejected.problems)
     problems.stop_if_any()
     progress("planning the scan at 0 degrees")
-    straight = make_plan(_at_0_degrees(setup))
+    straight = plan_at_0(setup)
     schedule = straight.schedule
     geometry = FrameGeometry.of(setup, straight)
     if any(geometry.drift_nm_per_s) and schedule.down.count:
@@ -189,6 +189,17 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     assert x is not None
     assert y is not None
     return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight)
+
+
+def plan_at_0(setup: Setup) -> Plan:
+    """Plan the same scan at 0 degrees, without coupling and drift.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction on both axes.
+    """
+    return make_plan(_at_0_degrees(setup))
 
 
 def _at_0_degrees(setup: Setup) -> Setup:
@@ -250,10 +261,10 @@ def _axis(
             centre = motion.centre
             room = min(centre / max(centre - beyond.least, 1e-9), (1.0 - centre) / max(beyond.most - centre, 1e-9))
             raise Unphysical(_what_fits(plan, setup.scan.angle_deg, line, _FIRST_GUESS * room)) from None
-        _check_reach(known, drive, plan.schedule.lines)
+        check_reach(known, drive, plan.schedule.lines)
         choice = _chosen_tables(setup, plan, line, known, drive, problems)
         shape = None if choice is None else choice.shape
-        program = _within(setup, plan, line, _quantised(setup, plan, line, known, drive, shape), problems)
+        program = within_range(setup, plan, line, _quantised(setup, plan, line, known, drive, shape), problems)
         reason = "" if choice is None else choice.reason
         return TurnedAxis(axis, line.converter, motion, piezo, known, drive, program, reason)
     return None
@@ -298,7 +309,7 @@ def piezo_in_time(known: KnownAxis, scanner: ScannerAxis, line_hz: float, frame_
     return OperatorInTime(operator, lambda mean: rate * known.factor(mean), known.response)
 
 
-def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
+def check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
     """Check that the operator was identified for strokes of this length."""
     u = drive.on_grid(lines, _SAMPLES)
     stroke, most = float(np.ptp(u)), max(line.stroke for line in known.operator.lines)
@@ -336,7 +347,7 @@ def _quantised(
     )
 
 
-def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
+def within_range(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
     """Return the program with its slew guard; what leaves the range or the slew rate goes to ``problems``."""
     output = program.output
     least, most, steepest = played_extremes(program)
