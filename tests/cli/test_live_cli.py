@@ -334,6 +334,7 @@ def test_a_preview_at_an_angle_whose_plan_is_refused_gives_way(turned: tuple[Pat
     assert all((later - earlier) % 16 == 1 for earlier, later in pairwise(watch.lines))
 
 
+@pytest.mark.common
 def test_a_device_without_modes_has_no_preview_at_an_angle(turned: tuple[Path, DeviceInfo]) -> None:
     file, info = turned
     plain = replace(info, features=info.features & ~Feature.COMMIT_MODES, more=info.more & ~More.MOVE)
