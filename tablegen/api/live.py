@@ -276,10 +276,10 @@ class Live:
             result = device.upload(image, limits=self._limits, swap=CommitMode.KEEP)
         except (Refused, Unsuitable):
             return None
-        shown = LivePreview(result.generation, preview.x_error_percent, preview.y_error_percent)
+        live_preview = LivePreview(result.generation, preview.x_error_percent, preview.y_error_percent)
         if self._on_preview is not None:
-            self._on_preview(shown)
-        return shown
+            self._on_preview(live_preview)
+        return live_preview
 
     def _go_back(self) -> None:
         """Play the scan before a preview whose plan was refused; a lost link leaves the preview."""

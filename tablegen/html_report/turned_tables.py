@@ -126,10 +126,10 @@ class TurnedTables:
         yield "     alone: ramp and mixing of a slow part are not measured by table, nor are its cells)"
         yield ""
         within = f"{self.max_error_lsb:g} LSB"
-        kept = any(row.smallest for row in self.rows)
-        error = f"{self.max_error_lsb:g}" if kept else at_least(min(row.max_error_lsb for row in self.rows))
+        any_within = any(row.smallest for row in self.rows)
+        error = f"{self.max_error_lsb:g}" if any_within else at_least(min(row.max_error_lsb for row in self.rows))
         yield (
-            f"* the least memory within {within}" if kept else f"No tables keep {within}; {error} LSB can be kept"
+            f"* the least memory within {within}" if any_within else f"No tables keep {within}; {error} LSB can be kept"
         ) + ("; with shaped output the build keeps its own" if self.shaped else ". In the scan file:")
         if not self.shaped:
             yield f"  [{self.axis}.table]"

@@ -48,8 +48,8 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     """
     straight = plan_at_0(setup)
     old, new = plan.schedule, straight.schedule
-    kept = ("ticks", "lines", "turn_tick", "forward", "backward", "up", "down")
-    if any(getattr(old, key) != getattr(new, key) for key in kept):
+    same_keys = ("ticks", "lines", "turn_tick", "forward", "backward", "up", "down")
+    if any(getattr(old, key) != getattr(new, key) for key in same_keys):
         return None
     shares = FrameGeometry.of(setup, straight).shares
     programs, errors = [], []
