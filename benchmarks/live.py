@@ -3,10 +3,15 @@
 ``python benchmarks/live.py`` moves the shipped example on a virtual line of 115200 baud: the client and the plans are
 the real ones, and the device is the model. The time of the host is the processor time of this computer, without that of
 the model; the time of the line is virtual, and has the wait for the start of a line.
+
+``python benchmarks/live.py --angle 30`` prints the errors of previews of the example at an angle, on an operator of
+plays: by that operator, in percent of the size.
 """
 
+import argparse
 import statistics
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -16,6 +21,7 @@ sys.path.insert(0, str(HERE.parent / "tests" / "helpers"))  # the line and the d
 from client_line import VirtualLine  # noqa: E402
 from client_rig import client, info_for, model  # noqa: E402
 from replacing import replace  # noqa: E402
+from turned_scans import turned_setup  # noqa: E402
 
 from tablegen.api.live import Live  # noqa: E402
 from tablegen.api.live_preview import LivePreview  # noqa: E402
@@ -23,6 +29,8 @@ from tablegen.config.load import load  # noqa: E402
 from tablegen.link.messages import Feature, More  # noqa: E402
 from tablegen.link.prepare import PreparedScan  # noqa: E402
 from tablegen.planning.line_plan import make_plan  # noqa: E402
+from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan  # noqa: E402
+from tablegen.planning.turned_preview import turned_preview  # noqa: E402
 
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
 MOVES_NM = (20.0, -15.0, 30.0, 5.0, -25.0, 10.0, 20.0, -5.0, -20.0)
@@ -47,8 +55,37 @@ def _row(name: str, host_s: list[float], line_s: list[float], sent: list[int]) -
     return f"{name:<8} {host * 1e3:9.1f} {line * 1e3:9.1f} {(host + line) * 1e3:9.1f} {statistics.median(sent):9.0f}"
 
 
+def at_angle(angle_deg: float) -> None:
+    """Print what previews of changes at an angle leave, and their processor time beside that of a plan."""
+    changes: dict[str, tuple[float, tuple[str, ...]]] = {
+        "a move by 5 V": (0.0, ("x.offset_v = 45.0",)),
+        "a zoom by 0.8": (0.0, ("x.size_nm = 240", "y.size_nm = 240")),
+        "a turn by 5 degrees": (5.0, ()),
+        "a turn by 30 degrees": (30.0, ()),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.process_time()
+        plan = make_turned_plan(turned_setup(Path(folder), angle_deg))
+        print(f"a plan takes {time.process_time() - start:.1f} s of CPU time; image {_image_bytes(plan)} bytes")
+        for name, (by_deg, edits) in changes.items():
+            start = time.process_time()
+            preview = turned_preview(turned_setup(Path(folder), angle_deg + by_deg, *edits), plan)
+            seconds = time.process_time() - start
+            errors = preview and f"{preview.x_error_percent:.2f} % of x, {preview.y_error_percent:.2f} % of y"
+            print(f"{name:<22} {errors or 'no preview'}, {seconds:.1f} s")
+
+
+def _image_bytes(plan: TurnedPlan) -> int:
+    return len(PreparedScan.of_turned(plan).image("table").data)
+
+
 def main() -> int:
     """Move the example, and print the medians."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--angle", type=float, metavar="DEGREES", help="print the errors of previews at an angle")
+    if (angle_deg := parser.parse_args().angle) is not None:
+        at_angle(angle_deg)
+        return 0
     info = info_for(PreparedScan.of_plan(make_plan(load(EXAMPLE))))
     info = replace(info, features=info.features | Feature.COMMIT_MODES, more=More.MOVE)
     line = _TimedLine(model(info), baud=_BAUD, tick_hz=info.update_rate_hz, out_s=_WAY_S, back_s=_WAY_S)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build
-from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, words_of
+from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.config.image_keys import IMAGES, SIZES
@@ -20,10 +20,12 @@ from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused, Unsuitable
 from tablegen.link.messages import AxisWords, DeviceState, Feature, More
 from tablegen.link.outcome import UploadResult
-from tablegen.link.prepare import check
+from tablegen.link.prepare import PreparedScan, check
 from tablegen.link.program_image import ProgramImage
+from tablegen.planning.frame_drift import DrivenFrame, frame_drift_nm
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.turned_plan import TurnedPlan
+from tablegen.planning.turned_preview import turned_preview
 
 AnyPlan = Plan | TurnedPlan
 _AXES = "xy"
@@ -35,7 +37,7 @@ class LiveAxis:
     """Where an axis scans: position of the offset above that at 0 V, size of the whole line, voltages at the piezo.
 
     ``drift_nm`` is how far creep and hysteresis move the image in the frame after the change, by the operator of the
-    axis; None without one, at an angle, and where the scan before is not known.
+    axis; None without one, and where the scan before is not known.
     """
 
     position_nm: float
@@ -127,7 +129,8 @@ class Live:
     A change continues the frame if the device can (firmware with ``DAC_COMMIT_MODES``), and ticks and lines stay the
     same. Otherwise it waits for the next frame; a device without modes begins a frame at the next line.
 
-    A scan may be at an angle, if both axes have an operator: its plan takes seconds, and it has no preview.
+    A scan may be at an angle, if both axes have an operator. Its plan takes seconds; until then a preview plays, if the
+    frame can go on: the tables that the device has, with gains and offsets for the new place, size and angle.
 
     A device with ``DAC_MOVE`` plays a preview first where the schedule stays: the tables that it has, with the gain and
     the offset that come closest to the new plan. The plan follows at once.
@@ -227,9 +230,21 @@ class Live:
             Values by key, such as ``{"timing.line_rate_hz": 2.0}``.
         """
         self._settle()
-        return self._send(self._planned(other_settings(self._scan.settings, settings)))
+        settings = other_settings(self._scan.settings, settings)
+        variant = self._variant(settings)
+        preview = self._preview_at_angle(variant)
+        try:
+            return self._send(self._built(settings, variant), preview)
+        except BaseException as error:  # an interrupted plan too
+            lost = isinstance(error, LinkError) and not isinstance(error, Refused | Unsuitable)
+            if preview is not None and not lost:
+                self._go_back()
+            raise
 
     def _planned(self, settings: dict[str, Any]) -> "_Scan":
+        return self._built(settings, self._variant(settings))
+
+    def _variant(self, settings: dict[str, Any]) -> Variant:
         _, scans = variants(self._path, {key: [value] for key, value in settings.items()})
         if len(scans) != 1:
             why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
@@ -238,8 +253,44 @@ class Live:
         if setup.scan.z is not None:
             why = "`live` sends no output z; leave [z] out, or build the C into the firmware"
             raise Rejected([setup.scan_file.problem("z", why)])
+        return scans[0]
+
+    def _built(self, settings: dict[str, Any], variant: Variant) -> "_Scan":
+        setup = variant.setup
         built = build_turned(setup, progress=self._on_stage) if setup.mixes_motions else build(setup)
-        return _Scan(settings, scans[0], built)
+        return _Scan(settings, variant, built)
+
+    def _preview_at_angle(self, variant: Variant) -> LivePreview | None:
+        """Play the tables of a scan at an angle with other gains and offsets, before the plan of a change is there.
+
+        A MOVE cannot say them: they go as a program. None where the device or a limit does not take them.
+        """
+        before, device = self.plan, self._device
+        if not (self._is_sent and isinstance(before, TurnedPlan) and variant.setup.mixes_motions):
+            return None
+        if Feature.COMMIT_MODES not in device.info.features:  # it would restart the frame
+            return None
+        preview = turned_preview(variant.setup, before)
+        if preview is None or not is_accepted(preview.program, self._limits, before.program, device.info.shaping):
+            return None
+        scan = PreparedScan(before.name, program_digest(preview.program), preview.program, None, None)
+        try:
+            image = scan.image("table", device.info)
+            check(scan, image, device.info, self._limits, swap=CommitMode.KEEP)
+            result = device.upload(image, limits=self._limits, swap=CommitMode.KEEP)
+        except (Refused, Unsuitable):
+            return None
+        live_preview = LivePreview(result.generation, preview.x_error_percent, preview.y_error_percent)
+        if self._on_preview is not None:
+            self._on_preview(live_preview)
+        return live_preview
+
+    def _go_back(self) -> None:
+        """Play the scan before a preview whose plan was refused; a lost link leaves the preview."""
+        with suppress(LinkError):
+            image = self._scan.build.prepared.image("auto", self._device.info)
+            result = self._device.upload(image, limits=self._limits, swap=CommitMode.KEEP)
+            self._playing = _Playing.of_upload(self._scan, result.generation)
 
     def _settle(self) -> None:
         """Find out whether the device took the scan of an upload that ended without an answer."""
@@ -253,7 +304,8 @@ class Live:
             self._scan, self._playing = self._sent, previewed
         self._sent = None
 
-    def _send(self, live: "_Scan") -> LiveScan:
+    def _send(self, live: "_Scan", played: LivePreview | None = None) -> LiveScan:
+        """Send a scan; ``played`` is the preview at an angle that plays."""
         device, plan, scan = self._device, live.build.plan, live.build.prepared
         image = scan.image("auto", device.info)
         swap = self._swap(plan)
@@ -269,10 +321,13 @@ class Live:
         self._scan, self._is_sent = live, True
         self._playing = _Playing.of_upload(live, result.generation)
         x, y = LiveAxis.of_build(live.build)
-        if before is not None and isinstance(plan, Plan) and isinstance(before, Plan):
+        if before is not None:
+            goes_on = swap is CommitMode.KEEP and result.line is not None
             x, y = (
-                replace(axis, drift_nm=_drift_nm(last, now, plan.schedule))
-                for axis, last, now in zip((x, y), before.lines, plan.lines, strict=True)
+                replace(axis, drift_nm=by_nm)
+                for axis, by_nm in zip(
+                    (x, y), _drifts_nm(before, plan, (result.line or 0) + 1 if goes_on else 0), strict=True
+                )
             )
         return LiveScan(
             name=scan.name,
@@ -284,7 +339,7 @@ class Live:
             angle_deg=self.angle_deg,
             x=x,
             y=y,
-            preview=preview,
+            preview=preview or played,
         )
 
     def _upload(self, image: ProgramImage, plan: AnyPlan, swap: CommitMode) -> tuple[LivePreview | None, UploadResult]:
@@ -336,6 +391,27 @@ class Live:
             return CommitMode.LINE
         keeps = self._is_sent and can_keep(self.plan.program, plan.program)
         return CommitMode.KEEP if keeps else CommitMode.FRAME
+
+
+def _drifts_nm(before: AnyPlan, now: AnyPlan, first_line: int) -> tuple[float | None, float | None]:
+    """Return the drift of both axes in the first frame after a change, which comes before ``first_line``."""
+    if isinstance(before, Plan) and isinstance(now, Plan):
+        x, y = (_drift_nm(last, new, now.schedule) for last, new in zip(before.lines, now.lines, strict=True))
+        return x, y
+    turned = now if isinstance(now, TurnedPlan) else before
+    assert isinstance(turned, TurnedPlan)
+    x_frames, y_frames = (
+        [frame.from_line(first_line) for frame in pair] for pair in zip(_driven(before), _driven(now), strict=True)
+    )
+    return frame_drift_nm(turned.x.piezo, *x_frames), frame_drift_nm(turned.y.piezo, *y_frames)
+
+
+def _driven(plan: AnyPlan) -> tuple[DrivenFrame, DrivenFrame]:
+    """Return the drives of both axes over a frame."""
+    if isinstance(plan, TurnedPlan):
+        return DrivenFrame.turned(plan.x), DrivenFrame.turned(plan.y)
+    lines, rate_hz = plan.schedule.lines, float(plan.schedule.line_rate)
+    return DrivenFrame.straight(plan.x, lines, rate_hz), DrivenFrame.straight(plan.y, lines, rate_hz)
 
 
 def _drift_nm(before: LinePlan, now: LinePlan, schedule: Schedule) -> float | None:

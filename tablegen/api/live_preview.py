@@ -1,11 +1,12 @@
 """The preview of a change: words with which the tables that play come closest to the plan that follows them."""
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import replace
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import Playing, first_objection
@@ -22,7 +23,8 @@ _NO_HASH = bytes(32).hex()
 class LivePreview:
     """A move by words alone that plays until the plan of the change does.
 
-    ``x_error_percent`` and ``y_error_percent`` are the largest distances from that plan, in percent of the size.
+    ``x_error_percent`` and ``y_error_percent`` are the largest distances from that plan, in percent of the size; at an
+    angle those from the wanted position, by the operators.
     """
 
     generation: int
@@ -72,7 +74,12 @@ def preview_words(playing: DualProgram, plan: DualProgram) -> PreviewWords | Non
     return PreviewWords(x, y, x_error_percent, y_error_percent)
 
 
-def is_accepted(program: DualProgram, limits: Limits, playing: DualProgram, order: int) -> bool:
+def program_digest(program: ScanProgram) -> str:
+    """Return a digest of a program that is no plan's."""
+    return hashlib.sha256(make_image(program, _NO_HASH).data).hexdigest()
+
+
+def is_accepted(program: ScanProgram, limits: Limits, playing: ScanProgram, order: int) -> bool:
     """Return True if a device that plays ``playing`` accepts a program: its checks, made before anything is sent.
 
     ``limits`` are those of the device, ``order`` is its highest order of shaping.

@@ -11,7 +11,9 @@ from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
 from tablegen.html_report.table_rows import AxisTables, axis_tables
 from tablegen.html_report.tables_text import tables_text
+from tablegen.html_report.turned_tables import TurnedTables, turned_tables
 from tablegen.planning.line_plan import make_plan
+from tablegen.planning.turned_plan import make_turned_plan
 
 
 def tables(
@@ -35,7 +37,7 @@ def tables(
     -------
     FeasibleTables
         ``axes``, each with ``rows`` by memory in bits, errors in LSB, and ``chosen``, the least memory within the
-        error.
+        error; of a scan at an angle, on coupled axes or with drift a row has the tables of line and frame.
 
     Raises
     ------
@@ -52,6 +54,8 @@ def tables(
     """
     progress("shaping the waveforms")
     setup = scan if isinstance(scan, Setup) else load(scan)
+    if setup.mixes_motions:
+        return _turned(setup, axis, progress)
     plan = make_plan(setup)
     lines = [line for line in plan.moving if axis in (None, line.axis)]
     if not lines:
@@ -65,12 +69,21 @@ def tables(
     return FeasibleTables(plan.name, tuple(axes))
 
 
+def _turned(setup: Setup, axis: str | None, progress: Callable[[str], object]) -> "FeasibleTables":
+    plan, axes = make_turned_plan(setup, progress), []
+    for one in plan.axes:
+        if axis in (None, one.axis):
+            progress(f"measuring tables of {one.axis}")
+            axes.append(turned_tables(setup, plan, one))
+    return FeasibleTables(plan.name, tuple(axes))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FeasibleTables(Result):
     """The tables of a scan by axis; ``name`` is the scan's."""
 
     name: str
-    axes: tuple[AxisTables, ...]
+    axes: tuple[AxisTables | TurnedTables, ...]
 
     @property
     def record(self) -> dict[str, Any]:
@@ -79,7 +92,7 @@ class FeasibleTables(Result):
 
     def texts(self) -> list[list[str]]:
         """Return the lines of each axis, its title first."""
-        return [list(tables_text(one)) for one in self.axes]
+        return [list(tables_text(one) if isinstance(one, AxisTables) else one.text()) for one in self.axes]
 
     def summary(self) -> str:
         """Return what ``tablegen tables`` prints: a line a table, and what to write into the scan file."""
@@ -92,8 +105,4 @@ class FeasibleTables(Result):
         return table_charts(self.name, self.axes)
 
     def _lines(self) -> Sequence[str]:
-        return f"tables of {self.name!r}", *(
-            f"{one.axis}: {one.chosen.shape.mode}, {one.chosen.shape.length} words of {one.chosen.shape.bits} bits, "
-            f"error up to {one.chosen.max_error_lsb:.3g} LSB"
-            for one in self.axes
-        )
+        return f"tables of {self.name!r}", *(f"{one.axis}: {one.brief}" for one in self.axes)

@@ -123,9 +123,10 @@ class TurnedBuild(Result):
         programs: dict[str, FrameProgram] = {axis.axis: axis.program for axis in self.plan.axes}
         if self.plan.z is not None:
             programs["z"] = self.plan.z.program
+        chosen: dict[str, str] = {axis.axis: f", {axis.choice}" for axis in self.plan.axes if axis.choice}
         tables = [
             f"{name}: cubic tables of {len(program.fast.words)} words for the line and "
-            f"{len(program.slow.words)} for the frame, {program.memory_bits // 8} bytes in all"
+            f"{len(program.slow.words)} for the frame, {program.memory_bits // 8} bytes in all{chosen.get(name, '')}"
             for name, program in programs.items()
         ]
         return (*self.setup.choices, *tables)

@@ -11,11 +11,11 @@ from msgspec import Struct
 
 from tablegen.fixedpoint.frame_program import played_extremes
 from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.frame_tables import compared_ticks
 from tablegen.planning.tilt import TiltedOutput
 from tablegen.planning.turned_plan import FrameGeometry, TurnedAxis, TurnedPlan
 
 _CHORD = 0.05  # of the line
-_MOST_SAMPLES = 512  # of a line, at which the position is computed
 
 
 class TurnedErrors(Struct, frozen=True):
@@ -71,8 +71,7 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
     """Play the integers of a frame on the operators, and compare the position with the wanted one."""
     progress("playing the frame on the operators")
     schedule = plan.schedule
-    stride = -(-schedule.ticks // _MOST_SAMPLES)
-    ticks = np.arange(0, schedule.ticks, stride)
+    ticks = compared_ticks(schedule.ticks)
     positions, distances = [], []
     for axis in plan.axes:
         codes = frame_codes(axis, ticks)
@@ -101,7 +100,7 @@ def tilt_errors(z: TiltedOutput) -> TiltErrors:
 
 def played_frame(plan: TurnedPlan) -> "ImagedFrame":
     """Return the positions of a frame on the operators of the plan."""
-    ticks = np.arange(0, plan.schedule.ticks, -(-plan.schedule.ticks // _MOST_SAMPLES))
+    ticks = compared_ticks(plan.schedule.ticks)
     x_nm, y_nm = (played_position(axis, frame_codes(axis, ticks), ticks, plan.schedule.ticks) for axis in plan.axes)
     return ImagedFrame.of(plan, x_nm, y_nm, (ticks + 0.5) / plan.schedule.ticks)
 

@@ -43,6 +43,8 @@ def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_jso
     takes; [cost] processor of the scan file selects one processor. * is the least memory within [x.table]
     max_error_lsb of the scan file; without that key within limits.max_error_lsb, or within 1 LSB if that is less. A
     table that some format of the scan file cannot play is marked - and not chosen.
+
+    A scan at an angle has cubic tables over the line and over the frame; = marks those that the build takes.
     """
     check_plot(plot, as_json)
     feasible = _feasible(scan, axis)

@@ -9,14 +9,16 @@ from tablegen.charts.picture_file import PlottedCharts
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import MODES
 from tablegen.html_report.table_rows import AxisTables
+from tablegen.html_report.turned_tables import TurnedTables
 
 _ROLES: dict[Mode, Role] = {"direct": "before", "interpolated": "limit", "cubic": "other"}
 _HIGHEST = 4.0  # times the requested error
 
 
-def table_charts(name: str, axes: Sequence[AxisTables]) -> PlottedCharts:
-    """Draw a chart per axis: the tables of each mode, the chosen one, and the requested error."""
-    return PlottedCharts(f"tables of {name}", tuple(map(table_chart, axes)), len(axes))
+def table_charts(name: str, axes: Sequence[AxisTables | TurnedTables]) -> PlottedCharts:
+    """Draw a chart per axis: its tables, the chosen one, and the requested error."""
+    charts = (one.chart() if isinstance(one, TurnedTables) else table_chart(one) for one in axes)
+    return PlottedCharts(f"tables of {name}", tuple(charts), len(axes))
 
 
 def table_chart(tables: AxisTables) -> Chart:

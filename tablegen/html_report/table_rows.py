@@ -72,6 +72,14 @@ class AxisTables:
         return next(row for row in self.rows if row.smallest)
 
     @property
+    def brief(self) -> str:
+        """The table with the least memory within the error, in words."""
+        shape = self.chosen.shape
+        return (
+            f"{shape.mode}, {shape.length} words of {shape.bits} bits, error up to {self.chosen.max_error_lsb:.3g} LSB"
+        )
+
+    @property
     def upload_bits(self) -> int:
         """The bits of the Fourier words."""
         return (2 * self.harmonics + 1) * WORD_BITS

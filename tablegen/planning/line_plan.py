@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 MIXED = (
     "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the formats c and "
-    "verilog, `verify`, `upload`, `readback`, `live`, `simulate`, `report`, `compare`, `correct` and `refine`; leave "
-    "this out for anything else"
+    "verilog, `verify`, `tables`, `upload`, `readback`, `live`, `simulate`, `report`, `compare`, `correct` and "
+    "`refine`; leave this out for anything else"
 )
 
 TILTED = (

@@ -19,16 +19,17 @@ from tablegen.compensation.operator.operator import STROKE_REACH
 from tablegen.compensation.operator.turned_frame import BeyondDriver, FrameDrive, FrameMotion, learn_frame
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Coupling, ScannerAxis
-from tablegen.config.schema import Limits
+from tablegen.config.schema import Limits, Table
 from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.converter import Converter, make_output
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
-from tablegen.fixedpoint.frame_words import FrameParts, quantise_frame
+from tablegen.fixedpoint.frame_words import FrameParts, FrameShape, quantise_frame
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
 from tablegen.planning.frame_refinement import learnt_frame_layer
+from tablegen.planning.frame_tables import FrameTableChoice, FrameTableSearch, choose_frame_tables, is_chosen
 from tablegen.planning.known_axis import KnownAxis
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan, mixing_key
 from tablegen.planning.tilt import TiltedOutput, plan_tilt
@@ -45,7 +46,8 @@ class TurnedAxis(Struct, frozen=True, eq=False):
     """One axis of a scan at an angle.
 
     ``motion`` has its shares of both motions. ``piezo`` is the axis in time, ``drive`` what was learnt on it, of v_max,
-    without the lead over the hold of the converter that ``program`` has.
+    without the lead over the hold of the converter that ``program`` has. ``choice`` says by what the build chose the
+    tables, if the scan file asks for that.
     """
 
     axis: Literal["x", "y"]
@@ -55,6 +57,7 @@ class TurnedAxis(Struct, frozen=True, eq=False):
     known: KnownAxis
     drive: FrameDrive
     program: FrameProgram
+    choice: str = ""
 
     def share(self, codes: Ints) -> Floats:
         """Return codes as shares of v_max, of their shape."""
@@ -191,7 +194,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
             problems.entries.extend(rejected.problems)
     problems.stop_if_any()
     progress("planning the scan at 0 degrees")
-    straight = make_plan(_at_0_degrees(setup))
+    straight = plan_at_0(setup)
     schedule = straight.schedule
     geometry = FrameGeometry.of(setup, straight)
     if any(geometry.drift_nm_per_s) and schedule.down.count:
@@ -227,16 +230,32 @@ def plan_z(setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Prob
     return None
 
 
+def plan_at_0(setup: Setup) -> Plan:
+    """Plan the same scan at 0 degrees, without coupling and drift.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction on both axes.
+    """
+    return make_plan(_at_0_degrees(setup))
+
+
 def _at_0_degrees(setup: Setup) -> Setup:
-    """Return the setup without angle, coupling, drift and z, and without a clock, which a slow part takes others of."""
+    """Return the setup without angle, coupling, drift and z, and without a clock, which a slow part takes others of.
+
+    Tables that a build chooses are not looked for: none of them plays.
+    """
+    tables = (axis.table for axis in (setup.scan.x, setup.scan.y))
+    x_table, y_table = (Table() if table.chosen_by_build else table for table in tables)
     scan = replace(
         setup.scan,
         angle_deg=0.0,
         drift_nm_per_s=(0.0, 0.0),
         z=None,
         emit=replace(setup.scan.emit, clock_hz=None),
-        x=replace(setup.scan.x, frame_refinement=None),
-        y=replace(setup.scan.y, frame_refinement=None),
+        x=replace(setup.scan.x, frame_refinement=None, table=x_table),
+        y=replace(setup.scan.y, frame_refinement=None, table=y_table),
     )
     return replace(setup, scan=scan, scanner=replace(setup.scanner, coupling=Coupling()))
 
@@ -282,9 +301,40 @@ def _axis(
             centre = motion.centre
             room = min(centre / max(centre - beyond.least, 1e-9), (1.0 - centre) / max(beyond.most - centre, 1e-9))
             raise Unphysical(_what_fits(plan, setup.scan.angle_deg, line, _FIRST_GUESS * room)) from None
-        _check_reach(known, drive, plan.schedule.lines)
-        program = _within(setup, plan, line, _quantised(setup, plan, line, known, drive), problems)
-        return TurnedAxis(axis, line.converter, motion, piezo, known, drive, program)
+        check_reach(known, drive, plan.schedule.lines)
+        choice = _chosen_tables(setup, plan, line, known, drive, problems)
+        shape = None if choice is None else choice.shape
+        program = within_range(setup, plan, line, _quantised(setup, plan, line, known, drive, shape), problems)
+        reason = "" if choice is None else choice.reason
+        return TurnedAxis(axis, line.converter, motion, piezo, known, drive, program, reason)
+    return None
+
+
+def frame_table_search(setup: Setup, plan: TurnedPlan, axis: TurnedAxis) -> FrameTableSearch:
+    """Return the tables that an axis of a plan could have."""
+    line = plan.straight.x if axis.axis == "x" else plan.straight.y
+    return _search(setup, plan.straight, line, axis.known, axis.drive)
+
+
+def _search(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive) -> FrameTableSearch:
+    schedule = plan.schedule
+
+    def quantise(shape: FrameShape) -> FrameProgram:
+        return _quantised(setup, plan, line, known, drive, shape)
+
+    return FrameTableSearch(drive, line.converter, known.driver, schedule.ticks, schedule.lines, quantise)
+
+
+def _chosen_tables(
+    setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive, problems: Problems
+) -> FrameTableChoice | None:
+    """Return the tables that the scan file lets the build choose; None if it does not, or ``problems`` grew."""
+    table = setup.scan.x.table if line.axis == "x" else setup.scan.y.table
+    if not is_chosen(table, line.program.output.shaping.order > 0):
+        return None
+    key = f"{line.axis}.table.{'mode' if table.max_error_lsb is None else 'max_error_lsb'}"
+    with problems.at(setup.scan_file, key):
+        return choose_frame_tables(_search(setup, plan, line, known, drive), table, setup.scan.limits)
     return None
 
 
@@ -299,7 +349,7 @@ def piezo_in_time(known: KnownAxis, scanner: ScannerAxis, line_hz: float, frame_
     return OperatorInTime(operator, lambda mean: rate * known.factor(mean), known.response)
 
 
-def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
+def check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
     """Check that the operator was identified for strokes of this length."""
     u = drive.on_grid(lines, _SAMPLES)
     stroke, most = float(np.ptp(u)), max(line.stroke for line in known.operator.lines)
@@ -311,8 +361,10 @@ def _check_reach(known: KnownAxis, drive: FrameDrive, lines: int) -> None:
         )
 
 
-def _quantised(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive) -> FrameProgram:
-    """Return the integers of a drive, without a slew guard."""
+def _quantised(
+    setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive, shape: FrameShape | None = None
+) -> FrameProgram:
+    """Return the integers of a drive in tables of a shape, or those by default, without a slew guard."""
     schedule, converter = plan.schedule, line.converter
     dac = setup.hardware(line.axis).dac
     hold = hold_inverse(drive.fast.harmonics, schedule.ticks, steps=False)
@@ -331,10 +383,11 @@ def _quantised(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive
         make_output(dac, converter, known.driver, park_v, line.program.output.shaping),
         schedule.ticks,
         schedule.lines,
+        shape,
     )
 
 
-def _within(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
+def within_range(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram, problems: Problems) -> FrameProgram:
     """Return the program with its slew guard; what leaves the range or the slew rate goes to ``problems``."""
     output = program.output
     least, most, steepest = played_extremes(program)

@@ -26,7 +26,7 @@ from turned_scans import write_turned
 
 import tablegen
 from tablegen.api.live import Live
-from tablegen.base.input_errors import Rejected
+from tablegen.base.input_errors import Problem, Rejected
 from tablegen.cli.device.live import live as live_command
 from tablegen.cli.device.live_keys import KEYS
 from tablegen.compensation.models.operator import OperatorIdentification
@@ -34,6 +34,7 @@ from tablegen.compensation.operator.in_time import OperatorInTime, Start
 from tablegen.config.load import load
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.errors import LinkLost, Refused
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import SPLINE_DEGREE, DeviceInfo, DeviceState, Feature, More, Reason, Request
@@ -43,7 +44,7 @@ from tablegen.link.prepare import PreparedScan
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.turned_record import turned_record
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.planning.turned_plan import make_turned_plan
+from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
 
 SCAN = {"timing.lines": 40}
 MOST_JUMP = 12_000  # codes; the first scan begins by less from the park code
@@ -266,7 +267,10 @@ def test_a_scan_is_turned(turned: tuple[Path, DeviceInfo], tmp_path: Path) -> No
     assert [scan["angle_deg"] for scan in scans] == [0.0, 30.0, -160.0, -160.0, 0.0]
     # The frame goes on where y has a slow part before and after.
     assert [scan["swap"] for scan in scans] == ["frame", "frame", "keep", "keep", "frame"]
-    assert all(scan["preview"] is None for scan in scans)
+    assert [scan["preview"] is not None for scan in scans] == [False, False, True, True, False]
+    for scan in scans[2:4]:  # a turn by half a circle and more, and a move
+        assert scan["preview"]["generation"] == scan["generation"] - 1
+        assert all(0.0 < scan["preview"][f"{axis}_error_percent"] < 2.0 for axis in "xy")
     assert moved["scan"]["x"]["position_nm"] - again["scan"]["x"]["position_nm"] == pytest.approx(10.0, abs=1e-6)
     assert moved["scan"]["x"]["size_nm"] == pytest.approx(start["scan"]["x"]["size_nm"])
     assert again["scan"]["y"]["amplitude_v"] != at_30["scan"]["y"]["amplitude_v"]
@@ -274,6 +278,11 @@ def test_a_scan_is_turned(turned: tuple[Path, DeviceInfo], tmp_path: Path) -> No
     assert again["scan"]["digest"] == content_hash(record | {"name": again["scan"]["name"]})
     assert wrong["error"] == "by_deg is null; give a number"
     assert status["status"]["digest"] == back["scan"]["digest"]
+    drifts = [[scan[axis]["drift_nm"] for axis in "xy"] for scan in scans]
+    assert drifts[0] == [None, None]
+    assert all(0.1 < drift < 30.0 for pair in drifts[1:3] for drift in pair)
+    assert drifts[4][0] == 0.0 < drifts[4][1]  # lines of x begin at their lower turn, which wipes out what was before
+    assert drifts[3][0] > 0.1 > drifts[3][1]  # y did not move
 
 
 @pytest.mark.common
@@ -281,15 +290,67 @@ def test_keys_turn_and_move_along_the_lines(turned: tuple[Path, DeviceInfo]) -> 
     file, info = turned
     _, start, *rest = pressed(Bench(model(info, boot=BOOT)), file, "[", "\x1b[C", "q")
     assert "learning a frame of 16 lines on the operator of x ..." in rest
-    at_5, right = (text for text in rest if not text.endswith(" ..."))
+    at_5, preview, right = (text for text in rest if not text.endswith(" ..."))
+    assert re.fullmatch(r"preview plays, within \S+ % of x, \S+ % of y; the exact scan follows", preview)
+    assert rest.index(preview) < len(rest) - 3  # before the plan
     assert at_5.splitlines()[-1] == "400 Hz, 16 lines, 5 degrees; from a new frame"
     before, after = (
-        [float(row.split()[-2]) for row in text.splitlines() if " nm at " in row] for text in (at_5, right)
+        [float(row.split(" nm at ")[1].split()[0]) for row in text.splitlines() if " nm at " in row]
+        for text in (at_5, right)
     )
     assert after[0] - before[0] == pytest.approx(30.0 * np.cos(np.radians(5.0)), abs=0.02)
     assert after[1] - before[1] == pytest.approx(30.0 * np.sin(np.radians(5.0)), abs=0.02)
     assert right.splitlines()[-1] == "400 Hz, 16 lines, 5 degrees; the frame goes on"
+    assert right.count(" nm in the first frame") == 2
     assert start.endswith("400 Hz, 16 lines; from a new frame")
+
+
+@pytest.mark.common
+def test_a_preview_at_an_angle_whose_plan_is_refused_gives_way(turned: tuple[Path, DeviceInfo]) -> None:
+    """By the plan, after the preview, and by the device; no frame is restarted, and the next change begins there."""
+    file, info = turned
+    watch, boot = _Watch(), make_plan(load(file)).program
+    machine = ModelDevice(info, SequencerPlayer(boot, on_tick=watch))
+    machine.tick(1)
+    previews: list[str] = []
+    with client(VirtualLine(machine, baud=3_000_000, tick_hz=500_000)) as device:
+
+        def note(_: object) -> None:
+            playing = machine.player.playing
+            assert playing is not None
+            assert isinstance(playing.x, FrameProgram)
+            previews.append(device.status().hash.hex())
+
+        live = Live(device, file, {"angle_deg": 20.0}, on_preview=note)
+        before = live.start()
+        watch.lines.clear()
+        problem = Rejected([Problem("scan.toml", 1, "limits", "is exceeded")])
+        with patch("tablegen.api.live.build_turned", side_effect=problem), pytest.raises(Rejected):
+            live.move(20.0)
+        assert device.status().hash.hex() == before.digest
+        assert machine.player.swaps == before.generation + 2
+        with pytest.raises(Rejected):
+            live.move(1e6)  # of which nothing is sent
+        assert machine.player.swaps == before.generation + 2
+        after = live.move(20.0, -10.0)
+        assert device.status().hash.hex() == after.digest
+    assert len(set(previews)) == len(previews) == 2
+    assert before.digest not in previews
+    assert after.x.position_nm == pytest.approx(before.x.position_nm + 20.0, abs=1e-6)
+    assert (after.swap, after.generation) == ("keep", before.generation + 4)
+    assert all((later - earlier) % 16 == 1 for earlier, later in pairwise(watch.lines))
+
+
+@pytest.mark.common
+def test_a_device_without_modes_has_no_preview_at_an_angle(turned: tuple[Path, DeviceInfo]) -> None:
+    file, info = turned
+    plain = replace(info, features=info.features & ~Feature.COMMIT_MODES, more=info.more & ~More.MOVE)
+    with client(VirtualLine(model(plain, boot=BOOT), baud=3_000_000, tick_hz=500_000)) as device:
+        live = Live(device, file, {"angle_deg": 20.0})
+        live.start()
+        with patch("tablegen.api.live.turned_preview") as never:
+            assert live.move(5.0).preview is None
+    never.assert_not_called()
 
 
 def test_an_axis_without_an_operator_is_not_turned(info: DeviceInfo, file: Path) -> None:
@@ -582,6 +643,54 @@ def test_no_code_jumps_and_no_frame_restarts_while_it_is_moved(pairs: int, info:
     assert refused < pairs
 
 
+@pytest.mark.rest
+@pytest.mark.parametrize("rounds", [2, pytest.param(40, marks=LONG_TEST)])
+def test_no_code_jumps_and_no_frame_restarts_while_it_is_turned(rounds: int, turned: tuple[Path, DeviceInfo]) -> None:
+    """Random moves, zooms and turns at an angle, tick by tick, with the previews: each line is of one program."""
+    file, info = turned
+    rng, watch = np.random.default_rng(11), _Watch()
+    machine = ModelDevice(info, SequencerPlayer(make_plan(load(file)).program, on_tick=watch))
+    machine.tick(1)
+    previews = refused = changes = 0
+    with client(VirtualLine(machine, baud=3_000_000, tick_hz=500_000)) as device:
+        live = Live(device, file, {"angle_deg": 25.0})
+        first = live.start()
+        watch.lines.clear()
+        for _ in range(rounds):
+            for change in (
+                partial(live.move, float(rng.uniform(-60.0, 60.0)), float(rng.uniform(-60.0, 60.0))),
+                partial(live.zoom, float(rng.uniform(0.7, 1.4))),
+                partial(live.rotate, float(rng.uniform(-40.0, 40.0))),
+            ):
+                changes += 1
+                try:
+                    scan = change()
+                except Rejected:
+                    refused += 1
+                    continue
+                assert scan.swap == "keep"
+                previews += scan.preview is not None
+                if scan.preview is not None:
+                    assert max(scan.preview.x_error_percent, scan.preview.y_error_percent) < 10.0
+        assert device.status().faults == 0
+        assert device.status().hash.hex() == live_digest(live)
+    assert all(
+        step <= limits.max_step for step, limits in zip(watch.steps, (info.x_limits, info.y_limits), strict=True)
+    )
+    assert watch.low >= min(info.x_limits.code_min, info.y_limits.code_min)
+    assert watch.high <= max(info.x_limits.code_max, info.y_limits.code_max)
+    assert all((after - before) % 16 == 1 for before, after in pairwise(watch.lines))
+    assert not watch.mixed
+    assert previews > changes // 2 > refused
+    assert machine.player.swaps >= first.generation + previews + changes - refused
+
+
+def live_digest(live: Live) -> str:
+    """The digest of the plan that should play."""
+    assert isinstance(live.plan, TurnedPlan)
+    return PreparedScan.of_turned(live.plan).digest
+
+
 class _Watch:
     """The largest step of each axis, the codes at the ends, and the number of each line, of all ticks so far."""
 
@@ -589,6 +698,8 @@ class _Watch:
         self.steps = [0, 0]
         self.low, self.high = 1 << 30, 0
         self.lines: list[int] = []
+        self.mixed = 0  # ticks inside a line at which another program has come
+        self._generation = -1
         self._before: tuple[int, int] | None = None
 
     def __call__(self, generation: int, line: int, tick: Tick) -> None:
@@ -597,6 +708,8 @@ class _Watch:
             self.steps = [max(most, abs(a - b)) for most, a, b in zip(self.steps, codes, self._before, strict=True)]
         self._before = codes
         self.low, self.high = min(self.low, *codes), max(self.high, *codes)
+        self.mixed += tick.playing and not tick.line and self._generation not in (-1, generation)
+        self._generation = generation
         if tick.playing and tick.line:
             self.lines.append(line)
 

@@ -73,13 +73,8 @@ def test_a_straight_build_takes_the_place_of_a_turned_one(scan: Path, tmp_path: 
     assert not (folder / "annexin_200nm_program.c").exists()
 
 
-@pytest.mark.parametrize(
-    "command",
-    [("tables",)],
-)
-def test_other_commands_refuse_it(command: tuple[str, ...], scan: Path) -> None:
-    name, *options = command
-    outcome = run(name, scan, *options)
+def test_a_sweep_refuses_it(scan: Path, tmp_path: Path) -> None:
+    outcome = run("sweep", scan, "-o", tmp_path / "library")
     assert outcome.status == 2
     assert "scan.toml:1: angle_deg: a scan at an angle, on coupled axes or with drift is for" in outcome.err
 

@@ -41,7 +41,8 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
 
     Every change is planned and checked as a build would be, and sent only if scanner, scan and device allow it. The
     frame goes on if the firmware has DAC_COMMIT_MODES=1, and ticks and lines stay the same. With DAC_MOVE=1 a preview
-    plays before the exact scan. A scan at an angle needs an operator on both axes, and seconds for each change.
+    plays before the exact scan. A scan at an angle needs an operator on both axes, and seconds for each change; a
+    preview plays until then.
 
     \b
     Example:
