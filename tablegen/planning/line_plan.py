@@ -43,8 +43,8 @@ MIXED = (
 )
 
 TILTED = (
-    "a scan with the output z is for `check`, `show`, `build` with the format c, `verify`, `simulate`, `correct` and "
-    "`refine`; leave [z] out for anything else"
+    "a scan with the output z is for `check`, `show`, `build` with the format c, `verify`, `tables`, `simulate`, "
+    "`correct` and `refine`; leave [z] out for anything else"
 )
 
 
