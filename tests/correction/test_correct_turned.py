@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from editing import SCANNER, run
+from msgspec import structs
 from operator_files import REVERSIBLE, THRESHOLDS, operator_file
 from scipy.ndimage import map_coordinates
 from turned_scans import write_turned
 
 import tablegen
 from tablegen.compensation.operator.file import operator_text
+from tablegen.compensation.operator.frame_layer import FrameLayer
 from tablegen.config.load import load
 from tablegen.config.scanner import Coupling
 from tablegen.correction.by_scanner import by_scan_file
@@ -23,6 +25,7 @@ from tablegen.correction.scan_images import Choice, read_scan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
 from tablegen.virtual.imaging import Conditions, FrameImages, hexagonal, turned_frame
+from tablegen.waveform.series import FourierSeries
 
 SHORT = ("timing.lines = 44", "timing.pixels = 64", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400")
 WEIGHTS = 9.0, 4.0, 2.0  # of the piezo, others than those by which the scan was planned
@@ -141,3 +144,20 @@ def test_a_part_of_a_frame_and_a_scanner_without_operators_are_refused(folder: P
     (folder / "laws.toml").write_text(SCANNER, "utf-8")
     with pytest.raises(tablegen.Rejected, match=r"x\.hysteresis: is no operator"):
         tablegen.correct(folder / "trace.npy", scan=folder / "scan.toml", scanner=folder / "laws.toml")
+
+
+@pytest.mark.common
+def test_what_was_learnt_beside_another_operator_is_left_out(
+    folder: Path, plan: TurnedPlan, frame: FrameImages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A layer of 5 nm changes a correction by the scan's own scanner file, and none by a file with other operators."""
+    wave = FourierSeries(0.0, np.array([5.0]), np.array([0.0]))
+    motion = replace(plan.x.motion, layer=FrameLayer(wave, wave))
+    learnt = structs.replace(plan, x=structs.replace(plan.x, motion=motion))
+    for scanner, is_same in (("scanner.toml", False), ("later.toml", True)):
+        straight = []
+        for one in (plan, learnt):
+            monkeypatch.setattr("tablegen.correction.turned_scan.make_turned_plan", lambda _, one=one: one)
+            made = tablegen.correct(folder / "trace.npy", scan=folder / "scan.toml", scanner=folder / scanner)
+            straight.append(made.trace)
+        assert np.array_equal(*straight, equal_nan=True) == is_same
