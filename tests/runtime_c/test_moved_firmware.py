@@ -58,4 +58,5 @@ def test_random_moves_in_qemu(moves: int, tmp_path: Path) -> None:
         status = device.status()
     assert taken > moves // 4
     assert (status.generation, status.faults, status.moved) == (generation, 0, True)
-    assert check.lines > taken
+    assert check.generation == generation
+    assert check.lines >= taken  # one a move where moves come as fast as lines
