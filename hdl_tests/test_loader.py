@@ -79,7 +79,7 @@ def random_dialogue(loader: Loader, seed: int, steps: int, words: list[int]) -> 
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", long(range(12), range(40)))
+@pytest.mark.parametrize("seed", long(range(6), range(40)))
 def test_random_dialogues(seed: int, loader: Loader) -> None:
     dialogue = random_dialogue(loader, seed, 120, [])
     assert len(dialogue.seen) > 10
@@ -98,7 +98,7 @@ def checked_uploads(loader: Loader, seed: int, uploads: int, words: list[int]) -
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", long(range(4), range(20)))
+@pytest.mark.parametrize("seed", long(range(2), range(20)))
 def test_every_check_is_that_of_the_model(seed: int, loader: Loader) -> None:
     seen = checked_uploads(loader, seed, 40, []).seen
     reasons = {key[1] for key in seen if isinstance(key, tuple) and key[0] == Request.COMMIT}
@@ -360,7 +360,7 @@ FINDERS: dict[str, Callable[[Loader, list[int]], object]] = {
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("mutant", one_of(2, MUTANTS), ids=lambda mutant: mutant.breaks)
+@pytest.mark.parametrize("mutant", one_of(4, MUTANTS), ids=lambda mutant: mutant.breaks)
 def test_a_program_with_a_fault_is_found(mutant: Mutant, loader: Loader) -> None:
     words = mutant.words()
     with pytest.raises((AssertionError, Differs)):

@@ -14,7 +14,7 @@ from tablegen.verification.play.stream import Script
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", BENCHES)
+@pytest.mark.parametrize("name", one_of(3, BENCHES))
 def test_the_verilog_as_it_is_passes(name: str, tmp_path: Path) -> None:
     played = bench_of(name, tmp_path / "whole").play(script_of(name))
     assert played.equal, played

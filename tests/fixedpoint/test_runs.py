@@ -192,18 +192,11 @@ def check_parts_do_not_show(program: Program, size: int) -> None:
     assert np.array_equal(parts.codes, whole.codes)
 
 
-@pytest.mark.rest
-@settings(max_examples=2, deadline=None)
-@given(st.one_of(programs(), splines()), st.integers(1, 40))
-def test_parts_do_not_show(program: Program, size: int) -> None:
-    check_parts_do_not_show(program, size)
-
-
 @pytest.mark.long
 @pytest.mark.timeout(86_400)
 @settings(max_examples=30, deadline=None)
 @given(st.one_of(programs(), splines()), st.integers(1, 40))
-def test_parts_do_not_show_of_many(program: Program, size: int) -> None:
+def test_parts_do_not_show(program: Program, size: int) -> None:
     check_parts_do_not_show(program, size)
 
 

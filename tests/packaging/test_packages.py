@@ -95,7 +95,8 @@ def test_the_sdist_holds_the_repository_and_nothing_that_was_made(packed: tuple[
         assert known - held == set()
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_tests_of_the_sdist_are_collected(
     sdist: Path, installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -175,7 +175,7 @@ def test_a_program_with_a_slow_part_is_not_moved() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", one_of(2, MUTANTS))
+@pytest.mark.parametrize("name", one_of(3, MUTANTS))
 def test_a_wrong_link_is_noticed(name: str, tmp_path: Path) -> None:
     file, old, new = MUTANTS[name]
     sources = []

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from link_replay import Replay, compile_replay, differs, random_replay
+from sets import long
 
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
@@ -71,17 +72,17 @@ def test_compilers_and_sanitizers(way: str, replays: list[Replay], tmp_path: Pat
     hold(replays, tmp_path, compiler=compiler, options=options)
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", long(["clang"], ["gcc", "clang"]))
 def test_sanitizers_with_modes_of_a_commit(compiler: str, replays_with_modes: list[Replay], tmp_path: Path) -> None:
     hold(replays_with_modes, tmp_path, compiler=(compiler,), options=(*SANITIZED, MODES))
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", long(["clang"], ["gcc", "clang"]))
 def test_sanitizers_with_moves(compiler: str, replays_with_moves: list[Replay], tmp_path: Path) -> None:
     hold(replays_with_moves, tmp_path, compiler=(compiler,), options=(*SANITIZED, MOVES))
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", long(["clang"], ["gcc", "clang"]))
 def test_sanitizers_with_kept_programs(compiler: str, replays_with_a_store: list[Replay], tmp_path: Path) -> None:
     hold(replays_with_a_store, tmp_path, compiler=(compiler,), options=(*SANITIZED, *STORE))
 

@@ -467,7 +467,7 @@ def test_a_wrong_store_is_found_by_cuts(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", one_of(2, MUTANTS))
+@pytest.mark.parametrize("name", one_of(3, MUTANTS))
 def test_a_wrong_link_is_noticed(name: str, tmp_path: Path) -> None:
     library = compile_with(tmp_path, MUTANTS[name])
     with pytest.raises((Differs, AssertionError)):

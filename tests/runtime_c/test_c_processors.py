@@ -83,7 +83,7 @@ def sweeps() -> dict[SequencerShape, Script]:
 
 
 @pytest.mark.parametrize("way", long(WAYS, product(("gcc", "zig"), ("-O2", "-Os"), (0, FILL))))
-@pytest.mark.parametrize("core", CORTEX_M)
+@pytest.mark.parametrize("core", long(["cortex-m0plus", "cortex-m4", "cortex-m33"], CORTEX_M))
 def test_cortex_m_plays_everything_that_a_host_may_ask(
     sweeps: dict[SequencerShape, Script], benches: Compile, core: str, way: tuple[str, str, int]
 ) -> None:

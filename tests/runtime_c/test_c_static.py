@@ -68,16 +68,7 @@ COMPILERS = {
 }
 QUICK = ("default", "small")
 # Each alternative of each #if is in one of these; the others are combinations of them.
-WHOLE = (
-    *QUICK,
-    "wide",
-    "no_long_multiplication",
-    "spline_shaped",
-    "spline_shaped_no_long_multiplication",
-    "commit_modes",
-    "slow_part",
-)
-ANALYSED = (*WHOLE, "first_order", "shaped_wide", "slow_part_no_long_multiplication")
+ANALYSED = (*QUICK, "wide", "spline_shaped_no_long_multiplication", "commit_modes", "slow_part")
 # An analyser reports what it finds in a file that is wrong in this way.
 FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
 ANALYSERS = {
@@ -101,7 +92,7 @@ def of_a_choice(pair: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("choice", "compiler"),
-    [of_a_choice(pair) for pair in in_pairs(list(CHOICES), list(COMPILERS), WHOLE, "gcc-c99")],
+    [of_a_choice(pair) for pair in in_pairs(list(CHOICES), list(COMPILERS), QUICK, "gcc-c99")],
 )
 def test_no_warnings(choice: str, compiler: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)

@@ -578,12 +578,12 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
 @pytest.mark.parametrize(
     ("arguments", "late"),
     [
-        pytest.param(["--axis", "blocks"], 24, marks=pytest.mark.rest),
+        pytest.param(["--axis", "blocks"], 24, marks=LONG_TEST),
         pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
         pytest.param(["--axis", "alternate"], 48, marks=pytest.mark.rest),
         (["--axis", "blocks", "--fourier"], 24),
         pytest.param(["--axis", "serial", "--fourier"], 41, marks=LONG_TEST),
-        pytest.param(["--fourier"], 36, marks=pytest.mark.rest),
+        pytest.param(["--fourier"], 36, marks=LONG_TEST),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
