@@ -6,14 +6,12 @@ clocks, and reset on each. What the words are follows from the programs, not fro
 """
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
-import mutants
 import numpy as np
 import pytest
-from boot_play import AFTER, BOOT, COMMIT, Clock, Played, Setup, Wrong, check_boots, hosts, play_boots
+from boot_play import AFTER, BOOT, COMMIT, Boots, Clock, Setup, Wrong, hosts
 from building import BENCHES, REPOSITORY
 from programs import random_dual, random_fourier
 
@@ -24,7 +22,6 @@ from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
 
-BENCH = BENCHES / "boot_bench.v"
 X_TABLE, X_FOURIER = 1, 3  # regions; those of y are one more
 AT_BOTH_ENDS = 2  # clocks on which a boot that is not held up writes nothing: it reads the first word, it has ended
 
@@ -83,17 +80,6 @@ def stimulus(name: str) -> list[Clock]:
     return hosts(name, [*start, *levels, *[(0, 1)] * (clocks + AFTER)])
 
 
-@dataclass(frozen=True)
-class Mutant(mutants.Mutant):
-    """A fault of dac_boot, and in ``where`` the setup that shows it."""
-
-    where: str = "interpolated"
-
-    @property
-    def path(self) -> Path:
-        return BOOT
-
-
 FAULTS: dict[str, tuple[str, ...]] = {
     "it_begins_at_once": ("started = waited == START[START_BITS-1:0]", "started = 1'b1", "late"),
     "a_word_is_lost": ("writing <= reading &&", "writing <= reading && write_at[0] &&"),
@@ -123,32 +109,19 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "a_reset_does_not_boot": ("            booting <= 1'b1;\n", ""),
     "a_reset_leaves_a_word_on_its_way": ("            writing <= 1'b0;\n", ""),
 }  # fmt: skip
-MUTANTS = {name: Mutant(name, BOOT.name, *fault) for name, fault in FAULTS.items()}
-
-
-def play(folder: Path, played: Mapping[str, tuple[str, Mutant | None]]) -> dict[str, list[str]]:
-    """Return what each bench captures of its setup, with a mutant or without, by the names of benches."""
-    boots = {
-        bench: Played(SETUPS[name], stimulus(name), None if mutant is None else mutant.source)
-        for bench, (name, mutant) in played.items()
-    }
-    return play_boots(folder, BENCH, BOOT, boots)
-
-
-def check(name: str, lines: Sequence[str]) -> int:
-    """Hold what left against the law; returns how many boots came to their end."""
-    return check_boots(SETUPS[name], stimulus(name), lines, AT_BOTH_ENDS)
+BOOTS = Boots(BENCHES / "boot_bench.v", BOOT, SETUPS, stimulus, AT_BOTH_ENDS)
+MUTANTS = BOOTS.mutants(FAULTS, where="interpolated")
 
 
 @pytest.fixture(scope="module")
 def captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    return play(tmp_path_factory.mktemp("boot") / "boot", {name: (name, None) for name in SETUPS})
+    return BOOTS.play(tmp_path_factory.mktemp("boot") / "boot")
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[str, list[str]], name: str) -> None:
-    ended = check(name, captured[name])
+    ended = BOOTS.check(name, captured[name])
     assert ended == 1 if name == "longest" else ended > len(SETUPS[name].writes)
 
 
@@ -227,15 +200,14 @@ def test_a_file_that_is_missing_or_short_is_never_committed(simulator: str, tmp_
 
 @pytest.fixture(scope="module")
 def mutants_captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    benches = {name: (mutant.where, mutant) for name, mutant in MUTANTS.items()}
-    return play(tmp_path_factory.mktemp("boot") / "mutants", benches)
+    return BOOTS.play(tmp_path_factory.mktemp("boot") / "mutants", MUTANTS)
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_found(mutants_captured: dict[str, list[str]], name: str) -> None:
     with pytest.raises(Wrong):
-        check(MUTANTS[name].where, mutants_captured[name])
+        BOOTS.check(MUTANTS[name].where, mutants_captured[name])
 
 
 def test_the_documentation_counts_them() -> None:

@@ -3,14 +3,11 @@
 What is written follows from random programs, not from the files that are read.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import mutants
 import numpy as np
 import pytest
-from boot_play import COMMIT, Clock, Played, Setup, Write, Wrong, check_boots, flags_without, play_boots, some_clocks
+from boot_play import COMMIT, Boots, Clock, Setup, Write, Wrong, some_clocks
 from building import BENCHES, REPOSITORY
 from slow_scripts import SLOW_FOLDER, X_PARTS, Y_PARTS, random_scan
 
@@ -23,7 +20,6 @@ from tablegen.verification.play.sequencer_shape import SequencerShape
 
 pytestmark = pytest.mark.common
 
-BENCH = BENCHES / "slow_boot_bench.v"
 SLOW_BOOT = SLOW_FOLDER / "dac_slow_boot.v"
 MOST_IDLE = 5  # clocks on which a boot that is not held up writes nothing: both modules begin, and end
 
@@ -66,17 +62,6 @@ def stimulus(name: str) -> list[Clock]:
     return some_clocks(name, SETUPS[name], MOST_IDLE)
 
 
-@dataclass(frozen=True)
-class Mutant(mutants.Mutant):
-    """A fault of dac_slow_boot, and in ``where`` the setup that shows it."""
-
-    where: str = "cubic"
-
-    @property
-    def path(self) -> Path:
-        return SLOW_BOOT
-
-
 FAULTS: dict[str, tuple[str, ...]] = {
     "it_begins_at_once": ("started = waited == START[START_BITS-1:0]", "started = 1'b1", "late"),
     "the_word_does_not_wait": ("now = writing && writable", "now = writing"),
@@ -100,31 +85,18 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "a_reset_does_not_load": ("            reading <= 1'b1;\n", ""),
     "a_reset_leaves_a_word_on_its_way": ("            writing <= 1'b0;\n", ""),
 }  # fmt: skip
-MUTANTS = {name: Mutant(name, SLOW_BOOT.name, *fault) for name, fault in FAULTS.items()}
-
-
-def play(folder: Path, played: Mapping[str, tuple[str, Mutant | None]]) -> dict[str, list[str]]:
-    """Return what each bench captures of its setup, with a mutant or without, by the names of benches."""
-    boots = {
-        bench: Played(SETUPS[name], stimulus(name), None if mutant is None else mutant.source)
-        for bench, (name, mutant) in played.items()
-    }
-    return play_boots(folder, BENCH, SLOW_BOOT, boots)
-
-
-def check(name: str, lines: Sequence[str]) -> int:
-    """Hold what left against the law; returns how many boots came to their end."""
-    return check_boots(SETUPS[name], stimulus(name), lines, MOST_IDLE)
+BOOTS = Boots(BENCHES / "two_boots_bench.v", SLOW_BOOT, SETUPS, stimulus, MOST_IDLE)
+MUTANTS = BOOTS.mutants(FAULTS, where="cubic")
 
 
 @pytest.fixture(scope="module")
 def captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    return play(tmp_path_factory.mktemp("boot") / "boot", {name: (name, None) for name in SETUPS})
+    return BOOTS.play(tmp_path_factory.mktemp("boot") / "boot")
 
 
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[str, list[str]], name: str) -> None:
-    assert check(name, captured[name]) >= 3
+    assert BOOTS.check(name, captured[name]) >= 3
     assert {(region, data >> 31) for region, _, data in SETUPS[name].writes if region > 4} == {
         (region, sign) for region in (X_PARTS, Y_PARTS) for sign in (0, 1)
     }
@@ -133,7 +105,7 @@ def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[
 @pytest.mark.parametrize("words", [None, -1, 3])
 def test_a_file_that_is_missing_or_short_is_said(words: int | None, tmp_path: Path) -> None:
     """The boot goes on to its end, for what stands before the sequencer to withdraw it."""
-    flags = flags_without(tmp_path / "boot", BENCH, SLOW_BOOT, SETUPS["cubic"], "SLOW_FILE", words)
+    flags = BOOTS.flags_without(tmp_path / "boot", "cubic", "SLOW_FILE", words)
     assert flags.count("d") == 1  # missing, booting, and a commit; where there are no words, flags are undefined
     assert not {"5", "1"} & set(flags)
     assert flags[-1] == "8"
@@ -141,15 +113,14 @@ def test_a_file_that_is_missing_or_short_is_said(words: int | None, tmp_path: Pa
 
 @pytest.fixture(scope="module")
 def mutants_captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    benches = {name: (mutant.where, mutant) for name, mutant in MUTANTS.items()}
-    return play(tmp_path_factory.mktemp("boot") / "mutants", benches)
+    return BOOTS.play(tmp_path_factory.mktemp("boot") / "mutants", MUTANTS)
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_found(mutants_captured: dict[str, list[str]], name: str) -> None:
     with pytest.raises(Wrong):
-        check(MUTANTS[name].where, mutants_captured[name])
+        BOOTS.check(MUTANTS[name].where, mutants_captured[name])
 
 
 def test_the_documentation_counts_them() -> None:

@@ -1,9 +1,11 @@
 """Boots in simulation: what goes in on each clock, what leaves, and the law that holds both together."""
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import mutants
 
 from tablegen.base.resources import verilog_runtime
 from tablegen.verification.verilog.simulate import Design, compile_design
@@ -48,15 +50,6 @@ class Clock:
         return flags << 51 | region << 48 | address << 32 | data
 
 
-@dataclass(frozen=True)
-class Played:
-    """A setup and its clocks, and the source of the module that boots where it is not that of the runtime."""
-
-    setup: Setup
-    clocks: Sequence[Clock]
-    source: str | None = None
-
-
 def hosts(name: str, levels: Sequence[tuple[int, int]]) -> list[Clock]:
     """Return clocks with these levels of reset and writable, and a host that asks for something on most of them."""
     rng = random.Random(name)
@@ -86,48 +79,6 @@ def some_clocks(name: str, setup: Setup, most_idle: int) -> list[Clock]:
     clocks = len(setup.writes) + most_idle
     start = [(int(clock == 10), clock % 2) for clock in range(setup.parameters["START_CLOCKS"])]
     return hosts(name, [*start, *some_boots(clocks), (1, 1), *[(0, 1)] * (clocks + AFTER)])
-
-
-def play_boots(folder: Path, bench: Path, module: Path, played: Mapping[str, Played]) -> dict[str, list[str]]:
-    """Return the lines that each bench captures, by its name, all in one simulation."""
-    (folder / "build").mkdir(parents=True)
-    sources, instances = sorted({bench, module, BOOT}), []
-    for index, (name, one) in enumerate(played.items()):
-        top = bench.stem
-        if one.source is not None:
-            top = f"{bench.stem}_{name}"
-            for path, text in ((bench, bench.read_text("utf-8")), (module, one.source)):
-                sources.append(folder / f"{path.stem}_{name}.v")
-                renamed = text.replace(f"{module.stem} #(", f"{module.stem}_{name} #(")
-                sources[-1].write_text(renamed.replace(f"{bench.stem} #(", f"{top} #("), "utf-8")
-        for key, content in one.setup.files.items():
-            if content is not None:
-                (folder / "build" / f"{name}_{key}.mem").write_bytes(content)
-        (folder / "build" / f"{name}.hex").write_text("".join(f"{each.word:x}\n" for each in one.clocks), "ascii")
-        given = [f".{key}({value})" for key, value in {**one.setup.parameters, "DEPTH": len(one.clocks)}.items()]
-        given += [f'.{key}("{name}_{key}.mem")' for key in one.setup.files]
-        given += [f'.STIMULUS("{name}.hex")', f'.CAPTURE("{name}.txt")']
-        instances.append(f"    {top} #({', '.join(given)}) bench_{index} (.clock(clock), .done(done[{index}]));\n")
-    boot_top = folder / "boot_top.v"
-    boot_top.write_text(
-        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
-        f"    wire [{len(instances) - 1}:0] done;\n    wire all_done = &done;\n{''.join(instances)}endmodule\n",
-        "ascii",
-    )
-    compiled = compile_design("icarus", Design([boot_top, *sources], "boot_top"), folder / "build")
-    assert compiled.run("cocotb_outputs") == (1, 0)
-    return {name: (compiled.folder / f"{name}.txt").read_text("ascii").splitlines() for name in played}
-
-
-def flags_without(folder: Path, bench: Path, module: Path, setup: Setup, file: str, words: int | None) -> list[str]:
-    """Return the flags on each clock of a boot whose file has only its first words, or is missing."""
-    content = setup.files[file]
-    assert content is not None
-    left = None if words is None else b"".join(content.splitlines(keepends=True)[:words])
-    clocks = [Clock(0, 1, 0, 0, (0, 0, 0))] * (len(setup.writes) + 10)
-    damaged = Setup({**setup.files, file: left}, setup.parameters, setup.writes)
-    lines = play_boots(folder, bench, module, {"damaged": Played(damaged, clocks)})["damaged"]
-    return [line.split()[0] for line in lines]
 
 
 def hexadecimal(digits: str) -> int:
@@ -192,3 +143,89 @@ def check_boots(setup: Setup, clocks: Sequence[Clock], lines: Sequence[str], mos
     if at != len(writes):
         raise Wrong("the last boot has no end")
     return ended
+
+
+@dataclass(frozen=True)
+class BootMutant(mutants.Mutant):
+    """A fault of a module that boots, and in ``where`` the setup that shows it."""
+
+    @property
+    def path(self) -> Path:
+        return next(BOOT.parent.rglob(self.file))
+
+
+@dataclass(frozen=True)
+class Boots:
+    """Setups of a module that boots, at a bench of the same ports as boot_bench.
+
+    ``most_idle`` are the clocks on which a boot that is not held up writes nothing.
+    """
+
+    bench: Path
+    module: Path
+    setups: Mapping[str, Setup]
+    stimulus: Callable[[str], list[Clock]]
+    most_idle: int
+
+    def mutants(self, faults: Mapping[str, tuple[str, ...]], where: str) -> dict[str, BootMutant]:
+        """Return mutants by name; a fault is what is put in place of what, and where it shows if not in ``where``."""
+        return {
+            name: BootMutant(name, self.module.name, old, new, *(others or [where]))
+            for name, (old, new, *others) in faults.items()
+        }
+
+    def play(self, folder: Path, found_by: Mapping[str, BootMutant] | None = None) -> dict[str, list[str]]:
+        """Return the lines that each setup captures, by its name; with mutants those of each mutant, by its name."""
+        if found_by is None:
+            return self._play(folder, {name: (one, self.stimulus(name), None) for name, one in self.setups.items()})
+        faulty = {
+            name: (self.setups[one.where], self.stimulus(one.where), one.source) for name, one in found_by.items()
+        }
+        return self._play(folder, faulty)
+
+    def check(self, name: str, lines: Sequence[str]) -> int:
+        """Hold what left of a setup against the law; return how many boots came to their end."""
+        return check_boots(self.setups[name], self.stimulus(name), lines, self.most_idle)
+
+    def flags_without(self, folder: Path, name: str, file: str, words: int | None) -> list[str]:
+        """Return the flags on each clock of a boot whose file has only its first words, or is missing."""
+        setup = self.setups[name]
+        content = setup.files[file]
+        assert content is not None
+        left = None if words is None else b"".join(content.splitlines(keepends=True)[:words])
+        clocks = [Clock(0, 1, 0, 0, (0, 0, 0))] * (len(setup.writes) + 10)
+        damaged = replace(setup, files={**setup.files, file: left})
+        lines = self._play(folder, {"damaged": (damaged, clocks, None)})["damaged"]
+        return [line.split()[0] for line in lines]
+
+    def _play(
+        self, folder: Path, played: Mapping[str, tuple[Setup, Sequence[Clock], str | None]]
+    ) -> dict[str, list[str]]:
+        """Return the lines captured of setups and their clocks, all in one simulation; a source replaces the module."""
+        (folder / "build").mkdir(parents=True)
+        sources, instances = sorted({self.bench, self.module, BOOT}), []
+        for index, (name, (setup, clocks, source)) in enumerate(played.items()):
+            top = self.bench.stem
+            if source is not None:
+                top = f"{self.bench.stem}_{name}"
+                for path, text in ((self.bench, self.bench.read_text("utf-8")), (self.module, source)):
+                    sources.append(folder / f"{path.stem}_{name}.v")
+                    renamed = text.replace(f"{self.module.stem} #(", f"{self.module.stem}_{name} #(")
+                    sources[-1].write_text(renamed.replace(f"{self.bench.stem} #(", f"{top} #("), "utf-8")
+            for key, content in setup.files.items():
+                if content is not None:
+                    (folder / "build" / f"{name}_{key}.mem").write_bytes(content)
+            (folder / "build" / f"{name}.hex").write_text("".join(f"{each.word:x}\n" for each in clocks), "ascii")
+            given = [f".{key}({value})" for key, value in {**setup.parameters, "DEPTH": len(clocks)}.items()]
+            given += [f'.{key}("{name}_{key}.mem")' for key in setup.files]
+            given += [f'.STIMULUS("{name}.hex")', f'.CAPTURE("{name}.txt")']
+            instances.append(f"    {top} #({', '.join(given)}) bench_{index} (.clock(clock), .done(done[{index}]));\n")
+        boot_top = folder / "boot_top.v"
+        boot_top.write_text(
+            "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
+            f"    wire [{len(instances) - 1}:0] done;\n    wire all_done = &done;\n{''.join(instances)}endmodule\n",
+            "ascii",
+        )
+        compiled = compile_design("icarus", Design([boot_top, *sources], "boot_top"), folder / "build")
+        assert compiled.run("cocotb_outputs") == (1, 0)
+        return {name: (compiled.folder / f"{name}.txt").read_text("ascii").splitlines() for name in played}

@@ -10,6 +10,7 @@ from tablegen.api.build import Build, build
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
+from tablegen.compensation.operator.frame_transient import frame_drift_nm
 from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.variants import Variant, other_settings, variants
 from tablegen.device.commit_mode import CommitMode
@@ -22,7 +23,7 @@ from tablegen.link.messages import AxisWords, DeviceState, Feature, More
 from tablegen.link.outcome import UploadResult
 from tablegen.link.prepare import PreparedScan, check
 from tablegen.link.program_image import ProgramImage
-from tablegen.planning.frame_drift import DrivenFrame, frame_drift_nm
+from tablegen.planning.driven_frames import driven_frames
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.planning.turned_preview import turned_preview
@@ -401,17 +402,10 @@ def _drifts_nm(before: AnyPlan, now: AnyPlan, first_line: int) -> tuple[float | 
     turned = now if isinstance(now, TurnedPlan) else before
     assert isinstance(turned, TurnedPlan)
     x_frames, y_frames = (
-        [frame.from_line(first_line) for frame in pair] for pair in zip(_driven(before), _driven(now), strict=True)
+        [frame.from_line(first_line) for frame in pair]
+        for pair in zip(driven_frames(before), driven_frames(now), strict=True)
     )
     return frame_drift_nm(turned.x.piezo, *x_frames), frame_drift_nm(turned.y.piezo, *y_frames)
-
-
-def _driven(plan: AnyPlan) -> tuple[DrivenFrame, DrivenFrame]:
-    """Return the drives of both axes over a frame."""
-    if isinstance(plan, TurnedPlan):
-        return DrivenFrame.turned(plan.x), DrivenFrame.turned(plan.y)
-    lines, rate_hz = plan.schedule.lines, float(plan.schedule.line_rate)
-    return DrivenFrame.straight(plan.x, lines, rate_hz), DrivenFrame.straight(plan.y, lines, rate_hz)
 
 
 def _drift_nm(before: LinePlan, now: LinePlan, schedule: Schedule) -> float | None:

@@ -4,6 +4,7 @@ from math import ceil
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.fixedpoint.converter import fit_gain, scaled_output
@@ -18,6 +19,7 @@ from tablegen.fixedpoint.frame_program import (
 from tablegen.fixedpoint.output import GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program, sample_gain
+from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.spline_words import spline_factors
 from tablegen.fixedpoint.synthesis import encode, synthesize
 from tablegen.numerics.arrays import Floats, Ints
@@ -110,6 +112,27 @@ def quantise_frame(
 
 def _length(series: FourierSeries) -> int:
     return max(_LEAST_LENGTH, 1 << (4 * series.harmonics - 1).bit_length())
+
+
+def scaled_frame(program: FrameProgram, fast: float, slow: float, offset: float) -> FrameProgram:
+    """Return a program with the same tables, its parts of line and frame scaled, about an offset.
+
+    Parameters
+    ----------
+    fast, slow
+        Factors of the gains of the line and of the gain of the frame.
+    offset
+        Code of the slow part at 0, as a real number.
+
+    Raises
+    ------
+    OverflowError
+        If a word does not fit.
+    """
+    gains = np.rint(fast * program.gains.words).astype(np.int64)
+    word = round_number(offset * float(1 << program.output.gain_q))
+    slow_table = SlowTable(program.slow.words, round_number(slow * program.slow.gain_word), word)
+    return replace(program, gains=Knots(gains, program.gains.spacing), slow=slow_table)
 
 
 def _spline(series: FourierSeries, length: int) -> FourierSeries:

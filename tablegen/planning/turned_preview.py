@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace as replaced
 
 from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram
-from tablegen.fixedpoint.frame_program import FrameProgram, Knots, SlowTable
-from tablegen.fixedpoint.rounding import round_number
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.frame_words import scaled_frame
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.turned_plan import FrameGeometry, TurnedAxis, TurnedPlan, check_reach, plan_at_0, within_range
@@ -76,20 +75,14 @@ def _scaled(
     longest = max(motion.longest_nm, axis.motion.longest_nm)
     fast = _ratio(fast_nm, axis.motion.fast_nm, _LEAST_SHARE * longest)
     slow = _ratio(slow_nm, axis.motion.slow_nm, _LEAST_SHARE * longest)
-    for turn in range(_ROUNDS + 1):
+    for number in range(_ROUNDS + 1):
         drive = _drive(axis.drive, fast, slow, centre)
         moved_fast, moved_slow, error_nm = _played(axis, motion, drive)
-        if turn < _ROUNDS:
+        if number < _ROUNDS:
             fast *= fast_nm / moved_fast if abs(moved_fast) > _LEAST_SHARE * abs(fast_nm) else 1.0
             slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
     check_reach(axis.known, drive, motion.lines)
-    words, output = axis.program, axis.program.output
-    offset = round_number(axis.converter.code(axis.known.driver.volts(centre)) * float(1 << output.gain_q))
-    program = replaced(
-        words,
-        gains=Knots(np.rint(fast * words.gains.words).astype(np.int64), words.gains.spacing),
-        slow=SlowTable(words.slow.words, round_number(slow * words.slow.gain_word), offset),
-    )
+    program = scaled_frame(axis.program, fast, slow, axis.converter.code(axis.known.driver.volts(centre)))
     problems = Problems()
     program = within_range(setup, straight, line, program, problems)
     return None if problems.entries else program, 100.0 * error_nm / motion.longest_nm

@@ -1,8 +1,9 @@
 `default_nettype none
 
-// Bench of a dac_boot with a dac_slow_boot behind it, as in the top of a scan at an angle: plays a stimulus, an entry a
-// clock, and writes what left on every clock. STIMULUS and CAPTURE are those of boot_bench.
-module slow_boot_bench #(
+// Bench of a dac_boot with another boot behind it: with PIXELS a dac_pixel_boot, as in the top of a scan with a table of
+// pixels, else a dac_slow_boot, as in that of a scan at an angle. Plays a stimulus, an entry a clock, and writes what
+// left on every clock. STIMULUS and CAPTURE are those of boot_bench.
+module two_boots_bench #(
     parameter STIMULUS = "stimulus.hex",
     parameter CAPTURE = "capture.txt",
     parameter DEPTH = 1,
@@ -10,6 +11,8 @@ module slow_boot_bench #(
     parameter X_FILE = "",
     parameter Y_FILE = "",
     parameter SLOW_FILE = "",
+    parameter PIXEL_FILE = "",
+    parameter PIXELS = 0,
     parameter X_WORDS = 8,
     parameter Y_WORDS = 8,
     parameter X_WORD_BITS = 16,
@@ -26,11 +29,11 @@ module slow_boot_bench #(
 );
     reg [63:0] stimulus [0:DEPTH-1];
     reg [63:0] entry;
-    wire booting, table_missing, slow_missing, rest_write, rest_commit, rest_writable, write, commit;
+    wire booting, table_missing, other_missing, rest_write, rest_commit, rest_writable, write, commit;
     wire [2:0] rest_region, region;
     wire [15:0] rest_address, address;
     wire [31:0] rest_data, data;
-    wire missing = table_missing || slow_missing;
+    wire missing = table_missing || other_missing;
     integer at, capture;
 
     initial begin
@@ -60,15 +63,26 @@ module slow_boot_bench #(
         .write(rest_write), .write_region(rest_region), .write_address(rest_address), .write_data(rest_data),
         .commit(rest_commit), .starting(), .booting(booting), .missing(table_missing)
     );
-    dac_slow_boot #(
-        .SLOW_FILE(SLOW_FILE), .X_TABLE_WORDS(X_WORDS), .X_SLOW_WORDS(X_SLOW_WORDS), .X_KNOTS(X_KNOTS), .Y_TABLE_WORDS(Y_WORDS),
-        .Y_SLOW_WORDS(Y_SLOW_WORDS), .Y_KNOTS(Y_KNOTS), .WORD_BITS(WORD_BITS), .START_CLOCKS(START_CLOCKS)
-    ) slow_boot (
-        .clock(clock), .reset(entry[54]), .boot_write(rest_write), .boot_region(rest_region),
-        .boot_address(rest_address), .boot_data(rest_data), .boot_commit(rest_commit), .boot_writable(rest_writable),
-        .writable(entry[53]), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .commit(commit), .missing(slow_missing)
-    );
+    generate if (PIXELS != 0) begin : pixels
+        dac_pixel_boot #(
+            .PIXEL_FILE(PIXEL_FILE), .PIXELS(PIXELS), .START_CLOCKS(START_CLOCKS)
+        ) boot (
+            .clock(clock), .reset(entry[54]), .boot_write(rest_write), .boot_region(rest_region),
+            .boot_address(rest_address), .boot_data(rest_data), .boot_commit(rest_commit), .boot_writable(rest_writable),
+            .writable(entry[53]), .write(write), .write_region(region), .write_address(address), .write_data(data),
+            .commit(commit), .missing(other_missing)
+        );
+    end else begin : slow_parts
+        dac_slow_boot #(
+            .SLOW_FILE(SLOW_FILE), .X_TABLE_WORDS(X_WORDS), .X_SLOW_WORDS(X_SLOW_WORDS), .X_KNOTS(X_KNOTS), .Y_TABLE_WORDS(Y_WORDS),
+            .Y_SLOW_WORDS(Y_SLOW_WORDS), .Y_KNOTS(Y_KNOTS), .WORD_BITS(WORD_BITS), .START_CLOCKS(START_CLOCKS)
+        ) boot (
+            .clock(clock), .reset(entry[54]), .boot_write(rest_write), .boot_region(rest_region),
+            .boot_address(rest_address), .boot_data(rest_data), .boot_commit(rest_commit), .boot_writable(rest_writable),
+            .writable(entry[53]), .write(write), .write_region(region), .write_address(address), .write_data(data),
+            .commit(commit), .missing(other_missing)
+        );
+    end endgenerate
 endmodule
 
 `default_nettype wire

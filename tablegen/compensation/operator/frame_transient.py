@@ -10,35 +10,15 @@ from msgspec import Struct
 from tablegen.compensation.operator.bias_memory import late_terms
 from tablegen.compensation.operator.in_time import OperatorInTime, Start, late_mode
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan
-from tablegen.planning.turned_plan import TurnedAxis
 
-_SAMPLES = 128  # of a line
+SAMPLES = 128  # of a line
 
 
 class DrivenFrame(Struct, frozen=True, eq=False):
-    """The drive of an axis over a frame that repeats, of v_max, shape (lines, samples), and the time of a line in s."""
+    """The drive of an axis over a frame that repeats, of v_max, shape (lines, SAMPLES), and the time of a line in s."""
 
     u: Floats
     line_s: float
-
-    @classmethod
-    def turned(cls, axis: TurnedAxis) -> "DrivenFrame":
-        """Return the drive of an axis of a scan at an angle."""
-        return cls(axis.drive.on_grid(axis.motion.lines, _SAMPLES), 1.0 / axis.motion.line_rate_hz)
-
-    @classmethod
-    def straight(cls, line: LinePlan, lines: int, line_rate_hz: float) -> "DrivenFrame":
-        """Return the drive of an axis of a scan at 0 degrees."""
-        drive, t = line.drive, np.arange(_SAMPLES) / _SAMPLES
-        if drive.resting:
-            w = np.full((lines, _SAMPLES), 0.5)
-        elif line.axis == "x":
-            w = np.tile(line.drive_series.value(t), (lines, 1))
-        else:
-            w = line.drive_series.on_grid(lines * _SAMPLES).reshape(lines, _SAMPLES)
-        volts = drive.v_offset + drive.v_amplitude * (w - 0.5)
-        return cls(np.asarray(drive.driver.share(volts)), 1.0 / line_rate_hz)
 
     def from_line(self, line: int) -> "DrivenFrame":
         """Return the same frame, beginning at another line; at its first one if it has fewer."""
@@ -76,11 +56,11 @@ def _line_means(axis: OperatorInTime, before: DrivenFrame, now: DrivenFrame) -> 
     Both are as sensitive as at the mean of ``now``. Positions are from v_min on, where the axis has rested.
     """
     first, then = before.u.ravel(), now.u.ravel()
-    played = np.concatenate([first, first, then, then[:_SAMPLES]])
+    played = np.concatenate([first, first, then, then[:SAMPLES]])
     y = axis.hysteresis(played, Start.REST, mean=float(np.mean(then)))[len(first) :]
-    steps = np.repeat([before.line_s / _SAMPLES, now.line_s / _SAMPLES], [len(first), len(y) - len(first)])
+    steps = np.repeat([before.line_s / SAMPLES, now.line_s / SAMPLES], [len(first), len(y) - len(first)])
     time_s = np.cumsum(steps) - steps
     creep = axis.operator.creep
     late = [share * late_mode(time_s, y, tau_s, len(first)).real for share, tau_s in creep.terms()]
     position = creep.direct * y + np.sum(late, axis=0) if late else y
-    return np.asarray(position.reshape(-1, _SAMPLES).mean(axis=1))
+    return np.asarray(position.reshape(-1, SAMPLES).mean(axis=1))

@@ -8,11 +8,11 @@ from operator_files import operator_file
 
 from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.file import operator_text, read_operator
+from tablegen.compensation.operator.frame_transient import DrivenFrame, frame_drift_nm
 from tablegen.compensation.operator.in_time import OperatorInTime, Start
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.transient import SettledLine, transient_between
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.frame_drift import DrivenFrame, frame_drift_nm
 
 pytestmark = pytest.mark.common
 
