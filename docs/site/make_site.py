@@ -2,7 +2,8 @@
 
 The site has the pages of docs/, the notebooks, and a page for each file of the repository that a page links to: a link
 from docs/c.md to ../examples/c/play.c leads to the file where the repository is read, and to a page that shows it here.
-The contents are those of docs/index.md: its headings and the pages that they list.
+The contents are those of docs/index.md: its headings and the pages that they list. Decisions are listed on their own
+page alone: a hundred entries more beside every page would hide the others, and take most of the time of a build.
 """
 
 import os
@@ -22,6 +23,7 @@ SITE = Path(__file__).resolve().parent
 REPOSITORY = SITE.parents[1]
 DOCS = REPOSITORY / "docs"
 NOTEBOOKS = sorted((REPOSITORY / "examples" / "notebooks").glob("*.ipynb"))
+DECISIONS = DOCS / "decisions"
 PICTURES = {".png", ".svg"}
 LINK = re.compile(r"(?<=\]\()(?![a-z]+:)([^)\s#]+)(?=[)#])")
 PAGE = re.compile(r"^(?:- |\| )\[(.*?)\]\((?![a-z]+:)([^)\s#]+\.md)\)", re.MULTILINE)
@@ -34,7 +36,7 @@ def assemble(folder: Path) -> None:
     """Write what Sphinx reads: pages and pictures, with links to each other."""
     waiting = sorted(path for path in DOCS.rglob("*") if path.suffix in {".md", *PICTURES} and SITE not in path.parents)
     waiting += NOTEBOOKS
-    listed = set(waiting)
+    listed = {path for path in waiting if path.parent != DECISIONS or path.name == "README.md"}
     seen = set(waiting)
     while waiting:
         target = waiting.pop()
@@ -46,7 +48,7 @@ def assemble(folder: Path) -> None:
         text = shown(target)
         if target == DOCS / "index.md":
             text += contents(text)
-        elif target.name == "README.md" and DOCS in target.parents:
+        elif target.name == "README.md" and DOCS in target.parents and target.parent != DECISIONS:
             text += contents_of_folder(text)
         written.write_text(("" if target in listed else ORPHAN) + relinked(target, text), "utf-8")
         new = {one for one in targets(target, text) if one not in seen and one.exists()}
