@@ -105,7 +105,8 @@ def test_half_of_the_columns_may_be_missing() -> None:
     assert same_lattice(find_cell(heights).vectors, cell)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_weak_lowest_orders_terraces_and_rows_that_jump() -> None:
     accepted, wrong = accepted_and_wrong(range(24))
     assert wrong == []

@@ -168,7 +168,8 @@ def test_errors_hold_with_noise() -> None:
     assert 0.1 < np.sqrt(np.mean(np.square(away))) < 1.5
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 @pytest.mark.parametrize("kind", long(["offset --image"], ["size --image", "offset --image"]))
 def test_fits_of_images_know_themselves(kind: str) -> None:
     """Truth within two standard errors in most of few trials; docs/calibration.md has the share of many."""

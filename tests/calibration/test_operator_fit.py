@@ -103,11 +103,11 @@ def test_the_family_and_the_creep_are_found() -> None:
 @pytest.mark.parametrize(
     ("kind", "protocol", "centre", "strokes", "scaling", "mismatch", "size"),
     [
-        (ManyPlays, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 2.5, 0.5, 0.5),
+        pytest.param(*(ManyPlays, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 2.5, 0.5, 0.5), marks=LONG_TEST),
         (ManyPlays, SIX, 0.85, (0.15, 0.28), 2.5, 0.5, 3.0),
         pytest.param(*(ManyPlays, TEN, 0.7, (0.15, 0.35, 0.55), 1.5, 0.25, 0.5), marks=LONG_TEST),
-        (ManyPlays, TEN, 0.85, (0.05, 0.15, 0.28), 1.5, 0.25, 0.5),
-        (BoucWen, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 3.0, 0.4, 0.5),
+        pytest.param(*(ManyPlays, TEN, 0.85, (0.05, 0.15, 0.28), 1.5, 0.25, 0.5), marks=LONG_TEST),
+        pytest.param(*(BoucWen, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 3.0, 0.4, 0.5), marks=LONG_TEST),
         (BoucWen, SIX, 0.85, (0.05, 0.15, 0.28), 3.0, 0.4, 1.0),
         pytest.param(*(BoucWen, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5), marks=LONG_TEST),
         pytest.param(*(JilesAtherton, SIX, 0.5, (0.15, 0.55, 0.9), 3.0, 0.4, 0.5), marks=LONG_TEST),
@@ -240,7 +240,7 @@ def test_the_next_trace_is_that_of_the_scans_and_says_what_it_brings() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("kind", [ManyPlays, BoucWen])
+@pytest.mark.parametrize("kind", [ManyPlays, pytest.param(BoucWen, marks=LONG_TEST)])
 def test_the_only_trace_of_an_offset_may_be_left_out(kind: type) -> None:
     """Its gain goes with it, and the other offset's stays at its place."""
     plant = ForeignPlant(kind())

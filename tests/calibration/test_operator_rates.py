@@ -164,7 +164,8 @@ def left_of(plant: ForeignPlant, operator: Operator) -> tuple[float, float]:
     return rms, size
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_plays_that_grow_with_the_rate_are_found_from_one_fast_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     """Thresholds that are a tenth larger at 1 kHz; the control is without them: 0.2 % rms, 0.24 % of the size."""
     plant = RateDependentPlant(ManyPlays())

@@ -121,7 +121,7 @@ def scanned(folder: Path, plant: str, fit: OperatorFit, size_nm: float, frame_hz
 @pytest.mark.parametrize(
     ("protocol", "plant"),
     [
-        *(pytest.param(FRAMES, plant, id=f"frames-{plant}") for plant in PLANTS),
+        *(pytest.param(FRAMES, plant, id=f"frames-{plant}", marks=LONG_TEST) for plant in PLANTS),
         pytest.param(TURNED, "plays", id="turned-plays"),
         pytest.param(QUICK, "Bouc-Wen", id="quick-Bouc-Wen"),
         pytest.param(TURNED, "Bouc-Wen", id="turned-Bouc-Wen", marks=LONG_TEST),

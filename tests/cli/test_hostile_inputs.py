@@ -21,7 +21,7 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from image_writers import npy
 from instrument_files import sxm
 from limits import PATIENCE_S, within
-from sets import common, quick
+from sets import common, common_of, quick
 
 CPU_S = 5
 MOST_MEMORY_BYTES = 500 << 20
@@ -80,7 +80,7 @@ READING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("what", common(["check"], READING))
+@pytest.mark.parametrize("what", common_of(3, ["check"], READING))
 def test_no_command_waits_at_a_pipe_or_reads_a_device(what: str, tmp_path: Path) -> None:
     write_pair(tmp_path)
     (tmp_path / "data.csv").write_text("offset_v,apparent_nm\n0,100\n50,120\n100,140\n")
@@ -217,7 +217,7 @@ DAMAGED: dict[str, tuple[str, Callable[[], bytes], str]] = {
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("what", common(["directory of itself", "deep header"], DAMAGED))
+@pytest.mark.parametrize("what", common_of(3, ["directory of itself", "deep header"], DAMAGED))
 def test_a_damaged_image_is_told(what: str, tmp_path: Path) -> None:
     name, content, said = DAMAGED[what]
     (tmp_path / name).write_bytes(content())

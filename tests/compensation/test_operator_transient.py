@@ -10,6 +10,7 @@ import pytest
 from editing import SCAN, SCANNER, edited, run
 from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record
 from replacing import replace
+from sets import LONG_TEST
 from stepped_plants import Followed, followed, one_state_played, plays_played
 from test_operator_waveform import THRESHOLDS, WEIGHTS, operator
 
@@ -126,7 +127,7 @@ def slowest(one: Operator) -> Operator:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize(("stroke", "centre"), [(0.2, 0.5), (0.6, 0.5), (0.6, 0.6)])
+@pytest.mark.parametrize(("stroke", "centre"), [(0.2, 0.5), pytest.param(0.6, 0.5, marks=LONG_TEST), (0.6, 0.6)])
 def test_the_virtual_scanner_drifts_as_the_operator_says(stroke: float, centre: float) -> None:
     """Its hysteresis from the loop before, and its creep from the mean of that: as if that had lasted for ever."""
     along = np.concatenate([np.linspace(0.0, 1.0, 20, endpoint=False), np.linspace(1.0, 0.0, 20, endpoint=False)])

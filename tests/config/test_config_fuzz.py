@@ -322,7 +322,7 @@ def test_any_bytes_anywhere_are_refused_or_built(folder: Path, at: int, put: byt
 
 
 @pytest.mark.rest
-@settings(STEADY, max_examples=80)
+@settings(STEADY, max_examples=30)
 @given(st.lists(st.tuples(across(-1e5, 1e5), across(1e-6, 1e9)), min_size=3, max_size=5), st.floats(0.0, 100.0))
 def test_any_offset_points_are_refused_or_built(folder: Path, points: list[tuple[float, float]], last: float) -> None:
     for rows in (points, [(last * (i + 1) / 9.0, 200.0 + 40.0 * (p[0] > 0.0)) for i, p in enumerate(points)]):
@@ -332,7 +332,7 @@ def test_any_offset_points_are_refused_or_built(folder: Path, points: list[tuple
 
 
 @pytest.mark.rest
-@settings(STEADY, max_examples=80)
+@settings(STEADY, max_examples=40)
 @given(
     model=st.sampled_from(("harmonic", "sinusoidal")),
     size=st.floats(1.0, 1200.0),

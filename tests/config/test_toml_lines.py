@@ -21,7 +21,7 @@ from tablegen.base.toml import read_toml
 
 Path_ = tuple[str | int, ...]
 
-settings.register_profile("toml", derandomize=True, deadline=None, max_examples=250)
+settings.register_profile("toml", derandomize=True, deadline=None, max_examples=120)
 STEADY = settings.get_profile("toml")
 
 NASTY = "ab1-_ .\"'#[]{}=,\\\t\u00e9\u2028\U0001f600\x7f\n"
@@ -338,7 +338,7 @@ def test_every_key_is_found_on_its_line_and_nothing_else(folder: Path, document:
 
 
 @pytest.mark.rest
-@settings(STEADY, max_examples=100)
+@settings(STEADY, max_examples=50)
 @given(documents())
 def test_line_ends_of_windows_change_nothing(folder: Path, document: tuple[str, dict[str, int]]) -> None:
     text, lines = document
@@ -358,7 +358,7 @@ def test_a_syntax_error_is_reported_on_its_line(
 
 
 @pytest.mark.rest
-@settings(STEADY, max_examples=100)
+@settings(STEADY, max_examples=50)
 @given(documents(), st.sampled_from((b"\xff", b"\xc3(", b"\xed\xa0\x80", b"\xf8\x88")))
 def test_a_byte_that_is_not_utf8_is_reported_on_its_line(
     folder: Path, document: tuple[str, dict[str, int]], wrong: bytes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from correcting import LATTICE, LAWS, OFFSET_V, PLANTS, RATE_HZ, V, off, old_frame, save_pair, scanner_file
 from replacing import replace
-from sets import common
+from sets import common, long
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.correction.by_fit import by_fit
@@ -64,7 +64,7 @@ def test_a_lattice_by_a_fit(plant: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("plant", common(["duhem", "plays"], PLANTS))
+@pytest.mark.parametrize("plant", long(["duhem"], PLANTS))
 def test_any_sample_by_the_operator(plant: str, tmp_path: Path) -> None:
     """Of six traces at 100 Hz; the slow axis by its own operator, of traces at 100 Hz too."""
     frame = old_frame(plant)

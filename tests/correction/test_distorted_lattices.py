@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from distorted_lattices import Knowledge, accepted_without_period, corrected, deviation, distorted_lattice
 from lattice_images import three_sites
-from sets import common
+from sets import common_of
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.images.terraces import without_steps, without_terraces
@@ -42,7 +42,8 @@ def test_an_edge_along_the_rows_does_not_move_them() -> None:
     assert error.outermost < 0.3
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_a_dozen_distorted_lattices() -> None:
     assert accepted_and_wrong([0, 1, 3, 4, 5, 7, 9, 10, 19, 24, 53, 98], "size and constant") == (12, [])
 
@@ -61,7 +62,7 @@ def test_without_a_size_another_cell_may_have_the_constant() -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("seed", common(range(3), range(10)))
+@pytest.mark.parametrize("seed", common_of(3, range(3), range(10)))
 def test_a_sample_without_a_lattice_is_refused(seed: int) -> None:
     assert not accepted_without_period(seed)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from building import REPOSITORY
 from editing import run
+from sets import one_of
 
 import tablegen
 
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.common
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", make_gallery.SCANS)
+@pytest.mark.parametrize("name", one_of(3, make_gallery.SCANS))
 def test_the_table_is_what_the_scan_gives(name: str, tmp_path: Path) -> None:
     shown = [line for line in PAGE.splitlines() if line.startswith(f"| {name} |")]
     assert make_gallery.rows(name, make_gallery.SCANS[name]) == shown

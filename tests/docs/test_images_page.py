@@ -28,7 +28,8 @@ def table() -> list[list[float]]:
     return [[float(cell) for cell in re.findall(r"[\d.]+", row.split("|", 2)[2])] for row in rows]
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_every_command_runs_and_the_scan_becomes_straight(tmp_path: Path) -> None:
     (scan,) = blocks("toml")
     (tmp_path / "scan.toml").write_text(scan, encoding="utf-8")

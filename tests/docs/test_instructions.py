@@ -44,6 +44,8 @@ def test_what_a_sample_takes_on_a_cortex_m4(cortex_m4: Any) -> None:
     assert counts.worst_step <= 400, "a driver reckons with it"
 
 
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_what_it_takes_on_a_cortex_m0(firmware: ModuleType, tmp_path: Path) -> None:
     """The aims of 26 instructions and 3 kB are missed; what was reached is kept."""
     fast = firmware.measure("cortex-m0plus", "-O2", tmp_path, FILLS)

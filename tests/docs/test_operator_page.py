@@ -76,7 +76,8 @@ def test_the_summary_has_the_numbers_of_the_page() -> None:
             assert f"{told[0]} | {told[1]}" in shown, (plant, line, told)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_the_example_of_the_page(tmp_path: Path) -> None:
     """All commands of the page, on what `tablegen init` writes; then what the scan leaves on the same scanner."""
     assert run_page(REPOSITORY / "docs" / "operator.md", tmp_path, before="tablegen init .") == []

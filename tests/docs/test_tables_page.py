@@ -119,7 +119,8 @@ def test_a_cortex_m0_plays_wide_words_without_long_products() -> None:
     assert takes["interpolated"]["cortex-m0plus"][0] < 90
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_cells_are_counted(benchmark: ModuleType) -> None:
     """Those of the tables that interpolate are rows of docs/resources.md, which has a digest of the Verilog."""
     assert benchmark.cells() == cells()

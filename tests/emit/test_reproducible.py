@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, write_variant
 from operator_files import operator_file
-from sets import common
+from sets import common, long
 
 from tablegen.compensation.operator.file import operator_text
 
@@ -241,7 +241,7 @@ def test_bytes_do_not_depend_on_vector_units(reference: dict[str, bytes], tmp_pa
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("option", common(["-OO"], ["-O", "-OO", "-I"]))
+@pytest.mark.parametrize("option", long(["-OO"], ["-O", "-OO", "-I"]))
 def test_bytes_do_not_depend_on_the_interpreter_s_options(
     reference: dict[str, bytes], tmp_path: Path, option: str
 ) -> None:

@@ -149,7 +149,8 @@ def test_pieces_of_splines(program: Program) -> None:
     check_pieces_of_splines(program)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 @settings(max_examples=100, deadline=None)
 @given(splines())
 def test_pieces_of_splines_of_many(program: Program) -> None:

@@ -18,6 +18,7 @@ from editing import run as tablegen
 from foreign_plants import ForeignPlant, ManyPlays
 from installing import write_command
 from operator_files import operator_file
+from sets import long
 from short_scans import model_ticks
 from sine_scans import response_csv, sine_scan, text_of
 from turned_scans import write_turned
@@ -191,7 +192,7 @@ def project(request: pytest.FixtureRequest, tmp_path: Path) -> Project:
     return Project(tool, folder, program, ["survey.toml", "detail.toml", "third/third.toml"])
 
 
-@pytest.mark.parametrize("project", ["make", "Ninja"], indirect=True)
+@pytest.mark.parametrize("project", long(["make"], ["make", "Ninja"]), indirect=True)
 def test_scans_of_different_widths_play_in_one_program(project: Project) -> None:
     """First the narrow one alone; then with the others, which have all objects compiled anew."""
     everything, project.scans = project.scans, ["survey.toml"]

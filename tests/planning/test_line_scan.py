@@ -8,7 +8,7 @@ import pytest
 from client_line import VirtualLine
 from client_rig import client, info_for, model
 from editing import SCAN, edited, run, write_pair
-from sets import common
+from sets import long
 from verifying import make_right
 
 import tablegen
@@ -73,7 +73,7 @@ def test_verify_of_the_files_agrees_and_finds_a_y_that_is_said_to_rest(built: Pa
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("options", common([("c",)], [("c",), ("verilog", "--axis", "blocks")]), ids=["c", "verilog"])
+@pytest.mark.parametrize("options", long([("c",)], [("c",), ("verilog", "--axis", "blocks")]), ids=["c", "verilog"])
 def test_c_and_verilog_play_it(built: Path, options: tuple[str, ...]) -> None:
     outcome = run("verify", built / "out", "--target", *options, "--ticks", "20000")
     assert outcome.status == 0, outcome.out + outcome.err

@@ -23,7 +23,7 @@ def errors(piezo: str, angle_deg: float) -> dict[str, float]:
     ("piezo", "angle_deg"),
     [
         ("plays", 30.0),
-        ("preisach", 77.0),
+        pytest.param("preisach", 77.0, marks=LONG_TEST),
         pytest.param("plays", 77.0, marks=LONG_TEST),
         pytest.param("preisach", 30.0, marks=LONG_TEST),
     ],
@@ -39,7 +39,8 @@ def test_a_turned_scan_is_nearly_as_good_as_a_straight_one(piezo: str, angle_deg
     assert straight["rms"] < 0.03
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_a_piezo_without_return_point_memory_shows_in_the_size_across() -> None:
     """What the page says of them: the residual stays small, and the slow motion is too large."""
     turned = errors("bouc-wen", 30.0)

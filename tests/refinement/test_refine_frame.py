@@ -236,7 +236,8 @@ def test_what_is_not_for_an_angle_is_said(tmp_path: Path) -> None:
         assert f"{option[0]} is for scans at 0 degrees" in outcome.err
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_a_piezo_without_return_point_memory_is_learnt() -> None:
     """Bouc-Wen at 30 degrees: the size across was 13 % off, and is within 1 % after two rounds."""
     with TemporaryDirectory() as folder:

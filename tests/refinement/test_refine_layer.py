@@ -8,7 +8,7 @@ import pytest
 from editing import SCAN, SCANNER, edited, run, write_pair
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sets import common
+from sets import long
 
 from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
@@ -168,7 +168,7 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("options", common([("c",)], [("verilog", "--axis", "blocks"), ("c",)]), ids=["verilog", "c"])
+@pytest.mark.parametrize("options", long([("c",)], [("verilog", "--axis", "blocks"), ("c",)]), ids=["verilog", "c"])
 def test_such_a_build_verifies(options: tuple[str, ...], tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, "timing.lines = 6", *at("x")))
     assert run("build", path, "-o", tmp_path / "out", "-q").status == 0

@@ -131,7 +131,8 @@ def test_the_map_of_sizes_is_within_one_percent(calibration: Calibration, exampl
     assert before.min() < -20.0
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_the_map_of_another_plant_is_not(example: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
     """One percent is the default scanner's own: it was made so that one m serves every size. Both pages say so."""
     scan = with_scan(example, size_v=20.0, rate_hz=100.0)
@@ -150,7 +151,8 @@ def test_the_map_of_another_plant_is_not(example: Setup, monkeypatch: pytest.Mon
     assert worst(same_numbers, 0.06) < 1.2
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_images_of_several_sizes_serve_scans_of_all(example: Setup) -> None:
     """m over the size too, on the plant that one m does not serve; and by m of 13 V alone."""
     plant = VirtualScanner.of(same_numbers(load_truth()))

@@ -141,7 +141,8 @@ def test_the_laboratory_images_a_frame(setup: Setup, plan: TurnedPlan) -> None:
     assert np.max(np.abs(frame.retrace.x_nm - trace.x_nm)) < 0.1 * abs(dx)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_operators_of_the_virtual_scanner_itself_are_far_better(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
     """The scanner file has those of another piezo; three traces instead of five, for time, leave more of the sizes."""
     monkeypatch.setattr("tablegen.virtual.operator_day.STROKES", (0.2, 0.45, 0.9))

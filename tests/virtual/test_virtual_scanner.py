@@ -7,6 +7,7 @@ import pytest
 from building import REPOSITORY
 from paper.identify import X_TARGETS, Y_TARGETS, Targets, identify
 from paper.printed_numbers import table
+from sets import LONG_TEST
 from variants import plan_of, setup_of
 
 from tablegen.compensation.hysteresis import BranchShape, beta_at
@@ -96,7 +97,11 @@ def test_sizes_over_voltage(axis: VirtualAxis, targets: Targets, rate_hz: float)
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(("axis", "targets", "rate_hz"), [(X, X_TARGETS, 100.0), (Y, Y_TARGETS, 1.0)], ids=["x", "y"])
+@pytest.mark.parametrize(
+    ("axis", "targets", "rate_hz"),
+    [pytest.param(X, X_TARGETS, 100.0, marks=LONG_TEST), (Y, Y_TARGETS, 1.0)],
+    ids=["x", "y"],
+)
 def test_one_factor_serves_all_sizes(axis: VirtualAxis, targets: Targets, rate_hz: float) -> None:
     """What (1) is good for: m times the drive of the middle makes the same scan elsewhere, large or small, to 1.3 %."""
     law = targets.size

@@ -7,6 +7,7 @@ from subprocess import CompletedProcess
 import pytest
 from building import NAME, Build, run
 from formatted import Formatted, check_finds_a_flip, formatted
+from sets import LONG_TEST
 from short_scans import model_ticks, short
 from sketches import own_warnings, run_builder, simulated_output
 
@@ -122,7 +123,7 @@ def objects(tmp_path: Path) -> set[str]:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"emit.formats": ["arduino"]},
+        pytest.param({"emit.formats": ["arduino"]}, marks=LONG_TEST),
         {"emit.formats": ["arduino", "verilog"]},
         {"emit.formats": ["arduino"], "emit.header_only": True},
     ],

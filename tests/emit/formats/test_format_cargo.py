@@ -9,6 +9,7 @@ import pytest
 from building import NAME, Build, tool
 from formatted import Formatted, check_finds_a_flip, formatted
 from packed_library import TICKS, plays_the_model, run_offline
+from sets import LONG_TEST
 from short_scans import CUBIC, short
 
 from tablegen.version import __version__
@@ -115,8 +116,8 @@ def packed(tmp_path: Path, built: Build) -> Path:
     "changes",
     [
         {},
-        {"emit.header_only": True},
-        {"dac.bits": 18, "x.table.bits": 18, "y.table.bits": 18},
+        pytest.param({"emit.header_only": True}, marks=LONG_TEST),
+        pytest.param({"dac.bits": 18, "x.table.bits": 18, "y.table.bits": 18}, marks=LONG_TEST),
         {"dac.shaping": "second", "x.table": CUBIC},
     ],
     ids=["16 bits", "header-only", "18 bits", "shaped and cubic"],
@@ -185,8 +186,8 @@ def test_cargo_refuses_the_crates_of_two_scans(tmp_path: Path, crate: Path) -> N
     ("line", "code"),
     [
         ("drop(memory);", "E0505"),
-        ("let (_, _) = start(&mut memory, [0, 0]).unwrap();", "E0499"),
-        ("let _second = Player { ..player };", "E0451"),
+        pytest.param("let (_, _) = start(&mut memory, [0, 0]).unwrap();", "E0499", marks=LONG_TEST),
+        pytest.param("let _second = Player { ..player };", "E0451", marks=LONG_TEST),
     ],
     ids=["moved", "started twice", "a second player"],
 )

@@ -152,7 +152,8 @@ def test_c_alone_is_verified_as_c(tmp_path: Path, header_only: bool) -> None:
     ]
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_verilog_alone_is_verified_as_verilog(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("build", write_pair(tmp_path), "-o", out, "-f", "verilog").status == 0
