@@ -58,7 +58,8 @@ def test_every_clock_is_that_of_the_model(signals: int, bits: int, tmp_path: Pat
     assert captured(tmp_path, "icarus", bits, clocks) == wanted(clocks)
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_verilator_has_the_same_clocks(tmp_path: Path) -> None:
     clocks = stimulus(8, 6, seed=2)
     assert captured(tmp_path, "verilator", 6, clocks) == wanted(clocks)
