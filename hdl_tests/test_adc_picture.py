@@ -28,7 +28,7 @@ from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 pytestmark = pytest.mark.rest
 
 SCAN: dict[str, object] = {
-    "timing": {"pixels": 24, "lines": 20, "line_rate_hz": 1500.0, "ticks_per_line": 192},
+    "timing": {"pixels": 24, "lines": 12, "line_rate_hz": 1500.0, "ticks_per_line": 192},
     "x.size_nm": 60.0,
     "y.size_nm": 60.0,
 }
@@ -194,6 +194,8 @@ def test_it_is_the_picture_of_a_simulated_frame(setup: Setup, delayed: Run) -> N
         assert np.std(picture - image.heights) < 0.1 * np.std(image.heights)
 
 
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_without_the_delay_it_is_displaced_by_the_latency(setup: Setup, delayed: Run, tmp_path: Path) -> None:
     undelayed = played(compiled(setup, tmp_path, 0), sampled(setup, delayed))
     schedule = setup.built.plan.schedule

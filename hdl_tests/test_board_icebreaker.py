@@ -10,9 +10,12 @@ import pytest
 from boards import TICKS, Board, expected_words, make
 from building import NAME, tool
 from link_talk import is_answer
+from sets import LONG_TEST
 
 from tablegen.api.build import build
 from tablegen.link.messages import Request
+
+pytestmark = [*LONG_TEST]
 
 START_CLOCKS = 4096
 ICEBREAKER = Board("icebreaker", clocks_per_tick=96, clocks_per_bit=104, limit=400_000)  # HELLO takes 125,000 clocks
@@ -49,15 +52,12 @@ def cells(board: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return ICEBREAKER.simulator(board / "build" / "icebreaker.json", folder, [library])
 
 
-@pytest.mark.long
-@pytest.mark.timeout(86_400)
 def test_the_bitstream_is_made(board: Path) -> None:
     """Placed in time for the clock of the board, or nextpnr ends with an error."""
     make(board, "build/icebreaker.bin")
     assert (board / "build" / "icebreaker.bin").stat().st_size == 104090  # of every UP5K
 
 
-@pytest.mark.rest
 def test_the_cells_play_the_model_once_they_are_triggered(board: Path, cells: Path) -> None:
     fault, answers, words = ICEBREAKER.played(cells, START_CLOCKS - 100)
     assert all(is_answer(*pair) for pair in zip(answers, (Request.HELLO, Request.ARM, Request.TRIGGER), strict=False))
@@ -68,7 +68,6 @@ def test_the_cells_play_the_model_once_they_are_triggered(board: Path, cells: Pa
     assert words == [each[: len(words[0])] for each in whole]
 
 
-@pytest.mark.rest
 def test_memories_that_sleep_longer_than_the_start_are_seen(cells: Path) -> None:
     """The control: without the wait the board would neither answer nor play."""
     _, answers, words = ICEBREAKER.played(cells, START_CLOCKS + 200)

@@ -14,6 +14,7 @@ import pytest
 from boot_play import AFTER, BOOT, COMMIT, Boots, Clock, Setup, Wrong, hosts
 from building import BENCHES, REPOSITORY
 from programs import random_dual, random_fourier
+from sets import long
 
 from tablegen.device.registers import program_words
 from tablegen.emit.memory import memory_files
@@ -159,7 +160,7 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize("simulator", ["icarus", pytest.param("verilator", marks=pytest.mark.rest)])
+@pytest.mark.parametrize("simulator", long(["icarus"], ["icarus", "verilator"]))
 def test_a_file_that_is_missing_or_short_is_never_committed(simulator: str, tmp_path: Path) -> None:
     """And that is said, the boot ends, and the host has access after it: with every file there it is committed."""
     (tmp_path / "build").mkdir()

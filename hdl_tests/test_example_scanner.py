@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from building import BENCHES, NAME, REPOSITORY, VARIANTS, Build, build, run_clean
 from limits import PATIENCE_S
-from sets import LONG_TEST, common
+from sets import common_and_rest
 from short_scans import CUBIC, DIRECT, model_ticks, short
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
@@ -97,11 +97,10 @@ def elaborated(built: Build, text: str, top: str, *sources: Path, **parameters: 
 
 
 QUICKER = ("interpolated", "direct x", "shaped", "18 bits")
-SLOWEST = "128 harmonics"
-SCANS = [*common(QUICKER, [name for name in PLAYED if name != SLOWEST]), pytest.param(SLOWEST, marks=LONG_TEST)]
+SLOW = ("y at rest", "128 harmonics")
 
 
-@pytest.mark.parametrize("name", SCANS)
+@pytest.mark.parametrize("name", common_and_rest(QUICKER, PLAYED.keys() - SLOW, PLAYED))
 def test_every_scan_is_played(name: str, tmp_path: Path) -> None:
     built, capture = short(tmp_path, PLAYED[name]), tmp_path / "capture.hex"
     ticks, converter = 60, Converter(built.plan.program.x.output.word_bits, cpol=0, cpha=0)

@@ -158,6 +158,8 @@ def test_a_clock_that_is_no_multiple_of_the_rate_is_refused(example: Any, made: 
         example.TablegenScan(SimPlatform("SIM", [("sys_clk", 0, Pins(1))]), made.folder, 8_100_000)
 
 
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_another_word_of_the_build_is_heard(example: Any, tmp_path: Path) -> None:
     """A control: with the memory file of another scan the samples are others."""
     made, other = build(tmp_path / "a", Variant(SCAN)), build(tmp_path / "b", Variant({**SCAN, "x.size_nm": 120.0}))

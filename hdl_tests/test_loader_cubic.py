@@ -11,7 +11,7 @@ from link_talk import Talk
 from loader_bridge import Simulation, compile_loader
 from loader_device import Loader
 from programs import random_dual
-from sets import LONG_TEST, long, one_of
+from sets import LONG_TEST, long
 from test_loader import checked_uploads, random_dialogue
 
 from tablegen.base.resources import verilog_runtime
@@ -29,7 +29,7 @@ from tablegen.verification.play.sequencer_shape import SequencerShape
 
 INDEX_BITS = {"X": 7, "Y": 6}  # of the bench
 OF_DEGREE = {0: lambda index_bits: 0, 1: lambda index_bits: index_bits, 3: lambda index_bits: index_bits + CUBIC}
-DEGREES = [(3, 1), (1, 3), (3, 0), (3, 3), (1, 1)]
+DEGREES = [(1, 3), (3, 1), (3, 0), (3, 3), (1, 1)]
 # What stands in the place of what, and the device in which that shows.
 SAID = "X_INTERPOLATED == 3 || Y_INTERPOLATED == 3 ? 8'd3"
 MUTANTS = {
@@ -47,6 +47,12 @@ MUTANTS = {
     "y goes by x": ("Y_INTERPOLATED == 3 ? CUBIC", "X_INTERPOLATED == 3 ? CUBIC", (3, 1)),
     "another bit is that of a spline": ("CUBIC = 8'd128", "CUBIC = 8'd64", (3, 3)),
 }  # fmt: skip
+FOUND_SOON = (
+    "no device says its degree",
+    "that of y is not said",
+    "y takes lines for a spline",
+    "x takes splines for lines",
+)
 
 
 def keeps_to_its_modes(x: int, y: int, folder: Path, sources: list[Path]) -> None:
@@ -79,13 +85,13 @@ def keeps_to_its_modes(x: int, y: int, folder: Path, sources: list[Path]) -> Non
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(("x", "y"), [*DEGREES[:3], *(pytest.param(*each, marks=LONG_TEST) for each in DEGREES[3:])])
+@pytest.mark.parametrize(("x", "y"), [DEGREES[0], *(pytest.param(*each, marks=LONG_TEST) for each in DEGREES[1:])])
 def test_it_takes_tables_of_its_own_modes_alone(x: int, y: int, tmp_path: Path) -> None:
     keeps_to_its_modes(x, y, tmp_path, verilog_runtime())
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("mutant", one_of(2, MUTANTS))
+@pytest.mark.parametrize("mutant", long(FOUND_SOON, MUTANTS))
 def test_a_mutant_is_found(mutant: str, tmp_path: Path) -> None:
     old, new, (x, y) = MUTANTS[mutant]
     sources = []
@@ -100,7 +106,7 @@ def test_a_mutant_is_found(mutant: str, tmp_path: Path) -> None:
         keeps_to_its_modes(x, y, tmp_path / "build", sources)
 
 
-@pytest.fixture(scope="module", params=[(3, 1), (3, 3)], ids=["x cubic", "both cubic"])
+@pytest.fixture(scope="module", params=[(3, 1), pytest.param((3, 3), marks=LONG_TEST)], ids=["x cubic", "both cubic"])
 def loader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Loader:
     """Of short tables, so that an upload is short too."""
     x, y = request.param
@@ -110,7 +116,7 @@ def loader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", long((0, 1), range(4)))
+@pytest.mark.parametrize("seed", long((0,), range(4)))
 def test_random_dialogues(seed: int, loader: Loader) -> None:
     assert len(random_dialogue(loader, seed, 120, []).seen) > 10
 
@@ -118,7 +124,7 @@ def test_random_dialogues(seed: int, loader: Loader) -> None:
 @pytest.mark.rest
 def test_every_check_is_that_of_the_model(loader: Loader) -> None:
     seen: Counter[Any] = Counter()
-    for seed in range(2):
+    for seed in range(2 if loader.boot.x.mode == loader.boot.y.mode else 1):
         seen += checked_uploads(loader, seed, 40, []).seen
     assert seen[Request.COMMIT] > 10
     assert len({key[1] for key in seen if isinstance(key, tuple) and key[0] == Request.COMMIT}) >= 8

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dialogues import boot_program
 from link_images import random_image
 from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader, LoaderDevice, limited
 from loader_dialogues import Dialogue
-from test_loader import MADE, TOLD, other_word
+from sets import long
+from test_loader import golden_loader, other_word
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
@@ -22,14 +22,9 @@ TOP = (1 << 16) - 1
 SETTLE_LINES = SCAN_WORDS.index("settle_lines")
 
 
-def made(folder: Path, **parameters: int) -> Loader:
-    x, y = ((limits.code_min, limits.code_max, limits.max_step) for limits in (TOLD.x_limits, TOLD.y_limits))
-    return Loader(folder, boot_program(MADE), (x, y), TOLD.harmonics, TOLD.update_rate_hz, LOW_AREA=1, **parameters)
-
-
 @pytest.fixture(scope="module")
 def loader(tmp_path_factory: pytest.TempPathFactory) -> Loader:
-    return made(tmp_path_factory.mktemp("modes"), COMMIT_MODES=1)
+    return golden_loader(tmp_path_factory.mktemp("modes"), COMMIT_MODES=1)
 
 
 def sent(simulation: Simulation, talk: Talk, image: ProgramImage, mode: int) -> bytes:
@@ -90,14 +85,14 @@ def test_another_frame_cannot_go_on_and_its_upload_stays(loader: Loader) -> None
 
 @pytest.mark.rest
 def test_a_device_without_modes_refuses_one(tmp_path: Path) -> None:
-    loader = made(tmp_path)
+    loader = golden_loader(tmp_path)
     with Simulation(loader.compiled, []) as simulation:
         talk = scanning(simulation, loader)
         assert talk.refusals(sent(simulation, talk, other_word(SETTLE_LINES, 5), 0)) == [(Reason.PAYLOAD, 0)]
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", long(range(2), range(6)))
 def test_random_dialogues_with_modes(seed: int, loader: Loader) -> None:
     wide = AxisLimits(0, TOP, TOP, TOP)
     info, memory = limited(loader.info, wide, wide)

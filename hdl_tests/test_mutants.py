@@ -7,18 +7,29 @@ import pytest
 from building import REPOSITORY
 from mutants import Verdict
 from programs import random_dual
-from sets import one_of
+from sets import long
 from stream_mutants import BENCHES, MUTANTS, SHAPES, Mutant, bench_of, judge, script_of
 
 from tablegen.verification.play.stream import Script
 
+FIRSTS = {name: mutant for mutant in reversed(MUTANTS) for name in (f"{mutant.file}.v", mutant.where)}
+SOME = [*MUTANTS[::16], *FIRSTS.values()]  # with the first of each module and of each bench
+# A bench of each kind of axis; a slow part is played by `test_stream_slow` in the rest.
+AS_IT_IS = ("digits", "low area", "second", "pixel tables", "pair sweep", "cubic")
+
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", one_of(3, BENCHES))
+@pytest.mark.parametrize("name", long(AS_IT_IS, BENCHES))
 def test_the_verilog_as_it_is_passes(name: str, tmp_path: Path) -> None:
-    played = bench_of(name, tmp_path / "whole").play(script_of(name))
-    assert played.equal, played
     assert judge(None, tmp_path, name) == Verdict(False, "")
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+@pytest.mark.parametrize("name", BENCHES)
+def test_it_passes_in_the_bench_of_the_streams_too(name: str, tmp_path: Path) -> None:
+    played = bench_of(name, tmp_path).play(script_of(name))
+    assert played.equal, played
 
 
 def test_the_documentation_counts_them() -> None:
@@ -32,7 +43,7 @@ def test_no_mutant_is_listed_twice() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("mutant", one_of(4, MUTANTS), ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
+@pytest.mark.parametrize("mutant", long(SOME, MUTANTS), ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
 def test_every_mutant_is_found(mutant: Mutant, tmp_path: Path) -> None:
     assert judge(mutant, tmp_path).killed
 

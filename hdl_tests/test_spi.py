@@ -88,7 +88,8 @@ def random_setup(generator: random.Random) -> Spi:
     )
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_random_parameters_on_verilator(tmp_path: Path) -> None:
     generator = random.Random(2024)
     setups = {f"random_{index}": random_setup(generator) for index in range(16)}

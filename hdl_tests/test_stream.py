@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from programs import extreme, random_dual, shaped
 from replacing import replace
-from sets import common, common_of
+from sets import LONG_TEST, common, common_and_rest, long
 from stream_benches import HARMONICS, equal, with_sine
 from stream_configurations import (
     CONFIGURATIONS,
@@ -43,6 +43,20 @@ from tablegen.verification.play.stream import FLAGS, Script
 from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 SAMPLES_ON_ICARUS = 100_000
+# Each kind of sequencer and of table; the others are of `make test-long`.
+OF_THE_REST = (
+    "bits_12",
+    "dac_8_words_24_plain",
+    "small_counters",
+    "shortest_lines",
+    "low_area_dac_24",
+    "first",
+    "second_low_area_dac_8",
+    "scanner_dac_23_words_24_plain",
+    "cubic_x",
+    "cubic_low_area",
+    "power_up_codes",
+)
 
 
 # Random programs, back to back.
@@ -53,10 +67,7 @@ def test_enough_is_played_on_icarus() -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize(
-    "name",
-    common_of(2, FEW[:3], CONFIGURATIONS),
-)
+@pytest.mark.parametrize("name", common_and_rest(FEW[:2], OF_THE_REST, CONFIGURATIONS))
 def test_random_programs(name: str, tmp_path: Path) -> None:
     configuration = CONFIGURATIONS[name]
     script = configuration.script(name)
@@ -110,7 +121,9 @@ def test_remainders_begin_anew_with_every_program(order: int, pace: int, tmp_pat
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", ["cubic_x", "cubic_y_lines_plain", "cubic_low_area"])
+@pytest.mark.parametrize(
+    "name", long(("cubic_x", "cubic_y_lines_plain"), ("cubic_x", "cubic_y_lines_plain", "cubic_low_area"))
+)
 def test_splines_of_extreme_words(name: str, tmp_path: Path) -> None:
     """Only the least word and the greatest one, so that the sums are as large as they can be."""
     configuration = CONFIGURATIONS[name]
@@ -144,7 +157,8 @@ def test_random_programs_on_verilator(tmp_path: Path) -> None:
     assert equal(bench, script).samples >= 150_000
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_low_area_on_verilator(tmp_path: Path) -> None:
     shape = SequencerShape(20, 1, 4, 24, 0, 5, 16)
     script = Script()
@@ -156,7 +170,7 @@ def test_low_area_on_verilator(tmp_path: Path) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("plain", [0, 1])
+@pytest.mark.parametrize("plain", long([1], [0, 1]))
 def test_tables_are_rendered_while_a_program_plays(plain: int, tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 4, 16, 1, 3, 14)
     script = Script()
@@ -228,7 +242,7 @@ def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
         (LEAST_PACE, LOW_AREA, "settle_0"),
         (SCANNER_PACE, SCANNER, "settle_0"),
         (SPLINE_PACE, {}, "cubic"),
-        (SPLINE_LOW_AREA_PACES[0], LOW_AREA, "cubic"),
+        pytest.param(SPLINE_LOW_AREA_PACES[0], LOW_AREA, "cubic", marks=LONG_TEST),
     ],
     ids=["low_area", "scanner", "cubic", "cubic_low_area"],
 )

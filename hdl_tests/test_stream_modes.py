@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from programs import Kind, random_dual, random_fourier, rendered, shaped, with_table
 from replacing import replace
-from sets import common
+from sets import common_and_rest
 from stream_benches import HARMONICS, equal, with_sine
 from stream_configurations import CONFIGURATIONS, SMALL, Configuration
 from stream_scripts import flag, play, rendering_clocks
@@ -70,7 +70,9 @@ def random_commits(
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(PLAYED[:2], PLAYED))
+@pytest.mark.parametrize(
+    "name", common_and_rest(PLAYED[:2], ("cubic", "bits_12", "scanner_low_area", "small_counters", "second"), PLAYED)
+)
 def test_random_commits_of_every_mode(name: str, tmp_path: Path) -> None:
     configuration = CONFIGURATIONS[name]
     script = Script(drain=configuration.placement.drain_clocks if configuration.placement.spline else Script.drain)
@@ -82,7 +84,8 @@ def test_random_commits_of_every_mode(name: str, tmp_path: Path) -> None:
     assert seen["goes on"], seen
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_random_commits_on_verilator(tmp_path: Path) -> None:
     configuration = Configuration(SequencerShape(20, 1, 4, 24, 0, 5, 18), {"PLAIN_MULTIPLIER": 1})
     script = Script()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pair_play import ALTERNATE, PAIR_PACES, PAIR_SHAPES, pair_script, pair_sources
 from programs import random_dual
-from sets import common
+from sets import common, common_and_rest
 from stream_benches import equal
 from stream_configurations import Configuration
 from stream_laws import follow_their_programs
@@ -33,7 +33,7 @@ def bench_of(
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(["bits_16", "direct_y"], PAIR_SHAPES))
+@pytest.mark.parametrize("name", common_and_rest(["bits_16"], ["bits_8", "direct", "words_15"], PAIR_SHAPES))
 def test_random_programs(name: str, tmp_path: Path) -> None:
     shape, parameters = PAIR_SHAPES[name], CODES if name == "bits_8" else {}
     script = pair_script((parameters.get("X_POWER_UP_CODE", 0), parameters.get("Y_POWER_UP_CODE", 0)))

@@ -63,7 +63,8 @@ def test_random_programs(kind: str, tmp_path: Path) -> None:
     assert np.any(flag(played.capture, "pixel"))
 
 
-@pytest.mark.rest
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
 def test_random_programs_on_verilator(tmp_path: Path) -> None:
     script = PixelScript(drain=DRAIN)
     random_play(np.random.default_rng(12), script, SHAPE, 50_000, (1, 2, 5), pixels=True)

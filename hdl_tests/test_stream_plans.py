@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import BENCHES, Variant
-from sets import common
+from sets import common, common_and_rest
 from spi_monitor import Converter, Wires, receive, updates
 from stream_benches import equal, with_sine
 from stream_configurations import (
@@ -29,9 +29,13 @@ from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script
 from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
+# Both kinds of tables and their turns; then each width by one plan.
+FEW = ("bits_16", "turn_0.7", "direct_steps", "guarded")
+OF_THE_REST = ("bits_8", "bits_24", "narrow_tables_wide_dac", "wide_tables_narrow_dac", "direct", "inverting")
+
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(("bits_16", "turn_0.7", "direct_steps", "settle_5", "cubic", "guarded"), PLANS))
+@pytest.mark.parametrize("name", common_and_rest(FEW, OF_THE_REST, PLANS))
 def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     plan = planned(tmp_path, PLANS[name])
     program = plan.program

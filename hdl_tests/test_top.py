@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from building import BENCHES, NAME, Build, run_clean
-from sets import common, quick
+from sets import common, one_of, quick
 from short_scans import CUBIC, DIRECT, model_ticks, short
 from test_lint import lint
 
@@ -78,7 +78,7 @@ def plays_the_model(built: Build, tmp_path: Path, pace: int = 11, by_turns: int 
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", SCANS)
+@pytest.mark.parametrize("name", one_of(2, SCANS))
 def test_no_tool_warns_of_it(name: str, tmp_path: Path) -> None:
     built = short(tmp_path, SCANS[name])
     run_clean(["iverilog", "-g2005", "-Wall", "-t", "null", "-s", TOP, *runtime(built)])

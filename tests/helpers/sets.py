@@ -51,9 +51,17 @@ def common_of(number: int, few: Collection[Any], parameters: Iterable[Any]) -> l
     With all further ones the test is of ``make test-long``.
     """
     every = list(parameters)
-    others = [each for each in every if each not in few]
-    marked = _divided(few, [each for each in every if each in few or each in others[::number]], pytest.mark.rest)
-    return marked + _divided((), [each for each in others if each not in others[::number]], *LONG_TEST)
+    return common_and_rest(few, [each for each in every if each not in few][::number], every)
+
+
+def common_and_rest(few: Collection[Any], some: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
+    """Return parameters of which a few are as the test is, and some of the others of the rest.
+
+    With all further ones the test is of ``make test-long``.
+    """
+    every = list(parameters)
+    marked = _divided(few, [each for each in every if each in few or each in some], pytest.mark.rest)
+    return marked + _divided((), [each for each in every if each not in few and each not in some], *LONG_TEST)
 
 
 def in_pairs(names: Sequence[str], others: Sequence[str], whole: Collection[str], always: str) -> list[Any]:
