@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kept_plays import own_program_alone
 from replacing import replace
+from sets import long
 from verifying import edit_manifest, failed, make_right, verdicts
 
 from tablegen.fixedpoint.output import Output
@@ -158,8 +159,9 @@ def test_the_c_plays_shaped_codes(played: Path) -> None:
 
 
 @pytest.mark.rest
-def test_the_verilog_plays_shaped_codes(played: Path) -> None:
-    all_shaped(run("verify", played, "--sim", "icarus", "--axis", "blocks"))
+@pytest.mark.parametrize("ticks", long([2000], [2000, 20_000]))
+def test_the_verilog_plays_shaped_codes(ticks: int, played: Path) -> None:
+    all_shaped(run("verify", played, "--sim", "icarus", "--axis", "blocks", "--ticks", str(ticks)))
 
 
 @pytest.mark.rest
