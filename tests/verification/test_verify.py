@@ -68,9 +68,8 @@ MODES = (
 ON_BLOCKS = ("left_aligned", "narrow_table_wide_dac")
 PLACED = [
     ("direct_steps", "pipelined"),
-    pytest.param(("example", "pipelined"), marks=LONG_TEST),
+    *(pytest.param((name, "pipelined"), marks=LONG_TEST) for name in ("example", "bits_24")),
     *(pytest.param((name, "blocks"), marks=LONG_TEST) for name in ON_BLOCKS),
-    pytest.param(("bits_24", "pipelined"), marks=pytest.mark.rest),
 ]
 # A frame that is soon played.
 FEW_TICKS = Variant(
@@ -391,12 +390,12 @@ def test_an_error_that_the_words_do_not_make_is_found(folder: Path, by: float) -
     assert re.search(r"x: axes\.x\.certificate\.max_error_lsb is [\d.]+, the words make it 0\.\d+", outcome.err)
 
 
-@pytest.mark.rest
+@pytest.mark.common
 def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
     axis = json.loads((folder / "manifest.json").read_bytes())["axes"]["y"]
     edit_manifest(folder, "axes", "y", "fourier", "a0", value=axis["fourier"]["a0"] + 1e-4)
     edit_manifest(folder, "axes", "x", "output", "max_step", value=1)
-    outcome = verify(folder)
+    outcome = verify(folder, "--target", "c")
     assert outcome.status == 5
     found = failed(outcome)
     assert {
