@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from building import run_clean
+from kept_objects import objects
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import ScanProgram
@@ -216,18 +217,28 @@ def compile_library(
     runtime: Sequence[Path] | None = None,
     more: Sequence[Path | str] = (),
 ) -> Path:
-    """The runtime and the probe as a shared library; ``more`` are further arguments for the compiler."""
+    """The runtime and the probe as a shared library; ``more`` are further arguments for the compiler.
+
+    Objects are kept: with a fault in one file, that file alone is compiled. Not those that count lines, whose notes
+    stand beside them.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    files = c_runtime() if runtime is None else list(runtime)
-    run_clean(
-        [
-            *compiler, *options, "-shared", "-fPIC",
-            f"-DDAC_TABLE_STORAGE_BITS={table_bits}", f"-DDAC_OUTPUT_STORAGE_BITS={output_bits}",
-            f"-DDAC_STRIDE={stride}",
-            *(f"-I{folder}" for folder in sorted({str(file.parent) for file in files})),
-            *(file for file in files if file.suffix == ".c"), PROBE, *more, "-o", path,
+    files = list(c_runtime() if runtime is None else runtime)
+    words = [str(word) for word in more if not str(word).endswith(".c")]
+    beside = [PROBE, *(Path(word) for word in more if str(word).endswith(".c"))]
+    command = [
+        *compiler, *options, "-fPIC", f"-DDAC_TABLE_STORAGE_BITS={table_bits}",
+        f"-DDAC_OUTPUT_STORAGE_BITS={output_bits}", f"-DDAC_STRIDE={stride}", *words,
+    ]  # fmt: skip
+    if "--coverage" in options:
+        places = sorted({str(file.parent) for file in files})
+        parts = [*(f"-I{place}" for place in places), *(file for file in files if file.suffix == ".c"), *beside]
+    else:
+        parts = [
+            *objects(command, files),
+            *objects(command, [*beside, *(file for file in files if file.suffix == ".h")]),
         ]
-    )  # fmt: skip
+    run_clean([*command, "-shared", *parts, "-o", path])
     return path
 
 

@@ -1,12 +1,11 @@
 """Commands about kept programs to firmware in QEMU, and scans for it."""
 
 import json
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 from building import REMOVED, VARIANTS
+from editing import run
 from limits import PATIENCE_S
 from link_qemu import LinkMachine
 
@@ -23,17 +22,10 @@ PATIENT = ("--timeout", str(PATIENCE_S))
 
 
 def command(machine: LinkMachine, *arguments: str | Path) -> str:
-    """The output of a command that works."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tablegen", *map(str, arguments), "--port", machine.url],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=PATIENCE_S,
-    )
-    assert done.returncode == 0, done.stdout
-    return done.stdout
+    """All that a command says that works; it runs in this process, since to start one takes longer than most do."""
+    outcome = run(*arguments, "--port", machine.url)
+    assert outcome.status == 0, outcome.err
+    return outcome.out + outcome.err
 
 
 def status(machine: LinkMachine) -> tuple[int, str]:

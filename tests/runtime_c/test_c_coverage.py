@@ -14,6 +14,7 @@ from c_library import compile_both
 from c_mutants import scripts
 from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_play, renderings
 from c_shaped_waves import WAVES, shaped_waves
+from sets import one_of
 
 from tablegen.base.resources import c_runtime
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -86,7 +87,7 @@ def test_every_line_of_shaping_was_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("more", SHAPED_WAYS, ids=" ".join)
-@pytest.mark.parametrize("name", WAVES)
+@pytest.mark.parametrize("name", one_of(3, WAVES))
 def test_the_fast_path_plays_the_second_and_the_third_order(name: str, more: tuple[str, ...], tmp_path: Path) -> None:
     """On converters of other than 16 bits too: ticks that are played one by one are few."""
     script = shaped_waves(WAVES[name])

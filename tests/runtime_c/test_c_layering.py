@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from building import run_clean
+from sets import long
 
 from tablegen.base.resources import c_link, c_runtime, c_store
 
@@ -66,7 +67,7 @@ def modules(graph: Graph, public: Iterable[str] = PUBLIC) -> Graph:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("choice", long(["default", "shaped", "slow_part", "store"], CHOICES))
 def test_files_do_not_call_each_other_in_a_circle(choice: str, tmp_path: Path) -> None:
     found = calls(EVERYTHING, tmp_path, *CHOICES[choice])
     assert circle(found) == []

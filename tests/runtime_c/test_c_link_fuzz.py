@@ -9,6 +9,7 @@ import pytest
 from building import run_clean
 from c_faults import Mutant as CMutant
 from c_mutants_shaping import MUTANTS as SHAPED
+from kept_objects import objects
 from limits import within
 from link_mutants import MUTANTS
 
@@ -51,9 +52,10 @@ def replay(
     for path in sources:
         text = mutant.source if mutant is not None and mutant.file == path.name else path.read_text("utf-8")
         (folder / path.name).write_text(text, "utf-8")
-    copies = [folder / path.name for path in sources if path.suffix == ".c"]
+    copies = [folder / path.name for path in sources]
     program = folder / "link"
-    run_clean(["clang", *OPTIONS, *TARGETS[target], f"-I{folder}", *copies, FUZZ / "link_fuzz.c", "-o", program])
+    command = ["clang", *OPTIONS, *TARGETS[target]]
+    run_clean([*command, *objects(command, [*copies, FUZZ / "link_fuzz.c"]), "-o", program])
     command = [str(program), "-runs=0", f"-artifact_prefix={folder}/", str(CORPUS)]
     return subprocess.run(within(CORPUS_S, command), capture_output=True, text=True, check=False, cwd=folder)
 

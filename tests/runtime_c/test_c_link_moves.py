@@ -80,7 +80,7 @@ def test_random_dialogues_with_moves_are_those_of_the_model() -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", one_of(3, SHAPES))
 @pytest.mark.parametrize("store", [False, True], ids=["", "store"])
 def test_random_dialogues_of_other_devices_are_those_of_the_model(name: str, store: bool) -> None:
     for key in (b"", KEY):

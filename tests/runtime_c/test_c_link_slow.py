@@ -24,7 +24,7 @@ from link_programs import make_scan
 from link_random import KEY, Dialogue
 from programs import random_schedule
 from replacing import replace
-from sets import one_of
+from sets import long, one_of
 from test_c_link_acceptance import Bench
 from turned_scans import turned_setup
 
@@ -222,14 +222,14 @@ def ask_all(path: Path, programs: int, seeds: int) -> None:
         Dialogue(SHAPES["cubic"], seed, slow=True).play(200)
 
 
-def differs(path: Path) -> bool:
+def differs(path: Path, programs: int = 300, seeds: int = 3) -> bool:
     """Return True if a device differs from its specification, or crashes; it is asked in a process of its own."""
 
     def trial() -> None:
         limit(120)
         faulthandler.disable()
         try:
-            ask_all(path, 300, 3)
+            ask_all(path, programs, seeds)
         except Exception:
             os._exit(1)
         os._exit(0)
@@ -266,5 +266,6 @@ def test_every_mutant_is_found(breaks: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.rest
-def test_the_link_as_it_is_does_not_differ(tmp_path: Path) -> None:
-    assert not differs(device_with(None, tmp_path))
+@pytest.mark.parametrize("programs", long([60], [60, 300]))
+def test_the_link_as_it_is_does_not_differ(programs: int, tmp_path: Path) -> None:
+    assert not differs(device_with(None, tmp_path), programs, 3 if programs == 300 else 1)

@@ -72,8 +72,14 @@ def benches(tmp_path_factory: pytest.TempPathFactory) -> Compile:
     return bench
 
 
-# Every pair of a compiler, a level and a way of playing, and each of them on every core; the others are of test-long.
-WAYS = [("gcc", "-O2", FILL), ("gcc", "-Os", 0), ("zig", "-O2", 0), ("zig", "-Os", FILL)]
+# Every pair of a compiler, a level and a way of playing; those of the other compiler on a core each, whose compilation
+# takes ten seconds. The others are of test-long.
+WAYS = [("gcc", "-O2", FILL), ("gcc", "-Os", 0)]
+CORES_AND_WAYS = [
+    *product(("cortex-m0plus", "cortex-m4", "cortex-m33"), WAYS),
+    ("cortex-m33", ("zig", "-O2", 0)),
+    ("cortex-m0plus", ("zig", "-Os", FILL)),
+]
 
 
 @pytest.fixture(scope="module")
@@ -82,19 +88,22 @@ def sweeps() -> dict[SequencerShape, Script]:
     return {shape: sweep(np.random.default_rng(7), shape, 1500) for shape in SHAPES}
 
 
-@pytest.mark.parametrize("way", long(WAYS, product(("gcc", "zig"), ("-O2", "-Os"), (0, FILL))))
-@pytest.mark.parametrize("core", long(["cortex-m0plus", "cortex-m4", "cortex-m33"], CORTEX_M))
+@pytest.mark.parametrize(
+    "core_and_way",
+    long(CORES_AND_WAYS, product(CORTEX_M, product(("gcc", "zig"), ("-O2", "-Os"), (0, FILL)))),
+    ids=lambda pair: "-".join(map(str, (pair[0], *pair[1]))),
+)
 def test_cortex_m_plays_everything_that_a_host_may_ask(
-    sweeps: dict[SequencerShape, Script], benches: Compile, core: str, way: tuple[str, str, int]
+    sweeps: dict[SequencerShape, Script], benches: Compile, core_and_way: tuple[str, tuple[str, str, int]]
 ) -> None:
-    compiler, level, fill = way
+    core, (compiler, level, fill) = core_and_way
     for shape in SHAPES:
         script = sweeps[shape]
         bench = benches(shape, core, fill, options(level), compiler)
         hold(bench.run(words_of(script, shape)), script, fill)
 
 
-@pytest.mark.parametrize("name", one_of(3, IN_C))
+@pytest.mark.parametrize("name", one_of(10, IN_C))
 def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, benches: Compile) -> None:
     configuration = IN_C[name]
     script = configuration.script(name)
@@ -103,7 +112,7 @@ def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, b
         hold(benches(configuration.shape, core, fill, shaping).run(words), script, fill)
 
 
-@pytest.mark.parametrize("name", one_of(3, LONG))
+@pytest.mark.parametrize("name", one_of(5, LONG))
 def test_cortex_m_plays_long_lines(name: str, benches: Compile) -> None:
     """Those that are played many ticks at once."""
     shape, script = LONG[name][0], long_play(name, 8000)
@@ -114,7 +123,7 @@ def test_cortex_m_plays_long_lines(name: str, benches: Compile) -> None:
 
 @pytest.mark.parametrize("fills", long(["by turns"], ["by turns", "both"]))
 @pytest.mark.parametrize("level", long(["-O2"], ["-O2", "-Os"]))
-@pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
+@pytest.mark.parametrize("core", long(["cortex-m0plus", "cortex-m4", "riscv32"], [*CORTEX_M, *RISC_V]))
 def test_shaped_output(core: str, level: str, fills: str, benches: Compile) -> None:
     """By turns half of the converters are played by fills and half by steps; at the other level the other half."""
     for index, name in enumerate(("bits_16", "bits_12", "bits_8", "bits_20")):
@@ -133,10 +142,16 @@ def test_tables_are_rendered_from_fourier_words(core: str, benches: Compile) -> 
     hold(benches(shape, core).run(words_of(script, shape, fourier=True)), script, 0)
 
 
-@pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
-@pytest.mark.parametrize("level", ["-O2", "-Os"])
-@pytest.mark.parametrize("core", RISC_V)
-def test_risc_v(sweeps: dict[SequencerShape, Script], core: str, level: str, fill: int, benches: Compile) -> None:
+@pytest.mark.parametrize(
+    "how",
+    long(
+        [("riscv32", "-O2", 0), ("riscv32", "-Os", FILL), ("riscv64", "-O2", FILL), ("riscv64", "-Os", 0)],
+        product(RISC_V, ("-O2", "-Os"), (0, FILL)),
+    ),
+    ids=lambda how: "-".join(map(str, how)),
+)
+def test_risc_v(sweeps: dict[SequencerShape, Script], how: tuple[str, str, int], benches: Compile) -> None:
+    core, level, fill = how
     for shape, script in sweeps.items():
         bench = benches(shape, core, fill, options(level))
         hold(bench.run(words_of(script, shape)), script, fill)

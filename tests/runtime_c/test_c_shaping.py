@@ -12,7 +12,7 @@ from c_library import BAD_SHAPING, LOADED, Library, compile_library
 from c_scripts import LONG, every_tick, long_play, refused_by_y, shaped, shaped_short_lines
 from c_shaped_waves import WAVES, shaped_waves
 from replacing import replace
-from sets import common
+from sets import long
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import DualProgram
@@ -43,7 +43,7 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("name", common(("bits_16", "bits_24"), LONG))
+@pytest.mark.parametrize("name", long(("bits_16", "bits_24", "cubic"), LONG))
 def test_long_lines(name: str, benches: dict[int, Benches]) -> None:
     script = long_play(name, 30_000, 1, 3)
     everywhere(benches[3], script, LONG[name][0])

@@ -25,7 +25,7 @@ from frame_programs import scan_program, shaped_scan
 from limits import limit
 from programs import random_schedule
 from replacing import replace
-from sets import common, one_of
+from sets import common, common_of, one_of
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.commit_mode import CommitMode
@@ -142,7 +142,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("option", common(("plain", "short_spline", "few_spline_shaping"), OPTIONS))
+@pytest.mark.parametrize("option", common_of(6, ("plain", "short_spline"), OPTIONS))
 def test_slow_parts_equal_the_model(option: str, folder: Path) -> None:
     library = library_of(compiled(folder, option))
     seen = Counter[str]()
@@ -253,7 +253,7 @@ def play_fills(library: Library, program: ScanProgram, ticks: int) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("option", common(("plain", "short_spline"), OPTIONS))
+@pytest.mark.parametrize("option", common_of(6, ("plain", "short_spline"), OPTIONS))
 def test_most_ticks_of_smooth_lines_come_from_runs(option: str, tmp_path: Path) -> None:
     """Without that, the tests of the loops for many ticks would show nothing."""
     library = library_of(compiled(tmp_path, option, runtime=runtime_with(COUNTS, tmp_path / "counting")))

@@ -64,7 +64,7 @@ def test_without_splines_a_cubic_table_is_not_loaded(tmp_path: Path) -> None:
     assert loaded(without, SHAPE, index_bits=4) == LOADED, "as lines"
 
 
-@pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
+@pytest.mark.parametrize("fill", common([FILL], [0, FILL]), ids=["step", "fill"])
 @pytest.mark.parametrize("name", common(["cubic_and_lines"], ["cubic", "cubic_and_lines"]))
 @pytest.mark.parametrize("long_multiply", common([0], [1, 0]), ids=["long", "short"])
 def test_a_spline_is_shaped_as_lines_are(name: str, fill: int, long_multiply: int, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from random import Random
 import numpy as np
 import pytest
 from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_warned, write_variant
+from editing import run
 from emulation import CmsdkBoard, Firmware, Pl011Board
 from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine
@@ -24,6 +25,7 @@ from link_line import Line
 from link_proxy import FaultProxy
 from link_qemu import LinkMachine
 from replacing import replace
+from sets import LONG_TEST
 
 from tablegen.config.load import load
 from tablegen.config.variants import variants
@@ -92,16 +94,9 @@ def build_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Board], Bui
 
 
 def _tablegen(*arguments: str | Path) -> tuple[int, str]:
-    """A command; its status, and all that it said."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tablegen", *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=PATIENCE_S,
-    )
-    return done.returncode, done.stdout
+    """A command in this process; its status, and all that it said."""
+    outcome = run(*arguments)
+    return outcome.status, outcome.out + outcome.err
 
 
 def _works(*arguments: str | Path) -> str:
@@ -118,10 +113,10 @@ def _play(machine: LinkMachine, check: LineCheck, digest: str) -> None:
 @pytest.mark.parametrize(
     ("board", "pty"),
     [
-        (Pl011Board, False),
-        (CmsdkBoard, True),
-        pytest.param(Pl011Board, True, marks=pytest.mark.rest),
-        pytest.param(CmsdkBoard, False, marks=pytest.mark.rest),
+        (Pl011Board, True),
+        (CmsdkBoard, False),
+        pytest.param(Pl011Board, False, marks=LONG_TEST),
+        pytest.param(CmsdkBoard, True, marks=LONG_TEST),
     ],
 )
 def test_the_command_line_and_firmware_in_qemu(build_for: Callable[[Board], Built], board: Board, pty: bool) -> None:
@@ -198,7 +193,7 @@ def _line_of(generation: int, number: int) -> Callable[[PlayedLine], bool]:
     return lambda line: (line.generation, line.line) == (generation, number) and not line.markers & swapped
 
 
-@pytest.mark.parametrize("board", [Pl011Board, pytest.param(CmsdkBoard, marks=pytest.mark.rest)])
+@pytest.mark.parametrize("board", [CmsdkBoard, pytest.param(Pl011Board, marks=LONG_TEST)])
 def test_the_command_line_and_qemu_with_faults_in_between(build_for: Callable[[Board], Built], board: Board) -> None:
     """Each command ends well, or says why not; what plays is always a whole scan."""
     built = build_for(board)
@@ -310,8 +305,8 @@ _SPOILT = replace(MIXED, reset=0.0)
     [
         (CmsdkBoard, Chances()),
         (Pl011Board, _SPOILT),
-        pytest.param(Pl011Board, Chances(), marks=pytest.mark.rest),
-        pytest.param(CmsdkBoard, _SPOILT, marks=pytest.mark.rest),
+        pytest.param(Pl011Board, Chances(), marks=LONG_TEST),
+        pytest.param(CmsdkBoard, _SPOILT, marks=LONG_TEST),
     ],
     ids=["clean", "faults", "clean", "faults"],
 )

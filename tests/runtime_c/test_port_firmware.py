@@ -25,7 +25,7 @@ from limits import PATIENCE_S
 from link_line import FarEnd, Line
 from link_qemu import LinkMachine
 from pipe_board import PipeBoard
-from sets import one_of
+from sets import LONG_TEST, long, one_of
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
 from stm32h7_board import OFF, Stm32h7Board
@@ -48,8 +48,8 @@ TIMING = {"pixels": 50, "lines": 4, "ticks_per_line": 331}
 SMALL = {
     **VARIANTS["short_frame"].scan,
     "limits": REMOVED,
-    "x.table.length": 256,
-    "y.table.length": 128,
+    "x.table.length": 64,  # the words of an upload take most of the time of a board
+    "y.table.length": 64,
 }
 
 
@@ -260,7 +260,7 @@ def _faulty(folder: Path, port: str, old: str, new: str) -> Path:
     return ports
 
 
-@pytest.mark.parametrize("fault", one_of(5, H7_FAULTS))
+@pytest.mark.parametrize("fault", long(["the pixel clock is not cleaned"], H7_FAULTS))
 def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
     ports = _faulty(tmp_path, "stm32h7", *H7_FAULTS[fault])
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
@@ -272,8 +272,8 @@ def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("converter", "table", "setups"),
     [
-        ("ad5791", {}, 1),
-        ("ad5781", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 1),
+        pytest.param("ad5791", {}, 1, marks=LONG_TEST),  # the test of the port has it
+        pytest.param("ad5781", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 1, marks=LONG_TEST),
         ("ad5761", {"dac.bits": 16}, 2),
     ],
 )
@@ -368,7 +368,7 @@ TEENSY_FAULTS = {  # the first four are in what ports to a Cortex-M7 share
 }
 
 
-@pytest.mark.parametrize("fault", one_of(5, TEENSY_FAULTS))
+@pytest.mark.parametrize("fault", one_of(8, TEENSY_FAULTS))
 def test_a_fault_of_the_teensy41_port_is_found(fault: str, tmp_path: Path) -> None:
     ports = _faulty(tmp_path, "teensy41", *TEENSY_FAULTS[fault])
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)

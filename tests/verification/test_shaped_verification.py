@@ -159,6 +159,17 @@ def test_the_c_plays_shaped_codes(played: Path) -> None:
 
 @pytest.mark.rest
 def test_the_verilog_plays_shaped_codes(played: Path) -> None:
+    """Those of the program of the build; the session with requests clamps and holds back too."""
+    with own_program_alone():
+        outcome = run("verify", played, "--sim", "icarus", "--axis", "blocks")
+    assert (outcome.status, outcome.err) == (0, "")
+    for axis in "xy":
+        assert verdicts(outcome)[axis, "shaped codes"] == verdicts(outcome)[axis, "integer model"] == "ok"
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_the_verilog_plays_shaped_codes_of_a_whole_session(played: Path) -> None:
     all_shaped(run("verify", played, "--sim", "icarus", "--axis", "blocks"))
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from building import NAME, Build
 from editing import run
+from kept_plays import own_program_alone
 from sets import quick
 from short_scans import CUBIC, DIRECT, short
 from verifying import edit, failed, make_right
@@ -94,9 +95,11 @@ def test_the_command_plays_it(built: Build, tmp_path: Path) -> None:
     edit(folder / TOP, *SWAPPED)
     make_right(folder, "9.9.9")
     options = ("--axis", "blocks", "--ticks", "1000")
-    outcome = run("verify", built.folder, *options)
+    with own_program_alone():
+        outcome = run("verify", built.folder, *options)
     assert (outcome.status, outcome.err) == (0, "")
     assert f"{TOP};" not in outcome.out
-    outcome = run("verify", folder, "--other-version", *options)
+    with own_program_alone():
+        outcome = run("verify", folder, "--other-version", *options)
     assert failed(outcome) == {("top", "integer model")}
     assert f"{TOP}: tick " in outcome.err

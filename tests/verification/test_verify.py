@@ -10,13 +10,14 @@ import signal
 import sys
 from contextlib import nullcontext
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 
 import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from kept_plays import kept_plays, own_program_alone
-from sets import LONG_TEST, long, one_of, quick
+from sets import LONG_TEST, long, quick
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -62,14 +63,23 @@ MODES = (
 )
 
 
-# By `make test` some are verified; together they have both modes of tables, steps, and words of all widths.
-# Of two only on multiplier blocks; widths are what the look-up tables go by.
+# Sessions with requests; the own programs of more are verified below. Of two only on multiplier blocks; widths are what
+# the look-up tables go by.
 ON_BLOCKS = ("left_aligned", "narrow_table_wide_dac")
 PLACED = [
-    *quick([("direct_steps", "pipelined")], [(name, "pipelined") for name in ("example", "direct_steps")]),
+    ("direct_steps", "pipelined"),
+    *(pytest.param((name, "pipelined"), marks=LONG_TEST) for name in ("example", "bits_24")),
     *(pytest.param((name, "blocks"), marks=LONG_TEST) for name in ON_BLOCKS),
-    pytest.param(("bits_24", "pipelined"), marks=pytest.mark.rest),
 ]
+# A frame that is soon played.
+FEW_TICKS = Variant(
+    {
+        "timing": {"pixels": 20, "lines": 8, "line_rate_hz": 3100.0, "ticks_per_line": 160},
+        "x.size_nm": 20.0,
+        "x.band_limit.harmonics": 8,
+        "y.band_limit.harmonics": 8,
+    }
+)
 
 # One edit for two tests, which share its play; what is in the comment ends a text of XML.
 ROUNDED_DOWN = ("1'b1} + step", "1'b0} + step  /* <&]]> */")
@@ -116,8 +126,14 @@ def test_a_build_verifies(placed: tuple[str, str], tmp_path: Path) -> None:
     assert not list(built.folder.glob("*.vvp")), "nothing is written into the build"
 
 
-@pytest.mark.rest
-@pytest.mark.parametrize("name", one_of(3, (name for name in MODES if name not in ("example", "direct_steps"))))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("example", marks=pytest.mark.common),
+        *(pytest.param(name, marks=pytest.mark.rest) for name in ("bits_8", "turn_0.7")),
+        *long((), (name for name in MODES if name not in ("example", "bits_8", "turn_0.7", "direct_steps"))),
+    ],
+)
 def test_the_own_program_of_a_build_verifies(name: str, tmp_path: Path) -> None:
     """The same of the others, without requests, which are the same for all."""
     built = build(tmp_path, VARIANTS[name])
@@ -149,7 +165,7 @@ def test_a_whole_frame_verifies(short: Build, seed: int, placed: str) -> None:
 def test_a_build_verifies_on_verilator(folder: Path, tmp_path: Path) -> None:
     """Also after the same build was compiled and kept."""
     for kept, made in ("first", True), ("second", False):
-        assert verify(folder, "--sim", "verilator", "--keep", tmp_path / kept).status == 0
+        assert verify_alone(folder, "--sim", "verilator", "--keep", tmp_path / kept).status == 0
         assert (tmp_path / kept / "verilator" / "build.log").is_file() == made
 
 
@@ -166,14 +182,15 @@ def test_verilator_finds_a_wrong_rounding_as_icarus_does(folder: Path) -> None:
 
 
 @pytest.mark.rest
-def test_what_was_not_played_is_said(short: Build) -> None:
-    outcome = verify(short.folder)
+def test_what_was_not_played_is_said(short: Build, tmp_path: Path) -> None:
+    few = build(tmp_path, FEW_TICKS)
+    outcome = verify(few.folder, ticks=1000, requests=False)
     assert outcome.status == 0
     notes = [line for line in outcome.out.splitlines() if line.startswith("note: ")]
-    assert len(notes) == 1
-    needed = re.fullmatch(r"note: not a whole frame of 2648 ticks was played; --ticks (\d+) plays one", notes[0])
+    needed = re.fullmatch(r"note: not a whole frame of 1280 ticks was played; --ticks (\d+) plays one", notes[0])
     assert needed
-    assert "note:" not in verify(short.folder, ticks=int(needed[1])).out
+    assert notes[1:] == [f"note: too few ticks for a program change within a frame; --ticks {needed[1]} has one"]
+    assert "note:" not in verify(few.folder, ticks=int(needed[1])).out
     short_of_both = verify(short.folder, "--target", "c", ticks=1000).out
     assert "note: too few ticks for a program change within a frame; --ticks" in short_of_both
 
@@ -183,7 +200,8 @@ def test_what_was_not_played_is_said(short: Build) -> None:
 
 @pytest.mark.common
 @pytest.mark.parametrize(
-    ("axis", "at", "bit"), [pytest.param("x", 70, 6, marks=pytest.mark.rest), ("x", 250, 15), ("y", 100, 8)]
+    ("axis", "at", "bit"),
+    [pytest.param("x", 70, 6, marks=LONG_TEST), pytest.param("x", 250, 15, marks=pytest.mark.rest), ("y", 100, 8)],
 )
 def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     """A bit of the word of that tick."""
@@ -224,7 +242,7 @@ def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit:
 @pytest.mark.parametrize("suffix", long(["x_fourier.mem"], ["sine.mem", "x_fourier.mem", "y_fourier.mem"]))
 def test_a_flipped_bit_of_what_the_session_does_not_play_is_found(folder: Path, suffix: str) -> None:
     flip(folder / f"{NAME}_{suffix}", 3, 0)
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     booted = (
         {("top", "integer model")} if suffix != "sine.mem" else set()
@@ -277,7 +295,7 @@ def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) 
 def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
     """Rounding down in place of to the nearest: one code too low here and there, told with tick, expected and got."""
     edit(folder / "dac_interpolator.v", *ROUNDED_DOWN)
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     assert {("files", "SHA-256 in the manifest"), ("y", "integer model")} <= failed(outcome)
     assert "files: dac_interpolator.v: stale or edited" in outcome.err
@@ -323,7 +341,7 @@ def test_unknown_codes_are_found(folder: Path) -> None:
 )
 def test_a_missing_file_is_named(folder: Path, name: str, also: str | None) -> None:
     (folder / name).unlink()
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert outcome.status == 5
     assert f"files: {name}: missing" in outcome.err
     simulated = ("x", "integer model") in verdicts(outcome)
@@ -367,7 +385,7 @@ def test_an_error_that_the_words_do_not_make_is_found(folder: Path, by: float) -
     """A promise that is a little too good, and one that allows everything: neither is the limit that is applied."""
     promised = json.loads((folder / "manifest.json").read_bytes())["axes"]["x"]["certificate"]["max_error_lsb"]
     edit_manifest(folder, "axes", "x", "certificate", "max_error_lsb", value=promised + by)
-    outcome = verify(folder)
+    outcome = verify_alone(folder)
     assert failed(outcome) == {("x", "its certificate")}
     assert re.search(r"x: axes\.x\.certificate\.max_error_lsb is [\d.]+, the words make it 0\.\d+", outcome.err)
 
@@ -377,7 +395,7 @@ def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
     axis = json.loads((folder / "manifest.json").read_bytes())["axes"]["y"]
     edit_manifest(folder, "axes", "y", "fourier", "a0", value=axis["fourier"]["a0"] + 1e-4)
     edit_manifest(folder, "axes", "x", "output", "max_step", value=1)
-    outcome = verify(folder)
+    outcome = verify(folder, "--target", "c")
     assert outcome.status == 5
     found = failed(outcome)
     assert {
@@ -477,13 +495,14 @@ def test_a_table_that_no_sequencer_can_address_is_wrong_input(tmp_path: Path) ->
 @pytest.mark.common
 def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     report = tmp_path / "reports" / "verify.xml"
-    outcome = verify(short.folder, "--junit", report)
+    outcome = verify_alone(short.folder, "--junit", report)
     assert outcome.status == 0
     told = read_report(report)
     assert told.counts == (str(CHECKS), "0", "0")
     assert 0.0 < told.seconds == pytest.approx(sum(told.times), abs=0.02 * CHECKS)
     assert list(told.cases) == list(verdicts(outcome))
-    assert told.failed == set()
+    assert told.failed == {case for case, verdict in verdicts(outcome).items() if verdict == "not exercised"}
+    assert {child.tag for children in told.cases.values() for child in children} == {"skipped"}
     assert told.manifest_sha256 == sha256((short.folder / "manifest.json").read_bytes()).hexdigest()
 
 
@@ -491,10 +510,11 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
 def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
     edit(folder / "dac_interpolator.v", *ROUNDED_DOWN)
     report = tmp_path / "verify.xml"
-    outcome = verify(folder, "--junit", report)
+    outcome = verify_alone(folder, "--junit", report)
     told = read_report(report)
-    assert told.failed == failed(outcome)
-    assert told.counts == (str(CHECKS), str(len(told.failed)), "0")
+    wrong = {case for case, children in told.cases.items() if [child.tag for child in children] == ["failure"]}
+    assert wrong == failed(outcome)
+    assert told.counts == (str(CHECKS), str(len(wrong)), "0")
     (model,) = told.cases["y", "integer model"]
     assert model.text == model.get("message")
     assert re.search(r"the first at tick \d+ \(line \d+.*, tick \d+ of it\): expected \d+, got \d+$", str(model.text))
@@ -558,10 +578,17 @@ def test_a_python_without_its_shared_library_is_status_6_with_its_remedy(short: 
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("begun", ["job.json", "capture.hex"])
-def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, begun: str) -> None:
+@pytest.mark.parametrize(
+    "interruption",
+    long(
+        [("job.json", signal.SIGTERM), ("capture.hex", signal.SIGINT)],
+        product(["job.json", "capture.hex"], [signal.SIGINT, signal.SIGTERM]),
+    ),
+    ids=lambda interruption: "-".join(map(str, interruption)),
+)
+def test_an_interruption_leaves_nothing_behind(tmp_path: Path, interruption: tuple[str, signal.Signals]) -> None:
     """Before or while the simulator plays."""
+    begun, number = interruption
     built = build(tmp_path / "built", VARIANTS["header_only"])
     check_interruption(built.folder, tmp_path / "temporary", number, begun, "--ticks", "40000")
 
@@ -574,24 +601,39 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
     check_interruption(built.folder, tmp_path / "temporary", number, "icarus", "--ticks", "40000", within_popen=True)
 
 
+PLACES = [
+    (["--axis", "blocks"], 24),
+    (["--axis", "serial"], 41),
+    (["--axis", "alternate"], 48),
+    (["--axis", "blocks", "--fourier"], 24),
+    (["--axis", "serial", "--fourier"], 41),
+    (["--fourier"], 36),
+]
+
+
+def build_small(folder: Path, arguments: list[str]) -> Build:
+    """Build what a way of placing plays soon."""
+    y_bits = 20 if "alternate" in arguments else 18
+    tables = {"x.table": {"length": 128, "bits": 20}, "y.table": {"length": 64, "bits": y_bits}}
+    return build(folder, Variant({**VARIANTS["short_frame"].scan, **tables}))
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize(("arguments", "late"), PLACES[1:3], ids=["serial", "alternate"])
+def test_a_way_of_placing_plays_the_own_program(tmp_path: Path, arguments: list[str], late: int) -> None:
+    outcome = verify(build_small(tmp_path / "out", arguments).folder, *arguments, requests=False)
+    assert outcome.status == 0, outcome.out + outcome.err
+    assert f" samples, {late} clocks late" in outcome.out
+
+
 @pytest.mark.rest
 @pytest.mark.parametrize(
     ("arguments", "late"),
-    [
-        pytest.param(["--axis", "blocks"], 24, marks=LONG_TEST),
-        pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
-        pytest.param(["--axis", "alternate"], 48, marks=pytest.mark.rest),
-        (["--axis", "blocks", "--fourier"], 24),
-        pytest.param(["--axis", "serial", "--fourier"], 41, marks=LONG_TEST),
-        pytest.param(["--fourier"], 36, marks=LONG_TEST),
-    ],
+    [each if each[0] == ["--axis", "blocks", "--fourier"] else pytest.param(*each, marks=LONG_TEST) for each in PLACES],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str], late: int) -> None:
-    y_bits = 20 if "alternate" in arguments else 18
-    tables = {"x.table": {"length": 128, "bits": 20}, "y.table": {"length": 64, "bits": y_bits}}
-    small = Variant({**VARIANTS["short_frame"].scan, **tables})
-    built = build(tmp_path / "out", small)
+    built = build_small(tmp_path / "out", arguments)
     outcome = verify(built.folder, *arguments)
     assert outcome.status == 0, outcome.out + outcome.err
     assert f" samples, {late} clocks late" in outcome.out

@@ -5,6 +5,7 @@ drive that the manifest states.
 """
 
 import shutil
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import numpy as np
 import pytest
 from building import EXAMPLE, NAME, REMOVED, VARIANTS, Build, Variant, build
 from editing import run
+from kept_plays import own_program_alone
 from manifest_integers import played_codes
-from sets import common
+from sets import LONG_TEST
 from verifying import edit_manifest, make_right
 
 from tablegen.certificate.certificate import certify
@@ -105,9 +107,18 @@ def test_the_slew_of_one_amplifier_is_the_guard_of_its_axis_alone(mixed: Build) 
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("options", common([("c",)], [("c",), ("verilog", "--axis", "blocks")]), ids=["c", "verilog"])
-def test_both_sequencers_play_it(mixed: Build, options: tuple[str, ...]) -> None:
-    outcome = run("verify", mixed.folder, "--target", *options)
+@pytest.mark.parametrize(
+    ("target", "requests"),
+    [
+        ("c", True),
+        pytest.param("verilog", False, marks=pytest.mark.rest),
+        pytest.param("verilog", True, marks=LONG_TEST),
+    ],
+)
+def test_both_sequencers_play_it(mixed: Build, target: str, requests: bool) -> None:
+    options = (target, "--axis", "blocks") if target == "verilog" else (target,)
+    with nullcontext() if requests else own_program_alone():
+        outcome = run("verify", mixed.folder, "--target", *options)
     assert outcome.status == 0, outcome.out + outcome.err
 
 

@@ -3,13 +3,16 @@
 import hashlib
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from shutil import copytree
 from typing import Any
 
 import pytest
 from foreign_plants import ForeignPlant, ManyPlays
+from kept_plays import own_program_alone
 from operator_files import operator_file
+from sets import long
 from sine_scans import response_csv, sine_scan, text_of
 
 from tablegen.api.build import build as build_scan
@@ -46,9 +49,11 @@ def test_a_build_verifies_in_c(build: Path) -> None:
 
 
 @pytest.mark.rest
-def test_it_verifies_in_verilog(build: Path) -> None:
+@pytest.mark.parametrize("requests", long([False], [False, True]), ids=["alone", "with requests"])
+def test_it_verifies_in_verilog(build: Path, requests: bool) -> None:
     """The markers of the table as the emitted modules play them, uploaded and booted by the emitted top."""
-    report = verify(build, "verilog", axis="blocks", ticks=TICKS)
+    with nullcontext() if requests else own_program_alone():
+        report = verify(build, "verilog", axis="blocks", ticks=TICKS)
     assert report.failures == []
     (top,) = (check for check in report.checks if check.subject == "top")
     assert top.failure is None

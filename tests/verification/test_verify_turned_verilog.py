@@ -10,6 +10,7 @@ from shutil import copytree
 
 import pytest
 from replacing import replace
+from sets import long
 from test_verify_turned import NAME, edit, signed, word
 from turned_scans import turned_setup
 
@@ -143,7 +144,7 @@ PLAYED = (
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("what", PLAYED)
+@pytest.mark.parametrize("what", long(["a slow word", "an offset", "a short memory", "a coding"], PLAYED))
 def test_tampering_is_found_in_what_is_booted_and_played(what: str, build: Path, tmp_path: Path) -> None:
     change, says = TAMPERING[what]
     copytree(build, tmp_path / "out")
