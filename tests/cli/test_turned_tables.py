@@ -12,11 +12,14 @@ from msgspec.structs import replace
 from turned_scans import write_turned
 
 import tablegen
-from tablegen.base.input_errors import Unphysical
+from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.config.load import Setup, load
 from tablegen.config.schema import Table
 from tablegen.html_report.turned_tables import TurnedTables, turned_tables
-from tablegen.planning.frame_costs import slow_counts
+from tablegen.planning import turned_plan
+from tablegen.planning.frame_costs import PlayedFrame, slow_counts
 from tablegen.planning.frame_tables import CostLimit, choose_frame_tables
+from tablegen.planning.line_plan import Plan
 from tablegen.planning.table_costs import PROCESSORS, MeasuredRun
 from tablegen.planning.turned_plan import TurnedAxis, frame_table_search, shape_costs
 
@@ -168,6 +171,27 @@ def test_a_limit_that_no_tables_keep_names_the_cheapest(built: tablegen.TurnedBu
             rf"no tables {what} {re.escape(limited)}\d+ words over the line and \d+ over the frame, of 1\d bits, {end}"
         )
         assert re.fullmatch(text, str(refused.value)), str(refused.value)
+
+
+def test_an_axis_without_runs_leaves_none_to_the_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """x is chosen alone, and again beside y, whose lines move so far in 16 ticks that its runs are refused."""
+    played = turned_plan.played_frame
+
+    def fast_y(setup: Setup, straight: Plan, axis: TurnedAxis) -> PlayedFrame:
+        frame = played(setup, straight, axis)
+        return frame if axis.axis == "x" else frame._replace(steepest=100.0)
+
+    cost = '+ [cost]\nprocessor = "cortex-m4"\nmax_instructions = 60'
+    setup = load(write_turned(tmp_path, 30.0, *ASKED, cost))
+    monkeypatch.setattr(turned_plan, "played_frame", fast_y)
+    with pytest.raises(Rejected) as refused:
+        turned_plan.make_turned_plan(setup)
+    (problem,) = refused.value.problems
+    assert problem.key == "x.table.max_error_lsb"
+    found = re.search(r"within the 60 instructions .* the cheapest, .* take ([\d.]+); allow", problem.why)
+    assert found, problem.why
+    in_runs, by_tick, _ = slow_counts()[MeasuredRun(16, 16, False)]["cortex-m4"]
+    assert abs(float(found[1]) - by_tick) < 0.1 * (by_tick - in_runs)
 
 
 def test_a_processor_has_its_column_and_its_limit(tmp_path: Path) -> None:
