@@ -108,10 +108,15 @@ def _mean(machine: Processor, coded: bool, by_tick: bool) -> float:
 def digest(sources: Sequence[Path] | None = None) -> str:
     """Return a digest of the C that is counted, comments and spaces aside, and of how it is."""
     paths = [*sequencer(), COUNTED] if sources is None else sources
-    code = [re.sub(r"//.*|/\*.*?\*/|\s+", "", path.read_text("utf-8"), flags=re.DOTALL) for path in paths]
+    code = code_of(paths)
     how = [inspect.getsource(function) for function in (instructions, _fills, _mean)]
     content = repr((code, how, LENGTHS, SKIPPED, FILLS, FILLS_BY_TICK))
     return hashlib.sha256(content.encode("utf-8")).hexdigest()[:32]
+
+
+def code_of(sources: Sequence[Path]) -> list[str]:
+    """Return the C of sources without comments and spaces."""
+    return [re.sub(r"//.*|/\*.*?\*/|\s+", "", path.read_text("utf-8"), flags=re.DOTALL) for path in sources]
 
 
 def compiler_version(core: str) -> str:

@@ -1,8 +1,8 @@
 """The memory that an error takes, for docs/tables.md, and what modes take on devices, for `tablegen tables`.
 
 ``python benchmarks/tables.py`` prints the memory, ``--write`` puts it into the page and draws its figure. ``--costs``
-measures what each mode takes: instructions in emulation by ``mode_costs.py``, cells by yosys and nextpnr as
-``resources.py`` does, and writes them where the package reads them.
+measures what each mode takes: instructions in emulation by ``mode_costs.py`` and ``slow_costs.py``, cells by yosys and
+nextpnr as ``resources.py`` does, and writes them where the package reads them.
 """
 
 import argparse
@@ -15,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import mode_costs
 import resources
+import slow_costs
 from mode_costs import MEASURED
 
 from tablegen.certificate.line_errors import EmittedPeriod
@@ -26,6 +27,7 @@ from tablegen.fixedpoint.table_shape import MODES, TableShape
 from tablegen.html_report.table_charts import table_charts
 from tablegen.html_report.table_rows import axis_tables
 from tablegen.html_report.tables_text import tables_text
+from tablegen.planning import frame_costs
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.other_table import maker_of, with_table
 from tablegen.planning.table_choice import possible_shapes
@@ -40,6 +42,13 @@ ERRORS = (2.0, 1.0, 0.75, 0.6, 0.55)
 SINES = ((16, 1000, 1.0), (16, 65536, 1.0), (18, 1000, 0.6), (18, 65536, 0.6))
 _WORDS = {16: "to 16 bits", 32: "above"}
 _SHAPING = {1: "first", 2: "second", 3: "scanner"}
+_PARTS = {
+    "line": "a line, in runs",
+    "word": "a word of a line, in runs",
+    "line_by_tick": "a line, tick by tick",
+    "word_by_tick": "a word of a line, tick by tick: mixing",
+    "second": "of the line, for the ratio of the second table",
+}
 _MODE = {"interpolated": "`direct`, `interpolated`", "cubic": "`cubic`"}
 
 
@@ -116,6 +125,41 @@ def costs() -> str:
     )
 
 
+def slow() -> str:
+    """What samples at an angle take, and what lines do, as tables of the page."""
+    counts_of, lines = frame_costs.slow_counts(), frame_costs.line_costs()
+    rows = [
+        f"| {_WORDS[run.output_storage_bits] if not run.shaping_order else _shaped_bits(run)}"
+        f"{', coded' if run.coded else ''} | {f'`{_SHAPING[run.shaping_order]}`' if run.shaping_order else ''} | "
+        f"{' | '.join(', '.join(f'{count:g}' for count in counts_of[run][core]) for core in PROCESSORS)} |"
+        for run in counts_of
+        if not (run.shaping_order and run.coded)
+    ]
+    parts = [
+        f"| {name} | {' | '.join(f'{getattr(lines[core], key):g}' for core in PROCESSORS)} |"
+        for key, name in _PARTS.items()
+    ]
+    off = " | ".join(f"{frame_costs.worst_percent()[core]:g} %" for core in PROCESSORS)
+    cores, blank = " | ".join(PROCESSORS), "---|"
+    return "\n".join(
+        [
+            f"| converter's word | shaping | {cores} |",
+            f"|{blank * (len(PROCESSORS) + 2)}",
+            *rows,
+            "",
+            f"| | {cores} |",
+            f"|{blank * (len(PROCESSORS) + 1)}",
+            *parts,
+            f"| worst difference of other lines and tables | {off} |",
+            "",
+        ]
+    )
+
+
+def _shaped_bits(run: MeasuredRun) -> str:
+    return "16 bits" if run.output_storage_bits == 16 else "other"
+
+
 def _takes(run: MeasuredRun, mode: Mode) -> str:
     return " | ".join("{:g}, {:g}".format(*counts()[run][mode][core]) for core in PROCESSORS)
 
@@ -160,8 +204,9 @@ def main() -> None:
     given = parser.parse_args()
     if given.costs:
         mode_costs.write(cells())
+        slow_costs.write()
         return
-    found = {"memory": memory(), "costs": costs(), "output": output()}
+    found = {"memory": memory(), "costs": costs(), "slow": slow(), "output": output()}
     print(*found.values(), sep="\n")
     if given.write:
         page = PAGE.read_text("utf-8")

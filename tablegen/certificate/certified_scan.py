@@ -9,7 +9,7 @@ from tablegen.base.input_errors import Problem
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.scan_warnings import limit_advice
 from tablegen.config.load import Setup
-from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.planning.line_plan import Plan, SampleCost, make_plan
 
 
 class CertifiedScan(Struct, frozen=True, eq=False):
@@ -48,17 +48,16 @@ def certify_scan(
     certificates = certify(plan)
     advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice
     broken = broken_limits(plan, certificates, setup.scan_file, advise, setup.hardware_problem)
-    broken += [problem for line in plan.lines if (problem := _too_dear(setup, line))]
+    broken += [problem for line in plan.lines if (problem := too_dear(setup, line.axis, line.sample_cost))]
     return CertifiedScan(setup, plan, certificates, tuple(broken))
 
 
-def _too_dear(setup: Setup, line: LinePlan) -> Problem | None:
+def too_dear(setup: Setup, axis: str, takes: SampleCost | None) -> Problem | None:
     """Return a problem where a sample of an axis takes more instructions than the scan file allows."""
-    takes = line.sample_cost
     if takes is None or takes.max_instructions is None or takes.instructions <= takes.max_instructions:
         return None
     why = (
-        f"the {line.axis} axis takes {takes}, above {takes.max_instructions:g}; with [{line.axis}.table] mode = 'auto' "
+        f"the {axis} axis takes {takes}, above {takes.max_instructions:g}; with [{axis}.table] mode = 'auto' "
         "the build looks for a table that takes no more"
     )
     return setup.scan_file.problem("cost.max_instructions", why)

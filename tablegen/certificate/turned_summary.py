@@ -1,6 +1,7 @@
 """A scan at an angle and its certificate in words: errors, drives, warnings, and limits that are exceeded."""
 
 from tablegen.base.input_errors import Problem
+from tablegen.certificate.certified_scan import too_dear
 from tablegen.certificate.error_answer import duration
 from tablegen.certificate.summary import rate
 from tablegen.certificate.turned_errors import TurnedCertificate
@@ -42,7 +43,13 @@ def turned_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str
         reach, step = f"{codes.least}..{codes.most}", f"{codes.steepest}/{axis.program.output.max_step}"
         moves = f"{axis.motion.fast_nm:+16.2f}  {axis.motion.slow_nm:+17.2f}"
         lines.append(f"{axis.axis:<4}  {moves}  {volts:9.3f}  {reach:<13}  {step:<10}  {lsb:.2f}")
-    return [*lines, *_z_summary(plan, certificate)]
+    return [*lines, *_z_summary(plan, certificate), *_costs(plan)]
+
+
+def _costs(plan: TurnedPlan) -> list[str]:
+    """Return what a sample of each axis takes, if the scan file names a processor."""
+    lines = [f"{axis.axis} takes {axis.sample_cost}, in C" for axis in plan.axes if axis.sample_cost is not None]
+    return ["", *lines] if lines else []
 
 
 def _z_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str]:
@@ -107,4 +114,5 @@ def broken_limits(setup: Setup, plan: TurnedPlan, certificate: TurnedCertificate
     for key, (limit, value, what, unit) in figures.items():
         if limit is not None and value > limit:
             problems.append(setup.scan_file.problem(f"limits.{key}", f"{what} {value:.3g} {unit}, above {limit:g}"))
-    return problems
+    costs = [too_dear(setup, axis.axis, axis.sample_cost) for axis in plan.axes]
+    return [*problems, *(problem for problem in costs if problem is not None)]

@@ -1,7 +1,8 @@
 """The tables that an axis of a scan at an angle could have: their errors, the least memory, and the Pareto front."""
 
 from collections.abc import Callable, Iterator
-from math import sqrt
+from functools import cached_property
+from math import inf, sqrt
 
 import numpy as np
 from msgspec import Struct
@@ -9,7 +10,7 @@ from msgspec import Struct
 from tablegen.base.figures import at_least
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.turned_frame import FrameDrive
-from tablegen.config.schema import Limits, Table
+from tablegen.config.schema import Limits, ProcessorName, Table
 from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.frame_words import BITS, FrameShape
@@ -70,6 +71,11 @@ class FrameTableSearch:
     def default(self) -> FrameShape:
         """The tables of a drive for which nothing else is requested."""
         return FrameShape.of(self._drive.fast, self._drive.slow)
+
+    @cached_property
+    def steepest(self) -> float:
+        """The largest step of a tick of the learnt drive within a line, in codes."""
+        return max(float(np.max(np.abs(np.diff(self._ideal(line))), initial=0.0)) for line in range(self._lines))
 
     def shapes(self, table: Table) -> list[FrameShape]:
         """Return the tables that hold the drive and agree with the length and the bits of a table, by memory."""
@@ -142,27 +148,77 @@ class FrameTableChoice(Struct, frozen=True):
     reason: str
 
 
+class CostLimit(Struct, frozen=True):
+    """The most instructions that a sample may take on a processor, and what it takes with tables of each shape.
+
+    ``costs`` has the shapes that hold the drive.
+    """
+
+    processor: ProcessorName
+    most: float
+    costs: dict[FrameShape, float]
+
+    def __str__(self) -> str:
+        return f"{self.most:g} instructions on {self.processor}"
+
+    def within(self, shapes: list[FrameShape]) -> list[FrameShape]:
+        """Return those shapes that take no more, in their order."""
+        return [shape for shape in shapes if self.costs.get(shape, inf) <= self.most]
+
+    def cheapest(self, search: FrameTableSearch, shapes: list[FrameShape], most_lsb: float) -> FrameShape | None:
+        """Return the shape of fewest instructions that keeps an error, of equal ones the least memory; None if none."""
+        for takes in sorted({*self.costs.values()}):
+            if rated := search.smallest([shape for shape in shapes if self.costs.get(shape) == takes], most_lsb):
+                return rated.shape
+        return None
+
+
 def is_chosen(table: Table, shaped: bool) -> bool:
     """Return True if a table of the scan file lets the build choose the tables at an angle, which are cubic."""
     return table.chosen_by_build and table.mode in (None, "auto", "cubic") and not shaped
 
 
-def choose_frame_tables(search: FrameTableSearch, table: Table, limits: Limits) -> FrameTableChoice:
+def choose_frame_tables(
+    search: FrameTableSearch, table: Table, limits: Limits, limit: CostLimit | None = None
+) -> FrameTableChoice:
     """Return the tables of least memory that keep an error; about the least error if none does and none is written.
+
+    Tables beyond the ``limit`` are left out.
 
     Raises
     ------
     Unphysical
-        If none keeps the error that is written.
+        If none keeps the error that is written; if none keeps the limit, with the cheapest.
     """
     most, shapes = allowed_lsb(table, limits, shaped=False), search.shapes(table)
-    if smallest := search.smallest(shapes, most):
-        return FrameTableChoice(smallest.shape, f"the least memory within {most:g} LSB")
+    allowed = shapes if limit is None else limit.within(shapes)
+    also = "" if limit is None else f" and {limit}"
+    if smallest := search.smallest(allowed, most):
+        return FrameTableChoice(smallest.shape, f"the least memory within {most:g} LSB{also}")
+    if limit is not None:
+        _raise_if_too_dear(search, shapes, limit, most, f"keep {most:g} LSB within")
+    if table.max_error_lsb is None and limits.max_error_lsb is None:
+        if limit is not None and not allowed:
+            _raise_if_too_dear(search, shapes, limit, inf, "keep")
+        if best := search.best(allowed):
+            near = search.smallest(allowed, best.max_error_lsb / _BETTER) or best
+            error = at_least(best.max_error_lsb, 4)
+            return FrameTableChoice(near.shape, f"the least memory within 5 % of the least error, {error} LSB{also}")
     best = search.best(shapes)
     if best is None:
         raise Unphysical("no tables of this length and width hold the drive of the frame; leave length and bits out")
     error = at_least(best.max_error_lsb, 4)
-    if table.max_error_lsb is None and limits.max_error_lsb is None:
-        near = search.smallest(shapes, best.max_error_lsb / _BETTER) or best
-        return FrameTableChoice(near.shape, f"the least memory within 5 % of the least error, {error} LSB")
     raise Unphysical(f"no tables keep {most:g} LSB; the best, {best.shape}, err by up to {error} LSB; allow that much")
+
+
+def _raise_if_too_dear(
+    search: FrameTableSearch, shapes: list[FrameShape], limit: CostLimit, most_lsb: float, what: str
+) -> None:
+    """Raise with the cheapest shape, if any keeps an error."""
+    cheapest = limit.cheapest(search, shapes, most_lsb)
+    if cheapest is not None:
+        raise Unphysical(
+            f"no tables {what} the {limit.most:g} instructions for a sample on {limit.processor} of "
+            f"cost.max_instructions; the cheapest, {cheapest}, take {limit.costs[cheapest]:g}; allow that many"
+            + (", or a larger error" if most_lsb < inf else "")
+        )

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from math import floor
+from math import ceil, floor
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from tablegen.compensation.operator.operator import STROKE_REACH
 from tablegen.compensation.operator.turned_frame import BeyondDriver, FrameDrive, FrameMotion, learn_frame
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Coupling, ScannerAxis
-from tablegen.config.schema import Limits, Table
+from tablegen.config.schema import Cost, Limits, ProcessorName, Table
 from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
@@ -28,10 +28,17 @@ from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.fixedpoint.frame_words import FrameParts, FrameShape, quantise_frame
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
+from tablegen.planning.frame_costs import PlayedFrame, frame_costs
 from tablegen.planning.frame_refinement import learnt_frame_layer
-from tablegen.planning.frame_tables import FrameTableChoice, FrameTableSearch, choose_frame_tables, is_chosen
+from tablegen.planning.frame_tables import (
+    CostLimit,
+    FrameTableChoice,
+    FrameTableSearch,
+    choose_frame_tables,
+    is_chosen,
+)
 from tablegen.planning.known_axis import KnownAxis
-from tablegen.planning.line_plan import LinePlan, Plan, make_plan, mixing_key
+from tablegen.planning.line_plan import LinePlan, Plan, SampleCost, make_plan, mixing_key
 from tablegen.planning.tilt import TiltedOutput, plan_tilt
 from tablegen.waveform.series import FourierSeries
 
@@ -47,7 +54,7 @@ class TurnedAxis(Struct, frozen=True, eq=False):
 
     ``motion`` has its shares of both motions. ``piezo`` is the axis in time, ``drive`` what was learnt on it, of v_max,
     without the lead over the hold of the converter that ``program`` has. ``choice`` says by what the build chose the
-    tables, if the scan file asks for that.
+    tables, if the scan file asks for that. ``sample_cost`` is there if the scan file names a processor.
     """
 
     axis: Literal["x", "y"]
@@ -58,6 +65,7 @@ class TurnedAxis(Struct, frozen=True, eq=False):
     drive: FrameDrive
     program: FrameProgram
     choice: str = ""
+    sample_cost: SampleCost | None = None
 
     def share(self, codes: Ints) -> Floats:
         """Return codes as shares of v_max, of their shape."""
@@ -181,8 +189,6 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     problems = Problems()
     if scan.y.motion != "ramp":
         problems.add(setup.scan_file, "y.motion", "a scan at an angle moves y on every tick; leave this out")
-    if scan.cost is not None:
-        problems.add(setup.scan_file, "cost", "instructions of a scan at an angle are not measured; leave this out")
     for axis in ("x", "y"):
         if getattr(scan, axis).refinement is not None:
             problems.add(setup.scan_file, f"{axis}.refinement", "was learnt at 0 degrees, and does not serve an angle")
@@ -215,7 +221,76 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     x, y = axes["x"], axes["y"]
     assert x is not None
     assert y is not None
+    if scan.cost is not None:
+        x, y = _within_cost(setup, straight, scan.cost, x, y, problems)
     return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight, z)
+
+
+def _within_cost(
+    setup: Setup, straight: Plan, cost: Cost, x: TurnedAxis, y: TurnedAxis, problems: Problems
+) -> tuple[TurnedAxis, TurnedAxis]:
+    """Count what a sample of both axes takes; chosen tables that take too much beside the others are chosen again.
+
+    Raises
+    ------
+    Rejected
+        If no tables of this axis keep the limit beside those.
+    """
+    axes = {"x": x, "y": y}
+    for line in straight.lines:
+        axis = axes[line.axis]
+        beside = played_frame(setup, straight, axes["y" if line.axis == "x" else "x"])
+        takes = frame_costs([played_frame(setup, straight, axis), beside], cost.processor)[0]
+        if axis.choice and cost.max_instructions is not None and takes > cost.max_instructions:
+            axes[line.axis] = _chosen_beside(setup, straight, line, axis, beside, problems)
+    counts = frame_costs([played_frame(setup, straight, axis) for axis in axes.values()], cost.processor)
+    x, y = (
+        replace(axis, sample_cost=SampleCost(cost.processor, takes, cost.max_instructions))
+        for axis, takes in zip(axes.values(), counts, strict=True)
+    )
+    return x, y
+
+
+def _chosen_beside(
+    setup: Setup, straight: Plan, line: LinePlan, axis: TurnedAxis, beside: PlayedFrame, problems: Problems
+) -> TurnedAxis:
+    """Return an axis with tables that are chosen beside the other axis; raise ``Rejected`` where none keep a limit."""
+    choice = _chosen_tables(setup, straight, line, axis.known, axis.drive, problems, beside)
+    problems.stop_if_any()
+    assert choice is not None
+    program = _quantised(setup, straight, line, axis.known, axis.drive, choice.shape)
+    program = within_range(setup, straight, line, program, problems)
+    problems.stop_if_any()
+    return replace(axis, program=program, choice=choice.reason)
+
+
+def played_frame(setup: Setup, straight: Plan, axis: TurnedAxis) -> PlayedFrame:
+    """Return what decides the cost of a planned axis; ``straight`` is the plan of the scan at 0 degrees."""
+    line = straight.x if axis.axis == "x" else straight.y
+    steepest = _search(setup, straight, line, axis.known, axis.drive).steepest
+    return PlayedFrame.of(axis.program, axis.program.output.max_step, steepest)
+
+
+def shape_costs(
+    setup: Setup,
+    line: LinePlan,
+    search: FrameTableSearch,
+    shapes: list[FrameShape],
+    processor: ProcessorName,
+    beside: PlayedFrame | None,
+) -> dict[FrameShape, float]:
+    """Return the instructions for a sample of an axis with tables of each shape that holds its drive.
+
+    ``beside`` is the other axis, which may have wider words of its converter, or no runs. With None it takes nothing.
+    """
+    programs = {shape: program for shape in shapes if (program := search.program(shape)) is not None}
+    guard, last = _allowed_step(setup, line), (1 << line.program.output.dac_bits) - 1
+    others = [] if beside is None else [beside]
+    max_step = min(2 * ceil(search.steepest), last) if guard is None else guard
+    return {
+        shape: frame_costs([PlayedFrame.of(program, max_step, search.steepest), *others], processor)[0]
+        for shape, program in programs.items()
+    }
 
 
 def plan_z(setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Problems) -> TiltedOutput | None:
@@ -244,7 +319,7 @@ def plan_at_0(setup: Setup) -> Plan:
 def _at_0_degrees(setup: Setup) -> Setup:
     """Return the setup without angle, coupling, drift and z, and without a clock, which a slow part takes others of.
 
-    Tables that a build chooses are not looked for: none of them plays.
+    Tables that a build chooses are not looked for, and nothing is counted: none of them plays.
     """
     tables = (axis.table for axis in (setup.scan.x, setup.scan.y))
     x_table, y_table = (Table() if table.chosen_by_build else table for table in tables)
@@ -253,6 +328,7 @@ def _at_0_degrees(setup: Setup) -> Setup:
         angle_deg=0.0,
         drift_nm_per_s=(0.0, 0.0),
         z=None,
+        cost=None,
         emit=replace(setup.scan.emit, clock_hz=None),
         x=replace(setup.scan.x, frame_refinement=None, table=x_table),
         y=replace(setup.scan.y, frame_refinement=None, table=y_table),
@@ -326,15 +402,25 @@ def _search(setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: F
 
 
 def _chosen_tables(
-    setup: Setup, plan: Plan, line: LinePlan, known: KnownAxis, drive: FrameDrive, problems: Problems
+    setup: Setup,
+    plan: Plan,
+    line: LinePlan,
+    known: KnownAxis,
+    drive: FrameDrive,
+    problems: Problems,
+    beside: PlayedFrame | None = None,
 ) -> FrameTableChoice | None:
     """Return the tables that the scan file lets the build choose; None if it does not, or ``problems`` grew."""
     table = setup.scan.x.table if line.axis == "x" else setup.scan.y.table
     if not is_chosen(table, line.program.output.shaping.order > 0):
         return None
     key = f"{line.axis}.table.{'mode' if table.max_error_lsb is None else 'max_error_lsb'}"
+    search, cost, limit = _search(setup, plan, line, known, drive), setup.scan.cost, None
+    if cost is not None and cost.max_instructions is not None:
+        costs = shape_costs(setup, line, search, search.shapes(table), cost.processor, beside)
+        limit = CostLimit(cost.processor, cost.max_instructions, costs)
     with problems.at(setup.scan_file, key):
-        return choose_frame_tables(_search(setup, plan, line, known, drive), table, setup.scan.limits)
+        return choose_frame_tables(search, table, setup.scan.limits, limit)
     return None
 
 
@@ -397,12 +483,11 @@ def within_range(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram
             (centre - output.code_min) / max(centre - least, 1), (output.code_max - centre) / max(most - centre, 1)
         )
         problems.add(*mixing_key(setup), _what_fits(plan, setup.scan.angle_deg, line, room))
-    slew, last = setup.hardware(line.axis).amplifier.max_slew_v_per_s, (1 << output.dac_bits) - 1
-    if slew is None:
-        return program.guarded(min(2 * steepest, last))
-    per_tick = slew / setup.hardware(line.axis).dac.update_rate_hz / abs(line.converter.v_per_code)
-    allowed = min(floor(per_tick), last)
+    allowed = _allowed_step(setup, line)
+    if allowed is None:
+        return program.guarded(min(2 * steepest, (1 << output.dac_bits) - 1))
     if steepest > allowed:
+        slew = setup.hardware(line.axis).amplifier.max_slew_v_per_s
         slower = at_most(float(plan.schedule.line_rate) * max(allowed - 1.0, 0.5) / steepest)  # a code for the rounding
         problems.add(
             setup.scan_file,
@@ -411,6 +496,15 @@ def within_range(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram
             f"allow {allowed}; about {slower} Hz would fit",
         )
     return program.guarded(allowed)
+
+
+def _allowed_step(setup: Setup, line: LinePlan) -> int | None:
+    """Return the codes that the amplifier of an axis allows in a tick; None if the scan file does not say."""
+    hardware, last = setup.hardware(line.axis), (1 << line.program.output.dac_bits) - 1
+    if hardware.amplifier.max_slew_v_per_s is None:
+        return None
+    per_tick = hardware.amplifier.max_slew_v_per_s / hardware.dac.update_rate_hz / abs(line.converter.v_per_code)
+    return min(floor(per_tick), last)
 
 
 def _what_fits(plan: Plan, angle_deg: float, line: LinePlan, room: float) -> str:

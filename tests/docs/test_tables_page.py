@@ -12,6 +12,7 @@ from building import REPOSITORY
 from editing import SCAN, edited, run, write_pair
 
 from tablegen.config.load import load
+from tablegen.planning import frame_costs
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.table_costs import MeasuredRun, cells, counts, measured
 
@@ -68,6 +69,21 @@ def test_what_the_modes_take_is_what_the_command_says(benchmark: ModuleType) -> 
     assert f"<!-- costs -->\n{benchmark.costs()}<!-- /costs -->" in PAGE
 
 
+def test_what_a_scan_at_an_angle_takes_is_what_the_command_says(benchmark: ModuleType) -> None:
+    assert f"<!-- slow -->\n{benchmark.slow()}<!-- /slow -->" in PAGE
+
+
+def test_emitted_scans_take_what_they_are_told() -> None:
+    """The page has two scans whose runs are refused; of them the counts differ by up to 8 %, of others by 1 %."""
+    table = PAGE.split("<!-- whole -->", 1)[1].split("<!-- /whole -->", 1)[0]
+    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[3:]]
+    assert len(rows) > 8
+    for name, *pairs in rows:
+        most = 8.0 if "of 300 nm" in name or "max_slew" in name else 1.0
+        for counted, told in (map(float, pair.split(", ")) for pair in pairs):
+            assert abs(told / counted - 1.0) <= 0.01 * most, (name, counted, told)
+
+
 @pytest.mark.rest
 @pytest.mark.parametrize(
     ("core", "run_of", "mode"),
@@ -99,9 +115,23 @@ def test_instructions_are_of_this_c(benchmark: ModuleType) -> None:
     assert measured()["sources"] == benchmark.mode_costs.digest(), "run `python benchmarks/tables.py --costs`"
 
 
-def test_a_change_of_the_c_changes_the_digest(benchmark: ModuleType, tmp_path: Path) -> None:
-    digest, copies = benchmark.mode_costs.digest, []
-    for path in [*benchmark.mode_costs.sequencer(), benchmark.mode_costs.COUNTED]:
+def test_instructions_at_an_angle_are_of_this_c(benchmark: ModuleType) -> None:
+    digest = benchmark.slow_costs.digest()
+    assert frame_costs.measured()["sources"] == digest, "run `python benchmarks/slow_costs.py`"
+
+
+@pytest.mark.rest
+def test_instructions_at_an_angle_are_counted(benchmark: ModuleType) -> None:
+    run_of = MeasuredRun(16, 16, True)
+    counted = benchmark.slow_costs.slow_count("cortex-m4", run_of)
+    assert counted == frame_costs.slow_counts()[run_of]["cortex-m4"]
+
+
+@pytest.mark.parametrize("counts_of", ["mode_costs", "slow_costs"])
+def test_a_change_of_the_c_changes_the_digest(benchmark: ModuleType, counts_of: str, tmp_path: Path) -> None:
+    module, copies = getattr(benchmark, counts_of), []
+    digest = module.digest
+    for path in [*module.sequencer(), module.COUNTED]:
         copies.append(tmp_path / path.name)
         copies[-1].write_text(path.read_text("utf-8"), "utf-8")
     (axis,) = (copy for copy in copies if copy.name == "dac_axis.c")

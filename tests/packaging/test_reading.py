@@ -39,6 +39,7 @@ ALLOWED = {
     ("verification/checks/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",
     ("verification/verilog/target.py", "shutil.copyfile"): "as in directory.py",
     ("link/transport.py", "open"): "a serial port",
+    ("planning/frame_costs.py", "read_text"): "its own counts, which ship with the package",
     ("planning/table_costs.py", "read_text"): "its own counts, which ship with the package",
     ("html_report/document.py", "read_text"): "its template, style and script, which ship with the package",
     ("calibration/tables/csv_blocks.py", "np.loadtxt"): "bytes that were read already",
@@ -46,6 +47,7 @@ ALLOWED = {
 }
 PARSERS = {"json.loads", "tomllib.loads", "tomlkit.parse", "msgspec.json.decode"}
 PARSED = {
+    ("planning/frame_costs.py", "json.loads"): "its own counts, which ship with the package",
     ("planning/table_costs.py", "json.loads"): "its own counts, which ship with the package",
     ("manifest/format.py", "json.loads"): "the one reader of manifests",
     ("cli/device/live.py", "json.loads"): "a request, a line of bounded length",

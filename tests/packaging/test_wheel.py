@@ -20,6 +20,7 @@ def shipped_files() -> set[str]:
         "tablegen/examples/__init__.py",
         "tablegen/firmware_templates/__init__.py",
         "tablegen/planning/table_costs.json",
+        "tablegen/planning/frame_costs.json",
     }
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
     for kind in ("[chv]", "ld"):

@@ -1,0 +1,128 @@
+"""The cost of a sample of an axis with a slow part, as of a scan at an angle: measured, and mapped to a program here.
+
+A line of such an axis begins with work that the words of its table take, so a sample takes more where lines are short.
+``python benchmarks/tables.py --costs`` measures samples of one line and one table, and what lines and words take;
+``frame_costs.json`` has both, of what a build has: cubic tables of up to 16 bits.
+"""
+
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from msgspec.structs import replace
+
+from tablegen.config.schema import ProcessorName
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable
+
+FILE = Path(__file__).with_name("frame_costs.json")
+TICKS, WORDS = 1250, 64  # of the line and of the tables whose samples are measured
+_RUN = 16  # ticks with one check of clamp and slew guard in the C
+_WIDEST = 32  # windows of this check in the range of a converter, at least
+
+
+class SlowCount(NamedTuple):
+    """Instructions for an axis sample with both tables of 64 words, over lines of 1,250 ticks.
+
+    In runs; tick by tick, where a program has no runs; and where it has, but moves so fast that each is refused.
+    """
+
+    in_runs: float
+    by_tick: float
+    refused: float
+
+
+class LineCost(NamedTuple):
+    """Instructions of an axis for a line with a second table, and for each word of its tables.
+
+    Those of runs have the ends of runs and the segments of a spline too. ``second`` is the part of a line that a
+    program without a second table leaves out, and ``word_by_tick`` the part of a word.
+    """
+
+    line: float
+    word: float
+    line_by_tick: float
+    word_by_tick: float
+    second: float
+
+    def of(self, words: int, in_runs: bool, second: bool = True) -> float:
+        """Return the instructions for a line whose table has so many words."""
+        whole = self.line + words * self.word if in_runs else self.line_by_tick + words * self.word_by_tick
+        return whole if second else whole - self.second - words * self.word_by_tick
+
+
+class PlayedFrame(NamedTuple):
+    """An axis with a slow part and a second table, as far as it decides what a sample takes.
+
+    ``table`` is that over the line; ``steepest`` the largest step of a tick in codes.
+    """
+
+    table: PlayedTable
+    steepest: float
+
+    @classmethod
+    def of(cls, program: FrameProgram, max_step: int, steepest: float) -> "PlayedFrame":
+        """Return what decides the cost of a program whose slew guard allows so many codes a tick."""
+        fast = program.fast
+        shape = TableShape(fast.mode, len(fast.words), fast.bits)
+        output = replace(program.output, max_step=max_step)
+        return cls(PlayedTable(shape, fast.phase.ticks, fast.hold, output), steepest)
+
+    @property
+    def keeps_window(self) -> bool:
+        """True if no 16 ticks leave the window in which the C checks clamp and slew guard for all of them at once."""
+        output = self.table.output
+        widest = min((output.code_max - output.code_min) // _WIDEST, output.max_step)
+        return _RUN * self.steepest <= (1 << (widest + 1).bit_length() - 1) // 2
+
+
+def frame_costs(axes: Sequence[PlayedFrame], processor: ProcessorName) -> list[float]:
+    """Return the instructions for a sample of each of the axes that are played together.
+
+    Words of all have the width of the widest, likewise those of the converters, and a run is one of all axes.
+    """
+    runs = [axis.table.run for axis in axes]
+    table_bits = max(run.table_storage_bits for run in runs)
+    output_bits = max(run.output_storage_bits for run in runs)
+    with_runs = all(axis.table.has_runs(processor, table_bits) for axis in axes)
+    in_runs = with_runs and all(axis.keeps_window for axis in axes)
+    costs = []
+    for axis, run in zip(axes, runs, strict=True):
+        its = run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits)
+        count, lines = slow_counts()[its][processor], line_costs()[processor]
+        here = lines.of(axis.table.shape.length, in_runs) / axis.table.period
+        counted = count.in_runs if in_runs else count.refused if with_runs else count.by_tick
+        costs.append(round(counted + here - lines.of(WORDS, in_runs) / TICKS, 1))
+    return costs
+
+
+@cache
+def slow_counts() -> dict[MeasuredRun, dict[ProcessorName, SlowCount]]:
+    """Return the instructions for a sample of an axis with cubic tables of 64 words over 1,250 ticks, gcc -O2."""
+    return {
+        MeasuredRun(*(row[name] for name in MeasuredRun._fields)): {name: SlowCount(*row[name]) for name in PROCESSORS}
+        for row in measured()["samples"]
+    }
+
+
+@cache
+def line_costs() -> dict[ProcessorName, LineCost]:
+    """Return the instructions of an axis for a line."""
+    lines = measured()["lines"]
+    return {name: LineCost(*lines[name]) for name in PROCESSORS}
+
+
+def worst_percent() -> dict[ProcessorName, float]:
+    """Return by how much samples of short lines, of one other table, differ from what these counts give, at most."""
+    worst: dict[ProcessorName, float] = measured()["worst_percent"]
+    return worst
+
+
+@cache
+def measured() -> dict[str, Any]:
+    """Return the content of the file: compilers, a digest of the C, lines and samples."""
+    content: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
+    return content

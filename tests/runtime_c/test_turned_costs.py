@@ -1,0 +1,49 @@
+"""``[cost]`` at an angle against the C that is emitted: whole builds, counted in emulation."""
+
+import importlib
+import sys
+from collections.abc import Iterator
+from types import ModuleType
+
+import pytest
+from building import REPOSITORY
+
+from tablegen.planning.cost_choice import played_table
+from tablegen.planning.frame_costs import slow_counts
+from tablegen.planning.table_costs import MeasuredRun, sample_costs
+
+pytestmark = pytest.mark.rest
+
+# Scans of the benchmark by name; percent by which what is told may differ; whether runs are played.
+BUILDS = [
+    ("cortex-m4", "words of 12 bits", 1.0, False),
+    ("cortex-m0plus", "lines of 313 ticks, of 60 nm", 1.0, True),
+    ("riscv32", "a converter in two's complement", 1.0, True),
+    ("cortex-m4", "no `max_slew_v_per_s`", 6.0, False),
+]
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> Iterator[ModuleType]:
+    """The benchmark, which is no package."""
+    sys.path.insert(0, str(REPOSITORY / "benchmarks"))
+    try:
+        yield importlib.import_module("turned_costs")
+    finally:
+        sys.path.remove(str(REPOSITORY / "benchmarks"))
+
+
+@pytest.mark.parametrize(("core", "name", "percent", "runs"), BUILDS)
+def test_a_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: str, percent: float, runs: bool) -> None:
+    """The cells of another coding, of runs in place of ticks, or of the fast table alone would be told apart."""
+    build = benchmark.built(benchmark.SCANS[name])
+    counted = benchmark.counted(build, core)
+
+    def agrees(told: float) -> bool:
+        return abs(told - counted) <= 0.01 * percent * counted
+
+    assert agrees(benchmark.told(build, core))
+    run = MeasuredRun(16, 16, "complement" in name)
+    other = slow_counts()[run._replace(coded=not run.coded)][core] if runs else slow_counts()[run][core]
+    assert not agrees(other.in_runs)
+    assert not agrees(sample_costs([played_table(build.plan.x.program.fast)], core)[0])
