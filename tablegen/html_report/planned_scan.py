@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.scan_warnings import weighed_warnings
 from tablegen.config.load import Setup, load
 from tablegen.emit.render import render_scan
 from tablegen.html_report.ranking import without_folder
-from tablegen.html_report.subject import PlannedScan, Subject, of_scan
+from tablegen.html_report.subject import NO_Z, PlannedScan, Subject, of_scan
 from tablegen.html_report.verify_record import VerifyRecord
 
 
@@ -38,8 +39,11 @@ def planned_scan(
     Rejected
         For wrong input.
     """
-    certified = certify_scan(scan if isinstance(scan, Setup) else load(scan), progress, remedies=remedies, sines=False)
-    setup, plan, certificates = certified.setup, certified.plan, certified.certificates
+    setup = scan if isinstance(scan, Setup) else load(scan)
+    if setup.scan.z is not None:
+        raise Rejected([setup.scan_file.problem("z", f"{NO_Z}; leave [z] out")])
+    certified = certify_scan(setup, progress, remedies=remedies, sines=False)
+    plan, certificates = certified.plan, certified.certificates
     warnings = []
     if remedies:
         progress("looking for remedies")

@@ -17,10 +17,12 @@ from tablegen.config.load import Setup
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import MANIFEST, read_json
-from tablegen.manifest.read import read_build
+from tablegen.manifest.read import NotABuild, read_build
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
 from tablegen.waveform.series import FourierSeries
+
+NO_Z = "`report` and `compare` show no scan with the output z"
 
 
 @dataclass(frozen=True)
@@ -105,9 +107,12 @@ def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
     Raises
     ------
     NotABuild
-        If the directory is not a build.
+        If the directory is not a build, or its scan has the output z.
     """
-    manifest = read_build(folder).manifest
+    stored = read_build(folder)
+    if stored.z is not None:
+        raise NotABuild(f"{folder}: {NO_Z}")
+    manifest = stored.manifest
     digest = manifest_digest(folder)
     states = (FileState(MANIFEST, digest), *files_beside(folder, manifest.files))
     return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)

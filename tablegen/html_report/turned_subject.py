@@ -12,14 +12,12 @@ from tablegen.certificate.turned_summary import broken_limits
 from tablegen.config.load import Setup
 from tablegen.emit.turned_scan import formats_of_turned, render_turned, turned_clocks
 from tablegen.html_report.ranking import without_folder
-from tablegen.html_report.subject import FileState, files_beside, manifest_digest
+from tablegen.html_report.subject import NO_Z, FileState, files_beside, manifest_digest
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import StoredTurned, TurnedManifest, parse_turned, read_turned
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan
-
-_Z = "`report` and `compare` show no scan with the output z"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ def turned_scan(
         For wrong input, or a scan with the output z.
     """
     if setup.scan.z is not None:
-        raise Rejected([setup.scan_file.problem("z", f"{_Z}; leave [z] out")])
+        raise Rejected([setup.scan_file.problem("z", f"{NO_Z}; leave [z] out")])
     formats = formats_of_turned(setup)
     plan = make_turned_plan(setup, progress)
     clocks = turned_clocks(setup, plan, formats)
@@ -95,7 +93,7 @@ def turned_directory(folder: Path, verified: VerifyRecord | None = None) -> Turn
     """
     stored, digest = read_turned(folder), manifest_digest(folder)
     if stored.z is not None:
-        raise NotABuild(f"{folder}: {_Z}")
+        raise NotABuild(f"{folder}: {NO_Z}")
     wrong = "" if stored.own_hash == stored.manifest.hash else "has a hash that is not that of its plan"
     states = (FileState(MANIFEST, digest, wrong), *files_beside(folder, stored.manifest.files))
     return TurnedSubject(stored, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)
