@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.scan_warnings import weighed_warnings
 from tablegen.config.load import Setup, load
 from tablegen.emit.render import render_scan
 from tablegen.html_report.ranking import without_folder
-from tablegen.html_report.subject import NO_Z, PlannedScan, Subject, of_scan
+from tablegen.html_report.subject import PlannedScan, Subject, of_scan
 from tablegen.html_report.verify_record import VerifyRecord
 
 
@@ -40,8 +39,6 @@ def planned_scan(
         For wrong input.
     """
     setup = scan if isinstance(scan, Setup) else load(scan)
-    if setup.scan.z is not None:
-        raise Rejected([setup.scan_file.problem("z", f"{NO_Z}; leave [z] out")])
     certified = certify_scan(setup, progress, remedies=remedies, sines=False)
     plan, certificates = certified.plan, certified.certificates
     warnings = []

@@ -81,11 +81,16 @@ class TurnedCodes(Struct):
     steepest: int
 
 
-class TiltCertificate(Struct):
-    """The largest distance of a code of z from the wanted height at an imaged tick, and its codes."""
+class TiltFigures(Struct):
+    """The largest distance of a code of z from the wanted height at an imaged tick, in LSB and in nm."""
 
     error_lsb: Annotated[float, Meta(ge=0.0)]
     error_nm: Annotated[float, Meta(ge=0.0)]
+
+
+class TiltCertificate(TiltFigures):
+    """The certificate of z, with its codes."""
+
     codes: TurnedCodes
 
 

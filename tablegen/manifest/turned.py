@@ -13,7 +13,7 @@ from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.manifest.fields import BuildFileName, Digest, FileName, ManifestSequence, Version
 from tablegen.manifest.format import MANIFEST, content_hash, read_json
-from tablegen.manifest.frame_fields import TurnedAxisFields, TurnedCodes, TurnedZ
+from tablegen.manifest.frame_fields import TiltFigures, TurnedAxisFields, TurnedCodes, TurnedZ
 from tablegen.manifest.read import AngleManifest, DamagedManifest, NotABuild, StoredBuild, parse_manifest
 
 
@@ -39,6 +39,7 @@ class TurnedFigures(Struct):
     """The part of the certificate that follows from the integers alone."""
 
     codes: dict[Literal["x", "y", "z"], TurnedCodes]
+    z: TiltFigures | None = None
 
 
 class TurnedManifest(Struct, kw_only=True):

@@ -30,6 +30,13 @@ import tablegen
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.emit.runtime_config import options_of_builds
 from tablegen.emit.turned import turned_options
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.html_report.blocks import Grid, Section
+from tablegen.html_report.page import charts_of, sections
+from tablegen.html_report.subject import of_directory
+from tablegen.html_report.tilt import ShownTilt, tilt_section
+from tablegen.html_report.turned_page import turned_sections
+from tablegen.html_report.turned_subject import turned_directory
 from tablegen.link.errors import Unsuitable
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.read import read_build
@@ -181,8 +188,7 @@ def test_the_summary_has_a_row_of_z(built: TurnedBuild) -> None:
 def test_what_does_not_take_z_says_so(scan: Path, built: TurnedBuild, build: Path, tmp_path: Path) -> None:
     refusals = {
         ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: the Verilog sequencer plays no output z",
-        ("report", scan, "-o", tmp_path / "page.html"): "z: `report` and `compare` show no scan with the output z",
-        ("compare", build, scan): "out: `report` and `compare` show no scan with the output z",
+        ("compare", build, scan): "out: `compare` takes no scan with the output z",
         ("upload", build, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", build, "--target", "cortex-m"): "which no emulator plays",
     }
@@ -246,8 +252,7 @@ def test_what_does_not_take_z_without_an_operator_says_so(straight: Path, tmp_pa
     scan = straight.parent / "scan.toml"
     refusals = {
         ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: 'verilog' plays no output z",
-        ("compare", straight, scan): "out: `report` and `compare` show no scan with the output z",
-        ("report", scan, "-o", tmp_path / "page.html"): "z: `report` and `compare` show no scan with the output z",
+        ("compare", straight, scan): "out: `compare` takes no scan with the output z",
         ("upload", straight, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", straight, "--target", "cortex-m"): "which no emulator plays",
     }
@@ -262,3 +267,46 @@ def test_what_does_not_take_z_without_an_operator_says_so(straight: Path, tmp_pa
     for text in (built.summary(), built.overview()):
         assert "+0.02 of x and -0.05 of y, by 5 nm/V" in text
     assert [chart.key for chart in built.charts().charts][-1] == "z_frame"
+
+
+def rows_of(section: Section) -> dict[str, list[str]]:
+    """The rows of a section's table by their names."""
+    (grid,) = (block for block in section.blocks if isinstance(block, Grid))
+    return {cells[0].text: [cell.text for cell in cells[1:]] for cells in grid.rows}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("operators", [True, False])
+def test_the_page_of_a_build_states_z(operators: bool, request: pytest.FixtureRequest) -> None:
+    """Its figures are those of a frame of the model, in volts by a formula of the tests."""
+    folder: Path = request.getfixturevalue("build" if operators else "straight")
+    if operators:
+        parts, beside = turned_sections(turned_directory(folder)), read_turned(folder).z
+    else:
+        parts, beside = sections(of_directory(folder)), read_build(folder).program_of_z
+    assert beside is not None
+    assert isinstance(beside.x, FrameProgram)
+    volts = volts_of(beside.x.frame())
+    below, above = float(np.min(volts)), 100.0 * 65535.0 / 65536.0 - float(np.max(volts))
+    rows = rows_of(next(part for part in parts if part.key == "z"))
+    assert rows["slope along x"][0] == "+0.02, +1.15 degrees"
+    assert rows["slope along y"][0] == "-0.05, -2.86 degrees"
+    assert rows["drive at the piezo"][0] == f"{np.min(volts):.6g}..{np.max(volts):.6g} V"
+    room = f"{above:.4g} V, {NM_PER_V * above:.4g} nm, from the highest voltage"
+    assert rows["room above"] == [room, "99.9985 V", "\u2713 within"]
+    room = f"{below:.4g} V, {NM_PER_V * below:.4g} nm, from the lowest voltage"
+    assert rows["room below"] == [room, "0 V", "\u2713 within"]
+    error, unit = rows["largest error at imaged ticks"][0].split()
+    assert 0.5 < float(error) < 1.5
+    assert unit == "LSB"
+    assert "z_frame" in charts_of(parts)
+
+
+@pytest.mark.common
+def test_the_page_shows_a_limit_that_z_exceeds(straight: Path) -> None:
+    stored = read_build(straight)
+    assert stored.z is not None
+    program, stated = stored.z.program(stored.manifest.sequence), stored.z.certificate
+    shown = ShownTilt(stored.z, program, stated.codes, stated.error_lsb, stated.error_nm)
+    for limit, says in ((1.5, "\u2713 within"), (0.5, "\u2717 exceeded")):
+        assert rows_of(tilt_section(shown, limit))["largest error at imaged ticks"][1:] == [f"{limit} LSB", says]
