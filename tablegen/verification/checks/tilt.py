@@ -60,9 +60,9 @@ def _distance(
     lines = [line for line in range(schedule.lines) if line in schedule.up or line in schedule.down]
     for line in lines:
         slow = z.slow_nm * (_triangle((line + t[ticks]) / schedule.lines, y.drive.turn) - 0.5)
-        wanted = (z.offset_v + (fast + slow) / z.nm_per_v - z.output.v_zero) / z.output.v_per_code
+        plane = (z.offset_v + (fast + slow) / z.nm_per_v - z.output.v_zero) / z.output.v_per_code
         codes = program.output.clamp(program.at(line, ticks))
-        worst = max(worst, float(np.max(np.abs(codes - wanted))))
+        worst = max(worst, float(np.max(np.abs(codes - plane))))
     return len(lines) * len(ticks), worst
 
 
