@@ -27,7 +27,7 @@ class TurnedContent(Struct, frozen=True, eq=False):
         """The content of the files of the second sequencer; None without z."""
         if self.z is None:
             return None
-        return content_beside(self.name, self.hash, self.z, self.version, self.scanner)
+        return content_beside(self.name, self.hash, self.z, self.version, self.scanner, self.clocks_per_tick)
 
     @property
     def axes(self) -> tuple[FrameProgram, FrameProgram]:
@@ -38,7 +38,9 @@ class TurnedContent(Struct, frozen=True, eq=False):
         return x, y
 
 
-def content_beside(name: str, digest: str, program: ScanProgram, version: str = "", scanner: str = "") -> TurnedContent:
+def content_beside(
+    name: str, digest: str, program: ScanProgram, version: str = "", scanner: str = "", clocks_per_tick: int = 0
+) -> TurnedContent:
     """Return the content of the files of a second sequencer, which plays the output z of a scan of this name.
 
     Parameters
@@ -49,4 +51,4 @@ def content_beside(name: str, digest: str, program: ScanProgram, version: str = 
         Its x is z, and its y rests.
     """
     summary = (f"The output z of {name}, for a sequencer of its own: x is z here, y rests at its offset.",)
-    return TurnedContent(f"{name}_z", digest, program, version, scanner, summary)
+    return TurnedContent(f"{name}_z", digest, program, version, scanner, summary, clocks_per_tick)

@@ -145,6 +145,4 @@ def parse_turned(content: bytes) -> StoredTurned:
         raise DamagedManifest([str(error)]) from None
     if (why := why_not_a_name(manifest.name)) is not None:
         raise DamagedManifest([f"name: {why}"])
-    if z is not None and manifest.formats != ["c"]:
-        raise DamagedManifest(["formats: a scan with the output z has the format c alone"])
     return StoredTurned(manifest, program, plain, z)

@@ -45,8 +45,8 @@ MIXED = (
 )
 
 TILTED = (
-    "a scan with the output z whose axes have operators is for `check`, `show`, `build` with the format c, `verify`, "
-    "`tables`, `simulate`, `correct` and `refine`; leave [z] out for anything else"
+    "a scan with the output z whose axes have operators is for `check`, `show`, `build` with the formats c and "
+    "verilog, `verify`, `tables`, `simulate`, `report`, `correct` and `refine`; leave [z] out for anything else"
 )
 
 

@@ -1,6 +1,7 @@
 """Verify a build of a scan at an angle: its files, its certificate, and what its C or its Verilog plays."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import dropwhile, zip_longest
 from pathlib import Path
 from typing import Literal
@@ -86,7 +87,14 @@ def verify_turned(
             played, difference = _played_checks(folder, work, stored, ticks)
         else:
             progress(f"{simulator} plays {ticks} ticks")
-            played = TurnedPlay(_content_of(stored), ticks).checks(folder, work / "verilog", simulator)
+            content = _content_of(stored)
+            played = TurnedPlay(content, ticks).checks(folder, work / "verilog", simulator)
+            if (of_z := content.content_of_z) is not None:
+                progress(f"{simulator} plays {ticks} ticks of z")
+                played += [
+                    replace(check, subject=f"{check.subject}, z")
+                    for check in TurnedPlay(of_z, ticks).checks(folder, work / "verilog_z", simulator)
+                ]
         checks += watch.timed(played)
     return Report(manifest.name, checks, difference, notes, watch.seconds)
 

@@ -187,7 +187,6 @@ def test_the_summary_has_a_row_of_z(built: TurnedBuild) -> None:
 @pytest.mark.common
 def test_what_does_not_take_z_says_so(scan: Path, built: TurnedBuild, build: Path, tmp_path: Path) -> None:
     refusals = {
-        ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: the Verilog sequencer plays no output z",
         ("compare", build, scan): "out: `compare` takes no scan with the output z",
         ("upload", build, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", build, "--target", "cortex-m"): "which no emulator plays",
