@@ -250,12 +250,12 @@ class Build(Result):
         return self.manifest
 
     def charts(self) -> "PlottedCharts":
-        """Return the drive of each axis, and the error of the modelled piezo with and without compensation."""
+        """Return the drive of each axis, the error of the modelled piezo with and without compensation, and z."""
         from tablegen.charts.picture_file import PlottedCharts
-        from tablegen.html_report.scan_charts import drive_of, modelled_error
+        from tablegen.html_report.scan_charts import charts_of_z, drive_of, modelled_error
 
         pairs = [(drive_of(line), modelled_error(line)) for line in self.plan.moving]
-        return PlottedCharts(self.name, tuple(chart for pair in pairs for chart in pair))
+        return PlottedCharts(self.name, (*(chart for pair in pairs for chart in pair), *charts_of_z(self.plan)))
 
     @property
     def answers(self) -> list[ErrorAnswer]:

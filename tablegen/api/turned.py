@@ -38,7 +38,7 @@ def build_turned(
 ) -> "TurnedBuild":
     """Plan and certify a scan at an angle, on coupled axes or with drift, and write it into ``out`` if one is given.
 
-    So is a scan with the output z, at any angle.
+    So is a scan with the output z whose axes have operators, at any angle; ``build`` takes the others.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def build_turned(
     out : str or Path, optional
         Directory; files of an earlier build there are removed.
     formats : sequence of str, optional
-        "c" and, without z, "verilog"; by default those of the scan, or "c" alone.
+        "c" and "verilog"; by default those of the scan, or "c" alone.
     progress : callable
         Called with a text for each stage.
 
@@ -171,6 +171,7 @@ class TurnedBuild(Result):
         """Return the drives over the frame, and those of both axes on the first, a middle and the last imaged line."""
         from tablegen.charts.chart import Chart, DrawnCurve
         from tablegen.charts.picture_file import PlottedCharts
+        from tablegen.html_report.tilt_chart import tilt_chart
 
         charts = []
         for axis in self.plan.axes:
@@ -186,11 +187,7 @@ class TurnedBuild(Result):
             frame = DrawnCurve(f"{axis.axis}", "other", np.arange(u.size) / _POINTS, driver.volts(u.ravel()))
             charts.append(Chart(f"{axis.axis}_frame", f"{axis.axis}: frame", "line", "drive [V]", (frame,)))
         if (z := self.plan.z) is not None:
-            ticks = np.arange(_POINTS) * self.plan.schedule.ticks // _POINTS
-            codes = np.stack([z.program.at(line, ticks) for line in range(self.plan.schedule.lines)]).ravel()
-            volts = np.asarray(z.converter.v_zero + z.converter.v_per_code * codes, dtype=np.float64)
-            frame = DrawnCurve("z", "other", np.arange(codes.size) / _POINTS, volts)
-            charts.append(Chart("z_frame", "z: frame", "line", "drive [V]", (frame,)))
+            charts.append(tilt_chart(z.program, z.converter.v_zero, z.converter.v_per_code))
         return PlottedCharts(self.name, tuple(charts))
 
     def write(self, folder: str | Path) -> list[str]:

@@ -49,7 +49,20 @@ def certify_scan(
     advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice
     broken = broken_limits(plan, certificates, setup.scan_file, advise, setup.hardware_problem)
     broken += [problem for line in plan.lines if (problem := too_dear(setup, line.axis, line.sample_cost))]
+    broken += _beyond_limit_of_z(setup, plan)
     return CertifiedScan(setup, plan, certificates, tuple(broken))
+
+
+def _beyond_limit_of_z(setup: Setup, plan: Plan) -> list[Problem]:
+    """Return a problem where a code of z is off by more than the scan file allows; empty without z."""
+    limit = plan.limits.max_error_lsb
+    if plan.z is None or limit is None or plan.z.errors.error_lsb <= limit:
+        return []
+    why = (
+        f"z errs by up to {plan.z.errors.error_lsb:.4g} LSB, above {limit:g}; more harmonics of x bring it closer to "
+        "the plane"
+    )
+    return [setup.scan_file.problem("limits.max_error_lsb", why)]
 
 
 def too_dear(setup: Setup, axis: str, takes: SampleCost | None) -> Problem | None:

@@ -12,7 +12,7 @@ from msgspec import Struct
 from tablegen.fixedpoint.frame_program import played_extremes
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.frame_tables import compared_ticks
-from tablegen.planning.tilt import TiltedOutput
+from tablegen.planning.tilt import CodeRange, TiltErrors
 from tablegen.planning.turned_plan import FrameGeometry, TurnedAxis, TurnedPlan
 
 _CHORD = 0.05  # of the line
@@ -40,25 +40,6 @@ class TurnedErrors(Struct, frozen=True):
     code_lsb: tuple[float, float]
 
 
-class CodeRange(Struct, frozen=True):
-    """The range of an axis' codes in a frame, and the largest step of a tick, with what shaping can add."""
-
-    least: int
-    most: int
-    steepest: int
-
-
-class TiltErrors(Struct, frozen=True):
-    """The output z: the largest distance of a code from the wanted height at the imaged ticks, in LSB and in nm.
-
-    ``codes`` are those of a frame.
-    """
-
-    error_lsb: float
-    error_nm: float
-    codes: CodeRange
-
-
 class TurnedCertificate(Struct, frozen=True):
     """The certificate of a scan at an angle: its errors, the codes of x and y, and z where the scan has it."""
 
@@ -82,20 +63,8 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
     return TurnedCertificate(
         TurnedErrors(**errors, code_lsb=(distances[0], distances[1])),
         (ranges[0], ranges[1]),
-        None if plan.z is None else tilt_errors(plan.z),
+        None if plan.z is None else plan.z.errors,
     )
-
-
-def tilt_errors(z: TiltedOutput) -> TiltErrors:
-    """Return the errors of the integers of z at all imaged ticks of a frame."""
-    program, ticks = z.program, z.program.fast.phase.ticks
-    t = (np.arange(ticks) + 0.5) / ticks
-    inside, worst = np.flatnonzero(z.motion.inside(t)), 0.0
-    for line in np.flatnonzero(z.motion.imaged).tolist():
-        codes = program.output.clamp(program.at(line, inside))
-        worst = max(worst, float(np.max(np.abs(codes - z.wanted_codes(np.array(line), t[inside])))))
-    in_nm = worst * abs(z.converter.v_per_code * z.nm_per_v)
-    return TiltErrors(worst, in_nm, CodeRange(*played_extremes(program)))
 
 
 def played_frame(plan: TurnedPlan) -> "ImagedFrame":

@@ -2,6 +2,7 @@
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import expected_lines, rate
+from tablegen.certificate.tilt_text import tilt_rows
 from tablegen.planning.line_plan import Plan
 
 
@@ -45,4 +46,6 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
                 f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
                 for i, text in enumerate(texts)
             ]
+    if plan.z is not None:
+        lines += [f"{'' if i else 'z':<4}  {label:<20}{value}" for i, (label, value) in enumerate(tilt_rows(plan.z))]
     return lines

@@ -19,6 +19,7 @@ from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.subject import Subject, of_directory
 from tablegen.html_report.turned_subject import TurnedSubject, turned_directory, turned_scan
 from tablegen.manifest.format import MANIFEST
+from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import is_turned
 
 Kind = Literal["scan", "build", "scanner", "operator"]
@@ -28,6 +29,7 @@ WORDS: dict[Kind, str] = {
     "scanner": "a scanner file",
     "operator": "an operator file",
 }
+_Z = "`compare` takes no scan with the output z"
 _NAMES = 4  # of damaged files that are named
 _TOGETHER = ({"scan", "build"}, {"scanner"}, {"operator"})
 
@@ -97,13 +99,15 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
     Raises
     ------
     Rejected
-        If a file is faulty.
+        If a file is faulty, or its scan has the output z.
     NotABuild
-        If a directory is not a build.
+        If a directory is not a build, or its scan has the output z.
     """
     subject: Subject | TurnedSubject
     if kind == "build":
         subject = turned_directory(path) if is_turned(path) else of_directory(path)
+        if subject.has_z:
+            raise NotABuild(f"{path}: {_Z}")
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
         text = f"{path.name or path}: does not agree with its manifest: {names}"
@@ -111,6 +115,8 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
         return ComparedSide(path, kind, _quantities(subject), damage, subject)
     if kind == "scan":
         setup = load(path)
+        if setup.scan.z is not None:
+            raise Rejected([setup.scan_file.problem("z", f"{_Z}; leave [z] out")])
         if setup.mixes_motions:
             subject = turned_scan(setup, progress=tell)
         else:

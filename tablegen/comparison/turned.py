@@ -13,7 +13,7 @@ from tablegen.comparison.scans import output_limits, rates, request_keys
 from tablegen.fixedpoint.frame_program import RATIO_FRACTION_BITS, FrameProgram
 from tablegen.html_report.turned_codes import axes_of, frame_volts
 from tablegen.html_report.turned_subject import TurnedSubject
-from tablegen.manifest.turned import TurnedAxisFields
+from tablegen.manifest.frame_fields import TurnedAxisFields
 from tablegen.numerics.arrays import Floats
 
 _ERRORS = (

@@ -78,9 +78,18 @@ class Setup(Struct, frozen=True, dict=True):
 
     @property
     def mixes_motions(self) -> bool:
-        """True if an output follows the line and the frame: at an angle, on coupled axes, with drift, or with z."""
-        turned = bool(self.scan.angle_deg % 360.0) or self.scan.z is not None
+        """True if x or y follows the line and the frame: at an angle, on coupled axes, or with drift.
+
+        A scan with z is planned as one of these where both axes have an operator.
+        """
+        turned = bool(self.scan.angle_deg % 360.0) or (self.scan.z is not None and self.has_operators)
         return turned or bool(self.scanner.coupling) or any(self.scan.drift_nm_per_s)
+
+    @property
+    def has_operators(self) -> bool:
+        """True if both axes of the scanner have an operator."""
+        tables = (self.scanner.x.hysteresis, self.scanner.y.hysteresis)
+        return all(table is not None and table.operator_file is not None for table in tables)
 
     @property
     def files(self) -> list[Path]:

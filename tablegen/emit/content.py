@@ -7,7 +7,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
@@ -34,7 +34,10 @@ class AxisContent(Struct, frozen=True, eq=False):
 
 
 class Content(Struct, frozen=True, eq=False):
-    """A build as formats see it; the content of comments alone is empty where a manifest is the source."""
+    """A build as formats see it; the content of comments alone is empty where a manifest is the source.
+
+    ``z`` is the program of a second sequencer that plays the output z, where the scan has one.
+    """
 
     name: str
     hash: str
@@ -46,6 +49,7 @@ class Content(Struct, frozen=True, eq=False):
     version: str = ""
     scanner: str = ""
     summary: tuple[str, ...] = ()
+    z: ScanProgram | None = None
 
     @property
     def axes(self) -> tuple[AxisContent, AxisContent]:

@@ -60,6 +60,8 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     for each in chosen_formats:
         if plan.schedule.pixel_table is not None and each.name not in PIXEL_FORMATS:
             raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take c or verilog")
+        if plan.z is not None and each.name != "c":
+            raise Unphysical(f"{each.name!r} plays no output z; take the format c, or leave [z] out")
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each)
@@ -78,7 +80,8 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     names = [each.name for each in chosen_formats]
-    files[MANIFEST] = manifest_file(record, digest, names, certificates, files, plan.clocks_per_tick)
+    of_z = None if plan.z is None else plan.z.errors
+    files[MANIFEST] = manifest_file(record, digest, names, certificates, files, plan.clocks_per_tick, of_z)
     return files
 
 
@@ -154,6 +157,7 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
         version=__version__,
         scanner=plan.scanner,
         summary=tuple(map(comment_safe, summary(plan, certificates))),  # they name files, in any characters
+        z=plan.program_of_z,
     )
 
 

@@ -24,4 +24,5 @@ def stored_content(stored: StoredBuild) -> Content:
         header_only=f"{name}.c" not in stored.manifest.files,
         clocks_per_tick=stored.manifest.clocks_per_tick,
         version=stored.manifest.tablegen,
+        z=stored.program_of_z,
     )

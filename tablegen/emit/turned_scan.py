@@ -6,6 +6,7 @@ from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.certificate.turned_errors import TurnedCertificate
 from tablegen.certificate.turned_summary import turned_summary
 from tablegen.config.load import Setup
+from tablegen.device.clocks import least_slow_clocks
 from tablegen.emit.render import format_rejected
 from tablegen.emit.templates import comment_safe
 from tablegen.emit.turned import TURNED_FORMATS, require_format, turned_files, turned_runtime
@@ -29,9 +30,6 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
     if not set(names) <= set(TURNED_FORMATS):
         why = "a scan at an angle, on coupled axes or with drift has the formats c and verilog"
         raise format_rejected(setup, why, explicit=formats is not None)
-    if setup.scan.z is not None and "verilog" in names:
-        why = "the Verilog sequencer plays no output z; take the format c, or leave [z] out"
-        raise format_rejected(setup, why, explicit=formats is not None)
     return names
 
 
@@ -48,8 +46,11 @@ def turned_clocks(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, exp
             require_format(name, plan.program)
         except Unphysical as error:
             raise format_rejected(setup, str(error), explicit=explicit) from None
+    if "verilog" not in formats:
+        return 0
+    programs = [each for each in (plan.program, plan.program_of_z) if each is not None]
     problems = Problems()
-    clocks = slow_clocks_per_tick(setup, plan.program, problems) if "verilog" in formats else 0
+    clocks = slow_clocks_per_tick(setup, max(programs, key=least_slow_clocks), problems)
     problems.stop_if_any()
     return clocks
 

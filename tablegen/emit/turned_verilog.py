@@ -23,7 +23,12 @@ _LEFT_OUT = frozenset({"HARMONICS", "FOURIER_LENGTH", "FOURIER_FRACTION_BITS", "
 
 
 def turned_verilog_files(content: TurnedContent) -> dict[str, bytes]:
-    """Render ``NAME.vh``, ``NAME_top.v`` and the memory files, by name."""
+    """Render ``NAME.vh``, ``NAME_top.v`` and the memory files, by name, and those of ``NAME_z`` where there is z."""
+    contents = [each for each in (content, content.content_of_z) if each is not None]
+    return {name: text for each in contents for name, text in _files_of(each).items()}
+
+
+def _files_of(content: TurnedContent) -> dict[str, bytes]:
     context = _context(content)
     files = {
         f"{content.name}.vh": template("verilog/turned.vh.j2", context, literal, range=value_range),

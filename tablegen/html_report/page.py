@@ -18,6 +18,7 @@ from tablegen.html_report.request import files, request_section, verification
 from tablegen.html_report.scan_errors import errors
 from tablegen.html_report.spectrum import quantisation, spectrum
 from tablegen.html_report.subject import Subject
+from tablegen.html_report.tilt import ShownTilt, tilt_section
 from tablegen.html_report.usable import usable
 
 Tell = Callable[[str], object]
@@ -32,6 +33,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
             *([] if own is None else [own]),
             request_section(subject),
             certificate(subject),
+            *_of_z(subject),
             lines(subject, None),
             spectrum(subject),
             quantisation(subject),
@@ -44,6 +46,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
     return [
         *([] if picture is None else [picture]),
         certificate(subject),
+        *_of_z(subject),
         request_section(subject),
         lines(subject, axes),
         errors(planned, axes),
@@ -55,6 +58,16 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
         verification(subject),
         files(subject),
     ]
+
+
+def _of_z(subject: Subject) -> list[Section]:
+    """Return the section of the output z; empty without z."""
+    z = subject.z
+    if z is None:
+        return []
+    program, stated = z.program(subject.manifest.sequence), z.certificate
+    limit = None if subject.planned is None else subject.planned.plan.limits.max_error_lsb
+    return [tilt_section(ShownTilt(z, program, stated.codes, stated.error_lsb, stated.error_nm), limit)]
 
 
 def charts_of(parts: list[Section]) -> dict[str, Chart]:

@@ -38,8 +38,9 @@ def planned_scan(
     Rejected
         For wrong input.
     """
-    certified = certify_scan(scan if isinstance(scan, Setup) else load(scan), progress, remedies=remedies, sines=False)
-    setup, plan, certificates = certified.setup, certified.plan, certified.certificates
+    setup = scan if isinstance(scan, Setup) else load(scan)
+    certified = certify_scan(setup, progress, remedies=remedies, sines=False)
+    plan, certificates = certified.plan, certified.certificates
     warnings = []
     if remedies:
         progress("looking for remedies")

@@ -13,6 +13,7 @@ from tablegen.html_report.lines import drive_chart
 from tablegen.html_report.playing import played_axes
 from tablegen.html_report.scan_errors import SIDES, residual_chart
 from tablegen.html_report.subject import PlannedScan
+from tablegen.html_report.tilt_chart import tilt_chart
 from tablegen.planning.line_plan import LinePlan, Plan
 
 _POINTS = 321
@@ -25,7 +26,14 @@ def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate
         for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
             row += [residual_chart(line.axis, one) for one in axis.corrections[-1:]]
     columns = max(map(len, rows))
+    rows.append(charts_of_z(plan))
     return PlottedCharts(f"{plan.name} on {plan.scanner}", tuple(chart for row in rows for chart in row), columns)
+
+
+def charts_of_z(plan: Plan) -> list[Chart]:
+    """Draw a frame of the output z; empty without z."""
+    z = plan.z
+    return [] if z is None else [tilt_chart(z.program, z.converter.v_zero, z.converter.v_per_code)]
 
 
 def _bent(line: LinePlan) -> bool:

@@ -17,6 +17,7 @@ from tablegen.config.load import Setup
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import MANIFEST, read_json
+from tablegen.manifest.frame_fields import StraightZ
 from tablegen.manifest.read import read_build
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
@@ -66,7 +67,7 @@ class OwnImage:
 
 @dataclass(frozen=True)
 class Subject:
-    """The build as its manifest describes it; ``planned`` is None for a directory."""
+    """The build as its manifest describes it; ``planned`` is None for a directory, ``z`` without that output."""
 
     manifest: Manifest
     digest: str
@@ -74,6 +75,7 @@ class Subject:
     planned: PlannedScan | None = None
     verified: VerifyRecord | None = None
     image: OwnImage | None = None
+    z: StraightZ | None = None
 
     @property
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
@@ -83,6 +85,11 @@ class Subject:
             ("y", self.manifest.axes.y),
         )
         return tuple(one for one in both if not one[1].resting)
+
+    @property
+    def has_z(self) -> bool:
+        """True if the scan has the output z."""
+        return self.z is not None
 
 
 def series_of(axis: ManifestAxis) -> FourierSeries:
@@ -94,9 +101,11 @@ def series_of(axis: ManifestAxis) -> FourierSeries:
 def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRecord | None = None) -> Subject:
     """Return a scan and the files that a build of it writes, the manifest among them."""
     content = files[MANIFEST]
-    manifest = msgspec.convert(read_json(content), Manifest)
+    plain = read_json(content)
+    manifest = msgspec.convert(plain, Manifest)
+    z = msgspec.convert(plain["z"], StraightZ) if "z" in plain else None
     states = tuple(FileState(name, sha256(data).hexdigest()) for name, data in sorted(files.items()))
-    return Subject(manifest, sha256(content).hexdigest(), states, planned, verified)
+    return Subject(manifest, sha256(content).hexdigest(), states, planned, verified, z=z)
 
 
 def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
@@ -107,10 +116,11 @@ def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
     NotABuild
         If the directory is not a build.
     """
-    manifest = read_build(folder).manifest
+    stored = read_build(folder)
+    manifest = stored.manifest
     digest = manifest_digest(folder)
     states = (FileState(MANIFEST, digest), *files_beside(folder, manifest.files))
-    return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified)
+    return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified, z=stored.z)
 
 
 def manifest_digest(folder: Path) -> str:

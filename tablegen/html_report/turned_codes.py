@@ -6,7 +6,8 @@ import numpy as np
 
 from tablegen.charts.chart import Chart, DrawnCurve, Role
 from tablegen.fixedpoint.frame_program import RATIO_FRACTION_BITS, FrameProgram
-from tablegen.manifest.turned import StoredTurned, TurnedAxisFields
+from tablegen.manifest.frame_fields import TurnedAxisFields
+from tablegen.manifest.turned import StoredTurned
 from tablegen.numerics.arrays import Floats
 
 SAMPLES = 200  # of a line

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tablegen.base.reading import BUILD_FILE, read_text
-from tablegen.emit.formats.c import literal
+from tablegen.emit.c_text import literal
 from tablegen.emit.templates import template_text
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.library.entry import Entry

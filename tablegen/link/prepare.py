@@ -56,7 +56,15 @@ class PreparedScan:
 
     @classmethod
     def of_plan(cls, plan: Plan) -> "PreparedScan":
-        """Prepare the scan of a plan."""
+        """Prepare the scan of a plan.
+
+        Raises
+        ------
+        Unsuitable
+            As ``of_turned``.
+        """
+        if plan.z is not None:
+            raise Unsuitable([f"{plan.name}: {_Z}"])
         digest = content_hash(plan_record(plan))
         return cls(plan.name, digest, plan.program, plan.x.fourier.in_order, plan.y.fourier.in_order)
 
@@ -86,9 +94,9 @@ class PreparedScan:
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
             raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")
+        if stored.z is not None:
+            raise NotABuild(f"{folder}: {_Z}")
         if isinstance(stored, StoredTurned):
-            if stored.z is not None:
-                raise NotABuild(f"{folder}: {_Z}")
             return cls(manifest.name, manifest.hash, stored.program, None, None)
         axes = stored.manifest.axes
         return cls(manifest.name, manifest.hash, stored.program, axes.x.fourier_words, axes.y.fourier_words)

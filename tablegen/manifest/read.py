@@ -7,7 +7,7 @@ from functools import cached_property
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 from msgspec import Struct
@@ -17,13 +17,16 @@ from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import other_than_file, other_than_folder, read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.manifest.fields import LEAST_V_PER_CODE, Manifest, ManifestAxis, ManifestSequence
 from tablegen.manifest.format import MANIFEST, RECORD, content_hash, read_json
+
+if TYPE_CHECKING:
+    from tablegen.manifest.frame_fields import StraightZ
 
 
 class NotABuild(Exception):
@@ -47,11 +50,16 @@ class AngleManifest(ForeignManifest):
 
 
 class StoredBuild(Struct, frozen=True, eq=False, dict=True):
-    """A build as its manifest has it; ``plain`` is the manifest as JSON."""
+    """A build as its manifest has it; ``plain`` is the manifest as JSON.
+
+    ``z`` is the output z, where the scan has one, and ``program_of_z`` what a second sequencer plays of it.
+    """
 
     manifest: Manifest
     program: DualProgram
     plain: dict[str, Any]
+    z: "StraightZ | None" = None
+    program_of_z: ScanProgram | None = None
 
     def __repr__(self) -> str:
         schedule, name = self.program.schedule, self.manifest.name
@@ -154,11 +162,31 @@ def parse_manifest(content: bytes) -> StoredBuild:
     try:
         manifest = msgspec.convert(plain, Manifest)
         program = DualProgram(manifest.axes.x.program, manifest.axes.y.program, manifest.sequence.schedule)
-    except (msgspec.ValidationError, ValueError, RecursionError) as error:
+        z, program_of_z = _stored_z(plain["z"], manifest) if "z" in plain else (None, None)
+    except (msgspec.ValidationError, ValueError, OverflowError, RecursionError) as error:
         raise DamagedManifest([str(error)]) from None
     if wrong := [*_wrong_names(manifest), *_wrong_schedule(manifest.sequence), *_wrong_axes(manifest)]:
         raise DamagedManifest(wrong)
-    return StoredBuild(manifest, program, plain)
+    return StoredBuild(manifest, program, plain, z, program_of_z)
+
+
+def _stored_z(plain: Any, manifest: Manifest) -> "tuple[StraightZ, ScanProgram]":
+    """Return the output z of a manifest, and the program of its sequencer.
+
+    Raises
+    ------
+    ValueError, OverflowError
+        If no device plays it.
+    """
+    from tablegen.device.beside import program_beside  # here: most scans have no z
+    from tablegen.manifest.frame_fields import StraightZ
+
+    z = msgspec.convert(plain, StraightZ)
+    if manifest.formats != ["c"]:
+        raise ValueError("formats: a scan with the output z has the format c alone")
+    if not _finite(z):
+        raise ValueError("z holds a number that is not finite")
+    return z, program_beside(z.program(manifest.sequence), manifest.sequence.schedule)
 
 
 def _a_program(folder: Path) -> Path | None:
@@ -180,16 +208,19 @@ def _wrong_names(manifest: Manifest) -> list[str]:
 def _hash(plain: dict[str, Any]) -> str:
     """Compute the hash of the plan: of everything that decides what is played."""
     record = {key: value for key, value in plain.items() if key not in _BESIDE_THE_PLAN}
-    record["axes"] = {
-        axis: {key: value for key, value in content.items() if key != "certificate"}
-        if isinstance(content, dict)
-        else content
-        for axis, content in plain["axes"].items()
-    }
+    record["axes"] = {axis: _without_certificate(content) for axis, content in plain["axes"].items()}
+    if "z" in plain:
+        record["z"] = _without_certificate(plain["z"])
     try:
         return content_hash(record)
     except (ValueError, RecursionError):  # infinity or a depth that no build writes
         return sha256(b"").hexdigest()
+
+
+def _without_certificate(content: Any) -> Any:
+    if not isinstance(content, dict):
+        return content
+    return {key: value for key, value in content.items() if key != "certificate"}
 
 
 def _wrong_schedule(sequence: ManifestSequence) -> list[str]:

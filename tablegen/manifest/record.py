@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from decimal import ROUND_CEILING, Context, Decimal
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec.structs import asdict
@@ -16,12 +16,17 @@ from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.line import SineLine
 from tablegen.device.schedule import Schedule, Window
 from tablegen.fixedpoint.converter import Converter
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.pixel_errors import PixelErrors
+
+if TYPE_CHECKING:
+    from tablegen.compensation.operator.turned_frame import FrameMotion
+    from tablegen.planning.tilt import TiltedOutput, TiltErrors
 
 _WRITTEN_APART = frozenset(
     {"scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped", "position", "pixels"}
@@ -34,7 +39,47 @@ def plan_record(plan: Plan) -> dict[str, Any]:
     x, y = axes["x"]["output"], axes["y"]["output"]
     if any(x[key] != y[key] for key in CONVERTER_KEYS):
         y["own_hardware"] = True
-    return {"name": plan.name, "scanner": plan.scanner, "sequence": sequence_record(plan.schedule), "axes": axes}
+    record = {"name": plan.name, "scanner": plan.scanner, "sequence": sequence_record(plan.schedule), "axes": axes}
+    return record if plan.z is None else {**record, "z": {"offset_v": _centre_v(plan.z), **tilt_record(plan.z)}}
+
+
+def tilt_record(z: "TiltedOutput") -> dict[str, Any]:
+    """Return the output z as JSON-ready data: slopes, motion and integers."""
+    slopes = {"slope_x": z.slope_x, "slope_y": z.slope_y, "nm_per_v": z.nm_per_v}
+    return slopes | frame_axis_record(z.motion, z.program, z.converter)
+
+
+def _centre_v(z: "TiltedOutput") -> float:
+    """Return the volts of z in the centre of the scan."""
+    return z.converter.v_zero + z.converter.v_per_code * z.offset
+
+
+def frame_axis_record(motion: "FrameMotion", program: FrameProgram, converter: Converter) -> dict[str, Any]:
+    """Return an output with a slow part as JSON-ready data."""
+    return {
+        "fast_nm": motion.fast_nm,
+        "slow_nm": motion.slow_nm,
+        "bits": program.fast.bits,
+        "words": program.fast.words.tolist(),
+        "second": program.second.tolist(),
+        "gains": {"spacing": program.gains.spacing, "words": program.gains.words.tolist()},
+        "ratios": {"spacing": program.ratios.spacing, "words": program.ratios.words.tolist()},
+        "slow": {
+            "gain_word": program.slow.gain_word,
+            "offset_word": program.slow.offset_word,
+            "words": program.slow.words.tolist(),
+        },
+        "output": output_record(program.output, converter),
+    }
+
+
+def tilt_certificate_record(errors: "TiltErrors") -> dict[str, Any]:
+    """Return the certificate of z as JSON-ready data; a maximum is one as printed."""
+    return {
+        "error_lsb": _bound(errors.error_lsb),
+        "error_nm": _bound(errors.error_nm),
+        "codes": asdict(errors.codes),
+    }
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:

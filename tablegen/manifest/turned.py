@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
-import numpy as np
 from msgspec import Meta, Struct
 
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
@@ -12,74 +11,10 @@ from tablegen.base.reading import read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
-from tablegen.fixedpoint.frame_program import MOST_KNOTS, FrameProgram, Knots, SlowTable
-from tablegen.fixedpoint.phase import RationalPhase
-from tablegen.fixedpoint.program import Program
-from tablegen.manifest.fields import BuildFileName, Digest, FileName, ManifestOutput, ManifestSequence, Version
+from tablegen.manifest.fields import BuildFileName, Digest, FileName, ManifestSequence, Version
 from tablegen.manifest.format import MANIFEST, content_hash, read_json
+from tablegen.manifest.frame_fields import TiltFigures, TurnedAxisFields, TurnedCodes, TurnedZ
 from tablegen.manifest.read import AngleManifest, DamagedManifest, NotABuild, StoredBuild, parse_manifest
-
-Words = Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=8, max_length=1 << 14)]
-KnotWords = Annotated[list[Annotated[int, Meta(ge=-(1 << 17), lt=1 << 17)]], Meta(min_length=2, max_length=MOST_KNOTS)]
-
-
-class TurnedKnots(Struct, forbid_unknown_fields=True):
-    """Words at knots, so many lines apart."""
-
-    spacing: Annotated[int, Meta(ge=1, le=1 << 16)]
-    words: KnotWords
-
-
-class TurnedSlow(Struct, forbid_unknown_fields=True):
-    """The cubic table of the slow part over a frame."""
-
-    gain_word: Annotated[int, Meta(ge=-(1 << 17), lt=1 << 17)]
-    offset_word: Annotated[int, Meta(gt=-(1 << 43), lt=1 << 43)]
-    words: Words
-
-
-class TurnedAxisFields(Struct, forbid_unknown_fields=True):
-    """One axis: its shares of both motions in nm, and its integers."""
-
-    fast_nm: float
-    slow_nm: float
-    bits: Annotated[int, Meta(ge=8, le=16)]
-    words: Words
-    second: Words
-    gains: TurnedKnots
-    ratios: TurnedKnots
-    slow: TurnedSlow
-    output: ManifestOutput
-
-    def program(self, sequence: ManifestSequence) -> FrameProgram:
-        """Return the program of the axis in a device.
-
-        Raises
-        ------
-        ValueError, OverflowError
-            If no device plays it.
-        """
-        words, second, gains, ratios, slow = (
-            np.array(each, dtype=np.int64)
-            for each in (self.words, self.second, self.gains.words, self.ratios.words, self.slow.words)
-        )
-        fast = Program(RationalPhase(sequence.line_ticks), 1, "cubic", self.bits, words, self.output.output)
-        return FrameProgram(
-            fast,
-            sequence.frame_lines,
-            Knots(gains, self.gains.spacing),
-            Knots(ratios, self.ratios.spacing),
-            second,
-            SlowTable(slow, self.slow.gain_word, self.slow.offset_word),
-        )
-
-
-class TurnedZ(TurnedAxisFields, forbid_unknown_fields=True):
-    """The output z: its slopes, nm of z for each nm along x and y, and the nm of z for a volt at its piezo."""
-
-    slope_x: float
-    slope_y: float
-    nm_per_v: float
 
 
 class TurnedAxes(Struct, forbid_unknown_fields=True):
@@ -100,18 +35,11 @@ class TurnedFields(Struct):
     z: TurnedZ | None = None
 
 
-class TurnedCodes(Struct):
-    """The codes of an axis by the certificate: the least, the greatest, and the largest step of a tick."""
-
-    least: int
-    most: int
-    steepest: int
-
-
 class TurnedFigures(Struct):
     """The part of the certificate that follows from the integers alone."""
 
     codes: dict[Literal["x", "y", "z"], TurnedCodes]
+    z: TiltFigures | None = None
 
 
 class TurnedManifest(Struct, kw_only=True):
@@ -217,6 +145,4 @@ def parse_turned(content: bytes) -> StoredTurned:
         raise DamagedManifest([str(error)]) from None
     if (why := why_not_a_name(manifest.name)) is not None:
         raise DamagedManifest([f"name: {why}"])
-    if z is not None and manifest.formats != ["c"]:
-        raise DamagedManifest(["formats: a scan with the output z has the format c alone"])
     return StoredTurned(manifest, program, plain, z)

@@ -7,10 +7,9 @@ from typing import Any
 from msgspec import structs
 
 from tablegen.certificate.turned_errors import TurnedCertificate
-from tablegen.manifest.record import output_record, sequence_record
+from tablegen.manifest.record import frame_axis_record, sequence_record, tilt_record
 from tablegen.manifest.write import readable
-from tablegen.planning.tilt import TiltedOutput
-from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan
+from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.version import __version__
 
 
@@ -26,8 +25,8 @@ def turned_record(plan: TurnedPlan) -> dict[str, Any]:
             "size_nm": list(geometry.size_nm),
             "coupling": [geometry.x_per_y, geometry.y_per_x],
             "drift_nm_per_s": list(geometry.drift_nm_per_s),
-            "axes": {axis.axis: _axis(axis) for axis in plan.axes},
-            **({} if plan.z is None else {"z": _z(plan.z)}),
+            "axes": {axis.axis: frame_axis_record(axis.motion, axis.program, axis.converter) for axis in plan.axes},
+            **({} if plan.z is None else {"z": tilt_record(plan.z)}),
         },
     }
 
@@ -72,28 +71,4 @@ def certificate_record(certificate: TurnedCertificate) -> dict[str, Any]:
         "errors": errors,
         "codes": codes if z is None else codes | {"z": structs.asdict(z.codes)},
         **({"z": of_z} if of_z else {}),
-    }
-
-
-def _z(z: TiltedOutput) -> dict[str, Any]:
-    slopes = {"slope_x": z.slope_x, "slope_y": z.slope_y, "nm_per_v": z.nm_per_v}
-    return slopes | _axis(z)
-
-
-def _axis(axis: TurnedAxis | TiltedOutput) -> dict[str, Any]:
-    program = axis.program
-    return {
-        "fast_nm": axis.motion.fast_nm,
-        "slow_nm": axis.motion.slow_nm,
-        "bits": program.fast.bits,
-        "words": program.fast.words.tolist(),
-        "second": program.second.tolist(),
-        "gains": {"spacing": program.gains.spacing, "words": program.gains.words.tolist()},
-        "ratios": {"spacing": program.ratios.spacing, "words": program.ratios.words.tolist()},
-        "slow": {
-            "gain_word": program.slow.gain_word,
-            "offset_word": program.slow.offset_word,
-            "words": program.slow.words.tolist(),
-        },
-        "output": output_record(program.output, axis.converter),
     }

@@ -3,14 +3,17 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.manifest.read import DamagedManifest, parse_manifest
-from tablegen.manifest.record import certificate_record
+from tablegen.manifest.record import certificate_record, tilt_certificate_record
 from tablegen.version import __version__
+
+if TYPE_CHECKING:
+    from tablegen.planning.tilt import TiltErrors
 
 _json = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode  # one, for there are hundreds of values
 
@@ -30,10 +33,12 @@ def manifest_file(
     certificates: dict[str, Certificate],
     files: Mapping[str, bytes],
     clocks_per_tick: int = 0,
+    z: "TiltErrors | None" = None,
 ) -> bytes:
     """Write the plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
 
     ``formats`` stand in it unless they are those that a build has by default, ``clocks_per_tick`` unless it is 0.
+    ``z`` are the errors of the output z, where the scan has one.
     ``require_readable`` belongs before the disk.
     """
     axes = {
@@ -43,11 +48,12 @@ def manifest_file(
     manifest = {
         "tablegen": __version__,
         "hash": digest,
-        **{key: value for key, value in record.items() if key != "axes"},
+        **{key: value for key, value in record.items() if key not in ("axes", "z")},
         **({"formats": list(formats)} if sorted(formats) != sorted(DEFAULT_FORMATS) else {}),
         **({"clocks_per_tick": clocks_per_tick} if clocks_per_tick else {}),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
         "axes": axes,
+        **({} if z is None else {"z": {**record["z"], "certificate": tilt_certificate_record(z)}}),
     }
     return (readable(manifest) + "\n").encode("ascii")
 

@@ -34,7 +34,9 @@ from tablegen.planning.waveforms import make_waveforms
 from tablegen.waveform.series import FourierSeries
 
 if TYPE_CHECKING:
+    from tablegen.device.dual_program import ScanProgram
     from tablegen.planning.table_costs import PlayedTable
+    from tablegen.planning.tilt import TiltedOutput
 
 MIXED = (
     "a scan at an angle, on coupled axes or with drift is for `check`, `show`, `build` with the formats c and "
@@ -43,8 +45,8 @@ MIXED = (
 )
 
 TILTED = (
-    "a scan with the output z is for `check`, `show`, `build` with the format c, `verify`, `tables`, `simulate`, "
-    "`correct` and `refine`; leave [z] out for anything else"
+    "a scan with the output z whose axes have operators is for `check`, `show`, `build` with the formats c and "
+    "verilog, `verify`, `tables`, `simulate`, `report`, `correct` and `refine`; leave [z] out for anything else"
 )
 
 
@@ -135,7 +137,7 @@ class LinePlan(Struct, frozen=True, eq=False):
 
 
 class Plan(Struct, frozen=True, eq=False):
-    """A whole build: both axes and their common schedule."""
+    """A whole build: both axes and their common schedule; ``z`` is the output beside them, where the scan has one."""
 
     name: str
     scanner: str
@@ -146,6 +148,7 @@ class Plan(Struct, frozen=True, eq=False):
     header_only: bool
     formats: tuple[str, ...] = DEFAULT_FORMATS
     clocks_per_tick: int = 0  # of an FPGA; 0: not known
+    z: "TiltedOutput | None" = None
 
     def __repr__(self) -> str:
         ticks, rate = self.schedule.ticks, float(self.schedule.line_rate)
@@ -174,6 +177,13 @@ class Plan(Struct, frozen=True, eq=False):
     def program(self) -> DualProgram:
         """The content of a bank of the device: the programs of both axes and their schedule."""
         return DualProgram(self.x.program, self.y.program, self.schedule)
+
+    @property
+    def program_of_z(self) -> "ScanProgram | None":
+        """What a second sequencer plays, whose x is z; None without z."""
+        from tablegen.device.beside import program_beside  # here: most scans have no z
+
+        return None if self.z is None else program_beside(self.z.program, self.schedule)
 
 
 def make_plan(setup: Setup, sines: bool = False) -> Plan:
@@ -229,7 +239,7 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
     clocks = clocks_per_tick(setup, schedule, (x.program, y.program), problems)
     problems.stop_if_any()
     scan = setup.scan
-    return Plan(
+    plan = Plan(
         scan.name,
         setup.scanner.name,
         schedule,
@@ -240,6 +250,12 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         default_formats(scan),
         clocks,
     )
+    if scan.z is not None:
+        from tablegen.planning.straight_tilt import plan_straight_z  # here: most scans have no z
+
+        sizes_nm = x.drive.size_nm, y.drive.size_nm
+        plan = replace(plan, z=plan_straight_z(setup, schedule, sizes_nm, x.series.harmonics))
+    return plan
 
 
 def _within_cost(

@@ -18,8 +18,9 @@ _HARMONICS = "a sine has one harmonic of the drive; leave this out, or take moti
 
 
 def default_formats(scan: Scan) -> tuple[str, ...]:
-    """Return the formats of a build: as written, or those that play its motion."""
-    return tuple(scan.emit.formats or (DEFAULT_FORMATS if scan.x.motion == "line" else _DEFAULT_PIXEL_FORMATS))
+    """Return the formats of a build: as written, or those that play its motion, and its output z."""
+    usual = scan.x.motion == "line" and scan.z is None
+    return tuple(scan.emit.formats or (DEFAULT_FORMATS if usual else _DEFAULT_PIXEL_FORMATS))
 
 
 def with_motion(setup: Setup, motion: Literal["line", "sine"]) -> Setup:

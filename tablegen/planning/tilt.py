@@ -1,6 +1,6 @@
 """Plan the output z of a scan on a tilted sample: a share of both motions, on a piezo that is taken as linear."""
 
-import dataclasses
+from functools import cached_property
 from math import floor
 
 import numpy as np
@@ -20,13 +20,33 @@ from tablegen.fixedpoint.frame_words import FrameParts, quantise_frame
 from tablegen.fixedpoint.output import Output
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.numerics.driver import Driver
+from tablegen.planning.frame_motion import frame_motion
 from tablegen.waveform.series import FourierSeries
 
 _SAMPLES = 512  # of a line, at which the reach of z is taken
 _LEAST_STEPS = 0.5  # of a code a tick, where a slew rate allows fewer than two
 
 
-class TiltedOutput(Struct, frozen=True, eq=False):
+class CodeRange(Struct, frozen=True):
+    """The range of an output's codes in a frame, and the largest step of a tick, with what shaping can add."""
+
+    least: int
+    most: int
+    steepest: int
+
+
+class TiltErrors(Struct, frozen=True):
+    """The output z: the largest distance of a code from the wanted height at the imaged ticks, in LSB and in nm.
+
+    ``codes`` are those of a frame.
+    """
+
+    error_lsb: float
+    error_nm: float
+    codes: CodeRange
+
+
+class TiltedOutput(Struct, frozen=True, eq=False, dict=True):
     """The output z: its slopes on the sample, its share of both motions, and its integers.
 
     ``offset`` is the code in the centre of the scan, as a real number.
@@ -44,9 +64,21 @@ class TiltedOutput(Struct, frozen=True, eq=False):
         """Return the codes, as real numbers, of the wanted heights at phases of lines, broadcast."""
         return np.asarray(self.offset + self.motion.wanted_nm(lines, t) / (self.nm_per_v * self.converter.v_per_code))
 
+    @cached_property
+    def errors(self) -> TiltErrors:
+        """The errors of its integers at all imaged ticks of a frame."""
+        program, ticks = self.program, self.program.fast.phase.ticks
+        t = (np.arange(ticks) + 0.5) / ticks
+        inside, worst = np.flatnonzero(self.motion.inside(t)), 0.0
+        for line in np.flatnonzero(self.motion.imaged).tolist():
+            codes = program.output.clamp(program.at(line, inside))
+            worst = max(worst, float(np.max(np.abs(codes - self.wanted_codes(np.array(line), t[inside])))))
+        in_nm = worst * abs(self.converter.v_per_code * self.nm_per_v)
+        return TiltErrors(worst, in_nm, CodeRange(*played_extremes(program)))
+
 
 def plan_tilt(
-    setup: Setup, schedule: Schedule, x_motion: FrameMotion, shares: tuple[float, float], problems: Problems
+    setup: Setup, schedule: Schedule, harmonics: int, shares: tuple[float, float], problems: Problems
 ) -> TiltedOutput | None:
     """Plan the output z; None where ``problems`` grew.
 
@@ -54,8 +86,8 @@ def plan_tilt(
     ----------
     setup
         A scan and a scanner that both have z.
-    x_motion
-        The motion of another axis of this scan.
+    harmonics
+        Those of its line.
     shares
         The nm that z moves along the line and along the frame, from x = 0 to 1 of each.
     """
@@ -68,7 +100,7 @@ def plan_tilt(
     if len(problems.entries) > before:
         return None
     centre, offset = driver.share(tilt.offset_v), converter.code(tilt.offset_v)
-    motion = dataclasses.replace(x_motion, fast_nm=shares[0], slow_nm=shares[1], centre=centre, layer=None)
+    motion = frame_motion(setup, schedule, harmonics, centre, *shares)
     slow, fast = linear_frame(motion, piezo.nm_per_v * driver.span)
     park_v = tilt.offset_v if tilt.park_v is None else tilt.park_v
     output = make_output(replace(hardware.dac, output=None), converter, driver, park_v)

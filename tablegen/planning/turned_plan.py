@@ -26,9 +26,10 @@ from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.converter import Converter, make_output
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.fixedpoint.frame_words import FrameParts, FrameShape, quantise_frame
-from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
 from tablegen.planning.frame_costs import PlayedFrame, frame_costs
+from tablegen.planning.frame_motion import frame_motion
 from tablegen.planning.frame_refinement import learnt_frame_layer
 from tablegen.planning.frame_tables import (
     CostLimit,
@@ -43,8 +44,6 @@ from tablegen.planning.tilt import TiltedOutput, plan_tilt
 from tablegen.waveform.series import FourierSeries
 
 KNOTS = 16  # intervals of gain and ratio over a frame
-_MOST_SLOW_HARMONICS = 24
-_LINES_PER_HARMONIC = 3
 _SAMPLES = 256  # of a line, at which the stroke of a drive is taken
 _FIRST_GUESS = 0.85  # of the room by the first guess of a drive that cannot be learnt: it overshoots less in the turns
 
@@ -213,7 +212,8 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     axes = {}
     for line in straight.lines:
         progress(f"learning a frame of {schedule.lines} lines on the operator of {line.axis}")
-        motion = _motion(setup, straight, line, *shares[line.axis])
+        centre = line.drive.driver.share(line.drive.v_offset)
+        motion = frame_motion(setup, schedule, straight.x.series.harmonics, centre, *shares[line.axis])
         motion = dataclasses.replace(motion, layer=learnt_frame_layer(setup, line, motion, problems))
         problems.stop_if_any()
         axes[line.axis] = _axis(setup, straight, line, known[line.axis], motion, problems)
@@ -298,10 +298,9 @@ def plan_z(setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Prob
     tilt = setup.scan.z
     if tilt is None:
         return None
-    motion = _motion(setup, straight, straight.x, *geometry.shares["x"])
     with problems.at(setup.scan_file, "z"):
         shares = geometry.on_a_plane(tilt.slope_x, tilt.slope_y)
-        return plan_tilt(setup, straight.schedule, motion, shares, problems)
+        return plan_tilt(setup, straight.schedule, straight.x.series.harmonics, shares, problems)
     return None
 
 
@@ -334,25 +333,6 @@ def _at_0_degrees(setup: Setup) -> Setup:
         y=replace(setup.scan.y, frame_refinement=None, table=y_table),
     )
     return replace(setup, scan=scan, scanner=replace(setup.scanner, coupling=Coupling()))
-
-
-def _motion(setup: Setup, plan: Plan, line: LinePlan, fast_nm: float, slow_nm: float) -> FrameMotion:
-    schedule, x, y = plan.schedule, setup.scan.x, setup.scan.y
-    lines = np.arange(schedule.lines)
-    imaged: Bools = np.array([at in schedule.up or at in schedule.down for at in lines.tolist()], dtype=np.bool_)
-    return FrameMotion(
-        fast_nm=fast_nm,
-        slow_nm=slow_nm,
-        fast_turn=x.turn,
-        fast_window=x.band_limit.window,
-        both=x.band_limit.directions == "both",
-        slow_turn=y.turn,
-        imaged=imaged,
-        line_rate_hz=float(schedule.line_rate),
-        harmonics=plan.x.series.harmonics,
-        slow_harmonics=max(1, min(_MOST_SLOW_HARMONICS, schedule.lines // _LINES_PER_HARMONIC)),
-        centre=line.drive.driver.share(line.drive.v_offset),
-    )
 
 
 def _axis(

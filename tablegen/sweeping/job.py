@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build
+from tablegen.base.input_errors import Rejected
 from tablegen.base.interruption import ENDINGS, defer_signals
 from tablegen.base.reading import holds
 from tablegen.config.load import Setup
@@ -70,6 +71,9 @@ def build_program(job: Job) -> BuiltProgram:
     CannotWrite
         If its files cannot be written.
     """
+    if job.setup.scan.z is not None:
+        why = "a library plays no output z; build this scan alone, or leave [z] out"
+        raise Rejected([job.setup.scan_file.problem("z", why)])
     built = build(job.setup, formats=job.formats)
     warnings = built.warnings
     if job.strict and warnings:

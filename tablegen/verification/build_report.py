@@ -22,6 +22,7 @@ from tablegen.verification.checks.listing import (
     written_files,
 )
 from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.checks.tilt import wrong_tilt
 from tablegen.verification.play.session import BuildSession, needed_ticks
 from tablegen.version import __version__
 
@@ -156,6 +157,9 @@ def verify_build(
     progress("measuring the certificate")
     certificates = check_certificates(stored, same, folder)
     checks += watch.timed(certificates.checks)
+    if stored.z is not None:
+        count, wrong = wrong_tilt(stored, stored.z)
+        checks += watch.timed([differing_check("z", "its plane, certificate", f"{count} codes", wrong)])
     outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
     checks += watch.timed(outcome.checks)
     if not same and other_version:

@@ -1,41 +1,31 @@
 """Verify a build of a scan at an angle: its files, its certificate, and what its C or its Verilog plays."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import dropwhile, zip_longest
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from tablegen.base.input_errors import Unphysical, shortened
 from tablegen.base.reading import BUILD_FILE, read_bytes
-from tablegen.device.dual_program import AxisProgram, ScanProgram
-from tablegen.device.sequencer import Sequencer, Tick
+from tablegen.device.dual_program import AxisProgram
 from tablegen.emit.turned import require_format, turned_files, turned_options, turned_runtime
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import StoredTurned, read_turned
-from tablegen.numerics.arrays import Ints
 from tablegen.verification.build_report import Report, Stopwatch, differing_check
 from tablegen.verification.c.bench import require_compiler
+from tablegen.verification.c.frame_play import frame_checks
 from tablegen.verification.c.host import host_compiler
-from tablegen.verification.c.play import compile_line, record, require_headers
-from tablegen.verification.c.program import OPTIONS
 from tablegen.verification.checks.directory import copies, wrong_digests
 from tablegen.verification.checks.played_checks import Check
-from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.play.stream import FLAGS
 from tablegen.verification.verilog.simulate import require
 from tablegen.verification.verilog.turned_play import TurnedPlay
 from tablegen.version import __version__
 
-_BENCH = Path(__file__).parent / "c" / "frame_bench.c"
-_REST = 5  # ticks before the scan
 _FRAMES = 2
 _MOST_TICKS = {"c": 3_000_000, "icarus": 3_000, "verilator": 30_000}  # unless they are given
-_TICK = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1"), ("faults", "u1")])
-_LEAST_TICKS_A_SECOND = 5000  # a slower program counts as hanging
 
 
 def verify_turned(
@@ -97,7 +87,14 @@ def verify_turned(
             played, difference = _played_checks(folder, work, stored, ticks)
         else:
             progress(f"{simulator} plays {ticks} ticks")
-            played = TurnedPlay(_content_of(stored), ticks).checks(folder, work / "verilog", simulator)
+            content = _content_of(stored)
+            played = TurnedPlay(content, ticks).checks(folder, work / "verilog", simulator)
+            if (of_z := content.content_of_z) is not None:
+                progress(f"{simulator} plays {ticks} ticks of z")
+                played += [
+                    replace(check, subject=f"{check.subject}, z")
+                    for check in TurnedPlay(of_z, ticks).checks(folder, work / "verilog_z", simulator)
+                ]
         checks += watch.timed(played)
     return Report(manifest.name, checks, difference, notes, watch.seconds)
 
@@ -223,101 +220,8 @@ def _played_checks(folder: Path, work: Path, stored: StoredTurned, ticks: int) -
     checks, differences = [], []
     for label, each in (("c", content), ("c, z", content.content_of_z)):
         if each is not None:
-            played, difference = _checks_of(label, each, files, turned_options(stored.program, stored.z), work, ticks)
+            options = turned_options(stored.program, stored.z)
+            played, difference = frame_checks(label, each.name, each.program, files, options, work, ticks)
             checks += played
             differences.append(difference)
     return checks, next(filter(None, differences), None)
-
-
-def _checks_of(
-    label: str, content: TurnedContent, files: list[Path], options: dict[str, int], work: Path, ticks: int
-) -> tuple[list[Check], str | None]:
-    """Compile the runtime with the program of one sequencer, and compare what it plays with the model."""
-    outputs = content.program.x.output, content.program.y.output
-    parked = 2 * (1 << max(each.dac_bits for each in outputs)) // min(each.max_step for each in outputs)
-    parked = min(parked + 10, ticks)
-    expected = _model(content.program, ticks, parked)
-    checks, difference = [], None
-    try:
-        program = _compiled(content.name, files, options, work)
-        for way in ("steps", "fills"):
-            capture = work / f"{way}.bin"
-            timeout = 60.0 + (ticks + parked) / _LEAST_TICKS_A_SECOND
-            most = 2 * _TICK.itemsize * len(expected) + 1000
-            record([str(program), way, str(ticks), str(parked)], b"", capture, most, timeout)
-            played = np.frombuffer(read_bytes(capture, BUILD_FILE), dtype=_TICK)
-            differs, what = _first_difference(played, expected, way), f"{label}, {way}"
-            difference = difference or differs
-            failure = differs and f"{what}: {differs}"
-            checks.append(Check(what, "the model", f"{len(expected)} ticks", failure=failure))
-    except SimulationFailed as error:
-        checks.append(Check(label, "the model", f"{len(expected)} ticks", failure=f"{label}: {error}"))
-    return checks, difference
-
-
-def _compiled(name: str, files: list[Path], options: dict[str, int], work: Path) -> Path:
-    compiler = require_compiler(host_compiler())
-    macros = {
-        **options,
-        "BENCH_PROGRAM_HEADER": f'"{name}_program.h"',
-        "BENCH_PROGRAM": f"{name}_program",
-        "BENCH_X_CONVERTER": f"{name}_x_converter",
-        "BENCH_Y_CONVERTER": f"{name}_y_converter",
-    }
-    program = work / "frame_bench"
-    sources = [str(path) for path in files if path.suffix == ".c"]
-    line = [*compiler, *OPTIONS, "-w", *(f"-D{key}={value}" for key, value in macros.items()), f"-I{files[0].parent}"]
-    try:
-        compile_line([*line, *sources, str(_BENCH), "-o", str(program)])
-    except SimulationFailed:
-        require_headers(compiler)
-        raise
-    return program
-
-
-def _model(program: ScanProgram, ticks: int, parked: int) -> Ints:
-    """Return what the integer model plays: rows of converter words of x and y, markers, and faults."""
-    model = Sequencer(None)
-    outputs = program.x.output, program.y.output
-    parts: list[Ints] = []
-
-    def put(tick: Tick) -> None:
-        markers = sum(1 << bit for bit, flag in enumerate(FLAGS) if getattr(tick, flag))
-        words = outputs[0].word(tick.x), outputs[1].word(tick.y)
-        parts.append(np.array([[*words, markers, tick.faults.value]], dtype=np.int64))
-
-    for _ in range(_REST):
-        put(model.step())
-    model.commit(program)
-    model.arm()
-    model.trigger()
-    left = ticks
-    while left:
-        ahead = model.ahead(left)
-        if ahead is None:
-            put(model.step())
-            left -= 1
-            continue
-        line, faults = ahead
-        markers = np.full(len(faults), 1 << FLAGS.index("playing"), dtype=np.int64)
-        for flag in ("line", "frame", "pixel", "backward", "valid"):
-            markers += getattr(line, flag) * (1 << FLAGS.index(flag))
-        parts.append(np.stack([outputs[0].word(line.x), outputs[1].word(line.y), markers, faults], axis=1))
-        left -= len(faults)
-    model.park()
-    for _ in range(parked):
-        put(model.step())
-    return np.concatenate(parts)
-
-
-def _first_difference(played: np.ndarray, expected: Ints, way: str) -> str | None:
-    if len(played) != len(expected):
-        return f"{len(played)} ticks were played, not {len(expected)}"
-    for at, key in enumerate(("x", "y", "markers", "faults")):
-        if key == "faults" and way == "fills":  # those of the status, after as many ticks as a fill has
-            continue
-        different = np.flatnonzero(played[key].astype(np.int64) != expected[:, at])
-        if len(different):
-            tick = int(different[0])
-            return f"{key} of tick {tick} is {played[key][tick]}, {expected[tick, at]} by the model"
-    return None

@@ -4,7 +4,7 @@ from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
-from editing import edited
+from editing import SCAN, SCANNER, edited, write_pair
 from turned_scans import write_turned
 
 from tablegen.numerics.arrays import Floats, Ints
@@ -22,6 +22,12 @@ def write_tilted(folder: Path, angle_deg: float, *edits: str, scanner: tuple[str
     file = folder / "scanner.toml"
     file.write_text(edited(file.read_text("utf-8"), *scanner), "utf-8")
     return path
+
+
+def write_straight(folder: Path, *edits: str) -> Path:
+    """Write the same frame at 0 degrees on the paper's scanner, whose axes are corrected by laws alone."""
+    sizes = (f"x.size_nm = {SIZE_NM}", f"y.size_nm = {SIZE_NM}", "y.band_limit.harmonics = 16", "- [limits]")
+    return write_pair(folder, edited(SCAN, *SHORT, *sizes, Z, *edits), edited(SCANNER, OF_SCANNER))
 
 
 def triangle(phase: Floats, turn: float) -> Floats:

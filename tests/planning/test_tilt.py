@@ -18,16 +18,17 @@ from tilted_scans import (
     fitted_plane,
     volts_of,
     wanted_places,
+    write_straight,
     write_tilted,
 )
 
 from tablegen.base.input_errors import Problems, Rejected
-from tablegen.certificate.turned_errors import tilt_errors
+from tablegen.certificate.certified_scan import certify_scan
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import make_plan
 from tablegen.planning.tilt import TiltedOutput
-from tablegen.planning.turned_plan import FrameGeometry, plan_z
+from tablegen.planning.turned_plan import FrameGeometry, make_turned_plan, plan_z
 
 LSB_NM = NM_PER_V * 100.0 / 65536.0
 
@@ -56,17 +57,24 @@ def planned(path: Path) -> TiltedOutput:
     return z
 
 
-@pytest.mark.parametrize("angle_deg", [0.0, 30.0])
-def test_the_codes_are_on_the_plane(angle_deg: float, tmp_path: Path) -> None:
+def straight(path: Path) -> TiltedOutput:
+    """The output z of a scan without an operator."""
+    z = make_plan(load(path)).z
+    assert z is not None
+    return z
+
+
+@pytest.mark.parametrize(("angle_deg", "operators"), [(0.0, True), (30.0, True), (0.0, False)])
+def test_the_codes_are_on_the_plane(angle_deg: float, operators: bool, tmp_path: Path) -> None:
     """At every imaged tick within an LSB; the plane through them has the slopes, and swapped ones are far off."""
-    z = planned(write_tilted(tmp_path, angle_deg))
+    z = planned(write_tilted(tmp_path, angle_deg)) if operators else straight(write_straight(tmp_path))
     assert z.program.lines == LINES
     lines, ticks, t = imaged(z)
     x_nm, y_nm = wanted_places(angle_deg, lines, t)
     z_nm = heights(z, lines, ticks)
     error = np.abs(z_nm - NM_PER_V * OFFSET_V - SLOPE_X * x_nm - SLOPE_Y * y_nm)
     assert np.max(error) < 1.5 * LSB_NM
-    assert np.max(error) == pytest.approx(tilt_errors(z).error_nm, rel=1e-6)
+    assert np.max(error) == pytest.approx(z.errors.error_nm, rel=1e-6)
     slope_x, slope_y, centre = fitted_plane(x_nm, y_nm, z_nm)
     assert max(abs(slope_x - SLOPE_X), abs(slope_y - SLOPE_Y)) * SIZE_NM < 0.2 * LSB_NM
     assert abs(centre - NM_PER_V * OFFSET_V) < 0.2 * LSB_NM
@@ -89,7 +97,7 @@ def test_a_window_off_the_middle_a_falling_piezo_and_a_level(tmp_path: Path) -> 
     edits = ("x.band_limit.window = [0.1, 0.7]", "x.turn = 0.6", "timing.pixels = 40")
     z = planned(write_tilted(tmp_path, 0.0, *edits, scanner=(own,)))
     assert z.program.output.dac_bits == 18
-    assert tilt_errors(z).error_nm < 2.0 * LSB_NM
+    assert z.errors.error_nm < 2.0 * LSB_NM
     level = planned(write_tilted(tmp_path, 0.0, "z.slope_x = 0", "z.slope_y = 0"))
     assert np.max(np.abs(volts_of(level.program.frame()) - OFFSET_V)) < 1e-3
 
@@ -160,6 +168,42 @@ def test_a_slew_rate_of_z_says_what_fits(tmp_path: Path) -> None:
     assert planned(path).offset > 0.0
 
 
+@pytest.mark.common
+def test_z_of_a_line_scan_follows_x_alone(tmp_path: Path) -> None:
+    """y rests in the wanted place 0, whatever its slope is."""
+    tables = ("- y.size_nm", "- y.turn", "- [y.band_limit]", "- [y.table]", "y.motion = 'off'")
+    z = straight(write_straight(tmp_path, *tables))
+    lines, ticks, t = imaged(z)
+    x_nm, _ = wanted_places(0.0, lines, t)
+    assert np.max(np.abs(heights(z, lines, ticks) - NM_PER_V * OFFSET_V - SLOPE_X * x_nm)) < 1.5 * LSB_NM
+
+
+@pytest.mark.parametrize(
+    ("edits", "says"),
+    [
+        (
+            ("y.motion = 'step'", "y.band_limit.harmonics = 8", "- amplifier.max_slew_v_per_s"),
+            "y.motion: z follows y on every tick; take 'ramp'",
+        ),
+        (("+ [emit]\nheader_only = true",), "emit.header_only: the program of z has files of its own"),
+        (("z.slope_y = -0.9",), "z.slope_y: the tilt leaves the 0..99.9985 V of z; the largest that fits here is"),
+        (("angle_deg = 30.0",), "x.hysteresis: is no operator"),
+    ],
+)
+def test_a_scan_without_an_operator_that_z_cannot_follow(edits: tuple[str, ...], says: str, tmp_path: Path) -> None:
+    path = write_straight(tmp_path, *edits)
+    setup = load(path)
+    with pytest.raises(Rejected, match=re.escape(says)):
+        make_turned_plan(setup) if setup.mixes_motions else make_plan(setup)
+
+
+def test_a_limit_of_the_scan_file_holds_for_z(tmp_path: Path) -> None:
+    """A steep tilt takes z further off than x and y are."""
+    path = write_straight(tmp_path, "z.slope_x = 0.2", "+ [limits]\nmax_error_lsb = 0.9")
+    (problem,) = certify_scan(load(path), remedies=False).broken
+    assert re.match(r"z errs by up to \d\.\d+ LSB, above 0\.9", problem.why), problem
+
+
 def test_a_plan_of_one_table_refuses_z(tmp_path: Path) -> None:
-    with pytest.raises(Rejected, match=r"z: a scan with the output z is for `check`"):
+    with pytest.raises(Rejected, match=r"z: a scan with the output z whose axes have operators is for `check`"):
         make_plan(load(write_tilted(tmp_path, 0.0)))

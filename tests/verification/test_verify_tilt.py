@@ -22,15 +22,25 @@ from tilted_scans import (
     fitted_plane,
     volts_of,
     wanted_places,
+    write_straight,
     write_tilted,
 )
 
+import tablegen
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.emit.runtime_config import options_of_builds
 from tablegen.emit.turned import turned_options
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.html_report.blocks import Grid, Section
+from tablegen.html_report.page import charts_of, sections
+from tablegen.html_report.subject import of_directory
+from tablegen.html_report.tilt import ShownTilt, tilt_section
+from tablegen.html_report.turned_page import turned_sections
+from tablegen.html_report.turned_subject import turned_directory
 from tablegen.link.errors import Unsuitable
 from tablegen.manifest.format import content_hash
-from tablegen.manifest.turned import read_turned
+from tablegen.manifest.read import read_build
+from tablegen.manifest.turned import parse_any, read_turned
 from tablegen.verification.run import verify
 
 ANGLE, NAME = 30.0, "annexin_200nm"
@@ -53,6 +63,14 @@ def built(scan: Path) -> TurnedBuild:
 def build(scan: Path, built: TurnedBuild) -> Path:
     """The folder of its build."""
     return scan.parent / ("out" if built.name == NAME else "")
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The build of the same frame at 0 degrees, without an operator."""
+    folder = tmp_path_factory.mktemp("straight")
+    tablegen.build(write_straight(folder), folder / "out")
+    return folder / "out"
 
 
 def edit(folder: Path, name: str, old: str, new: str) -> None:
@@ -100,7 +118,7 @@ def test_a_changed_word_is_heard(file: str, old: str, new: str, says: str, build
     assert any(failure.startswith("c, z") for failure in failures) == says.startswith("c, z")
 
 
-def change(*keys: str | int, by: int = 1) -> Callable[[Path], None]:
+def change(*keys: str | int, by: float = 1) -> Callable[[Path], None]:
     """Change a number of the manifest."""
 
     def do(folder: Path) -> None:
@@ -132,11 +150,14 @@ def test_tampering_is_found_in_the_files(
 
 
 @pytest.mark.common
-def test_two_sequencers_stay_together_and_z_is_on_the_plane(build: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("angle_deg", [ANGLE, 0.0])
+def test_two_sequencers_stay_together_and_z_is_on_the_plane(
+    angle_deg: float, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     """Markers are on the same ticks; the plane through the words of the imaged ticks has the slopes."""
-    stored = read_turned(build)
-    schedule, sources = stored.program.schedule, sorted(build.glob("*.c"))
-    options = [f"-D{key}={value}" for key, value in turned_options(stored.program, stored.z).items()]
+    build: Path = request.getfixturevalue("build" if angle_deg else "straight")
+    schedule, sources = parse_any((build / "manifest.json").read_bytes()).program.schedule, sorted(build.glob("*.c"))
+    options = [f"-D{key}={value}" for key, value in options_of_builds([build])[NAME].items()]
     program = tmp_path / "two_sequencers"
     code = Path(__file__).with_name("two_sequencers.c")
     own = [path for path in sources if not path.name.startswith(("dac_link", "dac_store"))]
@@ -148,9 +169,10 @@ def test_two_sequencers_stay_together_and_z_is_on_the_plane(build: Path, tmp_pat
     valid = (rows[frame:, 1] & rows[frame:, 2] & VALID).reshape(LINES, -1) != 0
     assert np.count_nonzero(valid) > 0.5 * frame
     line, tick = np.nonzero(valid)
-    x_nm, y_nm = wanted_places(ANGLE, line, (tick + 0.5) / schedule.ticks)
-    slope_x, slope_y, centre = fitted_plane(x_nm, y_nm, NM_PER_V * volts_of(rows[frame:, 0].reshape(LINES, -1)[valid]))
-    lsb_nm = NM_PER_V * 100.0 / 65536.0
+    x_nm, y_nm = wanted_places(angle_deg, line, (tick + 0.5) / schedule.ticks)
+    z_nm, lsb_nm = NM_PER_V * volts_of(rows[frame:, 0].reshape(LINES, -1)[valid]), NM_PER_V * 100.0 / 65536.0
+    assert np.max(np.abs(z_nm - NM_PER_V * OFFSET_V - SLOPE_X * x_nm - SLOPE_Y * y_nm)) < 1.5 * lsb_nm
+    slope_x, slope_y, centre = fitted_plane(x_nm, y_nm, z_nm)
     assert max(abs(slope_x - SLOPE_X), abs(slope_y - SLOPE_Y)) * SIZE_NM < 0.2 * lsb_nm
     assert abs(centre - NM_PER_V * OFFSET_V) < 0.2 * lsb_nm
 
@@ -165,9 +187,7 @@ def test_the_summary_has_a_row_of_z(built: TurnedBuild) -> None:
 @pytest.mark.common
 def test_what_does_not_take_z_says_so(scan: Path, built: TurnedBuild, build: Path, tmp_path: Path) -> None:
     refusals = {
-        ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: the Verilog sequencer plays no output z",
-        ("report", scan, "-o", tmp_path / "page.html"): "z: `report` and `compare` show no scan with the output z",
-        ("compare", build, scan): "out: `report` and `compare` show no scan with the output z",
+        ("compare", build, scan): "out: `compare` takes no scan with the output z",
         ("upload", build, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", build, "--target", "cortex-m"): "which no emulator plays",
     }
@@ -179,3 +199,113 @@ def test_what_does_not_take_z_says_so(scan: Path, built: TurnedBuild, build: Pat
     assert not list(tmp_path.iterdir())
     with pytest.raises(Unsuitable, match=f"{NAME}: the link sends no output z"):
         built.prepared.image()
+
+
+@pytest.mark.common
+def test_a_build_without_an_operator_is_verified(straight: Path) -> None:
+    report = verify(straight)
+    assert report.failures == []
+    assert {"z", "c z", "c, z, steps", "c, z, fills"} < {check.subject for check in report.checks}
+    stored = read_build(straight)
+    assert stored.z is not None
+    assert stored.z.certificate.error_lsb < 1.5
+    assert {"DAC_SLOW_PART": 1, "DAC_SPLINE": 1}.items() <= options_of_builds([straight])[NAME].items()
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(
+    ("keys", "by", "says"),
+    [
+        (("z", "slow", "words", 3), 1, "its plan does not match its hash"),
+        (("z", "slow", "words", 3), 1, f"{NAME}_z.c: a line is"),
+        (("z", "words", 10), 300, "z: error_lsb of the certificate is"),
+        (("z", "certificate", "codes", "most"), 1, "z: codes"),
+        (("z", "certificate", "error_lsb"), 0.001, "z: error_lsb of the certificate is"),
+        (("z", "slope_x"), 0.001, "z: fast_nm is"),
+    ],
+)
+def test_tampering_without_an_operator_is_found(
+    keys: tuple[str | int, ...], by: float, says: str, straight: Path, tmp_path: Path
+) -> None:
+    copytree(straight, tmp_path / "out")
+    change(*keys, by=by)(tmp_path / "out")
+    failures = verify(tmp_path / "out", "files").failures
+    assert any(says in failure for failure in failures), failures
+
+
+@pytest.mark.rest
+def test_a_changed_word_of_z_is_heard_without_an_operator(straight: Path, tmp_path: Path) -> None:
+    """In what is played, and of z alone."""
+    copytree(straight, tmp_path / "out")
+    path = tmp_path / "out" / f"{NAME}_z.c"
+    text, count = re.subn(r"(_z_x_table\[\] = \{\n    (?:-?\d+, ){5})-?\d+", r"\g<1>77", path.read_text("ascii"))
+    assert count == 1
+    path.write_text(text, "ascii")
+    failures = verify(tmp_path / "out").failures
+    assert any(failure.startswith("c, z, steps: x of tick") for failure in failures), failures
+    assert not any(failure.startswith(("x:", "y:", "fill:", "program:")) for failure in failures), failures
+
+
+@pytest.mark.common
+def test_what_does_not_take_z_without_an_operator_says_so(straight: Path, tmp_path: Path) -> None:
+    scan = straight.parent / "scan.toml"
+    refusals = {
+        ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: 'verilog' plays no output z",
+        ("compare", straight, scan): "out: `compare` takes no scan with the output z",
+        ("upload", straight, "--port", tmp_path / "none"): "out: the link sends no output z",
+        ("verify", straight, "--target", "cortex-m"): "which no emulator plays",
+    }
+    for command, says in refusals.items():
+        outcome = run(*command)
+        assert outcome.status == 2, (command, outcome)
+        assert says in outcome.err, (command, outcome.err)
+    assert not list(tmp_path.iterdir())
+    built = tablegen.build(scan)
+    with pytest.raises(Unsuitable, match=f"{NAME}: the link sends no output z"):
+        built.prepared.image()
+    for text in (built.summary(), built.overview()):
+        assert "+0.02 of x and -0.05 of y, by 5 nm/V" in text
+    assert [chart.key for chart in built.charts().charts][-1] == "z_frame"
+
+
+def rows_of(section: Section) -> dict[str, list[str]]:
+    """The rows of a section's table by their names."""
+    (grid,) = (block for block in section.blocks if isinstance(block, Grid))
+    return {cells[0].text: [cell.text for cell in cells[1:]] for cells in grid.rows}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("operators", [True, False])
+def test_the_page_of_a_build_states_z(operators: bool, request: pytest.FixtureRequest) -> None:
+    """Its figures are those of a frame of the model, in volts by a formula of the tests."""
+    folder: Path = request.getfixturevalue("build" if operators else "straight")
+    if operators:
+        parts, beside = turned_sections(turned_directory(folder)), read_turned(folder).z
+    else:
+        parts, beside = sections(of_directory(folder)), read_build(folder).program_of_z
+    assert beside is not None
+    assert isinstance(beside.x, FrameProgram)
+    volts = volts_of(beside.x.frame())
+    below, above = float(np.min(volts)), 100.0 * 65535.0 / 65536.0 - float(np.max(volts))
+    rows = rows_of(next(part for part in parts if part.key == "z"))
+    assert rows["slope along x"][0] == "+0.02, +1.15 degrees"
+    assert rows["slope along y"][0] == "-0.05, -2.86 degrees"
+    assert rows["drive at the piezo"][0] == f"{np.min(volts):.6g}..{np.max(volts):.6g} V"
+    room = f"{above:.4g} V, {NM_PER_V * above:.4g} nm, from the highest voltage"
+    assert rows["room above"] == [room, "99.9985 V", "\u2713 within"]
+    room = f"{below:.4g} V, {NM_PER_V * below:.4g} nm, from the lowest voltage"
+    assert rows["room below"] == [room, "0 V", "\u2713 within"]
+    error, unit = rows["largest error at imaged ticks"][0].split()
+    assert 0.5 < float(error) < 1.5
+    assert unit == "LSB"
+    assert "z_frame" in charts_of(parts)
+
+
+@pytest.mark.common
+def test_the_page_shows_a_limit_that_z_exceeds(straight: Path) -> None:
+    stored = read_build(straight)
+    assert stored.z is not None
+    program, stated = stored.z.program(stored.manifest.sequence), stored.z.certificate
+    shown = ShownTilt(stored.z, program, stated.codes, stated.error_lsb, stated.error_nm)
+    for limit, says in ((1.5, "\u2713 within"), (0.5, "\u2717 exceeded")):
+        assert rows_of(tilt_section(shown, limit))["largest error at imaged ticks"][1:] == [f"{limit} LSB", says]

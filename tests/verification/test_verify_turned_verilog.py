@@ -12,6 +12,7 @@ import pytest
 from replacing import replace
 from sets import long
 from test_verify_turned import NAME, edit, signed, word
+from tilted_scans import write_tilted
 from turned_scans import turned_setup
 
 from tablegen.api.turned import TurnedBuild, build_turned
@@ -197,3 +198,31 @@ def test_a_target_that_the_build_has_not_is_named(planned: TurnedBuild, tmp_path
     with pytest.raises(NotABuild, match="has the formats verilog, and no c; verify it with another --target"):
         verify(tmp_path / "out", "c")
     assert "parameter CLOCKS_PER_TICK = 0," in (tmp_path / "out" / TOP).read_text("ascii")
+
+
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The build of the same frame with the output z, whose sequencer has a top of its own."""
+    folder = tmp_path_factory.mktemp("tilted")
+    path = write_tilted(folder, 30.0, *SMALL, f"+ [emit]\nformats = ['c', 'verilog']\nclock_hz = {CLOCKS * 9600}")
+    build_turned(path, folder / "out")
+    return folder / "out"
+
+
+def test_the_top_of_z_plays_a_frame_of_the_model(tilted: Path) -> None:
+    report = verify(tilted)
+    assert report.failures == []
+    assert subjects(report)[-4:] == ["verilog header", "top", "verilog header, z", "top, z"]
+    stored = read_turned(tilted)
+    assert stored.z is not None
+    assert stored.manifest.clocks_per_tick == CLOCKS >= least_slow_clocks(stored.z)
+    assert f"_CLOCKS_PER_TICK = 32'sd{CLOCKS};" in (tilted / f"{NAME}_z.vh").read_text("ascii")
+
+
+@pytest.mark.rest
+def test_a_changed_word_is_found_in_the_top_of_z_alone(tilted: Path, tmp_path: Path) -> None:
+    copytree(tilted, tmp_path / "out")
+    memory_word("z_slow", 70)(tmp_path / "out")
+    failures = [one for one in verify(tmp_path / "out", ticks=PART).failures if "_top.v: " in one]
+    assert len(failures) == 1
+    assert failures[0].startswith(f"{NAME}_z_top.v: write 70 of its boot is"), failures

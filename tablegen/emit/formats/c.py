@@ -1,15 +1,16 @@
 """C99 tables and constants, with the C sequencer and the device's end of the serial link."""
 
 import re
-from collections.abc import Mapping
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.base.resources import c_link, c_runtime, c_store, resource_folder
+from tablegen.emit.c_text import beyond_defaults, literal
 from tablegen.emit.constants import (
     LEAST_STORAGE_BITS,
     axis_constants,
@@ -21,6 +22,7 @@ from tablegen.emit.constants import (
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.templates import comment_safe, rows, template
+from tablegen.emit.turned_content import content_beside
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.program import Program
@@ -48,7 +50,7 @@ class C(Format):
         if not content.header_only:
             files[f"{content.name}.c"] = template("c/tables.c.j2", context, literal)
             files |= _program_files(context)
-        return files
+        return files if content.z is None else files | _files_of_z(content)
 
     def runtime(self) -> list[Path]:
         """List the files of the C sequencer and its link."""
@@ -68,19 +70,13 @@ class C(Format):
         ]
         if not content.header_only:
             comparisons.append(Comparison("program", "2 files", wrong_program(folder, content)))
+        if content.z is not None:
+            files = _files_of_z(content)
+            comparisons.append(Comparison("z", f"{len(files)} files", _unlike(folder, files)))
         return comparisons
 
 
 FORMAT = C()
-
-
-def literal(value: int) -> str:
-    """Spell an integer in C, of a type that holds it on every machine."""
-    if value > 0x7FFFFFFF or value < -0x7FFFFFFF:
-        return f"UINT32_C({value})" if 0 <= value <= 0xFFFFFFFF else f"INT64_C({value})"
-    if value > 32767 or value < -32767:  # an int has 16 bits on some microcontrollers
-        return f"INT32_C({value})"
-    return str(value) if value >= 0 else f"({value})"
 
 
 def arrays_file(content: Content) -> str:
@@ -101,11 +97,6 @@ def packaged_files(content: Content) -> list[str]:
 def runtime_options(content: Content) -> dict[str, int]:
     """Return the macros that the runtime and an application are compiled with, at the least values that will do."""
     return {f"DAC_{key}": value for key, value in (_storage(content) | shaping_constants(content)).items()}
-
-
-def beyond_defaults(options: Mapping[str, int]) -> dict[str, int]:
-    """Return the options above the defaults of a runtime, by their names without ``DAC_``."""
-    return {key: value for key, value in options.items() if not key.endswith("_BITS") or value > LEAST_STORAGE_BITS}
 
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
@@ -147,8 +138,13 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 def wrong_program(folder: Path, content: Content) -> list[str]:
     """Return where the files of the program differ from what a build of this content has, behind the banner."""
+    return _unlike(folder, _program_files(_context(content)))
+
+
+def _unlike(folder: Path, files: dict[str, bytes]) -> list[str]:
+    """Return where files of a folder differ from these, behind the banner."""
     wrong = []
-    for name, right in _program_files(_context(content)).items():
+    for name, right in files.items():
         try:
             text = read_text(folder / name, BUILD_FILE, errors="replace")
         except OSError as error:
@@ -167,6 +163,15 @@ def _program_files(context: dict[str, Any]) -> dict[str, bytes]:
     """Render the files that define the program and its converters as objects."""
     names = {f"{context['name']}_program.{suffix}": f"c/program.{suffix}.j2" for suffix in ("h", "c")}
     return {name: template(source, context, literal) for name, source in names.items()}
+
+
+def _files_of_z(content: Content) -> dict[str, bytes]:
+    """Render the files of the sequencer that plays the output z."""
+    from tablegen.emit.slow_c import slow_c_files, slow_storage  # here: most scans have no z
+
+    assert content.z is not None
+    beside = content_beside(content.name, content.hash, content.z, content.version, content.scanner)
+    return slow_c_files(beside, slow_storage([content.z]))
 
 
 def _context(content: Content) -> dict[str, Any]:
@@ -228,7 +233,15 @@ def words_behind(program: Program) -> int:
 
 
 def _storage(content: Content) -> dict[str, int]:
-    """Return what the runtime is compiled for: bits of words of tables and converters in memory; splines; pixels."""
+    """Return what the runtime is compiled for: bits of words of tables and converters in memory; splines; pixels.
+
+    It plays the output z too, whose sequencer has a slow part.
+    """
+    if content.z is not None:
+        from tablegen.emit.slow_c import slow_storage  # here: most scans have no z
+
+        own, of_z = _storage(replace(content, z=None)), slow_storage([content.z])
+        return {key: max(own.get(key, 0), of_z.get(key, 0)) for key in own | of_z}
     programs = [axis.program for axis in content.axes]
     return {
         "TABLE_STORAGE_BITS": storage_bits(max(program.bits for program in programs)),

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from tablegen.base.resources import resource_folder
+from tablegen.emit.c_text import literal
 from tablegen.emit.constants import is_wide, scan_constants
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats.c import literal, packaged_files, runtime_options
+from tablegen.emit.formats.c import packaged_files, runtime_options
 from tablegen.emit.templates import template
 
 ROOM_BYTES = 768  # of a sequencer: 712 with all options on a machine of 64 bits; the bridge does not compile in less

@@ -25,6 +25,7 @@ class CProgram:
 
     own: list[Path]
     runtime: list[Path]
+    of_z: list[Path]  # of the second sequencer; empty without z
     choices: dict[str, int]  # of a firmware for this build, which the runtime is compiled with
     bench: dict[str, int]  # of the bench, beside them
 
@@ -45,12 +46,14 @@ def c_program(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> t
     own, absent = copies(folder, _own_files(stored), work / "c")
     runtime, missing = copies(folder, names, work / "runtime")
     absent += missing
+    of_z, missing = copies(folder, _files_of_z(stored), work / "c")
+    absent += missing
     if not names:
         absent.append("the build holds no dac_*.c")
     (work / "bench").mkdir(exist_ok=True)
     handed = work / "bench" / "bench_program.c"
     handed.write_text(_bench_program(stored, fourier), "ascii")
-    return CProgram([*own, handed], runtime, _choices(stored), _bench_choices(stored, fourier)), absent
+    return CProgram([*own, handed], runtime, of_z, _choices(stored), _bench_choices(stored, fourier)), absent
 
 
 def header_constants(content: Content) -> dict[str, int]:
@@ -67,14 +70,23 @@ def _own_files(stored: StoredBuild) -> list[str]:
     return sorted({f"{name}.h", arrays_file(stored_content(stored)), *program})
 
 
+def _files_of_z(stored: StoredBuild) -> list[str]:
+    """Return the names of the C files of the sequencer that plays the output z; empty without z."""
+    name = f"{stored.manifest.name}_z"
+    return [] if stored.z is None else [f"{name}{end}" for end in (".h", ".c", "_program.h", "_program.c")]
+
+
 def _choices(stored: StoredBuild) -> dict[str, int]:
     """Return the macros with which a firmware for this build is compiled."""
     axes = [axis for _, axis in stored.axes]
     order = max(program.output.shaping.order for program in (stored.program.x, stored.program.y))
+    outputs = [axis.output.word_bits for axis in axes] + ([] if stored.z is None else [stored.z.output.word_bits])
+    cubic = stored.z is not None or any(axis.table.mode == "cubic" for axis in axes)
     return {
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),
-        "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(axis.output.word_bits for axis in axes)),
-        **({"DAC_SPLINE": 1} if any(axis.table.mode == "cubic" for axis in axes) else {}),
+        "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(outputs)),
+        **({"DAC_SPLINE": 1} if cubic else {}),
+        **({} if stored.z is None else {"DAC_SLOW_PART": 1}),
         **({} if stored.program.schedule.pixel_table is None else {"DAC_PIXEL_TABLE": 1}),
         **({"DAC_SHAPING": order} if order else {}),
     }

@@ -15,6 +15,7 @@ from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification.build_report import Outcome, PlayJob, differing_check
 from tablegen.verification.c.bench import CRecord, require_compiler, script_words
 from tablegen.verification.c.emulated import EMULATED, EmulatedPlayer
+from tablegen.verification.c.frame_play import frame_checks
 from tablegen.verification.c.host import HostPlayer, host_compiler
 from tablegen.verification.c.program import c_program, header_constants
 from tablegen.verification.checks.directory import some
@@ -38,6 +39,7 @@ from tablegen.verification.play.session import make_session
 from tablegen.verification.play.stream import OUTPUTS, Script, read_states
 
 _UNTOLD = ("armed", "running", OUTPUTS)  # flags that the status of the C sequencer does not have
+_FRAMES_OF_Z = 2
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
 
 
@@ -64,8 +66,11 @@ class CTarget:
         Raises
         ------
         NotABuild
-            If a table is too long, or Fourier words are to be rendered and both tables are direct.
+            If a table is too long, Fourier words are to be rendered and both tables are direct, or an emulator would
+            have to play the output z.
         """
+        if stored.z is not None and self.machine == "cortex-m":
+            raise NotABuild(f"{folder}: has the output z, which no emulator plays; verify it with --target c")
         for name, axis in stored.axes:
             if axis.table.mode == "direct" and len(axis.table.words) > _MAX_TABLE_WORDS:
                 raise NotABuild(
@@ -119,8 +124,18 @@ class CTarget:
             checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
             checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))
+        difference = first_difference(capture)
+        if stored.program_of_z is not None:
+            progress("compiling and playing the output z")
+            files = [path for path in program.runtime if not path.name.startswith(("dac_link", "dac_store"))]
+            ticks = min(_FRAMES_OF_Z * stored.program.schedule.frame_ticks, job.most_ticks)
+            name = f"{stored.manifest.name}_z"
+            sources = [*program.of_z, *files]
+            of_z, differs = frame_checks("c, z", name, stored.program_of_z, sources, program.choices, work, ticks)
+            checks += of_z
+            difference = difference or differs
         unplayed = unplayed_c(stored.runtime(".c"), self.fourier)
-        return Outcome(checks, session, first_difference(capture), unplayed=unplayed)
+        return Outcome(checks, session, difference, unplayed=unplayed)
 
     @property
     def _name(self) -> str:

@@ -1,0 +1,25 @@
+"""The output z in words: rows of its slopes, volts, codes and errors."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tablegen.planning.tilt import TiltedOutput
+
+
+def tilt_rows(z: "TiltedOutput") -> list[tuple[str, str]]:
+    """List what z does, and the errors of its integers: label and value."""
+    errors, output, volts = z.errors, z.program.output, z.converter
+    codes = errors.codes
+    ends = sorted(volts.v_zero + volts.v_per_code * code for code in (codes.least, codes.most))
+    centre = volts.v_zero + volts.v_per_code * z.offset
+    return [
+        ("tilt", f"{z.slope_x:+g} of x and {z.slope_y:+g} of y, by {z.nm_per_v:g} nm/V"),
+        ("drive at the piezo", f"{ends[0]:.6g}..{ends[1]:.6g} V, {centre:.6g} V in the centre of the scan"),
+        ("error", f"max {errors.error_lsb:.3f} LSB, {errors.error_nm:.2g} nm, over all imaged ticks"),
+        (
+            "codes",
+            f"{codes.least}..{codes.most}, headroom {codes.least - output.code_min} below, "
+            f"{output.code_max - codes.most} above",
+        ),
+        ("step", f"at most {codes.steepest} of {output.max_step} codes a tick"),
+    ]

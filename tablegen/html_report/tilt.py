@@ -1,0 +1,67 @@
+"""The output z on the page: what it follows, its range, its errors, and a frame of it."""
+
+from math import atan, degrees
+
+from msgspec import Struct
+
+from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
+from tablegen.html_report.number_text import figure
+from tablegen.html_report.promises import bounded
+from tablegen.html_report.tilt_chart import tilt_chart
+from tablegen.manifest.frame_fields import TurnedCodes, TurnedZ
+
+
+class ShownTilt(Struct, frozen=True, eq=False):
+    """The output z of a manifest, its program, and its certificate; errors are at the imaged ticks."""
+
+    fields: TurnedZ
+    program: FrameProgram
+    codes: TurnedCodes
+    error_lsb: float
+    error_nm: float
+
+
+def tilt_section(z: ShownTilt, max_error_lsb: float | None) -> Section:
+    """Return the section of z; ``max_error_lsb`` is the limit of the scan file, None without it."""
+    fields, output, codes = z.fields, z.fields.output, z.codes
+    low, high = sorted(_volts(z, code) for code in (codes.least, codes.most))
+    share = 100.0 * (codes.most - codes.least + 1) / (1 << output.dac_bits)
+    rows = [
+        row("slope along x", _slope(fields.slope_x), "", ""),
+        row("slope along y", _slope(fields.slope_y), "", ""),
+        row("piezo", f"{fields.nm_per_v:g} nm/V, taken as linear", "", ""),
+        row("height over the frame", f"{figure((high - low) * abs(fields.nm_per_v), 4)} nm from end to end", "", ""),
+        row("drive at the piezo", f"{low:.6g}..{high:.6g} V", "", ""),
+        row("codes", f"{codes.least}..{codes.most}, {share:.3g} % of the converter", "", ""),
+        _margin("lowest", z, low),
+        _margin("highest", z, high),
+        bounded("largest error at imaged ticks", z.error_lsb, max_error_lsb, "LSB"),
+        row("the same in height", f"{figure(z.error_nm, 3)} nm", "", ""),
+        bounded("largest step", codes.steepest, output.max_step, "codes a tick"),
+    ]
+    lead = (
+        "What a second sequencer plays beside x and y: the height of the tilted sample under the wanted place. The "
+        "limits of the drive are those that driver and converter have in common."
+    )
+    chart = Charts((tilt_chart(z.program, output.v_zero, output.v_per_code),))
+    return Section("z", "Output z", (Grid("z, of its integers", ("", "figure", "limit", ""), tuple(rows)), chart), lead)
+
+
+def _slope(slope: float) -> str:
+    return f"{slope:+g}, {degrees(atan(slope)):+.3g} degrees"
+
+
+def _volts(z: ShownTilt, code: int) -> float:
+    return z.fields.output.v_zero + z.fields.output.v_per_code * code
+
+
+def _margin(end: str, z: ShownTilt, volts: float) -> tuple[TableCell, ...]:
+    """Return the room between an end of the drive and the end of its range, in volts and in height."""
+    limits = sorted(_volts(z, code) for code in (z.fields.output.code_min, z.fields.output.code_max))
+    limit = limits[0] if end == "lowest" else limits[1]
+    room = volts - limit if end == "lowest" else limit - volts
+    good = room >= -abs(z.fields.output.v_per_code)
+    cell = TableCell("\u2713 within", "good") if good else TableCell("\u2717 outside", "bad")
+    text = f"{figure(room, 4)} V, {figure(room * abs(z.fields.nm_per_v), 4)} nm, from the {end} voltage"
+    return row("room " + ("below" if end == "lowest" else "above"), text, f"{limit:.6g} V", cell)
