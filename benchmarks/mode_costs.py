@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import firmware
 from msgspec import structs
@@ -27,7 +26,7 @@ from tablegen.config.schema import Table
 from tablegen.emit.render import render
 from tablegen.fixedpoint.program import Mode
 from tablegen.planning.line_plan import make_plan
-from tablegen.planning.table_costs import FILE, PROCESSORS, MeasuredRun
+from tablegen.planning.table_costs import FILE, PROCESSORS, MeasuredRun, SampleCount
 from tablegen.verification.c.emulate import COMPILERS, CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
@@ -38,13 +37,7 @@ LENGTHS: dict[Mode, int | None] = {"direct": None, "interpolated": 512, "cubic":
 MEASURED: tuple[Mode, ...] = ("interpolated", "cubic")  # a direct table is played by the loop of lines
 SKIPPED, FILLS = 5, 49  # fills of 256 ticks: after the first ones, ten lines of 1250 ticks
 FILLS_BY_TICK = 5  # a line
-
-
-class Count(NamedTuple):
-    """Instructions for an axis sample: in runs, and where a program has none."""
-
-    in_runs: float
-    by_tick: float
+REFUSED_STEPS = 4.0  # slew guard in steepest steps of the line: no 16 ticks keep its window, and no tick meets it
 
 
 def every_run() -> list[MeasuredRun]:
@@ -58,13 +51,15 @@ def every_run() -> list[MeasuredRun]:
     ]
 
 
-def instructions(core: str, run: MeasuredRun, mode: Mode) -> Count:
+def instructions(core: str, run: MeasuredRun, mode: Mode) -> SampleCount:
     """Count an axis sample of ``fill``: of x, which both axes play."""
     return _fills(core, mode, run.table_storage_bits, run.output_storage_bits, run.shaping_order)[run.coded]
 
 
 @cache
-def _fills(core: str, mode: Mode, table_storage_bits: int, output_storage_bits: int, order: int) -> tuple[Count, Count]:
+def _fills(
+    core: str, mode: Mode, table_storage_bits: int, output_storage_bits: int, order: int
+) -> tuple[SampleCount, SampleCount]:
     """Return the means of samples, straight and coded."""
     setup = load(EXAMPLE)
     bits = 18 if table_storage_bits > 16 else 16
@@ -86,7 +81,9 @@ def _fills(core: str, mode: Mode, table_storage_bits: int, output_storage_bits: 
         options = ("-std=c99", "-O2")
         program = compile_bare(folder / "count.elf", sources, core, None, options, macro_values)
     machine = Processor(program, core)
-    straight, coded = (Count(*(_mean(machine, coded, by_tick) for by_tick in (False, True))) for coded in (False, True))
+    guard = int(REFUSED_STEPS * (1.0 + plan.x.steepest))
+    ways = (0, 0), (1, 0), (0, guard)
+    straight, coded = (SampleCount(*(_mean(machine, coded, *way) for way in ways)) for coded in (False, True))
     return straight, coded
 
 
@@ -95,12 +92,12 @@ def sequencer() -> list[Path]:
     return [path for path in c_runtime() if path.name != "dac_fourier.c"]
 
 
-def _mean(machine: Processor, coded: bool, by_tick: bool) -> float:
-    """Count fills of a program from its start."""
-    machine.call("count_start", int(coded), int(by_tick))
+def _mean(machine: Processor, coded: bool, by_tick: int, guard: int) -> float:
+    """Count fills of a program from its start; ``guard`` is another slew guard than its own, in codes a tick."""
+    machine.call("count_start", int(coded), by_tick, guard)
     if machine.word("refused"):
         raise RuntimeError(f"the runtime refuses the program: {machine.word('refused')}")
-    fills = FILLS_BY_TICK if by_tick else FILLS
+    fills = FILLS_BY_TICK if by_tick or guard else FILLS
     counts = [machine.call("count_fill").instructions for _ in range(SKIPPED + fills)][SKIPPED:]
     return round(sum(counts) / fills / firmware.TICKS / 2.0, 1)
 
@@ -110,7 +107,7 @@ def digest(sources: Sequence[Path] | None = None) -> str:
     paths = [*sequencer(), COUNTED] if sources is None else sources
     code = code_of(paths)
     how = [inspect.getsource(function) for function in (instructions, _fills, _mean)]
-    content = repr((code, how, LENGTHS, SKIPPED, FILLS, FILLS_BY_TICK))
+    content = repr((code, how, LENGTHS, SKIPPED, FILLS, FILLS_BY_TICK, REFUSED_STEPS))
     return hashlib.sha256(content.encode("utf-8")).hexdigest()[:32]
 
 

@@ -27,8 +27,8 @@ from tablegen.config.schema import ProcessorName
 from tablegen.fixedpoint.frame_words import BITS
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.frame_costs import FILE, TICKS, WORDS, LineCost, SlowCount
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun
+from tablegen.planning.frame_costs import FILE, TICKS, WORDS, LineCost
+from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, SampleCount
 from tablegen.verification.c.emulate import Processor, compile_bare
 
 COUNTED = Path(__file__).parent / "slow_count.c"
@@ -61,12 +61,12 @@ def every_run() -> list[MeasuredRun]:
     return [run for run in mode_costs.every_run() if run.table_storage_bits == 16]
 
 
-def slow_count(core: str, run: MeasuredRun) -> SlowCount:
+def slow_count(core: str, run: MeasuredRun) -> SampleCount:
     """Count a sample of an axis with both tables, of 64 words over lines of 1,250 ticks."""
     machine = _machine(core, run)
     scan = Scan(coded=run.coded)
     scans = scan, scan._replace(without_runs=True), scan._replace(fast=True)
-    return SlowCount(*(round(_sample(machine, run, one), 1) for one in scans))
+    return SampleCount(*(round(_sample(machine, run, one), 1) for one in scans))
 
 
 def line_cost(core: str) -> LineCost:
@@ -90,7 +90,7 @@ def short_line(core: str, run: MeasuredRun) -> float:
     return round(_sample(_machine(core, run), run, scan), 1)
 
 
-def expected_short_line(count: SlowCount, lines: LineCost) -> float:
+def expected_short_line(count: SampleCount, lines: LineCost) -> float:
     """Return what the counts give of ``short_line``."""
     here = lines.of(CHECKED_WORDS, in_runs=True, second=False) / SHORT_TICKS
     return count.in_runs + here - lines.of(WORDS, in_runs=True) / TICKS
@@ -129,7 +129,7 @@ def write() -> None:
     FILE.write_text("\n".join(["{", *text, "}", ""]), "utf-8")
 
 
-def _cell(core: str, run: MeasuredRun) -> tuple[SlowCount, float]:
+def _cell(core: str, run: MeasuredRun) -> tuple[SampleCount, float]:
     return slow_count(core, run), short_line(core, run)
 
 

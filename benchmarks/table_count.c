@@ -14,14 +14,16 @@ uint32_t refused;
 void bench_main(void) {}
 
 /* Both axes play x. Codes are two's complement if `coded`; there are no runs if `ticks`, as of a program that allows
- * none. */
-void count_start(uint32_t coded, uint32_t ticks)
+ * none; `guard` codes a tick are the slew guard, unless it is 0. */
+void count_start(uint32_t coded, uint32_t ticks, uint32_t guard)
 {
     dac_converter x = x_converter, y = y_converter;
     dac_program program = scan;
     dac_tick tick;
 
     x.twos_complement = y.twos_complement = program.x.twos_complement = program.y.twos_complement = coded != 0;
+    if (guard != 0)
+        program.x.max_step = program.y.max_step = (int32_t)guard;
 #if DAC_SHAPING
     program.x.shaping_order = program.y.shaping_order = DAC_SHAPING;
     program.x.shaping_zero = program.y.shaping_zero = DAC_SHAPING == 3 ? 100 : 0;

@@ -161,7 +161,7 @@ def _shaped_bits(run: MeasuredRun) -> str:
 
 
 def _takes(run: MeasuredRun, mode: Mode) -> str:
-    return " | ".join("{:g}, {:g}".format(*counts()[run][mode][core]) for core in PROCESSORS)
+    return " | ".join("{:g}, {:g}, {:g}".format(*counts()[run][mode][core]) for core in PROCESSORS)
 
 
 def output() -> str:

@@ -69,10 +69,8 @@ def too_dear(setup: Setup, axis: str, takes: SampleCost | None) -> Problem | Non
     """Return a problem where a sample of an axis takes more instructions than the scan file allows."""
     if takes is None or takes.max_instructions is None or takes.instructions <= takes.max_instructions:
         return None
-    why = (
-        f"the {axis} axis takes {takes}, above {takes.max_instructions:g}; with [{axis}.table] mode = 'auto' "
-        "the build looks for a table that takes no more"
-    )
+    auto = f"with [{axis}.table] mode = 'auto' the build looks for a table that takes no more"
+    why = f"the {axis} axis takes {takes}, above {takes.max_instructions:g}; {takes.remedy or auto}"
     return setup.scan_file.problem("cost.max_instructions", why)
 
 

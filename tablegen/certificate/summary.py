@@ -48,7 +48,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
         ),
         ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}{_chosen(line)}"),
         *_needs_of_table(line),
-        *([] if line.sample_cost is None else [("", f"{line.sample_cost}, in C")]),
+        *(("", text) for text in _takes(line)),
         ("gain, offset", f"{output.gain_word} / 2^{output.gain_q}, code {output.offset_code}"),
     ]
     if line.layer is not None:
@@ -254,6 +254,12 @@ def _volts(line: LinePlan) -> str:
     """Describe the volts of an axis with a converter or an amplifier of its own."""
     zero, step = line.converter.v_zero, line.converter.v_per_code
     return f"{zero:.6g} V {'-' if step < 0.0 else '+'} {abs(step):.6g} V c, at the piezo"
+
+
+def _takes(line: LinePlan) -> list[str]:
+    """Return what a sample takes, if the scan file names a processor, and what would give it runs."""
+    takes = line.sample_cost
+    return [] if takes is None else [f"{takes}, in C", *([takes.remedy] if takes.remedy else [])]
 
 
 def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:

@@ -48,8 +48,10 @@ def turned_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str
 
 def _costs(plan: TurnedPlan) -> list[str]:
     """Return what a sample of each axis takes, if the scan file names a processor."""
-    lines = [f"{axis.axis} takes {axis.sample_cost}, in C" for axis in plan.axes if axis.sample_cost is not None]
-    return ["", *lines] if lines else []
+    takes = {axis.axis: axis.sample_cost for axis in plan.axes if axis.sample_cost is not None}
+    lines = [f"{axis} takes {cost}, in C" for axis, cost in takes.items()]
+    remedies = dict.fromkeys(cost.remedy for cost in takes.values() if cost.remedy)
+    return ["", *lines, *remedies] if lines else []
 
 
 def _z_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str]:

@@ -333,9 +333,18 @@ class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         | None
     ) = None
     bias_v: Annotated[Volts, Meta(description="piezo voltage if the converter outputs 0 V; default: 0")] | None = None
-    max_slew_v_per_s: Annotated[float, Meta(ge=1e-3, le=1e12, description="maximum slew rate at the piezo")] | None = (
-        None
-    )
+    max_slew_v_per_s: (
+        Annotated[
+            float,
+            Meta(
+                ge=1e-3,
+                le=1e12,
+                description="maximum slew rate at the piezo; without it the slew guard is twice the steepest step, and "
+                "C takes several times the instructions",
+            ),
+        ]
+        | None
+    ) = None
 
 
 class WrittenTiming(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -12,11 +12,10 @@ from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import Setup
 from tablegen.config.schema import Cost
 from tablegen.emit.constants import storage_bits
-from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import WORD_BITS
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.cost_choice import played_table
+from tablegen.planning.cost_choice import played_table, remedy_for_runs
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
 from tablegen.planning.table_costs import PROCESSORS, cells, sample_costs
@@ -55,6 +54,7 @@ class AxisTables:
     """The tables of one axis by memory, and one that a device renders from Fourier words.
 
     ``rendered`` is None where no table that a device renders keeps the error. ``shaped`` is true if the output is.
+    ``remedy`` says what gives the axis runs, where it moves too far in 16 ticks.
     """
 
     axis: Literal["x", "y"]
@@ -65,6 +65,7 @@ class AxisTables:
     rendered: TableShape | None
     shaped: bool
     cost: Cost | None = None
+    remedy: str = ""
 
     @property
     def chosen(self) -> TableRow:
@@ -131,12 +132,12 @@ def axis_tables(setup: Setup, line: LinePlan, other: LinePlan | None = None) -> 
         If none keeps the requested error.
     """
     cost = setup.scan.cost
-    beside = None if other is None or cost is None else played_table(other.program)
+    beside = None if other is None or cost is None else played_table(other.program, other.steepest)
     front = table_front(setup, line, beside)
     processors = PROCESSORS if cost is None else (cost.processor,)
 
-    def instructions(program: Program) -> dict[str, float]:
-        played = [played_table(program), *([] if beside is None else [beside])]
+    def instructions(its: LinePlan) -> dict[str, float]:
+        played = [played_table(its.program, its.steepest), *([] if beside is None else [beside])]
         return {name: sample_costs(played, name)[0] for name in processors}
 
     def rows() -> Iterator[TableRow]:
@@ -148,7 +149,7 @@ def axis_tables(setup: Setup, line: LinePlan, other: LinePlan | None = None) -> 
                 (shape.length + _behind(shape)) * storage_bits(shape.bits),
                 shape == front.chosen,
                 shape == front.planned,
-                instructions(its.program),
+                instructions(its),
             )
 
     return AxisTables(
@@ -160,6 +161,7 @@ def axis_tables(setup: Setup, line: LinePlan, other: LinePlan | None = None) -> 
         front.rendered,
         line.program.output.shaping.order > 0,
         cost,
+        remedy_for_runs(setup, {line.axis: played_table(line.program, line.steepest)}),
     )
 
 

@@ -21,6 +21,8 @@ def tables_text(tables: AxisTables) -> Iterator[str]:
         into = f"rendered on the device into {tables.rendered}: {tables.rendered.memory_bits} bits"
         yield f"     {'Fourier words':<13}{2 * tables.harmonics + 1:>7}{32:>6}{tables.upload_bits:>11}  {into}"
     yield "     (cells: of words and codes of 16 bits, cubic of words of 14)"
+    if tables.remedy:
+        yield f"     (instructions: {tables.remedy})"
     choice = tables.chosen.shape
     yield ""
     within = f"{tables.max_error_lsb:g} LSB"

@@ -102,8 +102,16 @@ def _chosen(
         shapes = feasible.fitting(candidates, drive, converter, maker)
         if request.cost is None:
             return choose(TableSearch(maker), shapes, request.max_error_lsb)
-        from tablegen.planning.cost_choice import choose_within, costs_of  # here: most scans have no limit
+        from tablegen.planning.cost_choice import (  # here: most scans have no limit
+            choose_within,
+            costs_of,
+            made_table,
+            remedy_for_runs,
+        )
 
-        costs = costs_of(shapes, maker, request.cost, beside)
-        return choose_within(TableSearch(maker), costs, request.max_error_lsb, request.cost)
+        guard = feasible.expected_guard(drive, converter, maker.series, timing.period)
+        guarded = maker.limited(guard)
+        costs = costs_of(shapes, guarded, request.cost, beside)
+        remedy = remedy_for_runs(setup, {axis: made_table(guarded, shape)})
+        return choose_within(TableSearch(maker), costs, request.max_error_lsb, request.cost, remedy)
     return shape

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tablegen.base.input_errors import Unphysical
+from tablegen.config.load import Setup
 from tablegen.config.schema import Cost
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.table_shape import TableShape
@@ -15,10 +16,26 @@ if TYPE_CHECKING:
     from tablegen.planning.table_search import TableSearch
 
 
-def played_table(program: Program) -> PlayedTable:
-    """Return what decides the cost of a planned axis."""
+def played_table(program: Program, steepest: float) -> PlayedTable:
+    """Return what decides the cost of a planned axis; ``steepest`` is its largest step of a tick, in codes."""
     shape = TableShape(program.mode, len(program.words), program.bits)
-    return PlayedTable(shape, program.phase.ticks, program.hold, program.output)
+    return PlayedTable(shape, program.phase.ticks, program.hold, program.output, steepest)
+
+
+def remedy_for_runs(setup: Setup, played: Mapping[str, PlayedTable]) -> str:
+    """Say which axis moves too far in 16 ticks for runs, and what gives it some; empty where none does."""
+    for axis, table in played.items():
+        if table.keeps_window:
+            continue
+        if setup.hardware(axis).amplifier.max_slew_v_per_s is None:
+            return (
+                f"{axis} has no runs: without amplifier.max_slew_v_per_s its slew guard is too narrow; write that key"
+            )
+        moved = f"{16.0 * table.steepest:.3g}"
+        return (
+            f"{axis} has no runs: it moves {moved} codes in 16 ticks; a lower line rate or a smaller size gives it some"
+        )
+    return ""
 
 
 def costs_of(
@@ -26,21 +43,24 @@ def costs_of(
 ) -> dict[TableShape, float]:
     """Return the instructions for a sample of an axis with each table, in order of the shapes.
 
-    ``beside`` is the table of the other axis: where its words are wide, or where it has no runs, those of this axis
-    take more. With None it takes nothing.
+    ``maker`` has the slew guard of the axis. ``beside`` is the table of the other axis: where its words are wide, or
+    where it has no runs, those of this axis take more. With None it takes nothing.
     """
     others = [] if beside is None else [beside]
-    return {shape: sample_costs([_played(maker, shape), *others], cost.processor)[0] for shape in shapes}
+    return {shape: sample_costs([made_table(maker, shape), *others], cost.processor)[0] for shape in shapes}
 
 
-def _played(maker: "TableMaker", shape: TableShape) -> PlayedTable:
-    return PlayedTable(shape, maker.phase.ticks, maker.hold, maker.scaled(shape))
+def made_table(maker: "TableMaker", shape: TableShape) -> PlayedTable:
+    """Return what decides the cost of an axis with a table of a shape."""
+    return PlayedTable(shape, maker.phase.ticks, maker.hold, maker.scaled(shape), maker.steepest)
 
 
 def choose_within(
-    search: "TableSearch", costs: Mapping[TableShape, float], max_error_lsb: float, cost: Cost
+    search: "TableSearch", costs: Mapping[TableShape, float], max_error_lsb: float, cost: Cost, remedy: str
 ) -> TableShape:
     """Return the table of least memory that keeps an error and takes no more than ``cost.max_instructions``.
+
+    ``remedy`` is said where none does: what gives the axis runs, or nothing.
 
     Raises
     ------
@@ -59,6 +79,6 @@ def choose_within(
             raise Unphysical(
                 f"no table keeps {max_error_lsb:g} LSB within the {most:g} instructions for a sample on "
                 f"{cost.processor} of cost.max_instructions; the cheapest, {cheapest}, takes {takes:g}; allow that "
-                "many, or a larger error"
+                f"many, or a larger error{remedy and f'; {remedy}'}"
             )
     return choose(search, [*costs], max_error_lsb)

@@ -309,6 +309,13 @@ class Feasibility:
         slew, v_per_code = self._hardware.amplifier.max_slew_v_per_s, abs(converter.v_per_code)
         return last if slew is None else min(floor(slew / self._hardware.dac.update_rate_hz / v_per_code), last)
 
+    def expected_guard(self, drive: Drive, converter: Converter, series: FourierSeries, period: int) -> int:
+        """Return the slew guard in codes a tick, as far as it is known before the words of a table."""
+        allowed = self._allowed_step(converter)
+        if self._hardware.amplifier.max_slew_v_per_s is not None:
+            return allowed
+        return min(2 * _steepest(drive, converter, series, period, 0.0), allowed)
+
     def check_words(self, stored: StoredWave) -> None:
         """Check that the accumulator of the device holds the sum of all Fourier words, whatever their signs."""
         series, largest, sums = stored.series, stored.largest, _sums(stored.series)

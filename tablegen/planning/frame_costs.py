@@ -16,23 +16,10 @@ from msgspec.structs import replace
 from tablegen.config.schema import ProcessorName
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable
+from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable, SampleCount, way
 
 FILE = Path(__file__).with_name("frame_costs.json")
 TICKS, WORDS = 1250, 64  # of the line and of the tables whose samples are measured
-_RUN = 16  # ticks with one check of clamp and slew guard in the C
-_WIDEST = 32  # windows of this check in the range of a converter, at least
-
-
-class SlowCount(NamedTuple):
-    """Instructions for an axis sample with both tables of 64 words, over lines of 1,250 ticks.
-
-    In runs; tick by tick, where a program has no runs; and where it has, but moves so fast that each is refused.
-    """
-
-    in_runs: float
-    by_tick: float
-    refused: float
 
 
 class LineCost(NamedTuple):
@@ -54,56 +41,41 @@ class LineCost(NamedTuple):
         return whole if second else whole - self.second - words * self.word_by_tick
 
 
-class PlayedFrame(NamedTuple):
-    """An axis with a slow part and a second table, as far as it decides what a sample takes.
+def played_frame_table(program: FrameProgram, max_step: int, steepest: float) -> PlayedTable:
+    """Return the table over the line of an axis with a slow part and a second table, whose slew guard is given.
 
-    ``table`` is that over the line; ``steepest`` the largest step of a tick in codes.
+    ``max_step`` and ``steepest``, the largest step of a tick, are in codes.
     """
-
-    table: PlayedTable
-    steepest: float
-
-    @classmethod
-    def of(cls, program: FrameProgram, max_step: int, steepest: float) -> "PlayedFrame":
-        """Return what decides the cost of a program whose slew guard allows so many codes a tick."""
-        fast = program.fast
-        shape = TableShape(fast.mode, len(fast.words), fast.bits)
-        output = replace(program.output, max_step=max_step)
-        return cls(PlayedTable(shape, fast.phase.ticks, fast.hold, output), steepest)
-
-    @property
-    def keeps_window(self) -> bool:
-        """True if no 16 ticks leave the window in which the C checks clamp and slew guard for all of them at once."""
-        output = self.table.output
-        widest = min((output.code_max - output.code_min) // _WIDEST, output.max_step)
-        return _RUN * self.steepest <= (1 << (widest + 1).bit_length() - 1) // 2
+    fast = program.fast
+    shape = TableShape(fast.mode, len(fast.words), fast.bits)
+    return PlayedTable(shape, fast.phase.ticks, fast.hold, replace(program.output, max_step=max_step), steepest)
 
 
-def frame_costs(axes: Sequence[PlayedFrame], processor: ProcessorName) -> list[float]:
-    """Return the instructions for a sample of each of the axes that are played together.
+def frame_costs(axes: Sequence[PlayedTable], processor: ProcessorName) -> list[float]:
+    """Return the instructions for a sample of each of the axes that are played together, with their slow parts.
 
     Words of all have the width of the widest, likewise those of the converters, and a run is one of all axes.
     """
-    runs = [axis.table.run for axis in axes]
+    runs = [axis.run for axis in axes]
     table_bits = max(run.table_storage_bits for run in runs)
     output_bits = max(run.output_storage_bits for run in runs)
-    with_runs = all(axis.table.has_runs(processor, table_bits) for axis in axes)
-    in_runs = with_runs and all(axis.keeps_window for axis in axes)
+    column = way(axes, processor, table_bits)
     costs = []
     for axis, run in zip(axes, runs, strict=True):
         its = run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits)
         count, lines = slow_counts()[its][processor], line_costs()[processor]
-        here = lines.of(axis.table.shape.length, in_runs) / axis.table.period
-        counted = count.in_runs if in_runs else count.refused if with_runs else count.by_tick
-        costs.append(round(counted + here - lines.of(WORDS, in_runs) / TICKS, 1))
+        here = lines.of(axis.shape.length, column == 0) / axis.period
+        costs.append(round(count[column] + here - lines.of(WORDS, column == 0) / TICKS, 1))
     return costs
 
 
 @cache
-def slow_counts() -> dict[MeasuredRun, dict[ProcessorName, SlowCount]]:
+def slow_counts() -> dict[MeasuredRun, dict[ProcessorName, SampleCount]]:
     """Return the instructions for a sample of an axis with cubic tables of 64 words over 1,250 ticks, gcc -O2."""
     return {
-        MeasuredRun(*(row[name] for name in MeasuredRun._fields)): {name: SlowCount(*row[name]) for name in PROCESSORS}
+        MeasuredRun(*(row[name] for name in MeasuredRun._fields)): {
+            name: SampleCount(*row[name]) for name in PROCESSORS
+        }
         for row in measured()["samples"]
     }
 

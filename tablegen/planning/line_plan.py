@@ -28,6 +28,7 @@ from tablegen.planning.pixel_table import passages, with_pixel_table
 from tablegen.planning.settling import settle_lines
 from tablegen.planning.sine_setup import SINE, default_formats, sine_setup, with_motion
 from tablegen.planning.table_choice import TableRequest
+from tablegen.planning.table_maker import steepest_step
 from tablegen.planning.timing import AxisTiming, make_schedule
 from tablegen.planning.voltages import axis_voltages
 from tablegen.planning.waveforms import make_waveforms
@@ -51,11 +52,15 @@ TILTED = (
 
 
 class SampleCost(Struct, frozen=True):
-    """The instructions for a sample of an axis in C on a processor, and the limit of the scan file."""
+    """The instructions for a sample of an axis in C on a processor, and the limit of the scan file.
+
+    ``remedy`` says why the axes have no runs and what gives them some, where one of them moves too far in 16 ticks.
+    """
 
     processor: ProcessorName
     instructions: float
     max_instructions: float | None
+    remedy: str = ""
 
     def __str__(self) -> str:
         return f"{self.instructions:g} instructions for a sample on {self.processor}"
@@ -124,6 +129,11 @@ class LinePlan(Struct, frozen=True, eq=False):
     def codes_per_unit(self) -> float:
         """The distance in codes of w = 1 from w = 0; negative where the amplifier or the codes are inverted."""
         return self.drive.v_amplitude / self.converter.v_per_code
+
+    @property
+    def steepest(self) -> float:
+        """The largest step of a tick in codes, without rounding; 0 where an advance takes several ticks."""
+        return steepest_step(self.codes_per_unit, self.series, self.program.phase.ticks, self.program.hold)
 
     def codes(self, start: int, stop: int) -> Ints:
         """Return the emitted codes at ticks [start, stop) since the program began.
@@ -271,23 +281,25 @@ def _within_cost(
     Rejected
         If no table of this axis keeps its limit beside that one.
     """
-    from tablegen.planning.cost_choice import played_table  # here: most scans have no limit
+    from tablegen.planning.cost_choice import played_table, remedy_for_runs  # here: most scans have no limit
     from tablegen.planning.table_costs import sample_costs
 
     cost = setup.scan.cost
     assert cost is not None
     lines = {"x": x, "y": y}
     for line in (x, y):
-        other = played_table(lines["y" if line.axis == "x" else "x"].program)
-        alone = sample_costs([played_table(line.program), other], cost.processor)[0]
+        its_other = lines["y" if line.axis == "x" else "x"]
+        other = played_table(its_other.program, its_other.steepest)
+        alone = sample_costs([played_table(line.program, line.steepest), other], cost.processor)[0]
         if line.table_request is not None and cost.max_instructions is not None and alone > cost.max_instructions:
             again = _line_plan(setup, line.axis, schedule, problems, other)
             problems.stop_if_any()
             assert again is not None
             lines[line.axis] = again
-    takes = sample_costs([played_table(line.program) for line in lines.values()], cost.processor)
+    played = {axis: played_table(line.program, line.steepest) for axis, line in lines.items()}
+    takes, remedy = sample_costs([*played.values()], cost.processor), remedy_for_runs(setup, played)
     x, y = (
-        replace(line, sample_cost=SampleCost(cost.processor, its, cost.max_instructions))
+        replace(line, sample_cost=SampleCost(cost.processor, its, cost.max_instructions, remedy))
         for line, its in zip(lines.values(), takes, strict=True)
     )
     return x, y

@@ -18,6 +18,8 @@ FILE = Path(__file__).with_name("table_costs.json")
 PROCESSORS: tuple[ProcessorName, ...] = get_args(ProcessorName)
 _NARROW_BITS = 16
 _LEAST_SHAPED_WINDOW = 15  # codes: what is fed back may leave half of a smaller one
+_RUN = 16  # ticks with one check of clamp and slew guard in the C
+_WIDEST = 32  # windows of this check in the range of a converter, at least
 
 
 class MeasuredRun(NamedTuple):
@@ -32,13 +34,15 @@ class MeasuredRun(NamedTuple):
 class PlayedTable(NamedTuple):
     """A table and the axis that plays it, as far as they decide what a sample takes.
 
-    ``period`` is that of the phase, in advances; ``hold`` the ticks of an advance.
+    ``period`` is that of the phase, in advances; ``hold`` the ticks of an advance; ``steepest`` the largest step of a
+    tick, in codes, without rounding: 0 where an advance takes several ticks, since it then moves in one of many.
     """
 
     shape: TableShape
     period: int
     hold: int
     output: Output
+    steepest: float
 
     @property
     def run(self) -> MeasuredRun:
@@ -55,7 +59,7 @@ class PlayedTable(NamedTuple):
         """Return True if ``fill`` of the C can play runs of it; else each tick is played by itself.
 
         The rules are those of ``allow_runs`` in dac_program.c, which tests compare on random programs. Codes near a
-        limit, and lines that move by more than a 64th of the range in 16 ticks, have no runs either, with any table.
+        limit have no runs either, with any table.
         """
         shape, output = self.shape, self.output
         if ((1 << 32) - 1) // self.period <= 2:
@@ -70,6 +74,13 @@ class PlayedTable(NamedTuple):
             most = 1 << (31 - up if up > 14 else 17)
             return table_storage_bits > _NARROW_BITS or -most <= output.gain_word < most
         return 18 <= output.gain_q <= 32
+
+    @property
+    def keeps_window(self) -> bool:
+        """True if no 16 ticks leave the window in which the C checks clamp and slew guard for all of them at once."""
+        output = self.output
+        widest = min((output.code_max - output.code_min) // _WIDEST, output.max_step)
+        return _RUN * self.steepest <= (1 << (widest + 1).bit_length() - 1) // 2
 
 
 def _multiplies_long(processor: ProcessorName, table_storage_bits: int) -> bool:
@@ -95,24 +106,42 @@ def sample_costs(tables: Sequence[PlayedTable], processor: ProcessorName) -> lis
     runs = [table.run for table in tables]
     table_bits = max(run.table_storage_bits for run in runs)
     output_bits = max(run.output_storage_bits for run in runs)
-    by_tick = not all(table.has_runs(processor, table_bits) for table in tables)
+    column = way(tables, processor, table_bits)
     costs = []
     for table, run in zip(tables, runs, strict=True):
         its = run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits)
-        costs.append(counts()[its][_loop(table.shape.mode)][processor][by_tick])
+        costs.append(counts()[its][_loop(table.shape.mode)][processor][column])
     return costs
 
 
-Counts = dict[MeasuredRun, dict[Mode, dict[ProcessorName, tuple[float, float]]]]
+def way(tables: Sequence[PlayedTable], processor: ProcessorName, table_bits: int) -> int:
+    """Return how axes are played together: 0 in runs, 1 tick by tick, 2 in runs that are tried and refused."""
+    if not all(table.has_runs(processor, table_bits) for table in tables):
+        return 1
+    return 0 if all(table.keeps_window for table in tables) else 2
+
+
+Counts = dict[MeasuredRun, dict[Mode, dict[ProcessorName, "SampleCount"]]]
+
+
+class SampleCount(NamedTuple):
+    """Instructions for an axis sample.
+
+    In runs; tick by tick, where a program has no runs; and where it has, but moves so fast that each is refused.
+    """
+
+    in_runs: float
+    by_tick: float
+    refused: float
 
 
 @cache
 def counts() -> Counts:
-    """Return the instructions for a sample of one axis of the example, gcc -O2: in runs, and tick by tick."""
+    """Return the instructions for a sample of one axis of the example, gcc -O2."""
     by_run: Counts = {}
     for row in measured()["instructions"]:
         run = MeasuredRun(*(row[name] for name in MeasuredRun._fields))
-        by_run.setdefault(run, {})[row["mode"]] = {name: (row[name][0], row[name][1]) for name in PROCESSORS}
+        by_run.setdefault(run, {})[row["mode"]] = {name: SampleCount(*row[name]) for name in PROCESSORS}
     return by_run
 
 

@@ -6,7 +6,7 @@ from tablegen.base.input_errors import Problems
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis, Table
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.cost_choice import choose_within, costs_of
+from tablegen.planning.cost_choice import choose_within, costs_of, made_table, remedy_for_runs
 from tablegen.planning.feasibility import Feasibility
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import maker_of, shape_of
@@ -53,7 +53,8 @@ def table_front(setup: Setup, line: LinePlan, beside: PlayedTable | None = None)
         chosen = choose(search, shapes, most)
     else:
         costs = costs_of(shapes, maker, cost, beside)
-        chosen = choose_within(search, costs, most, cost)
+        remedy = remedy_for_runs(setup, {line.axis: made_table(maker, shape_of(line))})
+        chosen = choose_within(search, costs, most, cost, remedy)
         shapes = [shape for shape, takes in costs.items() if takes <= cost.max_instructions]
     rendered = search.smallest((shape for shape in shapes if shape.mode != "direct"), most)
     listed |= {chosen, shape_of(line)}

@@ -20,6 +20,14 @@ from tablegen.waveform.series import FourierSeries
 _PEAK_GRID = 1024
 
 
+def steepest_step(codes_per_unit: float, series: FourierSeries, period: int, hold: int) -> float:
+    """Return the largest step of a tick in codes, without rounding, of a waveform over a period of advances.
+
+    It is 0 where an advance takes several ticks: such an axis moves in one of many.
+    """
+    return abs(codes_per_unit) * series.peak_slope() / period if hold == 1 else 0.0
+
+
 class QuantisedTable(Struct, frozen=True, eq=False):
     """A program with its table, the Fourier words of the table, and the scale of both."""
 
@@ -68,6 +76,11 @@ class TableMaker(Struct, frozen=True, eq=False):
     def original(self) -> StoredWave:
         """The waveform itself."""
         return self._stored_by(0)
+
+    @property
+    def steepest(self) -> float:
+        """The largest step of a tick in codes, without rounding; 0 where an advance takes several ticks."""
+        return steepest_step(2.0 * self.amplitude, self.series, self.phase.ticks, self.hold)
 
     def stored(self, shape: TableShape) -> StoredWave:
         """Return the wave whose values the words of a shape are: the waveform, or the spline nearest to it."""

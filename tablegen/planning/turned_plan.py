@@ -28,7 +28,8 @@ from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.fixedpoint.frame_words import FrameParts, FrameShape, quantise_frame
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
-from tablegen.planning.frame_costs import PlayedFrame, frame_costs
+from tablegen.planning.cost_choice import remedy_for_runs
+from tablegen.planning.frame_costs import frame_costs, played_frame_table
 from tablegen.planning.frame_motion import frame_motion
 from tablegen.planning.frame_refinement import learnt_frame_layer
 from tablegen.planning.frame_tables import (
@@ -40,6 +41,7 @@ from tablegen.planning.frame_tables import (
 )
 from tablegen.planning.known_axis import KnownAxis
 from tablegen.planning.line_plan import LinePlan, Plan, SampleCost, make_plan, mixing_key
+from tablegen.planning.table_costs import PlayedTable
 from tablegen.planning.tilt import TiltedOutput, plan_tilt
 from tablegen.waveform.series import FourierSeries
 
@@ -243,16 +245,17 @@ def _within_cost(
         takes = frame_costs([played_frame(setup, straight, axis), beside], cost.processor)[0]
         if axis.choice and cost.max_instructions is not None and takes > cost.max_instructions:
             axes[line.axis] = _chosen_beside(setup, straight, line, axis, beside, problems)
-    counts = frame_costs([played_frame(setup, straight, axis) for axis in axes.values()], cost.processor)
+    played = {name: played_frame(setup, straight, axis) for name, axis in axes.items()}
+    counts, remedy = frame_costs([*played.values()], cost.processor), remedy_for_runs(setup, played)
     x, y = (
-        replace(axis, sample_cost=SampleCost(cost.processor, takes, cost.max_instructions))
+        replace(axis, sample_cost=SampleCost(cost.processor, takes, cost.max_instructions, remedy))
         for axis, takes in zip(axes.values(), counts, strict=True)
     )
     return x, y
 
 
 def _chosen_beside(
-    setup: Setup, straight: Plan, line: LinePlan, axis: TurnedAxis, beside: PlayedFrame, problems: Problems
+    setup: Setup, straight: Plan, line: LinePlan, axis: TurnedAxis, beside: PlayedTable, problems: Problems
 ) -> TurnedAxis:
     """Return an axis with tables that are chosen beside the other axis; raise ``Rejected`` where none keep a limit."""
     choice = _chosen_tables(setup, straight, line, axis.known, axis.drive, problems, beside)
@@ -264,11 +267,11 @@ def _chosen_beside(
     return replace(axis, program=program, choice=choice.reason)
 
 
-def played_frame(setup: Setup, straight: Plan, axis: TurnedAxis) -> PlayedFrame:
+def played_frame(setup: Setup, straight: Plan, axis: TurnedAxis) -> PlayedTable:
     """Return what decides the cost of a planned axis; ``straight`` is the plan of the scan at 0 degrees."""
     line = straight.x if axis.axis == "x" else straight.y
     steepest = _search(setup, straight, line, axis.known, axis.drive).steepest
-    return PlayedFrame.of(axis.program, axis.program.output.max_step, steepest)
+    return played_frame_table(axis.program, axis.program.output.max_step, steepest)
 
 
 def shape_costs(
@@ -277,7 +280,7 @@ def shape_costs(
     search: FrameTableSearch,
     shapes: list[FrameShape],
     processor: ProcessorName,
-    beside: PlayedFrame | None,
+    beside: PlayedTable | None,
 ) -> dict[FrameShape, float]:
     """Return the instructions for a sample of an axis with tables of each shape that holds its drive.
 
@@ -288,7 +291,7 @@ def shape_costs(
     others = [] if beside is None else [beside]
     max_step = min(2 * ceil(search.steepest), last) if guard is None else guard
     return {
-        shape: frame_costs([PlayedFrame.of(program, max_step, search.steepest), *others], processor)[0]
+        shape: frame_costs([played_frame_table(program, max_step, search.steepest), *others], processor)[0]
         for shape, program in programs.items()
     }
 
@@ -388,7 +391,7 @@ def _chosen_tables(
     known: KnownAxis,
     drive: FrameDrive,
     problems: Problems,
-    beside: PlayedFrame | None = None,
+    beside: PlayedTable | None = None,
 ) -> FrameTableChoice | None:
     """Return the tables that the scan file lets the build choose; None if it does not, or ``problems`` grew."""
     table = setup.scan.x.table if line.axis == "x" else setup.scan.y.table

@@ -17,10 +17,10 @@ from tablegen.config.load import Setup, load
 from tablegen.config.schema import Table
 from tablegen.html_report.turned_tables import TurnedTables, turned_tables
 from tablegen.planning import turned_plan
-from tablegen.planning.frame_costs import PlayedFrame, slow_counts
+from tablegen.planning.frame_costs import slow_counts
 from tablegen.planning.frame_tables import CostLimit, choose_frame_tables
 from tablegen.planning.line_plan import Plan
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun
+from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable
 from tablegen.planning.turned_plan import TurnedAxis, frame_table_search, shape_costs
 
 pytestmark = pytest.mark.common
@@ -177,7 +177,7 @@ def test_an_axis_without_runs_leaves_none_to_the_other(tmp_path: Path, monkeypat
     """x is chosen alone, and again beside y, whose lines move so far in 16 ticks that its runs are refused."""
     played = turned_plan.played_frame
 
-    def fast_y(setup: Setup, straight: Plan, axis: TurnedAxis) -> PlayedFrame:
+    def fast_y(setup: Setup, straight: Plan, axis: TurnedAxis) -> PlayedTable:
         frame = played(setup, straight, axis)
         return frame if axis.axis == "x" else frame._replace(steepest=100.0)
 

@@ -10,8 +10,8 @@ from tablegen.base.input_errors import Rejected
 from tablegen.config.load import load
 from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.cost_choice import played_table
-from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.planning.table_costs import MeasuredRun, counts, sample_costs
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.planning.table_costs import MeasuredRun, PlayedTable, counts, sample_costs
 
 AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
 COST = "+ [cost]\nprocessor = "
@@ -22,8 +22,12 @@ def planned(folder: Path, *edits: str, processor: str = "cortex-m4", most: float
     return make_plan(load(write_pair(folder, edited(SCAN, *edits, f'{COST}"{processor}"{limit}'))))
 
 
+def played(line: LinePlan) -> PlayedTable:
+    return played_table(line.program, line.steepest)
+
+
 def shape(plan: Plan, axis: str = "x") -> TableShape:
-    return played_table(getattr(plan, axis).program).shape
+    return played(getattr(plan, axis)).shape
 
 
 def test_without_a_limit_the_choice_is_that_of_memory(tmp_path: Path) -> None:
@@ -48,14 +52,46 @@ def test_a_limit_takes_the_smallest_table_within_it(tmp_path: Path) -> None:
 
 def test_a_table_without_runs_takes_what_ticks_take(tmp_path: Path) -> None:
     """With products of 64 bits, runs need words of at least two bits less than the converter has."""
-    few, enough = (played_table(planned(tmp_path, f"x.table.bits = {bits}").x.program) for bits in (13, 14))
-    in_runs, by_tick = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
+    few, enough = (played(planned(tmp_path, f"x.table.bits = {bits}").x) for bits in (13, 14))
+    in_runs, by_tick, _ = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
     assert (sample_costs([few], "cortex-m4"), sample_costs([enough], "cortex-m4")) == ([by_tick], [in_runs])
     assert by_tick > 5 * in_runs
     assert sample_costs([few, enough], "cortex-m4") == [by_tick, by_tick]
     assert sample_costs([few], "cortex-m0plus") == sample_costs([enough], "cortex-m0plus")
-    short = played_table(planned(tmp_path, "x.table.mode = 'cubic'", "x.table.length = 1024").x.program)
+    short = played(planned(tmp_path, "x.table.mode = 'cubic'", "x.table.length = 1024").x)
     assert sample_costs([short], "riscv32") == [counts()[MeasuredRun(16, 16, False)]["cubic"]["riscv32"][1]]
+
+
+WITHOUT_SLEW = "- amplifier.max_slew_v_per_s"
+
+
+@pytest.mark.parametrize(
+    ("edits", "remedy"),
+    [
+        (
+            (WITHOUT_SLEW,),
+            "x has no runs: without amplifier.max_slew_v_per_s its slew guard is too narrow; write that key",
+        ),
+        (
+            ("timing.line_rate_hz = 1600", "timing.pixels = 50"),
+            "codes in 16 ticks; a lower line rate or a smaller size gives it some",
+        ),
+    ],
+)
+def test_a_scan_that_moves_too_far_for_runs_takes_what_refused_runs_take(
+    tmp_path: Path, edits: tuple[str, ...], remedy: str
+) -> None:
+    """Both axes do, whatever the table: the plan knows the steps and the slew guard."""
+    in_runs, by_tick, refused = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
+    plan = planned(tmp_path, *edits)
+    assert [line.sample_cost.instructions for line in plan.lines if line.sample_cost] == [refused, refused]
+    assert in_runs < 0.2 * by_tick < 0.2 * refused
+    assert remedy in " ".join(run("show", tmp_path / "scan.toml", "--all", "--no-plot").out.split())
+    for auto in ((), AUTO):
+        with_limit = write_pair(tmp_path, edited(SCAN, *edits, *auto, f'{COST}"cortex-m4"\nmax_instructions = 25'))
+        outcome = run("check", with_limit)
+        assert outcome.status != 0
+        assert remedy in " ".join(outcome.err.split())
 
 
 def test_wide_words_of_the_other_axis_count(tmp_path: Path) -> None:

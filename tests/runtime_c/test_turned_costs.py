@@ -1,4 +1,4 @@
-"""``[cost]`` at an angle against the C that is emitted: whole builds, counted in emulation."""
+"""``[cost]`` against the C that is emitted: whole builds at an angle and at 0 degrees, counted in emulation."""
 
 import importlib
 import sys
@@ -9,9 +9,9 @@ import pytest
 from building import REPOSITORY
 from sets import LONG_TEST
 
-from tablegen.planning.cost_choice import played_table
 from tablegen.planning.frame_costs import slow_counts
-from tablegen.planning.table_costs import MeasuredRun, sample_costs
+from tablegen.planning.table_costs import MeasuredRun, counts, sample_costs
+from tablegen.planning.turned_plan import played_frame
 
 pytestmark = pytest.mark.rest
 
@@ -47,4 +47,21 @@ def test_a_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: s
     run = MeasuredRun(16, 16, "complement" in name)
     other = slow_counts()[run._replace(coded=not run.coded)][core] if runs else slow_counts()[run][core]
     assert not agrees(other.in_runs)
-    assert not agrees(sample_costs([played_table(build.plan.x.program.fast)], core)[0])
+    assert not agrees(sample_costs([played_frame(build.setup, build.plan.straight, build.plan.x)], core)[0])
+
+
+@pytest.mark.parametrize(
+    ("core", "name", "percent"),
+    [
+        ("cortex-m4", "the example", 1.0),
+        ("cortex-m4", "no `max_slew_v_per_s`", 8.0),
+        pytest.param("cortex-m4", "lines of 313 ticks", 8.0, marks=LONG_TEST),
+    ],
+)
+def test_a_straight_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: str, percent: float) -> None:
+    """That runs are refused without the slew rate of the amplifier would be seen: it makes eight of one."""
+    build = benchmark.straight(benchmark.STRAIGHT[name], core)
+    counted, told = benchmark.counted(build, core), benchmark.told_straight(build)
+    assert abs(told - counted) <= 0.01 * percent * counted
+    in_runs = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"].in_runs
+    assert (abs(in_runs - counted) <= 0.01 * percent * counted) == (name == "the example")
