@@ -38,7 +38,7 @@ def turned_sections(subject: TurnedSubject, tell: Callable[[str], object] = lamb
     tell("drawing")
     parts += [_certificate(subject), *_of_z(subject), _request(subject), _codes(subject), _tables(subject)]
     manifest = subject.manifest
-    origin = f"made by tablegen {manifest.tablegen}; formats c"
+    origin = f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats)}"
     files = file_section(manifest.hash, origin, subject.files)
     return [*parts, record_section(subject.verified, subject.digest), files]
 

@@ -1,6 +1,7 @@
 """`report` and `compare` of scans at an angle: the page, its charts, and what a changed build shows."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,15 @@ def test_the_page_of_a_build_names_what_was_changed(build: Path, tmp_path: Path)
     (tmp_path / "x.npy").write_bytes(b"")
     with pytest.raises(tablegen.Rejected):
         tablegen.report(build, image=tmp_path / "x.npy")
+
+
+def test_the_page_of_a_build_names_its_formats(build: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "build"
+    shutil.copytree(build, folder)
+    plain = json.loads((folder / MANIFEST).read_text("ascii"))
+    for formats in (["c"], ["c", "verilog"]):
+        (folder / MANIFEST).write_text(json.dumps({**plain, "formats": formats}), "ascii")
+        assert f"; formats {', '.join(formats)}<" in tablegen.report(folder).content.decode("utf-8")
 
 
 def test_a_build_is_compared_with_a_changed_one(build: Path, tmp_path: Path) -> None:
