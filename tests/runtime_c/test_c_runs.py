@@ -42,7 +42,7 @@ def tables(program: DualProgram) -> list[PlayedTable]:
     """Return what costs are read by, of both axes."""
     axes = (program.x, program.y)
     return [
-        PlayedTable(TableShape(axis.mode, len(axis.words), axis.bits), axis.phase.ticks, axis.hold, axis.output)
+        PlayedTable(TableShape(axis.mode, len(axis.words), axis.bits), axis.phase.ticks, axis.hold, axis.output, 0.0)
         for axis in axes
     ]
 
