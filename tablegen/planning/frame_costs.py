@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from tablegen.config.schema import ProcessorName
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable, SampleCount, way
+from tablegen.planning.table_costs import IN_RUNS, PROCESSORS, MeasuredRun, PlayedTable, SampleCount, played_together
 
 FILE = Path(__file__).with_name("frame_costs.json")
 TICKS, WORDS = 1250, 64  # of the line and of the tables whose samples are measured
@@ -52,20 +52,12 @@ def played_frame_table(program: FrameProgram, max_step: int, steepest: float) ->
 
 
 def frame_costs(axes: Sequence[PlayedTable], processor: ProcessorName) -> list[float]:
-    """Return the instructions for a sample of each of the axes that are played together, with their slow parts.
-
-    Words of all have the width of the widest, likewise those of the converters, and a run is one of all axes.
-    """
-    runs = [axis.run for axis in axes]
-    table_bits = max(run.table_storage_bits for run in runs)
-    output_bits = max(run.output_storage_bits for run in runs)
-    column = way(axes, processor, table_bits)
-    costs = []
+    """Return the instructions for a sample of each of the axes that are played together, with their slow parts."""
+    runs, column = played_together(axes, processor)
+    lines, in_runs, costs = line_costs()[processor], column == IN_RUNS, []
     for axis, run in zip(axes, runs, strict=True):
-        its = run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits)
-        count, lines = slow_counts()[its][processor], line_costs()[processor]
-        here = lines.of(axis.shape.length, column == 0) / axis.period
-        costs.append(round(count[column] + here - lines.of(WORDS, column == 0) / TICKS, 1))
+        here = lines.of(axis.shape.length, in_runs) / axis.period
+        costs.append(round(slow_counts()[run][processor][column] + here - lines.of(WORDS, in_runs) / TICKS, 1))
     return costs
 
 

@@ -83,6 +83,20 @@ class PlayedTable(NamedTuple):
         return _RUN * self.steepest <= (1 << (widest + 1).bit_length() - 1) // 2
 
 
+class SampleCount(NamedTuple):
+    """Instructions for an axis sample.
+
+    In runs; tick by tick, where a program has no runs; and where it has, but moves so fast that each is refused.
+    """
+
+    in_runs: float
+    by_tick: float
+    refused: float
+
+
+IN_RUNS, _BY_TICK, _REFUSED = range(len(SampleCount._fields))
+
+
 def _multiplies_long(processor: ProcessorName, table_storage_bits: int) -> bool:
     """Return the default of DAC_LONG_MULTIPLY in dac_config.h."""
     return processor == "cortex-m4" or (processor == "riscv32" and table_storage_bits > _NARROW_BITS)
@@ -99,40 +113,26 @@ def _loop(mode: Mode) -> Mode:
 
 
 def sample_costs(tables: Sequence[PlayedTable], processor: ProcessorName) -> list[float]:
-    """Return the instructions for a sample of each of the tables that are played together.
+    """Return the instructions for a sample of each of the tables that are played together."""
+    runs, column = played_together(tables, processor)
+    return [counts()[run][_loop(table.shape.mode)][processor][column] for table, run in zip(tables, runs, strict=True)]
+
+
+def played_together(tables: Sequence[PlayedTable], processor: ProcessorName) -> tuple[list[MeasuredRun], int]:
+    """Return what is measured of each table beside the others, and the index of the number of a ``SampleCount``.
 
     Words of all tables have the width of the widest, likewise those of the converters, and a run is one of all axes.
     """
     runs = [table.run for table in tables]
     table_bits = max(run.table_storage_bits for run in runs)
     output_bits = max(run.output_storage_bits for run in runs)
-    column = way(tables, processor, table_bits)
-    costs = []
-    for table, run in zip(tables, runs, strict=True):
-        its = run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits)
-        costs.append(counts()[its][_loop(table.shape.mode)][processor][column])
-    return costs
-
-
-def way(tables: Sequence[PlayedTable], processor: ProcessorName, table_bits: int) -> int:
-    """Return how axes are played together: 0 in runs, 1 tick by tick, 2 in runs that are tried and refused."""
+    widened = [run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits) for run in runs]
     if not all(table.has_runs(processor, table_bits) for table in tables):
-        return 1
-    return 0 if all(table.keeps_window for table in tables) else 2
+        return widened, _BY_TICK
+    return widened, IN_RUNS if all(table.keeps_window for table in tables) else _REFUSED
 
 
-Counts = dict[MeasuredRun, dict[Mode, dict[ProcessorName, "SampleCount"]]]
-
-
-class SampleCount(NamedTuple):
-    """Instructions for an axis sample.
-
-    In runs; tick by tick, where a program has no runs; and where it has, but moves so fast that each is refused.
-    """
-
-    in_runs: float
-    by_tick: float
-    refused: float
+Counts = dict[MeasuredRun, dict[Mode, dict[ProcessorName, SampleCount]]]
 
 
 @cache
