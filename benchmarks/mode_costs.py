@@ -37,7 +37,7 @@ LENGTHS: dict[Mode, int | None] = {"direct": None, "interpolated": 512, "cubic":
 MEASURED: tuple[Mode, ...] = ("interpolated", "cubic")  # a direct table is played by the loop of lines
 SKIPPED, FILLS = 5, 49  # fills of 256 ticks: after the first ones, ten lines of 1250 ticks
 FILLS_BY_TICK = 5  # a line
-REFUSED_STEPS = 4.0  # slew guard in steepest steps of the line: no 16 ticks keep its window, and no tick meets it
+REFUSED_STEPS = 4.0  # steepest steps of the line in a window that no 16 ticks keep
 
 
 def every_run() -> list[MeasuredRun]:
@@ -81,8 +81,8 @@ def _fills(
         options = ("-std=c99", "-O2")
         program = compile_bare(folder / "count.elf", sources, core, None, options, macro_values)
     machine = Processor(program, core)
-    guard = int(REFUSED_STEPS * (1.0 + plan.x.steepest))
-    ways = (0, 0), (1, 0), (0, guard)
+    window_bits = int(REFUSED_STEPS * (1.0 + plan.x.steepest) + 1.0).bit_length() - 1
+    ways = (0, 0), (1, 0), (0, window_bits)
     straight, coded = (SampleCount(*(_mean(machine, coded, *way) for way in ways)) for coded in (False, True))
     return straight, coded
 
@@ -92,12 +92,12 @@ def sequencer() -> list[Path]:
     return [path for path in c_runtime() if path.name != "dac_fourier.c"]
 
 
-def _mean(machine: Processor, coded: bool, by_tick: int, guard: int) -> float:
-    """Count fills of a program from its start; ``guard`` is another slew guard than its own, in codes a tick."""
-    machine.call("count_start", int(coded), by_tick, guard)
+def _mean(machine: Processor, coded: bool, by_tick: int, window_bits: int) -> float:
+    """Count fills of a program from its start, in windows of so many bits of a code; 0: in those that it has."""
+    machine.call("count_start", int(coded), by_tick, window_bits)
     if machine.word("refused"):
         raise RuntimeError(f"the runtime refuses the program: {machine.word('refused')}")
-    fills = FILLS_BY_TICK if by_tick or guard else FILLS
+    fills = FILLS_BY_TICK if by_tick or window_bits else FILLS
     counts = [machine.call("count_fill").instructions for _ in range(SKIPPED + fills)][SKIPPED:]
     return round(sum(counts) / fills / firmware.TICKS / 2.0, 1)
 

@@ -53,7 +53,7 @@ class Scan(NamedTuple):
     second: bool = True
     coded: bool = False
     without_runs: bool = False
-    fast: bool = False  # so fast that every run is refused, as of a scan whose slew guard follows its own steps
+    fast: bool = False  # so fast that every run is refused
 
 
 def every_run() -> list[MeasuredRun]:
@@ -187,10 +187,10 @@ def _start(machine: Processor, run: MeasuredRun, scan: Scan) -> None:
         "word_bits": BITS,
         "code_bits": code_bits,
         "gain_word": SLOW_GAIN,
-        "max_step": int(2.0 * steepest) if scan.fast else (1 << code_bits) - 1,
         "coded": int(scan.coded),
         "mixed": int(scan.second),
         "without_runs": int(scan.without_runs),
+        "window_bits": int(2.0 * steepest + 1.0).bit_length() - 1 if scan.fast else 0,
     }
     for name, array in arrays.items():
         machine.write(name, array.tobytes())

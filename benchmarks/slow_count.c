@@ -1,5 +1,6 @@
 /* What benchmarks/slow_costs.py counts the instructions of: a program with a slow part on both axes, whose words the
  * host writes into memory, and functions that are called one at a time. */
+#include "dac_run.h"
 #include "dac_slow.h"
 
 enum { TICKS = 256, MOST_WORDS = 256, BEHIND = 3, KNOTS = 17 }; /* half a buffer; knots as a build has them */
@@ -8,8 +9,9 @@ dac_word fast[MOST_WORDS + BEHIND], slow[MOST_WORDS + BEHIND];
 int8_t second[MOST_WORDS];
 int32_t gains[KNOTS];
 int16_t ratios[KNOTS];
-uint32_t line_ticks, frame_lines, index_bits, slow_index_bits, word_bits, code_bits, gain_word, max_step;
+uint32_t line_ticks, frame_lines, index_bits, slow_index_bits, word_bits, code_bits, gain_word;
 uint32_t coded, mixed, without_runs; /* two's complement; a second table; as of a program that has no runs */
+uint32_t window_bits;                /* of the codes of a window, if it is not 0 */
 uint32_t refused;
 
 static dac_word memory[2][MOST_WORDS + DAC_WORDS_BEHIND];
@@ -51,7 +53,7 @@ static void make_axis(dac_axis_program *axis, unsigned number)
     axis->gain_q = (uint8_t)(16u + word_bits + guard - code_bits);
     axis->code_max = (INT32_C(1) << code_bits) - 1;
     axis->park_code = axis->code_max / 2;
-    axis->max_step = (int32_t)max_step;
+    axis->max_step = axis->code_max;
     axis->dac_bits = axis->word_bits = (uint8_t)code_bits;
     axis->twos_complement = coded != 0;
 #if DAC_SHAPING
@@ -83,9 +85,14 @@ void count_start(void)
     refused = (uint32_t)dac_sequencer_load(&sequencer, &program);
     (void)dac_sequencer_commit(&sequencer);
     dac_sequencer_step(&sequencer, &tick); /* takes the program */
-    for (unsigned i = 0; i < 2 && without_runs != 0; i++) {
+    for (unsigned i = 0; i < 2; i++) {
         dac_bank *bank = &sequencer.bank[i];
-        bank->x.run_most = bank->x.line_most = bank->y.run_most = bank->y.line_most = 0;
+        if (without_runs != 0)
+            bank->x.run_most = bank->x.line_most = bank->y.run_most = bank->y.line_most = 0;
+        if (window_bits != 0) {
+            dac_set_window(&bank->x, (uint8_t)window_bits);
+            dac_set_window(&bank->y, (uint8_t)window_bits);
+        }
     }
     (void)dac_sequencer_arm(&sequencer, 0);
     (void)dac_sequencer_trigger(&sequencer);

@@ -1,5 +1,5 @@
 /* What benchmarks/tables.py counts the instructions of: functions without arguments, called one at a time. */
-#include "dac_sequencer.h"
+#include "dac_run.h"
 #include "annexin_200nm.h"
 
 enum { TICKS = 256 }; /* half a buffer */
@@ -14,16 +14,14 @@ uint32_t refused;
 void bench_main(void) {}
 
 /* Both axes play x. Codes are two's complement if `coded`; there are no runs if `ticks`, as of a program that allows
- * none; `guard` codes a tick are the slew guard, unless it is 0. */
-void count_start(uint32_t coded, uint32_t ticks, uint32_t guard)
+ * none; their windows have 2^`bits` codes, unless it is 0. */
+void count_start(uint32_t coded, uint32_t ticks, uint32_t bits)
 {
     dac_converter x = x_converter, y = y_converter;
     dac_program program = scan;
     dac_tick tick;
 
     x.twos_complement = y.twos_complement = program.x.twos_complement = program.y.twos_complement = coded != 0;
-    if (guard != 0)
-        program.x.max_step = program.y.max_step = (int32_t)guard;
 #if DAC_SHAPING
     program.x.shaping_order = program.y.shaping_order = DAC_SHAPING;
     program.x.shaping_zero = program.y.shaping_zero = DAC_SHAPING == 3 ? 100 : 0;
@@ -36,6 +34,8 @@ void count_start(uint32_t coded, uint32_t ticks, uint32_t guard)
         dac_bank *bank = &sequencer.bank[i];
         if (ticks != 0)
             bank->x.run_most = 0;
+        if (bits != 0)
+            dac_set_window(&bank->x, (uint8_t)bits);
         bank->y = bank->x;
     }
     sequencer.y.at = sequencer.x.at;

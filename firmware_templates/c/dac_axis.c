@@ -57,10 +57,12 @@ DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool
 
 /* The fast path has one check of clamp and slew guard for DAC_RUN ticks.
  *
- * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most
- * max_step + 1 wide and inside the limits. If all codes of a run are in it, any two of them differ by max_step at most,
- * and no limit is met: clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has
- * no bit above run_bits; the bits of all codes are or-ed together, and looked at once.
+ * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, inside the
+ * limits. If all codes of a run are in it, no limit is met, and the clamp would have changed nothing. Nor would the slew
+ * guard, for one of two reasons: the window is at most max_step + 1 wide, so any two of its codes differ by max_step at
+ * most; or dac_program.c has found no words so far apart that a code could move further, and may_enter() has compared
+ * the first one with the code before, which is any. A code is in the window if code - base, unsigned, has no bit above
+ * run_bits; the bits of all codes are or-ed together, and looked at once.
  *
  * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the
  * exact one, and every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which
@@ -187,8 +189,24 @@ DAC_CODE_ATTR static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, ui
 #define PLAY(bank) PLAY_LEVEL(bank)
 #endif
 
+/* Whether the slew guard lets the code of this tick be. */
+DAC_CODE_ATTR static bool may_enter(const dac_axis *axis, const dac_bank_axis *bank)
+{
+    const int32_t sample = dac_sample_at(bank, axis->at.high);
+#if DAC_SLOW_PART
+    const int32_t code = bank->slow != NULL ? dac_slow_code(axis, bank, sample) : code_of(bank, sample);
+#else
+    const int32_t code = code_of(bank, sample);
+#endif
+    const int32_t rise = code - axis->code;
+
+    return rise <= bank->run_entry && rise >= -bank->run_entry;
+}
+
 DAC_CODE_ATTR uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks)
 {
+    if (bank->run_entry != 0 && !may_enter(axis, bank))
+        return 0;
     const uint64_t step = bank->holds ? 0 : ((uint64_t)bank->step.high << 32 | bank->step.low >> 32) + 1;
     uint32_t done = 0;
 

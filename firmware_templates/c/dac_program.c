@@ -1,5 +1,5 @@
 /* Loads a program: checks it, and derives the values that the sequencer needs. */
-#include "dac_arithmetic.h"
+#include "dac_run.h"
 
 static bool inside(const dac_window *window, uint32_t length)
 {
@@ -243,14 +243,108 @@ static bool scale_shaped(dac_bank_axis *b, const dac_axis_program *p)
 }
 #endif
 
+static uint32_t distance(int32_t here, int32_t there)
+{
+    return here < there ? (uint32_t)there - (uint32_t)here : (uint32_t)here - (uint32_t)there;
+}
+
+/* The most that neighbouring words of the table differ by, on any line. */
+static uint32_t steepest_words(const dac_axis_program *p)
+{
+    uint32_t steepest = 0;
+#if DAC_SLOW_PART
+    uint32_t ratio = 0;
+
+    for (unsigned i = 0; mixes(p) && i < p->slow->ratio_knots; i++)
+        if (distance(p->slow->ratios[i], 0) > ratio)
+            ratio = distance(p->slow->ratios[i], 0);
+#endif
+    for (uint32_t i = 0; i < p->length; i++) {
+        uint32_t way = distance(DAC_TABLE_WORD(p->table[i]), DAC_TABLE_WORD(p->table[i + 1]));
+#if DAC_SLOW_PART
+        if (mixes(p)) /* words are mixed to the nearest */
+            way += (ratio * distance(p->slow->second[i], p->slow->second[i + 1 == p->length ? 0 : i + 1]) >> 12) + 1;
+#endif
+        if (way > steepest)
+            steepest = way;
+    }
+    return steepest;
+}
+
+/* The largest gain of any line, without its sign. */
+static uint32_t largest_gain(const dac_axis_program *p)
+{
+    uint32_t largest = 0;
+
+#if DAC_SLOW_PART
+    for (unsigned i = 0; p->slow != NULL && i < p->slow->gain_knots; i++)
+        if (distance(p->slow->gains[i], 0) > largest)
+            largest = distance(p->slow->gains[i], 0);
+    if (p->slow == NULL)
+#endif
+        largest = distance(p->gain_word, 0);
+    return largest;
+}
+
+/* The most that codes move by from one advance to the next, without a ramp. The samples between two words are on a
+ * straight line, or on a spline, which is nowhere steeper than its steepest two words are. */
+static int32_t steepest_step(const dac_bank_axis *b, const dac_axis_program *p)
+{
+    const uint32_t unit = CUBIC(p) ? 12 : UINT32_C(1) << b->guard; /* of a sample, for the LSB of a word */
+    const uint64_t words = (uint64_t)b->step.high + 1;             /* from one advance to the next, with a fraction */
+    const uint32_t rise = steepest_words(p);
+    /* Both samples are rounded, by less than 1 each. */
+    const uint64_t move = (unit * rise * words >> (CUBIC(p) ? 18 : 15)) + 3;
+
+    /* Words may have more bits than the program says. */
+    return rise >> 25 != 0 || move >> 26 != 0 ? INT32_MAX : (int32_t)(largest_gain(p) * move >> p->gain_q) + 1;
+}
+
+/* Windows of a run in the range of codes, at least: 32 bits hold none that is wider than a 32nd. */
+#if DAC_LONG_MULTIPLY
+enum { WINDOWS = 8 };
+#else
+enum { WINDOWS = 32 };
+#endif
+enum { RAMP = 4 }; /* codes of a tick for which a window has room */
+
+/* Widens a window of 2^bits codes, to at most `widest`, until no block of a run leaves it, if the slew guard cannot act
+ * on these codes. Only the first one, which follows any code, is then checked against the guard. */
+static uint8_t widened(dac_bank_axis *b, const dac_axis_program *p, uint8_t bits, int32_t widest)
+{
+    int32_t aside = 0; /* a code is so far from the value before its shaping, at most */
+
+#if DAC_SHAPING
+    aside = b->order < 2 ? b->order : 2 + (b->zero + 63) / 64;
+#endif
+    const int32_t step = steepest_step(b, p), allowed = p->max_step - 2 * aside;
+    int32_t block;
+
+    if (step > allowed)
+        return bits;
+    block = DAC_RUN * step + 2 * aside;
+#if DAC_SLOW_PART
+    b->ramp_most = (int64_t)(allowed - step) << b->gain_q;
+    if (p->slow != NULL)
+        block += DAC_RUN * RAMP;
+#endif
+    while (INT32_C(1) << bits < 2 * block && INT32_C(2) << bits <= widest + 1)
+        bits++;
+    if (INT32_C(1) << bits >> 1 > p->max_step)
+        b->run_entry = p->max_step - aside;
+    return bits;
+}
+
 /* Derives the windows of dac_axis_run, if runs are possible. */
 static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 {
-    int32_t widest = (p->code_max - p->code_min) / 32; /* keeps most of the range far enough from the limits */
+    const int32_t range = p->code_max - p->code_min;
+    int32_t widest = range / 32; /* keeps most of the range far enough from the limits */
     const uint32_t most = UINT32_MAX / p->phase_period;
     uint8_t bits = 0;
 
     b->run_most = 0;
+    b->run_entry = 0;
     /* Runs of a spline take less than half a segment from tick to tick. */
     if (CUBIC(p) && p->hold_ticks == 1 && p->phase_period <= 2 * p->length)
         return;
@@ -301,9 +395,7 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     if (b->order != 0 && bits < 4) /* what is fed back may leave half a window */
         b->run_most = 0;
 #endif
-    b->run_bits = bits;
-    b->run_half = INT32_C(1) << bits >> 1;
-    b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << bits);
+    dac_set_window(b, widened(b, p, bits, range / WINDOWS));
 }
 
 static void derive(dac_bank_axis *b, const dac_axis_program *p)

@@ -81,6 +81,14 @@ DAC_CODE_ATTR static inline uint32_t dac_block_of(uint32_t ticks)
     return ticks < DAC_RUN ? ticks : DAC_RUN;
 }
 
+/* Gives runs a window of 2^bits codes, half of them below the code before. */
+static inline void dac_set_window(dac_bank_axis *bank, uint8_t bits)
+{
+    bank->run_bits = bits;
+    bank->run_half = INT32_C(1) << bits >> 1;
+    bank->run_room = bank->code_max - bank->code_min + 1 - (INT32_C(1) << bits);
+}
+
 /* Returns true if a window with this lower end is inside the limits. */
 DAC_CODE_ATTR static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 {

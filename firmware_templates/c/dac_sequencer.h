@@ -304,6 +304,7 @@ typedef struct {
     int32_t gain, run_gain;     /* with gain_q and, if not shaped, with 32 fraction bits, or as DAC_UP scales it */
     int32_t code_min, code_max, max_step, park_code;
     int32_t run_half, run_room; /* half a window of 2^run_bits codes, and the room for it between the limits */
+    int32_t run_entry;          /* the first code of a run may be so far from the code before; 0: as far as the window */
     uint32_t run_most;          /* maximum ticks of a run; 0: no runs */
     dac_position step;          /* step per advance, rounded up */
     int64_t offset;             /* offset_word and half an LSB */
@@ -316,6 +317,7 @@ typedef struct {
     uint32_t lines, ramp_step;  /* lines of a frame; 2^32 / ticks of a line, rounded down */
     uint32_t line_most;         /* maximum ticks of a run, on lines whose ramp allows runs */
     int64_t ramp, run_ramp;     /* what offset and run_offset grow by in a tick */
+    int64_t ramp_most;          /* with run_entry, a line has runs if its ramp is at most that */
 #endif
 } dac_bank_axis;
 
@@ -391,7 +393,8 @@ bool dac_sequencer_writable(const dac_sequencer *s);
 unsigned dac_sequencer_idle(const dac_sequencer *s);
 
 /* Checks a program and puts it into the idle bank, where it stays until it is committed or another one is loaded. The
- * descriptor is copied, the tables are not. Cost: about 4000 instructions, independent of the length of the table. */
+ * descriptor is copied, the tables are not: from now on they stay as they are, until the bank is idle again, since
+ * runs rely on how far their words are apart. Cost: about 4000 instructions, and some 10 for each word. */
 dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 
 /* Commits the program in the idle bank: it is taken at the next line start, or on the next tick while no scan runs. */

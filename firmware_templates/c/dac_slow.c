@@ -112,6 +112,9 @@ DAC_CODE_ATTR static int64_t ramp_of(int64_t distance, uint32_t step)
 /* Sets what runs of the line need; see dac_program.c and dac_short.h. */
 DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
 {
+    const int64_t ramp = bank->ramp < 0 ? -bank->ramp : bank->ramp;
+
+    bank->run_most = bank->run_entry == 0 || ramp <= bank->ramp_most ? bank->line_most : 0;
 #if DAC_LONG_MULTIPLY
     if (bank->line_most == 0 || SHAPED(bank)) /* shaped runs take gain, offset and ramp as they are */
         return;
@@ -122,7 +125,6 @@ DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
 #else
     const bool scaled = SHAPED(bank) || DAC_TABLE_STORAGE_BITS != 16;
     const unsigned up = scaled ? DAC_UP(bank->bits, bank->guard) : 0u; /* as in dac_program.c */
-    const int64_t ramp = (bank->ramp < 0 ? -bank->ramp : bank->ramp) << up;
     uint8_t spread = 30 + DAC_FINE;
 
     for (uint32_t gain = (uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain) << up; gain != 0; gain >>= 1)
@@ -135,7 +137,8 @@ DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
     bank->run_ramp = bank->ramp * ((int64_t)1 << up);
 #endif
     bank->run_spread = spread > 19 + DAC_FINE ? 19 + DAC_FINE : spread;
-    bank->run_most = DAC_RUN * ramp <= INT64_C(1) << (30 + DAC_FINE) ? bank->line_most : 0;
+    if (DAC_RUN * (ramp << up) > INT64_C(1) << (30 + DAC_FINE))
+        bank->run_most = 0;
 #endif
 }
 

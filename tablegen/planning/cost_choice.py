@@ -9,7 +9,7 @@ from tablegen.config.schema import Cost
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.table_choice import choose
-from tablegen.planning.table_costs import PlayedTable, sample_costs
+from tablegen.planning.table_costs import PROCESSORS, PlayedTable, sample_costs
 
 if TYPE_CHECKING:
     from tablegen.planning.table_maker import TableMaker
@@ -23,17 +23,21 @@ def played_table(program: Program, steepest: float) -> PlayedTable:
 
 
 def remedy_for_runs(setup: Setup, played: Mapping[str, PlayedTable]) -> str:
-    """Say which axis moves too far in 16 ticks for runs, and what gives it some; empty where none does."""
+    """Say which axis moves too far in 16 ticks for runs, where, and what gives it some; empty where none does.
+
+    Without ``[cost]`` that is said of all processors.
+    """
+    cost = setup.scan.cost
+    names = PROCESSORS if cost is None else (cost.processor,)
     for axis, table in played.items():
-        if table.keeps_window:
+        without = [name for name in names if not table.keeps_window(name, table.run.table_storage_bits)]
+        if not without:
             continue
-        if setup.hardware(axis).amplifier.max_slew_v_per_s is None:
-            return (
-                f"{axis} has no runs: without amplifier.max_slew_v_per_s its slew guard is too narrow; write that key"
-            )
-        moved = f"{16.0 * table.steepest:.3g}"
+        where = "" if len(without) == len(names) else f" on {' and '.join(without)}"
+        moved = f"{16.0 * table.steepest:.0f}"
         return (
-            f"{axis} has no runs: it moves {moved} codes in 16 ticks; a lower line rate or a smaller size gives it some"
+            f"{axis} has no runs{where}: it moves {moved} codes in 16 ticks; a lower line rate or a smaller size gives "
+            f"it some"
         )
     return ""
 

@@ -6,6 +6,7 @@
 import json
 from collections.abc import Sequence
 from functools import cache
+from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -19,7 +20,8 @@ PROCESSORS: tuple[ProcessorName, ...] = get_args(ProcessorName)
 _NARROW_BITS = 16
 _LEAST_SHAPED_WINDOW = 15  # codes: what is fed back may leave half of a smaller one
 _RUN = 16  # ticks with one check of clamp and slew guard in the C
-_WIDEST = 32  # windows of this check in the range of a converter, at least
+_NARROW = 32  # windows of this check in the range of a converter, at least
+_WIDE = 8  # the same with long products, where the slew guard cannot act
 
 
 class MeasuredRun(NamedTuple):
@@ -75,12 +77,24 @@ class PlayedTable(NamedTuple):
             return table_storage_bits > _NARROW_BITS or -most <= output.gain_word < most
         return 18 <= output.gain_q <= 32
 
-    @property
-    def keeps_window(self) -> bool:
-        """True if no 16 ticks leave the window in which the C checks clamp and slew guard for all of them at once."""
-        output = self.output
-        widest = min((output.code_max - output.code_min) // _WIDEST, output.max_step)
-        return _RUN * self.steepest <= (1 << (widest + 1).bit_length() - 1) // 2
+    def keeps_window(self, processor: ProcessorName, table_storage_bits: int) -> bool:
+        """Return True if no 16 ticks leave the window in which the C checks clamp and slew guard for all of them."""
+        return _RUN * self.steepest <= self.window(processor, table_storage_bits, ceil(self.steepest) + 1) // 2
+
+    def window(self, processor: ProcessorName, table_storage_bits: int, step: int) -> int:
+        """Return the codes of this window, around the code before; ``step`` is the most that a tick moves, in codes.
+
+        The rule is that of ``allow_runs`` in dac_program.c without a slow part, whose windows have room for a ramp too.
+        """
+        output, widest = self.output, self.output.code_max - self.output.code_min
+        order, zero = output.shaping.order, output.shaping.zero
+        aside = order if order < 2 else 2 + -(-zero // 64)
+        window = _power_within(min(widest // _NARROW, output.max_step))
+        if step > output.max_step - 2 * aside:
+            return window
+        block = _RUN * step + 2 * aside
+        most = _power_within(widest // (_WIDE if _multiplies_long(processor, table_storage_bits) else _NARROW))
+        return max(window, min(1 << (2 * block - 1).bit_length(), most))
 
 
 class SampleCount(NamedTuple):
@@ -100,6 +114,11 @@ IN_RUNS, _BY_TICK, _REFUSED = range(len(SampleCount._fields))
 def _multiplies_long(processor: ProcessorName, table_storage_bits: int) -> bool:
     """Return the default of DAC_LONG_MULTIPLY in dac_config.h."""
     return processor == "cortex-m4" or (processor == "riscv32" and table_storage_bits > _NARROW_BITS)
+
+
+def _power_within(step: int) -> int:
+    """Return the largest power of two of codes in which no two differ by more than a step."""
+    return 1 << (step + 1).bit_length() - 1
 
 
 def _storage(bits: int) -> int:
@@ -129,7 +148,8 @@ def played_together(tables: Sequence[PlayedTable], processor: ProcessorName) -> 
     widened = [run._replace(table_storage_bits=table_bits, output_storage_bits=output_bits) for run in runs]
     if not all(table.has_runs(processor, table_bits) for table in tables):
         return widened, _BY_TICK
-    return widened, IN_RUNS if all(table.keeps_window for table in tables) else _REFUSED
+    kept = all(table.keeps_window(processor, table_bits) for table in tables)
+    return widened, IN_RUNS if kept else _REFUSED
 
 
 Counts = dict[MeasuredRun, dict[Mode, dict[ProcessorName, SampleCount]]]

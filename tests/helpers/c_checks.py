@@ -46,6 +46,7 @@ from c_runs import (
     rounding,
     runs_and_what_ends_them,
     runs_take_place,
+    slew_guards,
 )
 
 CHECKS: tuple[Check, ...] = (
@@ -54,7 +55,7 @@ CHECKS: tuple[Check, ...] = (
     the_largest_schedules, the_first_word_again, offsets_that_overflow, other_converters,
     converters_that_do_not_fit, requests_that_do_not_fit,
     words_too_wide_for_their_storage, lines_of_the_status, one_buffer_for_both,
-    runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, runs_take_place,
+    runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, slew_guards, runs_take_place,
     jumps_that_32_bits_do_not_tell, positions, renderings,
 )  # fmt: skip
 

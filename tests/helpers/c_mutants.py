@@ -25,7 +25,7 @@ from c_faults import Mutant
 from c_library import PROBE, Library
 from c_scripts import IN_C, LONG, everything, long_periods, long_play, refused_by_y, shaped_short_lines
 from c_scripts import LONG_PERIODS as PERIODS
-from c_shaped_waves import WAVES, shaped_waves
+from c_shaped_waves import JUMPS, WAVES, shaped_jumps, shaped_waves
 from c_threads import compile_threads
 from c_threads import play as play_threads
 from kept_objects import objects
@@ -92,6 +92,7 @@ def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
             (long_play("bits_16", 20_000, 1, 3), LONG["bits_16"][0]),
             (long_play("bits_12", 60_000, 0, 3), LONG["bits_12"][0]),
             (shaped_waves(WAVES["bits_12"]), WAVES["bits_12"]),
+            (shaped_jumps(JUMPS), JUMPS),
             (refused_by_y(20_000), LONG["many_lines"][0]),
             (shaped_short_lines(SequencerShape(16, 1, 4, 16, 1, 3, 16), 6000), SequencerShape(16, 1, 4, 16, 1, 3, 16)),
         )

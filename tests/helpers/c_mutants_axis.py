@@ -59,6 +59,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_run.h",
         "checks",
         {
+            "the window of runs has one code too much room": (
+                "bank->code_max - bank->code_min + 1 -",
+                "bank->code_max - bank->code_min + 2 -",
+            ),
             "a run's window reaches above the limit": (
                 "<= (uint32_t)bank->run_room;",
                 "<= (uint32_t)bank->run_room + 1;",
@@ -98,6 +102,10 @@ MUTANTS: tuple[Mutant, ...] = (
             "a run begins where the last one was refused": (
                 "axis->code = code;\n        done += length;",
                 "done += length;",
+            ),
+            "the first code of a run is not compared": (
+                "    if (bank->run_entry != 0 && !may_enter(axis, bank))\n        return 0;\n",
+                "",
             ),
             "runs move y while it is held": ("step = bank->holds ? 0 : ", "step = "),
             "y is skipped while it is held": (
@@ -300,6 +308,17 @@ MUTANTS: tuple[Mutant, ...] = (
             "a second run overwrites the first": ("out + done * DAC_STRIDE, most)", "out, most)"),
             "a skip loses its middle carry": ("+ (first >> 32);", ";"),
             "a skip loses its lowest bits": ("second << 32 | (first & 0xffffffffu)", "second << 32"),
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "checks",
+        {
+            "the first code of a run may rise by one more": ("rise <= bank->run_entry", "rise <= bank->run_entry + 1"),
+            "the first code of a run may fall by one more": (
+                "rise >= -bank->run_entry",
+                "rise >= -bank->run_entry - 1",
+            ),
         },
     ),
     *removed(

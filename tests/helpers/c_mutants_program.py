@@ -22,6 +22,11 @@ MUTANTS: tuple[Mutant, ...] = (
             "a direct table stands still": ("{UINT32_C(1) << 15, 0}", "{0, 0}"),
             "y is never held": ("b->holds = p->hold_ticks != 1", "b->holds = 0"),
             "x has the program of y": ("derive(&bank->x, &p->x)", "derive(&bank->x, &p->y)"),
+            "a window is widened where the slew guard acts": ("    if (step > allowed)\n        return bits;\n", ""),
+            "the samples of words have no guard bits": (
+                "UINT32_C(1) << b->guard; /* of a sample",
+                "UINT32_C(1); /* of a sample",
+            ),
             "the bank that plays is written": ("&s->bank[dac_sequencer_idle(s)]", "&s->bank[!dac_sequencer_idle(s)]"),
             "a program is committed for the first swap only": ("s->loaded_after = s->swaps", "s->loaded_after = 0"),
         },
@@ -102,6 +107,15 @@ MUTANTS: tuple[Mutant, ...] = (
             "a line of too many ticks": ("p->line_ticks - 1 < UINT32_C(1) << 24", "p->line_ticks != 0"),
             "a frame of too many ticks": ("p->frame_lines <= INT32_MAX / p->line_ticks", "true"),
             "a turn behind the line": ("p->turn_tick <= p->line_ticks", "true"),
+            "the last word and the first are not compared": (
+                "for (uint32_t i = 0; i < p->length; i++) {",
+                "for (uint32_t i = 0; i + 1 < p->length; i++) {",
+            ),
+            "only falling words are steep": (
+                "if (way > steepest)",
+                "if (way > steepest && p->table[i] > p->table[i + 1])",
+            ),
+            "an advance is a word": ("(uint64_t)b->step.high + 1; ", "UINT64_C(32768);    "),
             "words of 7 bits": ("p->bits >= 8", "p->bits >= 7"),
             "any word behind the last one": (
                 "DAC_TABLE_WORD(p->table[p->length]) == DAC_TABLE_WORD(p->table[0])",
@@ -120,10 +134,6 @@ MUTANTS: tuple[Mutant, ...] = (
             "the offset of runs has other fraction bits": (
                 "b->run_offset = b->offset * ((int64_t)1 << left)",
                 "b->run_offset = b->offset * ((int64_t)1 << (left - 1))",
-            ),
-            "the window of runs has one code too much room": (
-                "p->code_max - p->code_min + 1 -",
-                "p->code_max - p->code_min + 2 -",
             ),
             "wrong guard bits of wide words": ("? 25u - p->bits : 4u", "? 24u - p->bits : 4u"),
             "ties of the code are rounded down": (

@@ -141,6 +141,11 @@ MUTANTS: tuple[Mutant, ...] = (
             ),
             "a remainder has other bits": ("(uint8_t)(28 - p->dac_bits)", "(uint8_t)(27 - p->dac_bits)"),
             "there are no zeros": ("b->zero = p->shaping_zero;", "b->zero = 0;"),
+            "what shaping adds to a step is forgotten": (
+                "    aside = b->order < 2 ? b->order : 2 + (b->zero + 63) / 64;\n",
+                "",
+            ),
+            "what shaping adds to the first code is forgotten": ("p->max_step - aside", "p->max_step"),
         },
     ),
 )

@@ -236,6 +236,37 @@ def jumps_that_32_bits_do_not_tell(libraries: Libraries) -> None:
             assert (done, code.value) == ((16, 30000) if last in range(29_500, 30_500) else (0, last)), last
 
 
+def slew_guards(libraries: Libraries) -> None:
+    """The slew guard acts on one steep piece of a table, wherever it is, and on the first code of a run."""
+    # 20 codes a tick, and 30 from the last word to the first one, which no window of 16 such ticks refuses
+    wave = np.array([0, 1600, 3200, 4800, 4800, 4000, 3200, 2400])
+    fine = np.floor(900 * np.sin(np.arange(64) / 64 * 2 * np.pi)).astype(np.int64)
+    for words, ticks, max_step in (
+        (wave, 640, 24),
+        (wave[::-1], 640, 24),
+        (np.roll(wave, 3), 640, 24),
+        (fine, 20, 190),
+    ):
+        program = _resting(words.tolist(), ticks, [0] * 8, max_step=max_step)
+        twin = Twin(libraries.narrow, program, (32768, 32768))
+        twin.commit(program)
+        twin.play(1)
+        twin.ask("arm", "trigger")
+        for many in (241, 700, 2000):
+            twin.play(many, "fill")
+    for library, max_step in product(libraries, (1, 2, 4, 7)):
+        program = flat(30000, max_step=max_step)
+        device = device_for(library, program)
+        assert device.load(program) == LOADED
+        for away in range(-max_step - 2, max_step + 3):
+            position, code = (c_uint64(0), c_uint32(0)), c_int32(30000 + away)
+            out = np.zeros(20 * library.stride, library.output)
+            done = library.dll.probe_run(
+                device.state, 0, *map(byref, position), byref(code), out.ctypes.data_as(c_void_p), c_uint32(16)
+            )
+            assert done == (16 if abs(away) <= max_step else 0), f"from {away} codes beside it, by {max_step}"
+
+
 def limits(libraries: Libraries) -> None:
     """A wave whose peaks are so many codes beyond the limits or short of them, in runs wherever there is room."""
     for library in libraries:

@@ -17,6 +17,8 @@ WAVES = {
     "wide_words": SequencerShape(20, 1, 8, 24, 1, 8, 24),
 }
 
+JUMPS = SequencerShape(16, 1, 8, 16, 1, 8, 16)
+
 
 def shaped_waves(shape: SequencerShape) -> Script:
     """Waves so slow that runs play almost all of them, whatever the converter: each axis by the second and third order.
@@ -47,4 +49,30 @@ def shaped_waves(shape: SequencerShape) -> Script:
         script.wait_ticks(4000)
         script.request("park")
         script.wait_ticks(50)
+    return script
+
+
+def shaped_jumps(shape: SequencerShape) -> Script:
+    """Programs that all but rest, one after the other at twice the slew guard or a little less, by the third order.
+
+    So the second tick of each is at the slew guard or a little less from the code before, before it is shaped.
+    """
+    rng, script = np.random.default_rng(1), Script()
+    half, guard = 1 << (shape.dac_bits - 1), 30
+    jumps = (way * (2 * guard - few) for few in range(1, 5) for _ in range(16) for way in (1, -1))
+    script.tick_every(1)
+    for place in np.cumsum([half, *jumps]):
+        program = wave_program(shape, 0, 100)
+        output = replace(
+            program.x.output,
+            gain_word=10,
+            offset_word=(int(place) << program.x.output.gain_q) + int(rng.integers(1 << 20)),
+            code_min=0,
+            code_max=2 * half - 1,
+            park_code=half,
+            max_step=guard,
+            shaping=Shaping(3, MAXIMUM_ZERO),
+        )
+        play(script, replace(program, x=replace(program.x, output=output), y=replace(program.y, output=output)))
+        script.wait_ticks(110)
     return script

@@ -62,36 +62,38 @@ def test_a_table_without_runs_takes_what_ticks_take(tmp_path: Path) -> None:
     assert sample_costs([short], "riscv32") == [counts()[MeasuredRun(16, 16, False)]["cubic"]["riscv32"][1]]
 
 
-WITHOUT_SLEW = "- amplifier.max_slew_v_per_s"
+FAST = ("timing.line_rate_hz = 1600", "timing.pixels = 50")
 
 
-@pytest.mark.parametrize(
-    ("edits", "remedy"),
-    [
-        (
-            (WITHOUT_SLEW,),
-            "x has no runs: without amplifier.max_slew_v_per_s its slew guard is too narrow; write that key",
-        ),
-        (
-            ("timing.line_rate_hz = 1600", "timing.pixels = 50"),
-            "codes in 16 ticks; a lower line rate or a smaller size gives it some",
-        ),
-    ],
-)
-def test_a_scan_that_moves_too_far_for_runs_takes_what_refused_runs_take(
-    tmp_path: Path, edits: tuple[str, ...], remedy: str
-) -> None:
-    """Both axes do, whatever the table: the plan knows the steps and the slew guard."""
-    in_runs, by_tick, refused = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
-    plan = planned(tmp_path, *edits)
-    assert [line.sample_cost.instructions for line in plan.lines if line.sample_cost] == [refused, refused]
+def counted(tmp_path: Path, processor: str, *edits: str) -> list[float]:
+    """Return what both axes take on a processor."""
+    plan = planned(tmp_path, *edits, processor=processor)
+    return [line.sample_cost.instructions for line in plan.lines if line.sample_cost]
+
+
+@pytest.mark.parametrize("processor", ["cortex-m4", "cortex-m0plus", "riscv32"])
+def test_a_scan_without_a_slew_rate_takes_what_runs_take(tmp_path: Path, processor: str) -> None:
+    """Its slew guard is twice its steepest step, which no words of its table reach."""
+    in_runs, *_ = counts()[MeasuredRun(16, 16, False)]["interpolated"][processor]
+    assert counted(tmp_path, processor, "- amplifier.max_slew_v_per_s") == [in_runs, in_runs]
+
+
+def test_a_scan_that_moves_too_far_for_runs_takes_what_refused_runs_take(tmp_path: Path) -> None:
+    """Both axes do, whatever the table; a Cortex-M4 has wider windows, and runs."""
+    in_runs, by_tick, refused = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m0plus"]
+    assert counted(tmp_path, "cortex-m0plus", *FAST) == [refused, refused]
+    assert counted(tmp_path, "cortex-m4", *FAST) == [19.4, 19.4]
     assert in_runs < 0.2 * by_tick < 0.2 * refused
-    assert remedy in " ".join(run("show", tmp_path / "scan.toml", "--all", "--no-plot").out.split())
+    moves = "codes in 16 ticks; a lower line rate or a smaller size gives it some"
+    assert counted(tmp_path, "riscv32", *FAST) != [29.6, 29.6]
+    assert moves in " ".join(run("show", tmp_path / "scan.toml", "--all", "--no-plot").out.split())
     for auto in ((), AUTO):
-        with_limit = write_pair(tmp_path, edited(SCAN, *edits, *auto, f'{COST}"cortex-m4"\nmax_instructions = 25'))
+        with_limit = write_pair(tmp_path, edited(SCAN, *FAST, *auto, f'{COST}"cortex-m0plus"\nmax_instructions = 50'))
         outcome = run("check", with_limit)
         assert outcome.status != 0
-        assert remedy in " ".join(outcome.err.split())
+        assert moves in " ".join(outcome.err.split())
+    of_all = run("tables", write_pair(tmp_path, edited(SCAN, *FAST)), "--axis", "x").out
+    assert "x has no runs on cortex-m0plus and riscv32: it moves" in " ".join(of_all.split())
 
 
 def test_wide_words_of_the_other_axis_count(tmp_path: Path) -> None:

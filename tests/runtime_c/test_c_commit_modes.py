@@ -70,8 +70,10 @@ def play(library: Library, option: str, seed: int, rounds: int = 40) -> Counter[
     twin, seen = Twin(library, choice[0]), Counter[str]()
     commit(twin, choice[0], CommitMode(int(rng.integers(3))))
     twin.ask("arm", "trigger")
+    # A blind fill leaves the pixels unknown up to the next window, so markers are compared without such fills.
+    ways = ["blind"] if seed % 3 == 0 else ["step", "fill", "fill"]
     for _ in range(rounds):
-        twin.play(int(rng.integers(1, 3 * TICKS)), str(rng.choice(["step", "fill", "fill", "blind"])))
+        twin.play(int(rng.integers(1, 3 * TICKS)), str(rng.choice(ways)))
         waiting, mode = twin.model.idle, CommitMode(int(rng.integers(3)))
         program = choice[int(rng.integers(len(choice)))]
         if waiting is not None and rng.random() < 0.5:

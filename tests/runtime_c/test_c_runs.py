@@ -1,26 +1,34 @@
-"""Which programs the C plays in runs: ``PlayedTable.has_runs``, which costs are read by, against ``allow_runs``."""
+"""Which programs the C plays in runs, and in which windows: ``PlayedTable``, which costs are read by, and the C."""
 
 from collections import Counter
-from ctypes import c_uint32
+from ctypes import c_int32, c_uint32
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from c_library import LOADED, Device, Library, compile_library, converter_of
 from programs import random_dual, shaped
+from replacing import replace
 from test_c_slow_part import runtime_with
 
 from tablegen.config.schema import ProcessorName
 from tablegen.device.dual_program import DualProgram
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.table_costs import PlayedTable
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 # Two banks are derived for a load, x first.
 PROBE = {
-    "/* Derives the windows of dac_axis_run, if runs are possible. */": "uint32_t probe_runs;",
+    "/* Derives the windows of dac_axis_run, if runs are possible. */": (
+        "uint32_t probe_runs, probe_windows; int32_t probe_x_step, probe_step;"
+    ),
     "    b->park_code = p->park_code;\n    allow_runs(b, p);": (
         "    b->park_code = p->park_code;\n    allow_runs(b, p);\n    probe_runs = probe_runs << 16 | b->run_most;"
+        "    probe_windows = probe_windows << 16 | b->run_bits;\n"
+        "    probe_x_step = probe_step;\n    probe_step = steepest_step(b, p);"
     ),
 }
 DEVICES: dict[
@@ -47,24 +55,72 @@ def tables(program: DualProgram) -> list[PlayedTable]:
     ]
 
 
+def both(probe: c_uint32) -> tuple[int, int]:
+    """Return what a probe has of x and of y."""
+    return probe.value >> 16, probe.value & 0xFFFF
+
+
+def largest_step(axis: Program) -> int:
+    """Return the largest step of a code from one advance to the next, without limits and shaping."""
+    top = (1 << axis.output.dac_bits) - 1
+    free = replace(axis, output=replace(axis.output, code_min=0, code_max=top, shaping=Shaping()))
+    codes = free.codes(np.arange(axis.phase.ticks))
+    return int(np.max(np.abs(codes - np.roll(codes, 1))))
+
+
+def guarded(axis: Program) -> Program:
+    """Return the axis with a 50th of its gain, and a slew guard that just does not act on it."""
+    small = replace(axis, output=replace(axis.output, gain_word=axis.output.gain_word // 50))
+    return replace(small, output=replace(small.output, max_step=largest_step(small) + 12))
+
+
+def steps_and_windows(device: str, shaping: int, folder: Path, edits: dict[str, str]) -> None:
+    """Compare what the C derives of random programs with the rules of the costs, and with the codes of a period."""
+    processor, bits, options = DEVICES[device]
+    more = (*options, "-DDAC_SPLINE=1", f"-DDAC_SHAPING={shaping}")
+    runtime = runtime_with(PROBE | edits, folder / "runtime")
+    library = Library(compile_library(folder / "runs.so", bits, bits, runtime=runtime, more=more))
+    runs, windows = (c_uint32.in_dll(library.dll, name) for name in ("probe_runs", "probe_windows"))
+    steps = [c_int32.in_dll(library.dll, name) for name in ("probe_x_step", "probe_step")]
+    seen, widened = Counter[bool](), Counter[bool]()
+    rng = np.random.default_rng(5)
+    for shape in SHAPES[bits]:
+        for longest, gentle in product((6, 40, 300), (False, True)):
+            program = random_dual(rng, shape, (4, longest), kind="tame")
+            if shaping:
+                program = shaped(rng, program, shaping)
+            if gentle:
+                program = replace(program, x=guarded(program.x), y=guarded(program.y))
+            loading = Device(library, *(converter_of(axis.output) for axis in (program.x, program.y)))
+            assert loading.load(program) == LOADED
+            axes = zip(tables(program), (program.x, program.y), both(runs), both(windows), steps, strict=True)
+            for table, axis, most, window, step in axes:
+                assert table.has_runs(processor, bits) == (most != 0), (shape, table)
+                seen[most != 0] += 1
+                assert largest_step(axis) <= step.value, (shape, table)
+                if most != 0:
+                    assert table.window(processor, bits, step.value) == 1 << window, (shape, table, step.value)
+                    widened[1 << window > table.window(processor, bits, 1 << 30)] += 1
+    assert min(seen[True], seen[False], widened[True], widened[False]) > 5
+
+
 @pytest.mark.common
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("shaping", [0, 3])
 def test_runs_are_where_costs_expect_them(device: str, shaping: int, tmp_path: Path) -> None:
-    processor, bits, options = DEVICES[device]
-    more = (*options, "-DDAC_SPLINE=1", f"-DDAC_SHAPING={shaping}")
-    runtime = runtime_with(PROBE, tmp_path / "runtime")
-    library = Library(compile_library(tmp_path / "runs.so", bits, bits, runtime=runtime, more=more))
-    runs, seen = c_uint32.in_dll(library.dll, "probe_runs"), Counter[bool]()
-    rng = np.random.default_rng(5)
-    for shape in SHAPES[bits]:
-        for longest in (6, 40, 300):
-            program = random_dual(rng, shape, (4, longest), kind="tame")
-            if shaping:
-                program = shaped(rng, program, shaping)
-            device = Device(library, *(converter_of(axis.output) for axis in (program.x, program.y)))
-            assert device.load(program) == LOADED
-            for table, most in zip(tables(program), (runs.value >> 16, runs.value & 0xFFFF), strict=True):
-                assert table.has_runs(processor, bits) == (most != 0), (shape, table)
-                seen[most != 0] += 1
-    assert min(seen[True], seen[False]) > 5
+    steps_and_windows(device, shaping, tmp_path, {})
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize(
+    "edit",
+    [
+        ("CUBIC(p) ? 12 :", "CUBIC(p) ? 6 :"),
+        ("UINT32_C(1) << b->guard; /* of a sample", "UINT32_C(1) << b->guard >> 1; /* of a sample"),
+        ("(CUBIC(p) ? 18 : 15)) + 3", "18) + 3"),
+        ("(int32_t)(largest_gain(p) * move >> p->gain_q) + 1", "(int32_t)(largest_gain(p) * move >> p->gain_q)"),
+    ],
+)
+def test_a_bound_that_is_too_low_is_found(edit: tuple[str, str], tmp_path: Path) -> None:
+    with pytest.raises(AssertionError):
+        steps_and_windows("long, 16", 0, tmp_path, dict([edit]))

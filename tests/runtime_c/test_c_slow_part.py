@@ -6,6 +6,7 @@ import os
 from collections import Counter
 from ctypes import c_bool, c_uint64
 from functools import cache
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ from tablegen.base.resources import c_runtime
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.sequencer import can_keep
-from tablegen.fixedpoint.frame_program import FrameProgram, Knots
+from tablegen.fixedpoint.frame_program import FrameProgram, Knots, SlowTable
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -219,6 +220,32 @@ def without_ramps(program: ScanProgram) -> ScanProgram:
     return replace(program, x=still(program.x), y=still(program.y))
 
 
+def guarded_waves(steep: str, over: int) -> ScanProgram:
+    """Short lines of which one part is steep, beside a slew guard of its largest step less a few codes.
+
+    It is steep by the words that are mixed in, by the gain of its lines, or by their ramps.
+    """
+    program = even_waves("plain", 0)
+    schedule = replace(random_schedule(np.random.default_rng(1), 64, 1), lines=8, settle_lines=0)
+
+    def guarded(axis: FrameProgram) -> FrameProgram:
+        fast, q = axis.fast, axis.output.gain_q
+        words = np.floor(100 * np.sin(2 * np.pi * np.arange(len(fast.words)) / len(fast.words))).astype(np.int64)
+        second = np.where(np.arange(len(words)) % 2, 127, -127) * (steep == "second")
+        slow = SlowTable(np.array([0, 0, 8, 8, 0, 0, -8, -8]) * 1000 * (steep == "ramp"), 1 << 12, 1 << 15 + q)
+        gain = {"second": 20_000, "gain": 40_000, "ramp": 2000}[steep]
+        gains, ratios = (Knots(np.array([word] * 2), 8) for word in (gain, 2000))
+        output = replace(fast.output, gain_word=20_000, code_min=0, code_max=65535, park_code=32768, max_step=65535)
+        fast = replace(fast, words=words, phase=RationalPhase(schedule.ticks), output=output)
+        made = FrameProgram(fast, schedule.lines, gains, ratios, second, slow)
+        largest = int(np.max(np.abs(np.diff(made.frame().ravel()))))
+        return replace(made, fast=replace(fast, output=replace(output, max_step=max(largest - over, 1))))
+
+    assert isinstance(program.x, FrameProgram)
+    assert isinstance(program.y, FrameProgram)
+    return replace(program, x=guarded(program.x), y=guarded(program.y), schedule=schedule)
+
+
 def jumps() -> ScanProgram:
     """Lines with jumps by which the value of a code grows by 2^32: 32 bits do not see them."""
     program = even_waves("plain", 1)
@@ -243,9 +270,9 @@ def test_jumps_that_32_bits_do_not_see_are_played_one_by_one(option: str, folder
     play_fills(library_of(compiled(folder, option)), jumps(), 5000)
 
 
-def play_fills(library: Library, program: ScanProgram, ticks: int) -> None:
-    """Play the program alone, by fills."""
-    twin = Twin(library, program)
+def play_fills(library: Library, program: ScanProgram, ticks: int, code: int = 0) -> None:
+    """Play the program alone, by fills, from a code of both axes."""
+    twin = Twin(library, program, (code, code))
     commit(twin, program, CommitMode.LINE)
     twin.ask("arm", "trigger")
     for _ in range(ticks // 1000):
@@ -476,6 +503,15 @@ MUTANTS = {
     "runs have the gain of the axis": ("    bank->run_gain = bank->gain * (INT32_C(1) << left);\n", ""),
     "runs have half of the ramp": (RUN_RAMP, f"{RUN_RAMP} / 2"),
     "a chunk begins with the ramp of the last one": ("        rise += CHUNK * bank->ramp;\n", ""),
+    "the words that are mixed in are not steep": (
+        "        if (mixes(p)) /* words are mixed to the nearest */",
+        "        if (false)",
+    ),
+    "the gain of the axis is the largest": (
+        "    if (p->slow == NULL)\n#endif\n        largest",
+        "#endif\n        largest",
+    ),
+    "a window is as wide with any ramp": (" || ramp <= bank->ramp_most ?", " || true ?"),
     "runs without a window": (WINDOW, WINDOW.replace("if (out_of_window >> bank->run_bits != 0)", "if (false)")),
 }
 FED = "            out_of_window |= fed;\n            code = (fed >> bits)"
@@ -539,6 +575,8 @@ def differs(path: Path, option: str) -> bool:
                 play_fills(library, even_waves(option, seed), 9000)
             play_fills(library, without_ramps(even_waves(option, 3)), 9000)
             play_fills(library, jumps(), 5000)
+            for steep, over in product(("second", "gain", "ramp"), (0, 1, 2)):
+                play_fills(library, guarded_waves(steep, over), 3000, 1 << 15)
             for seed in range(16):
                 play(library, option, seed)
         except AssertionError:
