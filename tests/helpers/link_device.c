@@ -263,6 +263,12 @@ void device_tick(device *d, uint32_t ticks, unsigned work)
     }
 }
 
+/* Requests act, as on a core that is about to ask for samples; no tick follows. */
+void device_answer(device *d)
+{
+    dac_sequencer_answer(&d->sequencer);
+}
+
 size_t device_take(device *d, uint8_t *bytes)
 {
     const size_t sent = d->sent;

@@ -381,6 +381,10 @@ class HostDevice:
         self._note(f"t {ticks} {work}")
         self._dll.device_tick(self._device, c_uint32(ticks), c_uint32(work))
 
+    def take_requests(self) -> None:
+        """The requests that wait act, and no tick follows."""
+        self._dll.device_answer(self._device)
+
     def lines(self) -> list[Line]:
         """The lines that ended since the last call."""
         count = int(self._dll.device_records(self._device, None))
