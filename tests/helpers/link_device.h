@@ -52,6 +52,9 @@ typedef struct {
 } device;
 
 device *device_new(const device_setup *setup, uint32_t boot);
+#if DAC_SLOW_PART
+void device_refuse_slow(device *d);
+#endif
 #if DAC_STORE
 void device_keep(device *d, const dac_store_flash *flash, bool while_playing);
 #endif

@@ -79,7 +79,8 @@ MUTANTS = {
     "a compiled program has no CRC": (LIBRARY, "    put_crc(l);\n", ""),
     "the y of a compiled program never steps": (
         LIBRARY, "DAC_LINK_Y_STEPS, p->y.hold_ticks != 1", "DAC_LINK_Y_STEPS, 0"),
-    "offsets of compiled programs have 16 low bits": (LIBRARY, "a->offset_word & 0x3FFFF", "a->offset_word & 0xFFFF"),
+    "offsets of compiled programs have 16 low bits": (
+        LIBRARY, "(uint32_t)offset & 0x3FFFF", "(uint32_t)offset & 0xFFFF"),
     "the y of a compiled program is its x": (LIBRARY, "e(l, &entry->program.y);", "e(l, &entry->program.x);"),
     "compiled programs have no settling lines": (
         LIBRARY, "    put_word(page, DAC_LINK_SETTLE_LINES, s->settle_lines);\n", ""),
