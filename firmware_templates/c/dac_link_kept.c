@@ -123,11 +123,12 @@ dac_link_finding dac_link_slot(const dac_link *l, const uint8_t *payload, dac_li
 /* Whether flash may be written now. */
 static dac_link_finding check_state(const dac_link *l)
 {
+    const bool starts = dac_sequencer_starts(l->sequencer); /* first: in front of the tick whose markers follow */
     const dac_status s = dac_sequencer_status(l->sequencer);
-    const bool parked = (s.markers & (DAC_PLAYING | DAC_PARKED)) == DAC_PARKED;
+    const bool rests = s.swaps == 0 || (s.markers & (DAC_PLAYING | DAC_PARKED)) == DAC_PARKED;
 
-    return l->config->store_while_playing || s.swaps == 0 || parked ? dac_link_fine()
-                                                                    : dac_link_because(DAC_LINK_NOT_PARKED, 0);
+    return l->config->store_while_playing || (rests && !starts) ? dac_link_fine()
+                                                                : dac_link_because(DAC_LINK_NOT_PARKED, 0);
 }
 
 static dac_link_finding changed(const dac_link *l, dac_store_result result)

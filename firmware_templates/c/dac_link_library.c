@@ -38,14 +38,36 @@ static void put_scan(uint8_t *page, const dac_program *p)
 #endif
 }
 
+/* Step and remainder of a period, in two words. */
+static void put_step(uint8_t *page, unsigned word, uint32_t period)
+{
+    put_word(page, word, (uint32_t)((UINT64_C(1) << 32) / period));
+    put_word(page, word + 1, (uint32_t)((UINT64_C(1) << 32) % period));
+}
+
+static void put_level(uint8_t *page, int32_t gain, int64_t offset)
+{
+    put_word(page, DAC_LINK_GAIN, (uint32_t)gain);
+    put_word(page, DAC_LINK_OFFSET_LOW, (uint32_t)offset & 0x3FFFF);
+    put_word(page, DAC_LINK_OFFSET_HIGH, (uint32_t)(offset >> 18));
+}
+
+#if DAC_SLOW_PART
+/* Its gain and offset take the place of those of the axis, which have no effect. */
+static void put_slow(uint8_t *page, const dac_slow_part *s, uint32_t lines)
+{
+    put_level(page, s->gain_word, s->offset_word);
+    put_word(page, DAC_LINK_SLOW_WORD, s->gain_knots | (uint32_t)s->index_bits << 8);
+    put_word(page, DAC_LINK_KNOT_SPACING, s->gain_spacing);
+    put_step(page, DAC_LINK_SLOW_STEP, lines);
+}
+#endif
+
 static void put_axis(uint8_t *page, const dac_axis_program *a)
 {
-    put_word(page, DAC_LINK_PHASE_STEP, (uint32_t)((UINT64_C(1) << 32) / a->phase_period));
-    put_word(page, DAC_LINK_PHASE_REMAINDER, (uint32_t)((UINT64_C(1) << 32) % a->phase_period));
+    put_step(page, DAC_LINK_PHASE_STEP, a->phase_period);
     put_word(page, DAC_LINK_PHASE_PERIOD, a->phase_period);
-    put_word(page, DAC_LINK_GAIN, (uint32_t)a->gain_word);
-    put_word(page, DAC_LINK_OFFSET_LOW, (uint32_t)a->offset_word & 0x3FFFF);
-    put_word(page, DAC_LINK_OFFSET_HIGH, (uint32_t)(a->offset_word >> 18));
+    put_level(page, a->gain_word, a->offset_word);
     put_word(page, DAC_LINK_CODE_MIN, (uint32_t)a->code_min);
     put_word(page, DAC_LINK_CODE_MAX, (uint32_t)a->code_max);
     put_word(page, DAC_LINK_MAX_STEP, (uint32_t)a->max_step);
@@ -59,6 +81,24 @@ static unsigned table_bytes(const dac_axis_program *a)
 {
     return a->bits <= 16 ? 2 : 3; /* of a word */
 }
+
+#if DAC_SLOW_PART
+static uint32_t slow_bytes(const dac_axis_program *a)
+{
+    const dac_slow_part *const s = a->slow;
+
+    return s == NULL ? 0 : a->length + ((uint32_t)table_bytes(a) << s->index_bits) + UINT32_C(5) * s->gain_knots;
+}
+
+/* The words of an image have one spacing of knots. Without a second table there are no ratios. */
+static bool has_image(const dac_axis_program *a)
+{
+    const dac_slow_part *const s = a->slow;
+
+    return s == NULL || s->second == NULL
+        || (s->ratio_knots == s->gain_knots && s->ratio_spacing == s->gain_spacing);
+}
+#endif
 
 static uint8_t value_of(char digit)
 {
@@ -88,6 +128,9 @@ static void announce(const dac_library_entry *entry, uint8_t *info)
         shape[2] = axes[axis]->dac_bits;
         shape[3] = 0;
         bytes += axes[axis]->length * table_bytes(axes[axis]);
+#if DAC_SLOW_PART
+        bytes += slow_bytes(axes[axis]);
+#endif
     }
 #if DAC_PIXEL_TABLE
     if (entry->program.schedule.pixel_table != NULL)
@@ -105,17 +148,46 @@ static dac_link_finding store_program(dac_link *l, const dac_program *program)
     put_scan(words, program);
     put_axis(words + 64, &program->x);
     put_axis(words + 128, &program->y);
+#if DAC_SLOW_PART
+    if (program->x.slow != NULL)
+        put_slow(words + 64, program->x.slow, program->schedule.frame_lines);
+    if (program->y.slow != NULL)
+        put_slow(words + 128, program->y.slow, program->schedule.frame_lines);
+#endif
     for (unsigned i = 0; i < DAC_LINK_PROGRAM; i++)
         found = dac_link_store(l, words[i]);
     return found; /* that of the last byte */
 }
 
+static void store_word(dac_link *l, uint32_t word, unsigned bytes)
+{
+    for (unsigned byte = 0; byte < bytes; byte++)
+        (void)dac_link_store(l, (uint8_t)(word >> 8 * byte));
+}
+
 static void store_table(dac_link *l, const dac_axis_program *a)
 {
     for (uint32_t word = 0; word < a->length; word++)
-        for (unsigned byte = 0; byte < table_bytes(a); byte++)
-            (void)dac_link_store(l, (uint8_t)((uint32_t)a->table[word] >> 8 * byte));
+        store_word(l, (uint32_t)a->table[word], table_bytes(a));
 }
+
+#if DAC_SLOW_PART
+static void store_slow(dac_link *l, const dac_axis_program *a)
+{
+    const dac_slow_part *const s = a->slow;
+
+    if (s == NULL)
+        return;
+    for (uint32_t word = 0; word < a->length; word++)
+        store_word(l, s->second != NULL ? (uint32_t)s->second[word] : 0, 1);
+    for (uint32_t word = 0; word < UINT32_C(1) << s->index_bits; word++)
+        store_word(l, (uint32_t)s->table[word], table_bytes(a));
+    for (unsigned knot = 0; knot < s->gain_knots; knot++)
+        store_word(l, (uint32_t)s->gains[knot], 3);
+    for (unsigned knot = 0; knot < s->gain_knots; knot++)
+        store_word(l, s->second != NULL ? (uint32_t)s->ratios[knot] : 0, 2);
+}
+#endif
 
 #if DAC_PIXEL_TABLE
 static void store_pixels(dac_link *l, const dac_schedule *s)
@@ -138,19 +210,19 @@ static void put_crc(dac_link *l)
 }
 
 /* A compiled program goes the way of an upload too. The sequencer checks what an image does not have: the coding of the
- * converter, and the table in flash. The words of a slow part are not put into an image here. */
+ * converter, and the table in flash. */
 static dac_link_finding load_compiled(dac_link *l, const dac_library_entry *entry)
 {
     uint8_t info[DAC_LINK_INFO], payload[4];
     dac_link_answer a = {0, 0, 0, 0, payload};
 
-#if DAC_SLOW_PART
-    if (entry->program.x.slow != NULL || entry->program.y.slow != NULL)
-        return dac_link_because(DAC_LINK_SHAPE, entry->program.x.slow == NULL);
-#endif
     const dac_loaded loaded = dac_sequencer_load(l->sequencer, &entry->program);
     if (loaded != DAC_LOADED)
         return dac_link_because(DAC_LINK_REFUSED, (uint32_t)loaded);
+#if DAC_SLOW_PART
+    if (!has_image(&entry->program.x) || !has_image(&entry->program.y))
+        return dac_link_because(DAC_LINK_SHAPE, has_image(&entry->program.x) ? 1 : 0);
+#endif
     announce(entry, info);
     dac_link_finding found = dac_link_begin(l, info, &a);
     if (found.reason == DAC_LINK_NO_REASON)
@@ -158,7 +230,13 @@ static dac_link_finding load_compiled(dac_link *l, const dac_library_entry *entr
     if (found.reason != DAC_LINK_NO_REASON)
         return found;
     store_table(l, &entry->program.x);
+#if DAC_SLOW_PART
+    store_slow(l, &entry->program.x);
+#endif
     store_table(l, &entry->program.y);
+#if DAC_SLOW_PART
+    store_slow(l, &entry->program.y);
+#endif
 #if DAC_PIXEL_TABLE
     store_pixels(l, &entry->program.schedule);
 #endif

@@ -121,6 +121,24 @@ bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames)
 }
 
 bool dac_sequencer_trigger(dac_sequencer *s) { return request(s, TRIGGER, 0); }
+
+#if DAC_STORE
+bool dac_sequencer_starts(const dac_sequencer *s)
+{
+    const volatile uint8_t *const running = &s->running; /* the consumer's, which may be at work on another core */
+    bool starts = false;
+    uint8_t at = s->tail;
+
+    /* In this order: a trigger that is not in the queue any more has set `running`. */
+    DAC_ACQUIRE();
+    for (; at != s->head; at++) {
+        const uint8_t what = s->request[at % DAC_REQUESTS];
+        starts = what == TRIGGER || (starts && what != PARK && what != RESET);
+    }
+    return starts || *running != 0;
+}
+#endif
+
 bool dac_sequencer_park(dac_sequencer *s) { return request(s, PARK, 0); }
 bool dac_sequencer_reset(dac_sequencer *s) { return request(s, RESET, 0); }
 bool dac_sequencer_clear_faults(dac_sequencer *s) { return request(s, CLEAR_FAULTS, 0); }

@@ -136,7 +136,8 @@ class ModelStore:
         return b""
 
     def _check_state(self) -> None:
-        if not self._while_playing and self._player.state in (DeviceState.PLAYING, DeviceState.PARKING):
+        rests = self._player.state not in (DeviceState.PLAYING, DeviceState.PARKING) and not self._player.starts
+        if not self._while_playing and not rests:
             raise RequestRefused(Reason.PLAYING)
 
     def _change(self, change: Callable[[], None]) -> None:

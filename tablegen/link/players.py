@@ -49,6 +49,10 @@ class Player(Protocol):
     def writable(self) -> bool:
         """True if no program waits to be swapped in, nor will."""
 
+    @property
+    def starts(self) -> bool:
+        """True if a trigger waits for the next tick, and no park behind it; ``state`` knows nothing of it yet."""
+
     def commit(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> bool:
         """Commit a program, to be swapped in as its mode says, or on the next tick where no scan plays."""
 
@@ -82,12 +86,14 @@ class _Queue:
         self._requests: list[Callable[[], None]] = []
         self._commits = 0
         self.swaps = self.swapped_at = 0
+        self.starts = False  # a trigger waits, and no park behind it
         self.restart()
 
     def restart(self, program: ScanProgram | None = None) -> None:
         """Restart as at power-up: this program, or else the boot program, if there is one, waits for the first tick."""
         self._requests.clear()
         self._commits = self.swaps = self.swapped_at = 0
+        self.starts = False
         self._power_up()
         first = program or self._boot
         if first is not None:
@@ -110,6 +116,24 @@ class _Queue:
         self._commits += accepted
         return accepted
 
+    def trigger(self) -> bool:
+        """Start at line 0."""
+        accepted = self._ask(self._trigger)
+        self.starts = self.starts or accepted
+        return accepted
+
+    def park(self) -> bool:
+        """Park after the current tick; no frame follows."""
+        accepted = self._ask(self._park)
+        self.starts = self.starts and not accepted
+        return accepted
+
+    def _trigger(self) -> None:
+        raise NotImplementedError
+
+    def _park(self) -> None:
+        raise NotImplementedError
+
     def _ask(self, act: Callable[[], None]) -> bool:
         if len(self._requests) == MAX_REQUESTS:
             return False
@@ -117,6 +141,7 @@ class _Queue:
         return True
 
     def _answer(self) -> None:
+        self.starts = False
         while self._requests:
             self._requests.pop(0)()
 
@@ -189,17 +214,11 @@ class SequencerPlayer(_Queue):
         """Let the next trigger start so many frames; 0 is without end."""
         return self._ask(lambda: self.sequencer.arm(frames))
 
-    def trigger(self) -> bool:
-        """Start at line 0."""
+    def _trigger(self) -> None:
+        self.sequencer.trigger()
 
-        def act() -> None:
-            self.sequencer.trigger()
-
-        return self._ask(act)
-
-    def park(self) -> bool:
-        """Park after the current tick; no frame follows."""
-        return self._ask(self.sequencer.park)
+    def _park(self) -> None:
+        self.sequencer.park()
 
     def clear(self) -> bool:
         """Clear the faults."""
@@ -277,26 +296,16 @@ class LinePlayer(_Queue):
 
         return self._ask(act)
 
-    def trigger(self) -> bool:
-        """Start at line 0."""
+    def _trigger(self) -> None:
+        if self._armed and not self._running and (self.playing or self._waits) is not None:
+            self._armed, self._running = False, True
+            self._endless, self._frames_left = self._armed_frames == 0, self._armed_frames
+            self._tick = self.line = 0
 
-        def act() -> None:
-            if self._armed and not self._running and (self.playing or self._waits) is not None:
-                self._armed, self._running = False, True
-                self._endless, self._frames_left = self._armed_frames == 0, self._armed_frames
-                self._tick = self.line = 0
-
-        return self._ask(act)
-
-    def park(self) -> bool:
-        """Park after the current tick; no frame follows."""
-
-        def act() -> None:
-            if self._running and self.playing is not None:
-                self._parks_for = self._way_to_park(self.playing)
-            self._armed = self._running = False
-
-        return self._ask(act)
+    def _park(self) -> None:
+        if self._running and self.playing is not None:
+            self._parks_for = self._way_to_park(self.playing)
+        self._armed = self._running = False
 
     def clear(self) -> bool:
         """Clear the faults, of which there are none."""

@@ -95,6 +95,12 @@ device *device_new(const device_setup *setup, uint32_t boot)
 }
 
 #if DAC_SLOW_PART
+/* From now on the link has no memory for slow parts. */
+void device_refuse_slow(device *d)
+{
+    d->config.slow_knots = 0;
+}
+
 static void free_slow(const dac_link_axis *axis)
 {
     for (unsigned i = 0; i < 2; i++) {
@@ -261,6 +267,12 @@ void device_tick(device *d, uint32_t ticks, unsigned work)
         }
         device_run(d, work);
     }
+}
+
+/* Requests act, as on a core that is about to ask for samples; no tick follows. */
+void device_answer(device *d)
+{
+    dac_sequencer_answer(&d->sequencer);
 }
 
 size_t device_take(device *d, uint8_t *bytes)

@@ -52,6 +52,9 @@ typedef struct {
 } device;
 
 device *device_new(const device_setup *setup, uint32_t boot);
+#if DAC_SLOW_PART
+void device_refuse_slow(device *d);
+#endif
 #if DAC_STORE
 void device_keep(device *d, const dac_store_flash *flash, bool while_playing);
 #endif
@@ -71,6 +74,7 @@ void device_permit(device *d, bool permits);
 size_t device_feed(device *d, const uint8_t *bytes, size_t count);
 unsigned device_run(device *d, unsigned most);
 void device_tick(device *d, uint32_t ticks, unsigned work);
+void device_answer(device *d);
 size_t device_take(device *d, uint8_t *bytes);
 size_t device_records(device *d, line_record *records);
 void device_poke(device *d, unsigned axis, uint32_t word, int32_t value);

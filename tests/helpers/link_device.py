@@ -381,6 +381,14 @@ class HostDevice:
         self._note(f"t {ticks} {work}")
         self._dll.device_tick(self._device, c_uint32(ticks), c_uint32(work))
 
+    def refuse_slow(self) -> None:
+        """Leave no memory for slow parts to the link."""
+        self._dll.device_refuse_slow(self._device)
+
+    def take_requests(self) -> None:
+        """The requests that wait act, and no tick follows."""
+        self._dll.device_answer(self._device)
+
     def lines(self) -> list[Line]:
         """The lines that ended since the last call."""
         count = int(self._dll.device_records(self._device, None))

@@ -28,6 +28,7 @@ from tablegen.link.messages import (
     Feature,
     More,
     Move,
+    Reason,
     Refusal,
     Request,
 )
@@ -87,7 +88,7 @@ class Dialogue:
             how |= {"flash": (self.flashes[0], layout), **kept}
             kept |= {"flash": (self.flashes[1], layout)}
         if store or plays:
-            compiled = [random_image(self.rng, shape, 0, "smooth", order) for _ in range(COMPILED)]
+            compiled = [self._some_compiled() for _ in range(COMPILED)]
             names = ("program_0", LONG_NAME)
             kept |= {"compiled": {name: image for name, (image, _) in zip(names, compiled, strict=True)}}
             how |= {
@@ -182,6 +183,17 @@ class Dialogue:
             if first_objection(take_apart(image.data, image.info.x, image.info.y), *limits, None) is None:
                 return program
         return random_dual(self.rng, self.shape, kind="smooth")
+
+    def _some_compiled(self) -> tuple[ProgramImage, ScanProgram]:
+        """A program that a sequencer loads; one with a slow part may fail the checks of its codes."""
+        while self.slow and self.rng.random() < 0.7:
+            program = random_slow_program(self.rng, self.shape)
+            image = make_image(program, digest(self.rng))
+            limits = widest(program.x.output), widest(program.y.output)
+            objection = first_objection(take_apart(image.data, image.info.x, image.info.y), *limits, None)
+            if objection is None or objection[0] in (Reason.RANGE, Reason.SLEW):
+                return image, program
+        return random_image(self.rng, self.shape, 0, "smooth", self.order)
 
     def _some_image(self) -> ProgramImage:
         if self.slow and self.rng.random() < 0.7:

@@ -1,21 +1,39 @@
 """LIST and PLAY: the client against the model of a device."""
 
+import numpy as np
 import pytest
 from client_rig import KEY, LoseOnce, Watched, client, model
 from cut_flash import CutFlash
+from link_images import random_slow_program
 from link_programs import INFO, make_scan
 from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode
+from tablegen.device.dual_program import ScanProgram
+from tablegen.link.acceptance import first_objection
 from tablegen.link.errors import NotUnderstood, OutOfTime, Refused, Unsuitable
-from tablegen.link.messages import DeviceInfo, DeviceState, Feature, Listing, More, Reason, Request
+from tablegen.link.messages import (
+    AxisLimits,
+    AxisShape,
+    AxisWords,
+    DeviceInfo,
+    DeviceState,
+    Feature,
+    Listing,
+    More,
+    Reason,
+    Request,
+)
 from tablegen.link.model_device import ModelDevice
+from tablegen.link.program_image import make_image, take_apart
 from tablegen.link.programs import DeviceProgram, named
 from tablegen.link.store import Layout
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 LAYOUT = Layout(base=0, sector_bytes=4096, place_sectors=1, slots=2)
 PLAYS = replace(INFO, features=INFO.features | Feature.COMMIT_MODES, more=More.PLAY)
 KEEPS = replace(PLAYS, features=PLAYS.features | Feature.STORE)
+WIDEST = AxisLimits(0, (1 << 16) - 1, (1 << 24) - 1, (1 << 24) - 1)
 SCANS = [make_scan(3), make_scan(5, lines=8)]
 COMPILED = {f"scan_{number}": scan.image(False) for number, scan in enumerate(SCANS)}
 
@@ -50,6 +68,38 @@ def test_compiled_and_kept_programs_play_by_number(key: bytes) -> None:
         with pytest.raises(ValueError, match="65536"):
             device.play(65536)
     assert [len(frame.payload) for frame in line.frames if frame.type == Request.PLAY] == [3 + 16 * bool(key)] * 6
+
+
+def _mixed_scan() -> ScanProgram:
+    """A scan with a slow part, within the limits of its converters."""
+    rng, shape = np.random.default_rng(1), SequencerShape(16, 3, 5, 16, 3, 4, 16)
+    while True:
+        program = random_slow_program(rng, shape)
+        image = make_image(program, bytes(32).hex())
+        if first_objection(take_apart(image.data, image.info.x, image.info.y), WIDEST, WIDEST, None) is None:
+            return program
+
+
+def test_compiled_programs_with_slow_parts_play_as_uploads_of_them() -> None:
+    program = _mixed_scan()
+    image = make_image(program, "ab" * 32)
+    size = len(image.data)
+    shapes = {"x": AxisShape(5, 16, 16, 16), "y": AxisShape(4, 16, 16, 16), "degree": 3}
+    info = replace(PLAYS, **shapes, x_limits=WIDEST, y_limits=WIDEST, image_bytes=size)
+    able = replace(info, more=More.PLAY | More.MOVE | More.SLOW_PARTS, slow_knots=65, slow_index_bits=7)
+    for device_info, reason in ((able, None), (info, Reason.LENGTH), (replace(able, slow_knots=2), Reason.SHAPE)):
+        with client(Watched(model(device_info, boot=None, compiled={"mixed": image}))) as device:
+            if reason is not None:
+                with pytest.raises(Refused) as caught:
+                    device.play(0)
+                assert (caught.value.request, caught.value.reason) == (Request.PLAY, reason)
+                continue
+            assert device.programs() == (DeviceProgram(0, "mixed", None, "ab" * 32),)
+            generation = device.play(0).generation
+            assert (device.status().hash.hex(), device.readback()) == ("ab" * 32, image.data)
+            words = AxisWords(program.x.output.gain_word, program.x.output.offset_word)
+            with pytest.raises(Refused, match=r"\(slow_part\)"):
+                device.move(words, words, generation)
 
 
 def test_a_frame_goes_on_or_ends_first() -> None:

@@ -7,6 +7,7 @@ import pytest
 from client_rig import BOOT, KEY, Watched, client, model
 from cut_flash import CutFlash
 from link_programs import INFO, SmallScan, make_scan
+from link_talk import Talk
 from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode
@@ -23,6 +24,7 @@ from tablegen.link.messages import (
     StoreStatus,
 )
 from tablegen.link.model_device import ModelDevice
+from tablegen.link.players import LinePlayer, SequencerPlayer
 from tablegen.link.store import Layout
 
 LAYOUT = Layout(base=0, sector_bytes=256, place_sectors=3, slots=3)
@@ -187,6 +189,34 @@ def test_a_device_says_whether_it_writes_flash_while_a_scan_plays(while_playing:
         device.park()
         device.wait_for(DeviceState.PARKED, 5.0)
         device.save(0)
+
+
+@pytest.mark.parametrize("player", [LinePlayer, SequencerPlayer])
+def test_a_trigger_that_waits_for_its_tick_plays_already(player: type[LinePlayer | SequencerPlayer]) -> None:
+    """No change between a TRIGGER and its tick; an ARM, or a PARK with or without a TRIGGER in front, is no reason."""
+    flash = CutFlash(LAYOUT.place(LAYOUT.slots + 1), LAYOUT.sector_bytes)
+    device, talk = ModelDevice(WITH_STORE, player(BOOT.program), flash=(flash, LAYOUT)), Talk()
+    device.receive(talk.hello())
+    device.tick(1000)
+
+    def reasons(*kinds: Request) -> list[int]:
+        payloads = {Request.ARM: bytes(4), Request.SELECT: bytes([NO_SLOT, 0])}
+        device.transmit()
+        device.receive(b"".join(talk.acting(kind, payloads.get(kind, b"")) for kind in kinds))
+        return [reason for reason, _ in talk.refusals(device.transmit())]
+
+    assert reasons(Request.SELECT, Request.PARK, Request.SELECT, Request.ARM, Request.SELECT) == []
+    assert reasons(Request.TRIGGER, Request.SELECT, Request.CONFIRM) == [Reason.PLAYING, Reason.PLAYING]
+    assert reasons(Request.PARK, Request.SELECT) == []
+    device.tick(1)
+    assert reasons(Request.ARM, Request.TRIGGER, Request.ARM, Request.SELECT) == [Reason.PLAYING]
+    device.tick(1)
+    assert reasons(Request.SELECT, Request.PARK, Request.SELECT) == [Reason.PLAYING, Reason.PLAYING]
+    device.tick(1000)
+    assert reasons(Request.ARM, Request.TRIGGER) == []
+    device.reboot()
+    device.receive(talk.hello())
+    assert reasons(Request.SELECT) == []
 
 
 def test_nothing_is_sent_to_a_device_that_keeps_nothing() -> None:

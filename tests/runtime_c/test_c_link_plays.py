@@ -96,7 +96,7 @@ def test_random_dialogues_with_moves() -> None:
         Dialogue(SHAPES["16 bits"], seed, KEY if seed % 2 else b"", store=True, moves=True, plays=True).play(STEPS)
 
 
-def _asked(device: HostDevice, talk: Talk, number: int, mode: CommitMode = CommitMode.LINE) -> Refusal | int:
+def asked(device: HostDevice, talk: Talk, number: int, mode: CommitMode = CommitMode.LINE) -> Refusal | int:
     """Ask for a program; the generation that it began, or the refusal."""
     device.receive(talk.acting(Request.PLAY, struct.pack("<HB", number, mode)))
     device.tick(1000)
@@ -109,7 +109,7 @@ def _asked(device: HostDevice, talk: Talk, number: int, mode: CommitMode = Commi
 
 def _refused(device: StoreDevice, number: int) -> tuple[int, int, int]:
     """Ask for a program that is refused: request, reason and detail."""
-    refusal = _asked(device.device, device.talk, number)
+    refusal = asked(device.device, device.talk, number)
     assert isinstance(refusal, Refusal)
     return refusal.type, refusal.reason, refusal.detail
 
@@ -128,7 +128,7 @@ def check_numbers(library: DeviceLibrary | None = None) -> None:
     assert [each.hash.hex() for each in listed[:2]] == [SCANS[1].digest, SCANS[2].digest]
     for number, scan in ((0, 1), (3, 4), (1, 2)):
         generation = device.status().generation
-        assert _asked(device.device, device.talk, number) == generation + 1
+        assert asked(device.device, device.talk, number) == generation + 1
         assert (device.plays(), device.status().upload) == (scan, Upload.NONE)
     for number in (2, 4, 5, 256, 0xFFFF):
         assert _refused(device, number) == (Request.PLAY, Reason.NUMBER, 5)
@@ -160,7 +160,7 @@ def check_upload_in_hand(library: DeviceLibrary | None = None) -> None:
     device.device.receive(device.talk.request(Request.DATA, bytes(4 + 100)))
     device.device.transmit()
     assert device.status().received == 100
-    assert _asked(device.device, device.talk, 0) == 4
+    assert asked(device.device, device.talk, 0) == 4
     assert device.plays() == 1
 
 
@@ -194,7 +194,7 @@ def check_modes(library: DeviceLibrary | None = None) -> None:
         old = [line for generation, line in lines if generation == 1]
         assert old == ([2, 3, 4, 5] if mode is CommitMode.FRAME else [2]), mode
         assert (2, first) == next(line for line in lines if line[0] == 2), mode
-        refusal = _asked(device, talk, 1, CommitMode.KEEP)
+        refusal = asked(device, talk, 1, CommitMode.KEEP)
         assert isinstance(refusal, Refusal)
         assert refusal.reason == Reason.KEEP, "the frame has other lines"
         device.receive(talk.request(Request.STATUS))

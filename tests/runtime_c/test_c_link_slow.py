@@ -2,12 +2,15 @@
 
 import faulthandler
 import os
+import struct
 import subprocess
 import sys
 from collections import Counter
+from ctypes import byref, c_char, c_char_p
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import link_device
 import numpy as np
@@ -16,27 +19,31 @@ from building import run_clean
 from client_rig import Served
 from editing import run
 from frame_programs import common_knots, scan_program
+from kept_dialogues import LAYOUT, new_flash
 from limits import PATIENCE_S, limit
 from line_log import LineCheck, PlayedLine
-from link_device import SANITIZED, DeviceLibrary, HostDevice, Started, compile_device
+from link_device import SANITIZED, CompiledProgram, DeviceLibrary, HostDevice, Started, compile_device, widest
 from link_images import damaged_slow, digest, random_limits, random_slow_program, resealed
 from link_programs import make_scan
 from link_random import KEY, Dialogue
+from link_talk import Talk
 from programs import random_schedule
 from replacing import replace
 from sets import long, one_of
 from test_c_link_acceptance import Bench
+from test_c_link_plays import asked
 from turned_scans import turned_setup
 
 from tablegen.api.turned import build_turned
 from tablegen.base.resources import c_link, c_runtime
+from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.registers import OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS
-from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.frame_program import MOST_KNOTS, FrameProgram, Knots
 from tablegen.link.acceptance import first_objection
 from tablegen.link.device import Device
-from tablegen.link.messages import AxisLimits, DeviceState, Reason
+from tablegen.link.messages import AxisLimits, DeviceState, DeviceStatus, Reason, Refusal, Request
 from tablegen.link.prepare import PreparedScan
-from tablegen.link.program_image import make_image, take_apart
+from tablegen.link.program_image import fast_of, make_image, take_apart
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 pytestmark = pytest.mark.common
@@ -133,15 +140,90 @@ def test_a_random_dialogue_is_that_of_the_model(name: str, key: bytes) -> None:
         Dialogue(SHAPES[name], seed, key, slow=True, modes=True).play(200)
 
 
+def _without_second(axis: AxisProgram) -> AxisProgram:
+    """An axis that mixes nothing into its table: C has no second table then."""
+    assert isinstance(axis, FrameProgram)
+    return replace(axis, second=0 * axis.second, ratios=replace(axis.ratios, words=0 * axis.ratios.words))
+
+
+def _mixed(seed: int) -> tuple[ScanProgram, ScanProgram, ScanProgram]:
+    """A program with two slow parts, and those that mix nothing into x, or into y; a device accepts all three."""
+    rng = np.random.default_rng(seed)
+    while True:
+        program = random_slow_program(rng, SHAPES["cubic"])
+        x, y = program.x, program.y
+        if not (isinstance(x, FrameProgram) and isinstance(y, FrameProgram)) or len(y.ratios.words) == MOST_KNOTS:
+            continue
+        programs = program, replace(program, x=_without_second(x)), replace(program, y=_without_second(y))
+        images = [make_image(each, digest(rng)) for each in programs]
+        contents = [take_apart(image.data, image.info.x, image.info.y) for image in images]
+        limits = widest(x.output), widest(y.output)
+        if all(first_objection(each, *limits, None) is None for each in contents):
+            return programs
+
+
+def _other_knots(axis: AxisProgram, words: int, lines: int) -> AxisProgram:
+    """An axis with so many more ratios, so many lines further apart than the gains."""
+    assert isinstance(axis, FrameProgram)
+    more = np.append(axis.ratios.words, np.zeros(words, dtype=np.int64))
+    return replace(axis, ratios=Knots(more, axis.ratios.spacing + lines))
+
+
+def check_compiled(**how: Any) -> None:
+    """A compiled program is the image of an upload, byte by byte; one that no words can describe is refused."""
+    plain, no_x, no_y = _mixed(1)
+    apart = replace(plain, x=_other_knots(plain.x, 0, 1))
+    several = replace(plain, y=_other_knots(plain.y, 1, 0))
+    unused = replace(no_y, y=_other_knots(no_y.y, 1, 1))
+    programs = (no_x, unused, apart, several)
+    compiled = [CompiledProgram(b"program", b"%064x" % number, each) for number, each in enumerate(programs)]
+    device, talk = HostDevice(plain, plain, slow=True, plays=True, compiled=compiled, **how), Talk()
+    device.receive(talk.hello())
+    device.tick(1000)
+    device.transmit()
+    for number, expected in enumerate((no_x, no_y)):
+        assert asked(device, talk, number) == number + 2
+        image = make_image(expected, f"{number:064x}")
+        device.receive(talk.request(Request.STATUS))
+        (answer,) = talk.answers(device.transmit())
+        assert DeviceStatus.unpack(answer.payload).hash == image.info.hash
+        parts = []
+        for at in range(0, len(image.data) + 240, 240):
+            device.receive(talk.request(Request.READBACK, struct.pack("<IB", at, 240)))
+            parts += [answer.payload[4:] for answer in talk.answers(device.transmit())]
+        assert b"".join(parts) == image.data, number
+    refusals = [asked(device, talk, number) for number in (2, 3)]
+    device.refuse_slow()
+    refusals.append(asked(device, talk, 0))
+    assert refusals == [
+        Refusal(Request.PLAY, Reason.SHAPE, 0),
+        Refusal(Request.PLAY, Reason.SHAPE, 1),
+        Refusal(Request.PLAY, Reason.LENGTH, 192 + 2 * (len(fast_of(plain.x).words) + len(fast_of(plain.y).words))),
+    ]
+
+
+def test_compiled_programs_are_images_of_uploads() -> None:
+    check_compiled(modes=True, flash=(new_flash(), LAYOUT))  # as the devices of the next test
+
+
 @pytest.mark.rest
-def test_programs_with_slow_parts_are_kept() -> None:
-    for seed in range(4):
-        Dialogue(SHAPES["cubic"], seed, store=True, slow=True, moves=seed % 2 == 1).play(250)
+def test_programs_with_slow_parts_are_kept_and_play_by_number() -> None:
+    seen: Counter[Any] = Counter()
+    for seed in range(6):
+        how = {"store": True, "slow": True, "plays": True, "modes": True, "moves": seed % 2 == 1}
+        dialogue = Dialogue(SHAPES["cubic"], seed, KEY if seed > 3 else b"", **how)
+        dialogue.play(250)
+        seen += dialogue.seen
+    assert min(seen[Request.PLAY], seen[Request.SAVE]) > 5, seen
+    assert seen[Request.PLAY, Reason.SLEW] + seen[Request.PLAY, Reason.RANGE] > 1, seen
 
 
 @pytest.mark.rest
 def test_a_turned_scan_on_a_pty_plays_as_the_integer_model(tmp_path: Path) -> None:
-    """From the command line to the samples: each line of a frame that a compiled device plays after the upload."""
+    """From the command line to the samples: each line of a frame that a compiled device plays after the upload.
+
+    Then each line of the program that was compiled with the device, in the C that was emitted: played by its number.
+    """
     setup = turned_setup(
         tmp_path, 30.0, "timing.lines = 16", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400"
     )
@@ -150,19 +232,36 @@ def test_a_turned_scan_on_a_pty_plays_as_the_integer_model(tmp_path: Path) -> No
     x = scan.program.x
     assert isinstance(x, FrameProgram)
     boot = replace(scan.program, x=replace(x, gains=replace(x.gains, words=x.gains.words * 7 // 8)))
-    device = HostDevice(scan.program, boot, update_rate_hz=500_000, slow=True)
+    library, compiled = _with_build(tmp_path, scan.name)
+    device = HostDevice(scan.program, boot, update_rate_hz=500_000, library=library, slow=True)
+    digits = scan.digest.encode()
+    library.dll.device_compile(device._device, c_char_p(b"turned"), c_char_p(digits), compiled)
     check = LineCheck(boot)
     check.offer("upload", scan.program)
     with Served(device, "pty", 500_000) as served:
         assert run("upload", tmp_path / "out", "--port", served.url, "--timeout", str(PATIENCE_S)).status == 0
         with Device(served.url) as client:
-            client.arm(1)
-            client.trigger()
-            client.wait_for(DeviceState.PARKED, PATIENCE_S)
-            status = client.status()
+            uploaded = client.readback()
+            for _ in range(2):
+                client.arm(1)
+                client.trigger()
+                client.wait_for(DeviceState.PLAYING, PATIENCE_S)
+                client.wait_for(DeviceState.PARKED, PATIENCE_S)
+                played = client.play(0)
+            status, readback = client.status(), client.readback()
+    assert (played.generation, readback) == (4, uploaded)
     assert (status.hash.hex(), status.faults) == (scan.digest, 0)
     check.follow(PlayedLine(**line._asdict()) for line in device.lines())
-    assert (check.lines, check.taken[2]) == (scan.program.schedule.lines, "upload")
+    assert check.lines == 2 * scan.program.schedule.lines
+    assert (check.taken[2], check.taken[3]) == ("upload", "upload")
+
+
+def _with_build(folder: Path, name: str) -> tuple[DeviceLibrary, Any]:
+    """A device that was compiled with the C of a build, and the program of this."""
+    sources = [folder / "out" / f"{name}{end}.c" for end in ("", "_program")]
+    more = ["-DDAC_SPLINE=1", SLOW, "-DDAC_LIBRARY=2", f"-I{folder / 'out'}", *sources]
+    library = DeviceLibrary(compile_device(folder / "device.so", more=more))
+    return library, byref(c_char.in_dll(library.dll, f"{name}_program"))
 
 
 def test_a_configuration_with_one_fault_is_refused() -> None:
@@ -175,7 +274,7 @@ def test_a_configuration_with_one_fault_is_refused() -> None:
 @pytest.mark.rest
 def test_checks_and_dialogues_with_sanitizers(tmp_path: Path) -> None:
     """Memory of a slow part has just the words that the configuration says."""
-    more = ["-DDAC_SPLINE=1", SLOW]
+    more = ["-DDAC_SPLINE=1", SLOW, "-DDAC_LIBRARY=2"]
     device = compile_device(tmp_path / "device.so", options=SANITIZED, more=more)
     runtime = run_clean(["gcc", "-print-file-name=libasan.so"]).strip()
     environment = {
@@ -187,7 +286,7 @@ def test_checks_and_dialogues_with_sanitizers(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
 
 
-CHECK, IMAGE = "dac_link_check.c", "dac_link_image.c"
+CHECK, IMAGE, LIBRARY = "dac_link_check.c", "dac_link_image.c", "dac_link_library.c"
 MUTANTS = {
     "words always show that a line is in range": (CHECK, "return least >> o->gain_q", "return true || 0"),
     "words always show that steps are small": (CHECK, "return rest < max_step &&", "return true ||"),
@@ -206,6 +305,20 @@ MUTANTS = {
     "the jump is that from line 0": (CHECK, "line_of(&old, c->at);", "line_of(&old, 0);"),
     "ratios are gains": (IMAGE, "axis->slow[image].ratios[at] = (int16_t)word;", "axis->slow[image].gains[at] = word;"),
     "words behind the slow table are missing": (CHECK, "table[words + i] = table[i];", "(void)i;"),
+    "the gain of a compiled program is that of its table": (
+        LIBRARY, "    put_level(page, s->gain_word, s->offset_word);\n", ""),
+    "the slow table of a compiled program is too short": (LIBRARY, "(uint32_t)s->index_bits << 8", "3u << 8"),
+    "the frame of a compiled program has no step": (LIBRARY, "    put_step(page, DAC_LINK_SLOW_STEP, lines);\n", ""),
+    "the slow part of a compiled y is that of x": (
+        LIBRARY, "put_slow(words + 128, program->y", "put_slow(words + 128, program->x"),
+    "compiled slow parts have no length": (LIBRARY, "        bytes += slow_bytes(axes[axis]);\n", ""),
+    "nothing is mixed into a compiled program": (LIBRARY, "s->second != NULL ? (uint32_t)s->second[word] : 0", "0"),
+    "a second table is always there": (LIBRARY, "s->second != NULL ? (uint32_t)s->second[word]", "1 ? s->second[word]"),
+    "ratios are always there": (LIBRARY, "s->second != NULL ? (uint32_t)s->ratios[knot]", "1 ? s->ratios[knot]"),
+    "compiled ratios are gains": (LIBRARY, "(uint32_t)s->ratios[knot]", "(uint32_t)s->gains[knot]"),
+    "other lines of ratios are lost": (LIBRARY, " && s->ratio_spacing == s->gain_spacing", ""),
+    "other numbers of ratios are lost": (LIBRARY, "s->ratio_knots == s->gain_knots && ", ""),
+    "ratios count that are not used": (LIBRARY, "s == NULL || s->second == NULL\n", "s == NULL\n"),
 }  # fmt: skip
 _FORK = get_context("fork")
 
@@ -215,11 +328,13 @@ def ask_all(path: Path, programs: int, seeds: int) -> None:
     library = DeviceLibrary(path)
     link_device.device_library = lambda *_: library  # type: ignore[assignment]
     test_rare_words_are_refused()
+    check_compiled()
     for state in ("playing", "parked"):
         for seed in range(seeds):
             compare.__wrapped__("cubic", state, programs, 2 + seed)
     for seed in range(seeds):
         Dialogue(SHAPES["cubic"], seed, slow=True).play(200)
+        Dialogue(SHAPES["cubic"], seed, slow=True, plays=True).play(200)
 
 
 def differs(path: Path, programs: int = 300, seeds: int = 3) -> bool:
@@ -251,7 +366,9 @@ def device_with(mutant: tuple[str, str, str] | None, folder: Path) -> Path:
         (folder / path.name).write_text(text, "utf-8")
         sources.append(folder / path.name)
     options = ("-std=c99", "-O1", "-w")
-    return compile_device(folder / "device.so", options=options, sources=sources, more=["-DDAC_SPLINE=1", SLOW])
+    return compile_device(
+        folder / "device.so", options=options, sources=sources, more=["-DDAC_SPLINE=1", SLOW, "-DDAC_LIBRARY=2"]
+    )
 
 
 def test_every_mutant_is_of_the_link_as_it_is() -> None:

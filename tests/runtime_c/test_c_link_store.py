@@ -21,6 +21,7 @@ from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.messages import (
     NO_SLOT,
     DeviceInfo,
+    DeviceState,
     Feature,
     Reason,
     Request,
@@ -30,14 +31,19 @@ from tablegen.link.messages import (
 )
 from tablegen.link.store import Store
 
-KEPT, LIBRARY, LINK, UPLOAD, REQUESTS, STORE = (
-    "dac_link_kept.c", "dac_link_library.c", "dac_link.c", "dac_link_upload.c", "dac_link_requests.c", "dac_store.c"
+KEPT, LIBRARY, LINK, UPLOAD, REQUESTS, STORE, SEQUENCER = (
+    "dac_link_kept.c", "dac_link_library.c", "dac_link.c", "dac_link_upload.c", "dac_link_requests.c", "dac_store.c",
+    "dac_sequencer.c",
 )  # fmt: skip
 MUTANTS = {
     "another generation is saved": (KEPT, "dac_link_get(payload + 1) != generation", "false"),
     "the upload is announced": (KEPT, "    dac_link_put(info + DAC_LINK_IMAGE_CRC, ~crc);\n", ""),
-    "flash is written at any time": (KEPT, "l->config->store_while_playing || s.swaps == 0", "true"),
-    "flash is written only when parked": (KEPT, "l->config->store_while_playing || s.swaps == 0", "false"),
+    "flash is written at any time": (KEPT, "l->config->store_while_playing || (rests && !starts)", "true"),
+    "flash is written only when parked": (KEPT, "const bool rests = s.swaps == 0 || ", "const bool rests = "),
+    "a trigger that waits is not seen": (KEPT, "(rests && !starts)", "rests"),
+    "a park that waits is a trigger": (SEQUENCER, "starts = what == TRIGGER || (", "starts = true || ("),
+    "a park behind a trigger does not count": (SEQUENCER, "(starts && what != PARK && what != RESET)", "starts"),
+    "a trigger that was taken is forgotten": (SEQUENCER, "starts || *running != 0", "starts"),
     "a kept program has no checks": (KEPT, "        found = check_all(l);", "        found = dac_link_fine();"),
     "checks of a second program at a start go on where the first ones ended": (
         KEPT, "    dac_link_start_check(&l->check);\n    l->loading", "    l->loading"),
@@ -73,7 +79,8 @@ MUTANTS = {
     "a compiled program has no CRC": (LIBRARY, "    put_crc(l);\n", ""),
     "the y of a compiled program never steps": (
         LIBRARY, "DAC_LINK_Y_STEPS, p->y.hold_ticks != 1", "DAC_LINK_Y_STEPS, 0"),
-    "offsets of compiled programs have 16 low bits": (LIBRARY, "a->offset_word & 0x3FFFF", "a->offset_word & 0xFFFF"),
+    "offsets of compiled programs have 16 low bits": (
+        LIBRARY, "(uint32_t)offset & 0x3FFFF", "(uint32_t)offset & 0xFFFF"),
     "the y of a compiled program is its x": (LIBRARY, "e(l, &entry->program.y);", "e(l, &entry->program.x);"),
     "compiled programs have no settling lines": (
         LIBRARY, "    put_word(page, DAC_LINK_SETTLE_LINES, s->settle_lines);\n", ""),
@@ -217,6 +224,24 @@ def check_playing(library: DeviceLibrary | None = None) -> None:
         device.device.receive(device.talk.hello())
         device.device.transmit()
         assert device.act(Request.DELETE, bytes([1])) == 0
+
+
+def check_starting(library: DeviceLibrary | None = None) -> None:
+    """Between a TRIGGER and its first tick a scan plays already; an ARM or PARK that waits changes nothing."""
+    device = StoreDevice(new_flash(), library)
+    device.upload(SCANS[1])
+    assert (device.act(Request.ARM, bytes(4)), device.act(Request.PARK), device.save(0)) == (0, 0, 0)
+    device.device.tick(1)
+    assert (device.act(Request.ARM, bytes(4)), device.save(0)) == (0, 0)
+    assert (device.act(Request.TRIGGER), device.status().state) == (0, DeviceState.PARKED)
+    change = ((Request.SELECT, bytes(2)), (Request.DELETE, bytes(1)), (Request.CONFIRM, b""))
+    assert [device.save(0), *(device.act(*each) for each in change)] == [Reason.PLAYING] * 4
+    device.device.take_requests()  # on another core, in front of the tick
+    assert (device.status().state, device.save(0)) == (DeviceState.PARKED, Reason.PLAYING)
+    assert (device.act(Request.PARK), device.save(0)) == (0, Reason.PLAYING)
+    device.device.tick(1000)
+    assert (device.act(Request.ARM, bytes(4)), device.act(Request.TRIGGER), device.act(Request.PARK)) == (0, 0, 0)
+    assert device.save(0) == 0, "no tick of it plays"
 
 
 def check_changed_slot(library: DeviceLibrary | None = None) -> None:
@@ -376,6 +401,7 @@ CHECKS = (
     check_two_refused_programs,
     check_damage,
     check_playing,
+    check_starting,
     check_changed_slot,
 )
 
