@@ -6,7 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from shutil import copytree
 
+import numpy as np
 import pytest
+from building import run_clean
 from editing import run
 from sets import long
 from test_verify_turned import NAME, edit
@@ -15,19 +17,24 @@ from tilted_scans import write_straight
 import tablegen
 from tablegen.base.input_errors import Rejected
 from tablegen.device.clocks import least_slow_clocks
+from tablegen.device.dual_program import ScanProgram
+from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.emit.stored import stored_content
 from tablegen.emit.turned_content import content_beside
 from tablegen.manifest.read import NotABuild, read_build
+from tablegen.numerics.arrays import Ints
+from tablegen.verification.play.stream import FLAGS
 from tablegen.verification.run import verify
 from tablegen.verification.verilog.turned_play import TurnedPlay
 
 SMALL = (
     "timing.lines = 12", "timing.pixels = 4", "timing.line_rate_hz = 400", "dac.update_rate_hz = 9600",
-    "x.band_limit.harmonics = 8", "y.band_limit.harmonics = 8",
+    "x.band_limit.harmonics = 8", "y.band_limit.harmonics = 8", "x.table.length = 64", "y.table.length = 64",
 )  # fmt: skip
 RATE, CLOCKS, TICKS = 9600, 101, 12 * 24  # the least clocks a tick of these lines; of longer ones 93
 PART = 30  # ticks that show what does not take a frame
 TOP = f"{NAME}_z_top.v"
+SWAPPED, OF_EACH = 1 << FLAGS.index("swapped"), 1 << FLAGS.index("valid") | 1 << FLAGS.index("swapped")
 
 
 def emit(clocks: int, formats: str = "'c', 'verilog'") -> str:
@@ -210,3 +217,71 @@ def test_verilog_alone_is_verified_in_its_files(build: Path, tmp_path: Path) -> 
     path.write_text(json.dumps({**plain, "formats": ["verilog", "vhdl"]}), "ascii")
     with pytest.raises(NotABuild, match="a scan with the output z has the formats c and verilog alone"):
         read_build(tmp_path / "out")
+
+
+def both_tops(build: Path, folder: Path, **parameters: int) -> tuple[Ints, Ints, Ints]:
+    """Play both tops on one clock; return words, markers and faults of each tick of x and y, of z, and the requests."""
+    design, bench = folder / "two_tops", Path(__file__).with_name("two_tops.v")
+    settings = [f"-Ptwo_tops.{key}={value}" for key, value in {"PACE": CLOCKS, **parameters}.items()]
+    sources = [*sorted(build.glob("dac_*.v")), build / f"{NAME}_top.v", build / TOP, bench]
+    run_clean(["iverilog", "-g2005", "-s", "two_tops", *settings, "-o", design, *sources], folder)
+    lines = [line.split() for line in run_clean(["vvp", "-n", design], build).splitlines()]
+    axes, z, requests = (np.array([row[1:] for row in lines if row[0] == of], dtype=np.int64) for of in "012")
+    assert np.array_equal(axes[:, 0], np.arange(len(axes)))
+    return axes[:, 1:], z[:, 1:], requests[:, 0]
+
+
+def as_row(program: ScanProgram, tick: Tick) -> list[int]:
+    """A tick of the model as the bench writes it."""
+    markers = sum(getattr(tick, flag) << bit for bit, flag in enumerate(FLAGS))
+    return [program.x.output.word(tick.x), program.y.output.word(tick.y), markers, tick.faults.value]
+
+
+def modelled(program: ScanProgram, requests: Ints, ticks: int) -> Ints:
+    """What the model plays of a scan, a park, and a scan of one frame that begin before these ticks, from the first."""
+    model, first_scan, parked = Sequencer(None), *np.diff(requests).tolist()
+    model.commit(program)
+    model.step()
+    model.arm()
+    model.trigger()
+    played = [model.step() for _ in range(first_scan)]
+    model.park()
+    played += [model.step() for _ in range(parked)]
+    model.arm(1)
+    model.trigger()
+    played += [model.step() for _ in range(ticks - int(requests[-1]))]
+    return np.array([as_row(program, tick) for tick in played])
+
+
+@pytest.mark.rest
+def test_both_tops_stay_on_the_same_ticks(build: Path, tmp_path: Path) -> None:
+    """From a trigger while x and y still render, over more than a frame, through a park, and a trigger three ticks on.
+
+    Each begins while z or x and y are not ready: z hands its trigger over, and no tick comes between. Which tick takes
+    the program is a matter of each.
+    """
+    axes, z, requests = both_tops(build, tmp_path, HAND_OVER=1, TICKS=TICKS + 40, LATER=30)
+    stored, begin = read_build(build), requests[0]
+    assert stored.program_of_z is not None
+    assert len(axes) == len(z) > begin + TICKS + 70
+    for played in (axes, z):
+        played[begin, 2] &= ~SWAPPED
+    assert np.array_equal(axes[begin:], modelled(stored.program, requests, len(axes)))
+    assert np.array_equal(z[begin:], modelled(stored.program_of_z, requests, len(z)))
+    assert np.array_equal(axes[begin:, 2] | OF_EACH, z[begin:, 2] | OF_EACH)
+    for flag in ("line", "frame", "pixel", "backward", "valid"):
+        assert np.count_nonzero(z[begin:, 2] >> FLAGS.index(flag) & 1) > 1, flag
+
+
+@pytest.mark.rest
+def test_markers_tell_that_z_began_late(build: Path, tmp_path: Path) -> None:
+    """A trigger of both after a park, before z has its line, begins x and y alone."""
+    axes, z, (begin, park, again) = both_tops(build, tmp_path, WAIT=80 * CLOCKS, TICKS=30, LATER=30)
+    differ = (axes[:, 2] ^ z[:, 2]) & ~OF_EACH != 0
+    assert not differ[begin:again].any()
+    assert park + 3 == again
+    assert differ[again]
+    playing = 1 << FLAGS.index("playing")
+    late = np.flatnonzero(z[again:, 2] & playing)[0]
+    assert axes[again, 2] & playing
+    assert 8 <= late <= 20
