@@ -232,7 +232,8 @@ class Build(Result):
     @property
     def runtime(self) -> set[str]:
         """The names of those files that are the same in every build: sequencers and links."""
-        return {name for each in chosen(self.formats) for name in runtime_files(each)}
+        with_z = self.plan.z is not None
+        return {name for each in chosen(self.formats) for name in runtime_files(each, with_z)}
 
     @property
     def manifest(self) -> str:

@@ -82,8 +82,7 @@ def build(
     A scaling error above 1 %, or above that of the uncompensated line, is a warning on stderr, with its cause and with
     remedies that were tried.
 
-    A scan at an angle, on coupled axes or with drift is built in C, and with -f verilog in Verilog. One with [z] whose
-    axes have no operators is built in C.
+    A scan at an angle, on coupled axes, with drift or with [z] is built in C, and with -f verilog in Verilog.
 
     \b
     Examples:

@@ -9,6 +9,7 @@ from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.law_charts import law_charts
 from tablegen.comparison.operators import SIDES, ComparedOperator, Place, residuals
 from tablegen.comparison.overlay import overlay
+from tablegen.comparison.tilt import tilt_charts
 from tablegen.comparison.turned import turned_charts
 from tablegen.compensation.operator.loop import POINTS
 from tablegen.html_report.blocks import Charts as ChartsBlock
@@ -62,6 +63,7 @@ def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
         yield _drive(axis, one, other)
         yield _difference(axis, one, other)
         yield _spectrum(axis, one, other)
+    yield from tilt_charts(a, b)
     if a.planned is not None and b.planned is not None:
         played = {one.axis: one for one in played_axes(b.planned)}
         for first in played_axes(a.planned):

@@ -12,6 +12,7 @@ from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import scan_quantities
+from tablegen.comparison.tilt import tilt_quantities
 from tablegen.comparison.turned import turned_quantities
 from tablegen.config.load import load, load_scanner
 from tablegen.config.scanner import Scanner
@@ -19,7 +20,6 @@ from tablegen.html_report.planned_scan import planned_scan
 from tablegen.html_report.subject import Subject, of_directory
 from tablegen.html_report.turned_subject import TurnedSubject, turned_directory, turned_scan
 from tablegen.manifest.format import MANIFEST
-from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import is_turned
 
 Kind = Literal["scan", "build", "scanner", "operator"]
@@ -29,7 +29,6 @@ WORDS: dict[Kind, str] = {
     "scanner": "a scanner file",
     "operator": "an operator file",
 }
-_Z = "`compare` takes no scan with the output z"
 _NAMES = 4  # of damaged files that are named
 _TOGETHER = ({"scan", "build"}, {"scanner"}, {"operator"})
 
@@ -99,15 +98,13 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
     Raises
     ------
     Rejected
-        If a file is faulty, or its scan has the output z.
+        If a file is faulty.
     NotABuild
-        If a directory is not a build, or its scan has the output z.
+        If a directory is not a build.
     """
     subject: Subject | TurnedSubject
     if kind == "build":
         subject = turned_directory(path) if is_turned(path) else of_directory(path)
-        if subject.has_z:
-            raise NotABuild(f"{path}: {_Z}")
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
         text = f"{path.name or path}: does not agree with its manifest: {names}"
@@ -115,8 +112,6 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
         return ComparedSide(path, kind, _quantities(subject), damage, subject)
     if kind == "scan":
         setup = load(path)
-        if setup.scan.z is not None:
-            raise Rejected([setup.scan_file.problem("z", f"{_Z}; leave [z] out")])
         if setup.mixes_motions:
             subject = turned_scan(setup, progress=tell)
         else:
@@ -139,4 +134,6 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: 
 
 
 def _quantities(subject: Subject | TurnedSubject) -> list[ComparedQuantity]:
-    return turned_quantities(subject) if isinstance(subject, TurnedSubject) else scan_quantities(subject)
+    if isinstance(subject, TurnedSubject):
+        return turned_quantities(subject)
+    return [*scan_quantities(subject), *tilt_quantities(subject)]

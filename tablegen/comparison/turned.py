@@ -6,10 +6,12 @@ import numpy as np
 
 from tablegen.certificate.turned_errors import ImagedFrame, played_frame
 from tablegen.charts.chart import Chart, Mark
+from tablegen.comparison.frame_axis import frame_quantities
 from tablegen.comparison.overlay import overlay
 from tablegen.comparison.quantity import ComparedQuantity, digest
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import output_limits, rates, request_keys
+from tablegen.comparison.tilt import tilt_charts, tilt_quantities
 from tablegen.fixedpoint.frame_program import RATIO_FRACTION_BITS, FrameProgram
 from tablegen.html_report.turned_codes import axes_of, frame_volts
 from tablegen.html_report.turned_subject import TurnedSubject
@@ -49,7 +51,7 @@ def turned_quantities(subject: TurnedSubject) -> list[ComparedQuantity]:
     ]
     for number, (axis, fields, _) in enumerate(axes_of(subject.stored)):
         codes, section = manifest.certificate.codes[axis], f"{axis} certificate"
-        quantities += _axis(axis, fields)
+        quantities += frame_quantities(axis, fields)
         quantities += [
             ComparedQuantity(section, "lowest code", codes.least),
             ComparedQuantity(section, "highest code", codes.most),
@@ -58,9 +60,10 @@ def turned_quantities(subject: TurnedSubject) -> list[ComparedQuantity]:
         if "code_lsb" in errors:
             quantities.append(ComparedQuantity(section, "largest error of a code", errors["code_lsb"][number], "LSB"))
         quantities += output_limits(axis, fields.output)
+    quantities += tilt_quantities(subject)
     quantities += [
         ComparedQuantity("build", "name", manifest.name),
-        ComparedQuantity("build", "formats", "c"),
+        ComparedQuantity("build", "formats", ", ".join(manifest.formats)),
         ComparedQuantity("build", "tablegen", manifest.tablegen),
         ComparedQuantity("build", "plan", manifest.hash[:16]),
         ComparedQuantity("build", "files", f"{len(manifest.files)}: {digest(sorted(manifest.files.items()))}"),
@@ -68,23 +71,6 @@ def turned_quantities(subject: TurnedSubject) -> list[ComparedQuantity]:
     if planned is not None:
         quantities += scanner_quantities(planned.setup.scanner_file, planned.setup.scanner)
     return quantities
-
-
-def _axis(axis: str, fields: TurnedAxisFields) -> Iterator[ComparedQuantity]:
-    section, slow = f"{axis} tables", fields.slow
-    yield ComparedQuantity(f"{axis} drive", "of the line", fields.fast_nm, "nm")
-    yield ComparedQuantity(f"{axis} drive", "of the frame", fields.slow_nm, "nm")
-    yield ComparedQuantity(section, "table of a line, words", len(fields.words))
-    yield ComparedQuantity(section, "table of a line, bits a word", fields.bits)
-    yield ComparedQuantity(section, "table of a line, content", digest(fields.words))
-    yield ComparedQuantity(section, "second table, content", digest(fields.second))
-    yield ComparedQuantity(section, "slow part, words", len(slow.words))
-    yield ComparedQuantity(section, "slow part, content", digest(slow.words))
-    yield ComparedQuantity(section, "slow part, gain word", slow.gain_word)
-    yield ComparedQuantity(section, "slow part, offset word", slow.offset_word)
-    for name, knots in (("gains", fields.gains), ("ratios", fields.ratios)):
-        yield ComparedQuantity(section, f"{name}, lines apart", knots.spacing)
-        yield ComparedQuantity(section, name, digest(knots.words))
 
 
 def turned_charts(a: TurnedSubject, b: TurnedSubject) -> Iterator[Chart]:
@@ -98,6 +84,7 @@ def turned_charts(a: TurnedSubject, b: TurnedSubject) -> Iterator[Chart]:
         yield overlay(f"slow-{axis}", f"{axis} slow part", frame, volts, *slow)
         yield overlay(f"gains-{axis}", f"{axis} gain of each line", frame, "gain word", *gains)
         yield overlay(f"ratios-{axis}", f"{axis} share of the second table", frame, "ratio", *ratios)
+    yield from tilt_charts(a, b)
     plans = [one.planned.plan for one in (a, b) if one.planned is not None]
     if len(plans) == 2:
         curves = [_line_rms(played_frame(plan), plan.geometry.size_nm) for plan in plans]

@@ -463,6 +463,7 @@ class Cost(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 DEFAULT_FORMATS = ("c", "verilog")
+FORMATS_WITH_Z = ("c", "verilog")  # which have a second sequencer
 
 
 class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -475,7 +476,7 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 min_length=1,
                 max_length=64,
                 description="formats to write, by `tablegen formats`; default: c and verilog, of a scan at an angle "
-                "c alone",
+                "or with [z] c alone",
             ),
         ]
         | None
@@ -488,7 +489,7 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 gt=0.0,
                 le=1e10,
                 description="Verilog: clock of the FPGA. It has to be a whole multiple of update_rate_hz, to 0.01 %, "
-                "and fast enough for the sequencer",
+                "and fast enough for the sequencer, and for that of z",
             ),
         ]
         | None

@@ -53,6 +53,10 @@ class Format(ABC):
         """Return the files that go with the format unchanged, such as a sequencer."""
         return []
 
+    def runtime_of_z(self) -> list[Path]:
+        """Return the files that go with it unchanged beside those of ``runtime`` where a build has the output z."""
+        return []
+
     def sources(self) -> list[Path]:
         """Return the files beside its module that decide what it writes: templates, and the runtime."""
         return self.runtime()

@@ -5,20 +5,22 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import PurePosixPath
 
-from tablegen.base.input_errors import Problem, Rejected, Unphysical
+from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
 from tablegen.base.resources import own_runtime_folders, resource_folder
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
 from tablegen.config.load import Setup
 from tablegen.config.names import of_the_runtime
+from tablegen.config.schema import FORMATS_WITH_Z
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats import UnknownFormat, chosen, failing_as_format, files_of
+from tablegen.emit.formats import UnknownFormat, chosen, failing_as_format, files_of, runtime_paths
 from tablegen.emit.templates import comment_safe
 from tablegen.manifest.fields import MAXIMUM_FILE_NAME
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifest_file, require_readable
+from tablegen.planning.clock import slow_clocks_per_tick
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.sine_setup import PIXEL_FORMATS
 from tablegen.version import __version__
@@ -60,15 +62,15 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     for each in chosen_formats:
         if plan.schedule.pixel_table is not None and each.name not in PIXEL_FORMATS:
             raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take c or verilog")
-        if plan.z is not None and each.name != "c":
-            raise Unphysical(f"{each.name!r} plays no output z; take the format c, or leave [z] out")
+        if plan.z is not None and each.name not in FORMATS_WITH_Z:
+            raise Unphysical(f"{each.name!r} plays no output z; take c or verilog, or leave [z] out")
         own_files = files_of(each, content)
         with failing_as_format(each):
-            own_files |= runtime_files(each)
+            own_files |= runtime_files(each, plan.z is not None)
         for name, text in own_files.items():
             if not _FILE_NAME.fullmatch(name) or len(name) > MAXIMUM_FILE_NAME or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
-            if any(map(of_the_runtime, name.split("/"))) and name not in own_runtime(each):
+            if any(map(of_the_runtime, name.split("/"))) and name not in own_runtime(each, plan.z is not None):
                 raise UnknownFormat(
                     f"{each.name!r} writes {name!r}, a name of the sequencer's files: dac_*, program_loader*"
                 )
@@ -112,8 +114,13 @@ def render_scan(
     Raises
     ------
     Rejected
-        For an unknown format, for a scan that a format cannot hold, and for a build that could not be read back.
+        For an unknown format, for a scan that a format cannot hold, for a clock that is too slow for its output z, and
+        for a build that could not be read back.
     """
+    if plan.program_of_z is not None and "verilog" in (plan.formats if formats is None else formats):
+        problems = Problems()
+        slow_clocks_per_tick(setup, plan.program_of_z, problems, "z")
+        problems.stop_if_any()
     try:
         files = render(plan, certificates, formats)
         require_readable(files[MANIFEST])
@@ -162,14 +169,15 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
 
 
 @cache
-def runtime_files(of: Format) -> dict[str, bytes]:
-    """Read the files that go with a format unchanged, by name: a sequencer, or nothing."""
-    return {path.name: path.read_bytes() for path in of.runtime()}
+def runtime_files(of: Format, with_z: bool = False) -> dict[str, bytes]:
+    """Read the files that go with a format unchanged, by name: a sequencer, with what z needs of it, or nothing."""
+    return {path.name: path.read_bytes() for path in runtime_paths(of, with_z)}
 
 
 @cache
-def own_runtime(of: Format) -> set[str]:
+def own_runtime(of: Format, with_z: bool = False) -> set[str]:
     """List the names among ``runtime_files`` that are tablegen's own, whoever's format this is."""
     known, own = own_runtime_folders(), resource_folder("firmware_templates").resolve()
     # Links are followed only where the path does not say it: to follow that of every file is some percent of a build.
-    return {path.name for path in of.runtime() if path.parent in known or own in path.resolve().parents}
+    paths = runtime_paths(of, with_z)
+    return {path.name for path in paths if path.parent in known or own in path.resolve().parents}

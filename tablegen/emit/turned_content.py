@@ -3,6 +3,7 @@
 from msgspec import Struct
 
 from tablegen.device.dual_program import ScanProgram
+from tablegen.emit.content import Content
 from tablegen.fixedpoint.frame_program import FrameProgram
 
 
@@ -25,9 +26,7 @@ class TurnedContent(Struct, frozen=True, eq=False):
     @property
     def content_of_z(self) -> "TurnedContent | None":
         """The content of the files of the second sequencer; None without z."""
-        if self.z is None:
-            return None
-        return content_beside(self.name, self.hash, self.z, self.version, self.scanner, self.clocks_per_tick)
+        return content_beside(self)
 
     @property
     def axes(self) -> tuple[FrameProgram, FrameProgram]:
@@ -38,17 +37,20 @@ class TurnedContent(Struct, frozen=True, eq=False):
         return x, y
 
 
-def content_beside(
-    name: str, digest: str, program: ScanProgram, version: str = "", scanner: str = "", clocks_per_tick: int = 0
-) -> TurnedContent:
-    """Return the content of the files of a second sequencer, which plays the output z of a scan of this name.
+def content_beside(content: Content | TurnedContent) -> TurnedContent | None:
+    """Return the content of the files of a second sequencer, whose x is z, and whose y rests; None without z.
 
-    Parameters
-    ----------
-    digest
-        Hash of the plan of the scan, z included.
-    program
-        Its x is z, and its y rests.
+    They have the hash of the plan of the whole scan.
     """
-    summary = (f"The output z of {name}, for a sequencer of its own: x is z here, y rests at its offset.",)
-    return TurnedContent(f"{name}_z", digest, program, version, scanner, summary, clocks_per_tick)
+    if content.z is None:
+        return None
+    summary = (f"The output z of {content.name}, for a sequencer of its own: x is z here, y rests at its offset.",)
+    return TurnedContent(
+        f"{content.name}_z",
+        content.hash,
+        content.z,
+        content.version,
+        content.scanner,
+        summary,
+        content.clocks_per_tick,
+    )

@@ -8,10 +8,10 @@ from tablegen.device.clocks import least_slow_clocks
 from tablegen.device.registers import program_words
 from tablegen.device.widths import least_widths
 from tablegen.emit.constants import axis_constants, sequence_constants
-from tablegen.emit.formats.verilog import literal, value_range
 from tablegen.emit.memory import Memory, memory_file
 from tablegen.emit.templates import comment_safe, template
 from tablegen.emit.turned_content import TurnedContent
+from tablegen.emit.verilog_text import literal, value_range
 from tablegen.emit.verilog_top import port_range
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.interpolation import index_bits_of
@@ -25,10 +25,11 @@ _LEFT_OUT = frozenset({"HARMONICS", "FOURIER_LENGTH", "FOURIER_FRACTION_BITS", "
 def turned_verilog_files(content: TurnedContent) -> dict[str, bytes]:
     """Render ``NAME.vh``, ``NAME_top.v`` and the memory files, by name, and those of ``NAME_z`` where there is z."""
     contents = [each for each in (content, content.content_of_z) if each is not None]
-    return {name: text for each in contents for name, text in _files_of(each).items()}
+    return {name: text for each in contents for name, text in slow_verilog_files(each).items()}
 
 
-def _files_of(content: TurnedContent) -> dict[str, bytes]:
+def slow_verilog_files(content: TurnedContent) -> dict[str, bytes]:
+    """Render constants, top and memory files of one sequencer whose axes have a slow part, by name."""
     context = _context(content)
     files = {
         f"{content.name}.vh": template("verilog/turned.vh.j2", context, literal, range=value_range),

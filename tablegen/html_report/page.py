@@ -18,7 +18,7 @@ from tablegen.html_report.request import files, request_section, verification
 from tablegen.html_report.scan_errors import errors
 from tablegen.html_report.spectrum import quantisation, spectrum
 from tablegen.html_report.subject import Subject
-from tablegen.html_report.tilt import ShownTilt, tilt_section
+from tablegen.html_report.tilt import shown_tilt, tilt_section
 from tablegen.html_report.usable import usable
 
 Tell = Callable[[str], object]
@@ -62,12 +62,11 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
 
 def _of_z(subject: Subject) -> list[Section]:
     """Return the section of the output z; empty without z."""
-    z = subject.z
+    z = shown_tilt(subject)
     if z is None:
         return []
-    program, stated = z.program(subject.manifest.sequence), z.certificate
     limit = None if subject.planned is None else subject.planned.plan.limits.max_error_lsb
-    return [tilt_section(ShownTilt(z, program, stated.codes, stated.error_lsb, stated.error_nm), limit)]
+    return [tilt_section(z, limit)]
 
 
 def charts_of(parts: list[Section]) -> dict[str, Chart]:

@@ -86,11 +86,6 @@ class Subject:
         )
         return tuple(one for one in both if not one[1].resting)
 
-    @property
-    def has_z(self) -> bool:
-        """True if the scan has the output z."""
-        return self.z is not None
-
 
 def series_of(axis: ManifestAxis) -> FourierSeries:
     """Return the emitted waveform w(t)."""

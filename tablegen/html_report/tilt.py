@@ -8,7 +8,9 @@ from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
 from tablegen.html_report.number_text import figure
 from tablegen.html_report.promises import bounded
+from tablegen.html_report.subject import Subject
 from tablegen.html_report.tilt_chart import tilt_chart
+from tablegen.html_report.turned_subject import TurnedSubject
 from tablegen.manifest.frame_fields import TurnedCodes, TurnedZ
 
 
@@ -20,6 +22,20 @@ class ShownTilt(Struct, frozen=True, eq=False):
     codes: TurnedCodes
     error_lsb: float
     error_nm: float
+
+
+def shown_tilt(subject: Subject | TurnedSubject) -> ShownTilt | None:
+    """Return the output z of a scan or a build; None without z."""
+    if isinstance(subject, Subject):
+        if (z := subject.z) is None:
+            return None
+        stated = z.certificate
+        return ShownTilt(z, z.program(subject.manifest.sequence), stated.codes, stated.error_lsb, stated.error_nm)
+    of_z, certificate = subject.manifest.turned.z, subject.manifest.certificate
+    codes, errors = certificate.codes.get("z"), certificate.z
+    if of_z is None or codes is None or errors is None:
+        return None
+    return ShownTilt(of_z, of_z.program(subject.manifest.sequence), codes, errors.error_lsb, errors.error_nm)
 
 
 def tilt_section(z: ShownTilt, max_error_lsb: float | None) -> Section:

@@ -14,7 +14,7 @@ from tablegen.html_report.number_text import figure
 from tablegen.html_report.promises import bounded
 from tablegen.html_report.ranking import file_findings
 from tablegen.html_report.request import file_section, image_text, record_section
-from tablegen.html_report.tilt import ShownTilt, tilt_section
+from tablegen.html_report.tilt import shown_tilt, tilt_section
 from tablegen.html_report.turned_charts import error_maps, lattice_image, line_errors, mean_line
 from tablegen.html_report.turned_codes import axes_of, frame_charts, line_charts, path_chart, table_charts
 from tablegen.html_report.turned_subject import TurnedSubject
@@ -147,13 +147,11 @@ def _certificate(subject: TurnedSubject) -> Section:
 
 def _of_z(subject: TurnedSubject) -> list[Section]:
     """Return the section of the output z; empty without z."""
-    z, certificate = subject.manifest.turned.z, subject.manifest.certificate
-    codes, errors = certificate.codes.get("z"), certificate.z
-    if z is None or codes is None or errors is None:
+    z = shown_tilt(subject)
+    if z is None:
         return []
     limit = None if subject.planned is None else subject.planned.plan.limits.max_error_lsb
-    program = z.program(subject.manifest.sequence)
-    return [tilt_section(ShownTilt(z, program, codes, errors.error_lsb, errors.error_nm), limit)]
+    return [tilt_section(z, limit)]
 
 
 def _room(name: str, codes: int) -> tuple[TableCell, ...]:

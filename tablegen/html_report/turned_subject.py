@@ -51,11 +51,6 @@ class TurnedSubject:
         return self.stored.manifest
 
     @property
-    def has_z(self) -> bool:
-        """True if the scan has the output z."""
-        return self.stored.z is not None
-
-    @property
     def errors(self) -> dict[str, Any]:
         """The errors of the certificate by the names of ``TurnedErrors``."""
         errors: dict[str, Any] = self.stored.plain["certificate"].get("errors", {})

@@ -14,8 +14,8 @@ import numpy as np
 from tablegen.base.reading import BUILD_FILE, read_bytes, read_text
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.emit.constants import DEGREES
-from tablegen.emit.formats.verilog import literal, value_range
 from tablegen.emit.templates import template_text
+from tablegen.emit.verilog_text import literal, value_range
 from tablegen.library.entry import AxisEntry, Entry
 
 MODULE = "dac_library.v"

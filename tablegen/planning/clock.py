@@ -20,12 +20,12 @@ def clocks_per_tick(setup: Setup, schedule: Schedule, programs: tuple[Program, P
     return _clocks(setup, schedule, least_clocks(programs), problems)
 
 
-def slow_clocks_per_tick(setup: Setup, program: ScanProgram, problems: Problems) -> int:
-    """Return the same for a program with a slow part on both axes, which the sequencer plays in low area."""
-    return _clocks(setup, program.schedule, least_slow_clocks(program), problems)
+def slow_clocks_per_tick(setup: Setup, program: ScanProgram, problems: Problems, of: str = "this scan") -> int:
+    """Return the same for a program with a slow part on both axes, which a sequencer ``of`` the scan or z plays."""
+    return _clocks(setup, program.schedule, least_slow_clocks(program), problems, of)
 
 
-def _clocks(setup: Setup, schedule: Schedule, least: int, problems: Problems) -> int:
+def _clocks(setup: Setup, schedule: Schedule, least: int, problems: Problems, of: str = "this scan") -> int:
     clock_hz = setup.scan.emit.clock_hz
     if clock_hz is None:
         return 0
@@ -35,7 +35,7 @@ def _clocks(setup: Setup, schedule: Schedule, least: int, problems: Problems) ->
     why = None
     if clocks < least:
         why = (
-            f"{clock_hz:.9g} Hz are {float(exact_clocks):.4g} clocks a tick, and the sequencer of this scan takes "
+            f"{clock_hz:.9g} Hz are {float(exact_clocks):.4g} clocks a tick, and the sequencer of {of} takes "
             f"{least}; take a clock of at least {at_least(float(rate * least), 6)} Hz, or an update_rate_hz of at "
             f"most {at_most(clock_hz / least, 6)}"
         )

@@ -223,7 +223,7 @@ def _file_checks(
         differing_check("files", "SHA-256 in the manifest", f"{len(files)} files", wrong_files(folder, stored)),
     ]
     if same:
-        compared, unlike = unlike_installed(folder, written)
+        compared, unlike = unlike_installed(folder, stored, written)
         if compared:
             checks.append(differing_check("files", f"tablegen {__version__}", f"{compared} files", unlike))
     elif not other_version:

@@ -17,6 +17,10 @@ _BY_TURNS = {
 _RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}
 _SPLINE = {"dac_phase", "dac_spline", "dac_spline_step"}
 _LINES = {"dac_phase", "dac_table", "dac_interpolator"}
+_SLOW_PART = {
+    "dac_slow_axis", "dac_slow_boot", "dac_slow_divide", "dac_slow_engine", "dac_slow_fit", "dac_slow_part",
+    "dac_slow_store", "dac_axis_serial", "dac_spline_terms",
+}  # fmt: skip
 
 
 def played_modules(placement: Placement, programs: Sequence[Program], has_pixel_table: bool = False) -> set[str]:
@@ -41,10 +45,18 @@ def played_modules(placement: Placement, programs: Sequence[Program], has_pixel_
 
 
 def unplayed_verilog(
-    files: Iterable[str], placements: Sequence[Placement], programs: Sequence[Program], has_pixel_table: bool = False
+    files: Iterable[str],
+    placements: Sequence[Placement],
+    programs: Sequence[Program],
+    has_pixel_table: bool = False,
+    has_z: bool = False,
 ) -> list[str]:
-    """List the files of a runtime, and the options of its sequencer, that no session of these placements plays."""
+    """List the files of a runtime, and the options of its sequencer, that no session of these placements plays.
+
+    The top of z, where there is one, plays a slow part.
+    """
     played = set().union(*(played_modules(placement, programs, has_pixel_table) for placement in placements))
+    played |= _SLOW_PART if has_z else set()
     unplayed = sorted(name for name in files if name.removesuffix(".v") not in played)
     options = [
         f"PLAIN_MULTIPLIER = {int(axis == 'blocks')}"

@@ -149,11 +149,13 @@ def _target(
         return CTarget(name, fourier), DEFAULT_TICKS[name]
     from tablegen.verification.play.placement import Placement
     from tablegen.verification.verilog.target import VerilogTarget
+    from tablegen.verification.verilog.turned_play import USUAL_TICKS
 
     placement = Placement(axis, fourier)
     separate_frame = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual
     tick_clocks = placement.playing(read_build(folder).program).tick_clocks
-    return VerilogTarget(simulator, placement, separate_frame), DEFAULT_TICKS[simulator] // tick_clocks
+    of_z = USUAL_TICKS[simulator] if as_usual else None
+    return VerilogTarget(simulator, placement, separate_frame, of_z), DEFAULT_TICKS[simulator] // tick_clocks
 
 
 @contextmanager

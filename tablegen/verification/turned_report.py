@@ -1,14 +1,13 @@
 """Verify a build of a scan at an angle: its files, its certificate, and what its C or its Verilog plays."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from itertools import dropwhile, zip_longest
 from pathlib import Path
 from typing import Literal
 
 from tablegen.base.input_errors import Unphysical, shortened
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.device.dual_program import AxisProgram
+from tablegen.emit.banner import different_files
 from tablegen.emit.turned import require_format, turned_files, turned_options, turned_runtime
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
@@ -21,11 +20,11 @@ from tablegen.verification.c.host import host_compiler
 from tablegen.verification.checks.directory import copies, wrong_digests
 from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.verilog.simulate import require
-from tablegen.verification.verilog.turned_play import TurnedPlay
+from tablegen.verification.verilog.turned_play import USUAL_TICKS, TurnedPlay
 from tablegen.version import __version__
 
 _FRAMES = 2
-_MOST_TICKS = {"c": 3_000_000, "icarus": 3_000, "verilator": 30_000}  # unless they are given
+_MOST_TICKS = {"c": 3_000_000, **USUAL_TICKS}  # unless they are given
 
 
 def verify_turned(
@@ -91,10 +90,7 @@ def verify_turned(
             played = TurnedPlay(content, ticks).checks(folder, work / "verilog", simulator)
             if (of_z := content.content_of_z) is not None:
                 progress(f"{simulator} plays {ticks} ticks of z")
-                played += [
-                    replace(check, subject=f"{check.subject}, z")
-                    for check in TurnedPlay(of_z, ticks).checks(folder, work / "verilog_z", simulator)
-                ]
+                played += TurnedPlay(of_z, ticks, ", z").checks(folder, work / "verilog_z", simulator)
         checks += watch.timed(played)
     return Report(manifest.name, checks, difference, notes, watch.seconds)
 
@@ -144,7 +140,7 @@ def _file_checks(folder: Path, stored: StoredTurned, other_version: bool) -> lis
             checks.append(Check(f"{each} files", "manifest", "0 files", failure=f"{each} files: {error}"))
             continue
         files = turned_files(_content_of(stored), [each])
-        different = [why for name, right in files.items() if (why := _difference(folder / name, right))]
+        different = different_files(folder, files)
         checks.append(differing_check(f"{each} files", "manifest", f"{len(files)} files", different))
         own |= files
     if manifest.tablegen == __version__:
@@ -166,25 +162,6 @@ def _content(path: Path) -> bytes | None:
         return read_bytes(path, BUILD_FILE)
     except OSError:
         return None
-
-
-def _difference(path: Path, right: bytes) -> str | None:
-    """Return the first line of a file that is not as the manifest has it, behind the comment at its beginning."""
-    content = _content(path)
-    if content is None:
-        return f"{path.name}: cannot be read"
-    ours = _behind_banner(path, content.decode("utf-8", "replace"))
-    expected = _behind_banner(path, right.decode("ascii"))
-    if ours == expected:
-        return None
-    line, other = next(pair for pair in zip_longest(ours, expected, fillvalue="") if pair[0] != pair[1])
-    return f"{path.name}: a line is {line.strip()[:60]!r}, it is {other.strip()[:60]!r} by the manifest"
-
-
-def _behind_banner(path: Path, text: str) -> list[str]:
-    if path.suffix in (".c", ".h"):
-        return text.partition("*/")[2].splitlines()
-    return list(dropwhile(lambda line: line.startswith("//"), text.splitlines()))
 
 
 def _code_check(stored: StoredTurned) -> Check:

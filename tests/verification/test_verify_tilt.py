@@ -28,6 +28,8 @@ from tilted_scans import (
 
 import tablegen
 from tablegen.api.turned import TurnedBuild, build_turned
+from tablegen.comparison.charts import comparison_charts, differing_charts
+from tablegen.comparison.comparison import compared
 from tablegen.emit.runtime_config import options_of_builds
 from tablegen.emit.turned import turned_options
 from tablegen.fixedpoint.frame_program import FrameProgram
@@ -187,7 +189,6 @@ def test_the_summary_has_a_row_of_z(built: TurnedBuild) -> None:
 @pytest.mark.common
 def test_what_does_not_take_z_says_so(scan: Path, built: TurnedBuild, build: Path, tmp_path: Path) -> None:
     refusals = {
-        ("compare", build, scan): "out: `compare` takes no scan with the output z",
         ("upload", build, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", build, "--target", "cortex-m"): "which no emulator plays",
     }
@@ -250,8 +251,7 @@ def test_a_changed_word_of_z_is_heard_without_an_operator(straight: Path, tmp_pa
 def test_what_does_not_take_z_without_an_operator_says_so(straight: Path, tmp_path: Path) -> None:
     scan = straight.parent / "scan.toml"
     refusals = {
-        ("build", scan, "-o", tmp_path / "out", "-f", "verilog"): "formats: 'verilog' plays no output z",
-        ("compare", straight, scan): "out: `compare` takes no scan with the output z",
+        ("build", scan, "-o", tmp_path / "out", "-f", "vhdl"): "formats: 'vhdl' plays no output z; take c or verilog",
         ("upload", straight, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", straight, "--target", "cortex-m"): "which no emulator plays",
     }
@@ -266,6 +266,38 @@ def test_what_does_not_take_z_without_an_operator_says_so(straight: Path, tmp_pa
     for text in (built.summary(), built.overview()):
         assert "+0.02 of x and -0.05 of y, by 5 nm/V" in text
     assert [chart.key for chart in built.charts().charts][-1] == "z_frame"
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("operators", [True, False])
+def test_compare_states_what_differs_in_z(operators: bool, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    """A build is the same as itself; beside another plane rows and chart of z differ, and none of x and y."""
+    folder: Path = request.getfixturevalue("build" if operators else "straight")
+    assert run("compare", folder, folder).status == 0
+    copytree(folder, tmp_path / "other")
+    z = ("turned", "z") if operators else ("z",)
+    change(*z, "slope_x", by=0.01)(tmp_path / "other")
+    change(*z, "slow", "words", 3, by=40)(tmp_path / "other")
+    outcome = run("compare", folder, tmp_path / "other", "--json")
+    assert outcome.status == 1
+    differing = {(row["section"], row["name"]): row for row in json.loads(outcome.out)["quantities"]}
+    assert {one for one in differing if one[0] != "build"} == {
+        ("z drive", "slope along x"), ("z tables", "slow part, content"),
+    }  # fmt: skip
+    slope = differing["z drive", "slope along x"]
+    assert (slope["a"], slope["b"]) == (SLOPE_X, pytest.approx(SLOPE_X + 0.01))
+    both = compared(folder, tmp_path / "other")
+    assert [chart.key for chart in differing_charts(comparison_charts(both))] == ["drive-z"]
+
+
+@pytest.mark.common
+def test_compare_of_a_scan_without_z_has_one_side_of_it(straight: Path, tmp_path: Path) -> None:
+    plain = write_straight(tmp_path, "- [z]")
+    outcome = run("compare", straight.parent / "scan.toml", plain)
+    assert outcome.status == 1
+    assert re.search(rf"\n  slope along y +{SLOPE_Y} +-\n", outcome.out), outcome.out
+    both = compared(straight.parent / "scan.toml", plain)
+    assert "drive-z" not in {chart.key for chart in comparison_charts(both)}
 
 
 def rows_of(section: Section) -> dict[str, list[str]]:

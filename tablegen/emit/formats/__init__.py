@@ -88,6 +88,11 @@ def files_of(one: Format, content: Content) -> dict[str, bytes]:
     return dict(files)
 
 
+def runtime_paths(of: Format, with_z: bool) -> list[Path]:
+    """List the files that go with a format unchanged, in a build with the output z or in one without."""
+    return [*of.runtime(), *(of.runtime_of_z() if with_z else ())]
+
+
 @contextmanager
 def failing_as_format(one: Format) -> Iterator[None]:
     """Report an exception inside a format of another distribution; one of an own format is a fault of the program.

@@ -1,7 +1,6 @@
 """C99 tables and constants, with the C sequencer and the device's end of the serial link."""
 
 import re
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ from msgspec.structs import replace
 
 from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.base.resources import c_link, c_runtime, c_store, resource_folder
+from tablegen.emit.banner import different_files
 from tablegen.emit.c_text import beyond_defaults, literal
 from tablegen.emit.constants import (
     LEAST_STORAGE_BITS,
@@ -72,7 +72,7 @@ class C(Format):
             comparisons.append(Comparison("program", "2 files", wrong_program(folder, content)))
         if content.z is not None:
             files = _files_of_z(content)
-            comparisons.append(Comparison("z", f"{len(files)} files", _unlike(folder, files)))
+            comparisons.append(Comparison("z", f"{len(files)} files", different_files(folder, files)))
         return comparisons
 
 
@@ -138,25 +138,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 def wrong_program(folder: Path, content: Content) -> list[str]:
     """Return where the files of the program differ from what a build of this content has, behind the banner."""
-    return _unlike(folder, _program_files(_context(content)))
-
-
-def _unlike(folder: Path, files: dict[str, bytes]) -> list[str]:
-    """Return where files of a folder differ from these, behind the banner."""
-    wrong = []
-    for name, right in files.items():
-        try:
-            text = read_text(folder / name, BUILD_FILE, errors="replace")
-        except OSError as error:
-            wrong.append(f"{name}: cannot be read: {error.strerror or error}")
-            continue
-        expected = right.decode("ascii").partition("*/")[2].splitlines()
-        lines = text.partition("*/")[2].splitlines()
-        if lines != expected:
-            pairs = zip_longest(lines, expected, fillvalue="")
-            line, other = next(pair for pair in pairs if pair[0] != pair[1])
-            wrong.append(f"{name}: a line is {line.strip()[:60]!r}, it is {other.strip()[:60]!r} by the manifest")
-    return wrong
+    return different_files(folder, _program_files(_context(content)))
 
 
 def _program_files(context: dict[str, Any]) -> dict[str, bytes]:
@@ -169,9 +151,9 @@ def _files_of_z(content: Content) -> dict[str, bytes]:
     """Render the files of the sequencer that plays the output z."""
     from tablegen.emit.slow_c import slow_c_files, slow_storage  # here: most scans have no z
 
-    assert content.z is not None
-    beside = content_beside(content.name, content.hash, content.z, content.version, content.scanner)
-    return slow_c_files(beside, slow_storage([content.z]))
+    beside = content_beside(content)
+    assert beside is not None
+    return slow_c_files(beside, slow_storage([beside.program]))
 
 
 def _context(content: Content) -> dict[str, Any]:

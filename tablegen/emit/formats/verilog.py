@@ -7,6 +7,7 @@ from typing import Any
 from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.base.resources import resource_folder, verilog_by_turns, verilog_runtime, verilog_slow_part
 from tablegen.device.widths import least_widths
+from tablegen.emit.banner import different_files
 from tablegen.emit.constants import (
     pixel_constants,
     sequence_constants,
@@ -18,6 +19,7 @@ from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
+from tablegen.emit.verilog_text import literal, value_range
 from tablegen.emit.verilog_top import pixel_memory, sine_memory, top_file
 
 # Patterns of checks are compiled on first use, since a build needs none.
@@ -35,43 +37,35 @@ class Verilog(Format):
     def files(self, content: Content) -> dict[str, bytes]:
         """Render the header and the memory files."""
         header = template("verilog/tables.vh.j2", _context(content), literal, range=value_range)
-        return {f"{content.name}.vh": header, **top_file(content), **_memories(content)}
+        return {f"{content.name}.vh": header, **top_file(content), **_memories(content), **_files_of_z(content)}
 
     def runtime(self) -> list[Path]:
         """List the files of the Verilog sequencer, with those of ``ALTERNATE``, and the loader."""
         return [*verilog_runtime(), *verilog_by_turns()]
 
+    def runtime_of_z(self) -> list[Path]:
+        """List the modules of a slow part, which the sequencer of z has."""
+        return verilog_slow_part()
+
     def sources(self) -> list[Path]:
         """Return the runtime, also that of a scan at an angle, and the templates."""
         templates = (resource_folder("firmware_templates") / "verilog").glob("*.j2")
-        return [*self.runtime(), *verilog_slow_part(), *templates]
+        return [*self.runtime(), *self.runtime_of_z(), *templates]
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
-        """Compare the constants of the header, and the words of the memory files."""
+        """Compare the constants of the header, the words of the memory files, and the text of the files of z."""
         constants, different = wrong_constants(folder, content)
         words, flipped = wrong_memories(folder, content)
-        return [
+        comparisons = [
             Comparison("header", f"{constants} constants", different),
             Comparison("memories", f"{words} words", flipped),
         ]
+        if files := _files_of_z(content):
+            comparisons.append(Comparison("z", f"{len(files)} files", different_files(folder, files)))
+        return comparisons
 
 
 FORMAT = Verilog()
-
-
-def literal(value: int) -> str:
-    """Spell an integer in Verilog, of 32 or 64 bits."""
-    width = _width(value)
-    return f"{width}'sd{value}" if value >= 0 else f"-{width}'sd{-value}"
-
-
-def value_range(value: int) -> str:
-    """Return the range of a localparam that holds an integer."""
-    return "[31:0]" if _width(value) == 32 else "[63:0]"
-
-
-def _width(value: int) -> int:
-    return 32 if -0x7FFFFFFF <= value <= 0x7FFFFFFF else 64
 
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
@@ -107,6 +101,18 @@ def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
 def _memories(content: Content) -> dict[str, bytes]:
     fourier = {axis.axis: axis.fourier_words for axis in content.axes}
     return memory_files(content.name, content.schedule, content.x.program, content.y.program, fourier)
+
+
+def _files_of_z(content: Content) -> dict[str, bytes]:
+    """Render the files of the sequencer that plays the output z; none without z."""
+    if content.z is None:
+        return {}
+    from tablegen.emit.turned_content import content_beside  # here: most scans have no z
+    from tablegen.emit.turned_verilog import slow_verilog_files
+
+    beside = content_beside(content)
+    assert beside is not None
+    return slow_verilog_files(beside)
 
 
 def _context(content: Content) -> dict[str, Any]:

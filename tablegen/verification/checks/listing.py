@@ -6,7 +6,7 @@ from pathlib import Path
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats import UnknownFormat, files_of, get
+from tablegen.emit.formats import UnknownFormat, files_of, get, runtime_paths
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import StoredBuild
 
@@ -52,7 +52,7 @@ def listed_files(
     for one, own in written:
         formats_by_name |= dict.fromkeys(own, one.name)
         if same_version:
-            formats_by_name |= {path.name: one.name for path in one.runtime()}
+            formats_by_name |= {path.name: one.name for path in runtime_paths(one, stored.z is not None)}
     listed = set(stored.manifest.files)
     wrong = [
         f"{name}: a build of {formats_by_name[name]} has it, the manifest does not list it"
@@ -76,14 +76,14 @@ def _is_runtime(name: str) -> bool:
     return name.startswith(("dac_", "program_loader")) and name != MANIFEST
 
 
-def unlike_installed(folder: Path, written: Written) -> tuple[int, list[str]]:
+def unlike_installed(folder: Path, stored: StoredBuild, written: Written) -> tuple[int, list[str]]:
     """Return how many files are alike in every build of this version, or follow from the manifest, and which differ.
 
     A comment at the beginning of a file that is made again is passed over: no manifest has its words.
     """
     count, wrong = 0, []
     for one, own in written:
-        for path in one.runtime():
+        for path in runtime_paths(one, stored.z is not None):
             count += 1
             content = _content(folder / path.name)
             if content is not None and sha256(content).digest() != sha256(path.read_bytes()).digest():

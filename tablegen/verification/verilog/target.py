@@ -5,15 +5,16 @@ time: that takes half as long.
 """
 
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from tablegen.device.by_turns import not_by_turns
 from tablegen.device.registers import program_words
 from tablegen.emit.stored import stored_content
+from tablegen.emit.turned_content import content_beside
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import process_group as worker
 from tablegen.verification.build_report import Outcome, PlayJob, differing_check
@@ -56,6 +57,7 @@ from tablegen.verification.verilog.bench import (
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
 from tablegen.verification.verilog.simulate import Design, compile_design, require
 from tablegen.verification.verilog.top_play import TopPlay
+from tablegen.verification.verilog.turned_play import TurnedPlay
 
 _SESSION_TICKS = 30_000  # of the program of a build, in a session that has its frame apart
 _CAPTURED_TICK_BYTES = 17  # bytes of a captured tick
@@ -65,11 +67,15 @@ _MAX_TABLE_WORDS = 1 << 16  # words of a table that the sequencer can address
 
 @dataclass(frozen=True)
 class VerilogTarget:
-    """A simulator, and the placement of the sequencer; with ``separate_frame`` a long frame is played by itself."""
+    """A simulator, and the placement of the sequencer; with ``separate_frame`` a long frame is played by itself.
 
-    simulator: str
+    The sequencer of z has one placement.
+    """
+
+    simulator: Literal["icarus", "verilator"]
     placement: Placement
     separate_frame: bool = False
+    ticks_of_z: int | None = None  # most ticks of the output z; None: as many as of x and y
     format_name: str = "verilog"
 
     def require(self) -> None:
@@ -106,7 +112,11 @@ class VerilogTarget:
                 raise NotABuild(f"{folder}: ALTERNATE {obstacle[0]}: {obstacle[1]}; or verify it with --axis serial")
 
     def play(self, job: PlayJob) -> Outcome:
-        """Play a session on the simulator, and a frame beside it where that takes too long."""
+        """Play a session on the simulator, and a frame beside it where that takes too long; then z."""
+        return self._with_z(job, self._played(job))
+
+    def _played(self, job: PlayJob) -> Outcome:
+        """Play the sequencer of x and y."""
         stored, work, name = job.stored, job.work, job.stored.manifest.name
         memories, missing = _memories(job.folder, work, stored, self.placement)
         present = {path.name for path in job.folder.glob("dac_*.v")}
@@ -133,6 +143,20 @@ class VerilogTarget:
         except (SimulationFailed, OSError, ValueError) as error:
             ticks = sum(len(run.session.script.expected) for run in runs)
             return Outcome([Check("simulation", self.simulator, f"{ticks} ticks", failure=f"simulation: {error}")])
+
+    def _with_z(self, job: PlayJob, outcome: Outcome) -> Outcome:
+        """Play the top of the output z too, where the scan has one."""
+        of_z = content_beside(stored_content(job.stored))
+        if of_z is None:
+            return outcome
+        frame, line = of_z.program.schedule.frame_ticks, of_z.program.schedule.ticks
+        ticks = min(frame + line, job.most_ticks if self.ticks_of_z is None else self.ticks_of_z)
+        notes = list(outcome.notes)
+        if ticks < frame:
+            notes.append(f"{ticks} of the {frame} ticks of a frame of z were played; --ticks {frame} plays them all")
+        job.progress(f"{self.simulator} plays {ticks} ticks of z")
+        checks = TurnedPlay(of_z, ticks, ", z").checks(job.folder, job.work / "verilog_z", self.simulator)
+        return replace(outcome, checks=outcome.checks + checks, notes=notes)
 
     def _runs(self, job: PlayJob, memories: Memories) -> "list[SimulatedRun]":
         """Return the session as it is placed, and a whole frame with multiplier blocks (twice as fast)."""
@@ -191,9 +215,10 @@ class VerilogTarget:
             [one.placement for one in runs],
             programs,
             stored.program.schedule.pixel_table is not None,
+            stored.z is not None,
         )
-        if run.top is not None:
-            unplayed = [name for name in unplayed if name != f"{stored.manifest.name}_top.v"]
+        tops = ([] if run.top is None else [f"{content.name}_top.v"]) + [f"{content.name}_z_top.v"]
+        unplayed = [name for name in unplayed if name not in tops]
         return Outcome(checks, run.session, next(filter(None, differences), None), whole, unplayed=unplayed)
 
 

@@ -1,9 +1,11 @@
-"""A play of the Verilog of a scan at an angle: its ``NAME_top.v`` boots, and plays from the start of a frame.
+"""A play of a top in Verilog whose axes have a slow part: it boots, and plays from the start of a frame.
+
+It is the top of a scan at an angle, or that of the output z.
 
 The header is compiled beside it, and its constants are written down as the simulator reads them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -31,11 +33,12 @@ from tablegen.verification.verilog.top_play import (
 
 _X_PARTS, _Y_PARTS = 5, 6  # regions
 _PART_SHIFT = 14  # of the address: second table, slow table, gains, ratios
+USUAL_TICKS = {"icarus": 3_000, "verilator": 30_000}  # unless they are given
 _OTHER_CLOCKS = 2000  # to boot and to drain, beside the words
 _TARGET = "tablegen.verification.verilog.target"  # which has the job that compiles and runs a bench
 
 _MODULE = """\
-// The bench of tablegen verify for a scan at an angle: its header, and a play of its top.
+// The bench of tablegen verify for axes with a slow part: their header, and a play of their top.
 `timescale 1ns / 1ps
 `default_nettype none
 
@@ -65,10 +68,14 @@ endmodule
 
 @dataclass(frozen=True)
 class TurnedPlay:
-    """A play of ``ticks`` ticks from the start of a frame, as close to each other as the sequencer allows."""
+    """A play of ``ticks`` ticks from the start of a frame, as close to each other as the sequencer allows.
+
+    The subjects of its checks have a ``suffix``.
+    """
 
     content: TurnedContent
     ticks: int
+    suffix: str = ""
 
     def checks(self, folder: Path, work: Path, simulator: Literal["icarus", "verilator"]) -> list[Check]:
         """Play the build in ``folder`` and return what differs; ``work`` is an empty folder, which is made."""
@@ -77,7 +84,7 @@ class TurnedPlay:
         modules = sorted(path.name for path in folder.glob("dac_*.v"))
         sources, missing = copies(folder, [*modules, f"{name}_top.v", f"{name}.vh"], work / "rtl")
         if missing:
-            return [Check("simulation", simulator, "nothing", failure=f"simulation: {some(missing)}")]
+            return [self._failed(simulator, "nothing", some(missing))]
         memories = [f"{name}_{one.name}.mem" for one in turned_memories(self.content)]
         beside = write_top(name, memories, self._bench_text(), folder, work, work / simulator, [])
         bench, constants = work / f"{TOP}.v", self._constants()
@@ -93,11 +100,16 @@ class TurnedPlay:
             worker.run(work, _TARGET, job)
             different = different_constants(work, name, constants)
             header = differing_check(
-                "verilog header", "manifest, by the simulator", f"{len(constants)} constants", different
+                f"verilog header{self.suffix}", "manifest, by the simulator", f"{len(constants)} constants", different
             )
-            return [header, check_top(name, self._boot(), self.content.program, self.ticks, work)]
+            top = check_top(name, self._boot(), self.content.program, self.ticks, work)
+            return [header, replace(top, subject=f"{top.subject}{self.suffix}")]
         except (SimulationFailed, OSError, ValueError) as error:
-            return [Check("simulation", simulator, f"{self.ticks} ticks", failure=f"simulation: {error}")]
+            return [self._failed(simulator, f"{self.ticks} ticks", str(error))]
+
+    def _failed(self, simulator: str, compared: str, why: str) -> Check:
+        subject = f"simulation{self.suffix}"
+        return Check(subject, simulator, compared, failure=f"{subject}: {why}")
 
     @property
     def _pace(self) -> int:
