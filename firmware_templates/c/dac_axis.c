@@ -58,11 +58,11 @@ DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool
 /* The fast path has one check of clamp and slew guard for DAC_RUN ticks.
  *
  * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, inside the
- * limits. If all codes of a run are in it, no limit is met, and the clamp would have changed nothing. Nor would the slew
- * guard, for one of two reasons: the window is at most max_step + 1 wide, so any two of its codes differ by max_step at
- * most; or dac_program.c has found no words so far apart that a code could move further, and may_enter() has compared
- * the first one with the code before, which is any. A code is in the window if code - base, unsigned, has no bit above
- * run_bits; the bits of all codes are or-ed together, and looked at once.
+ * limits. If all codes of a run are in it, no limit is met, and the clamp would have changed nothing. Nor would the
+ * slew guard, for one of two reasons: the window is at most max_step + 1 wide, so any two of its codes differ by
+ * max_step at most; or dac_program.c has found no words so far apart that a code could move further, and may_enter()
+ * has compared the first one with the code before, which is any. A code is in the window if code - base, unsigned, has
+ * no bit above run_bits; the bits of all codes are or-ed together, and looked at once.
  *
  * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the
  * exact one, and every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which

@@ -304,7 +304,7 @@ typedef struct {
     int32_t gain, run_gain;     /* with gain_q and, if not shaped, with 32 fraction bits, or as DAC_UP scales it */
     int32_t code_min, code_max, max_step, park_code;
     int32_t run_half, run_room; /* half a window of 2^run_bits codes, and the room for it between the limits */
-    int32_t run_entry;          /* the first code of a run may be so far from the code before; 0: as far as the window */
+    int32_t run_entry;          /* most codes from the code before a run to its first; 0: half a window */
     uint32_t run_most;          /* maximum ticks of a run; 0: no runs */
     dac_position step;          /* step per advance, rounded up */
     int64_t offset;             /* offset_word and half an LSB */
@@ -394,7 +394,7 @@ unsigned dac_sequencer_idle(const dac_sequencer *s);
 
 /* Checks a program and puts it into the idle bank, where it stays until it is committed or another one is loaded. The
  * descriptor is copied, the tables are not: from now on they stay as they are, until the bank is idle again, since
- * runs rely on how far their words are apart. Cost: about 4000 instructions, and some 10 for each word. */
+ * runs rely on how far their words are apart. Cost: about 4000 instructions, and 8 to 15 for each word. */
 dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 
 /* Commits the program in the idle bank: it is taken at the next line start, or on the next tick while no scan runs. */

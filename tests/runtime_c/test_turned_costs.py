@@ -60,9 +60,9 @@ def test_a_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: s
     ],
 )
 def test_a_straight_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: str, percent: float) -> None:
-    """That runs are refused without the slew rate of the amplifier would be seen: it makes eight of one."""
+    """That runs are refused would be seen: it makes eight of one."""
     build = benchmark.straight(benchmark.STRAIGHT[name], core)
     counted, told = benchmark.counted(build, core), benchmark.told_straight(build)
     assert abs(told - counted) <= 0.01 * percent * counted
-    in_runs = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"].in_runs
-    assert (abs(in_runs - counted) <= 0.01 * percent * counted) == (name == "the example")
+    in_runs = counts()[MeasuredRun(16, 16, False)]["interpolated"][core].in_runs
+    assert (counted < 1.1 * in_runs) == (core == "cortex-m4")
