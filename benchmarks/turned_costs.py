@@ -35,7 +35,7 @@ COUNTED = HERE / "turned_count.c"
 SKIPPED_LINES = 2  # until the output has reached the scan
 FRAME = ("timing.lines = 16", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400")
 NARROW = (
-    *(f"{axis}.table.{key}" for axis in "xy" for key in ("mode = 'auto'", "bits = 12")),
+    *(f"{axis}.table.{key}" for axis in "xy" for key in ("mode = 'auto'", "bits = 11")),
     *(f"- {axis}.table.length" for axis in "xy"),
 )
 SHORT = ("timing.line_rate_hz = 1600", "timing.pixels = 100")
@@ -44,7 +44,7 @@ SCANS: dict[str, tuple[str, ...]] = {
     "lines of 313 ticks, of 60 nm": (*SHORT, "x.size_nm = 60", "y.size_nm = 60"),
     "lines of 313 ticks, of 300 nm": SHORT,
     "128 words over the line": ("x.band_limit.harmonics = 24",),
-    "words of 12 bits": NARROW,
+    "words of 11 bits": NARROW,
     "a converter in two's complement": ("dac.coding = 'twos-complement'",),
     "a converter of 18 bits": ("dac.bits = 18",),
     "shaped `second`": ("dac.shaping = 'second'",),
@@ -55,7 +55,7 @@ SCANS: dict[str, tuple[str, ...]] = {
 STRAIGHT_FRAME = ("timing.lines = 16",)
 STRAIGHT: dict[str, tuple[str, ...]] = {
     "the example": (),
-    "words of 13 bits for x": ("x.table.bits = 13", "- [limits]"),
+    "words of 10 bits for x": ("x.table.bits = 10", "- [limits]"),
     "lines of 313 ticks": ("timing.line_rate_hz = 1600", "timing.pixels = 50"),
     "no `max_slew_v_per_s`": ("- amplifier.max_slew_v_per_s",),
 }

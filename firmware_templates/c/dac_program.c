@@ -274,15 +274,13 @@ static uint32_t steepest_words(const dac_axis_program *p)
 /* The largest gain of any line, without its sign. */
 static uint32_t largest_gain(const dac_axis_program *p)
 {
-    uint32_t largest = 0;
+    uint32_t largest = distance(p->gain_word, 0);
 
 #if DAC_SLOW_PART
     for (unsigned i = 0; p->slow != NULL && i < p->slow->gain_knots; i++)
         if (distance(p->slow->gains[i], 0) > largest)
             largest = distance(p->slow->gains[i], 0);
-    if (p->slow == NULL)
 #endif
-        largest = distance(p->gain_word, 0);
     return largest;
 }
 
@@ -302,7 +300,7 @@ static int32_t steepest_step(const dac_bank_axis *b, const dac_axis_program *p)
 
 /* Windows of a run in the range of codes, at least: 32 bits hold none that is wider than a 32nd. */
 #if DAC_LONG_MULTIPLY
-enum { WINDOWS = 8 };
+enum { WINDOWS = 4 };
 #else
 enum { WINDOWS = 32 };
 #endif
@@ -380,7 +378,7 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     if (b->order == 0)
 #endif
     {
-        if (left > 14) /* the gain would not fit */
+        if (left > 30 || largest_gain(p) > (uint32_t)INT32_MAX >> left) /* it would not fit */
             return;
         b->run_gain = p->gain_word * (INT32_C(1) << left);
         b->run_offset = b->offset * ((int64_t)1 << left);

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from msgspec.structs import replace
 
 from tablegen.config.schema import ProcessorName
@@ -48,7 +49,9 @@ def played_frame_table(program: FrameProgram, max_step: int, steepest: float) ->
     """
     fast = program.fast
     shape = TableShape(fast.mode, len(fast.words), fast.bits)
-    return PlayedTable(shape, fast.phase.ticks, fast.hold, replace(program.output, max_step=max_step), steepest)
+    gain = max(abs(program.output.gain_word), int(np.max(np.abs(program.gains.words))))
+    output = replace(program.output, max_step=max_step, gain_word=gain)
+    return PlayedTable(shape, fast.phase.ticks, fast.hold, output, steepest)
 
 
 def frame_costs(axes: Sequence[PlayedTable], processor: ProcessorName) -> list[float]:

@@ -19,9 +19,10 @@ FILE = Path(__file__).with_name("table_costs.json")
 PROCESSORS: tuple[ProcessorName, ...] = get_args(ProcessorName)
 _NARROW_BITS = 16
 _LEAST_SHAPED_WINDOW = 15  # codes: what is fed back may leave half of a smaller one
+_LARGEST = (1 << 31) - 1  # of a gain with 32 fraction bits
 _RUN = 16  # ticks with one check of clamp and slew guard in the C
 _NARROW = 32  # windows of this check in the range of a converter, at least
-_WIDE = 8  # the same with long products, where the slew guard cannot act
+_WIDE = 4  # the same with long products, where the slew guard cannot act
 
 
 class MeasuredRun(NamedTuple):
@@ -75,7 +76,8 @@ class PlayedTable(NamedTuple):
             up = 29 - shape.bits
             most = 1 << (31 - up if up > 14 else 17)
             return table_storage_bits > _NARROW_BITS or -most <= output.gain_word < most
-        return 18 <= output.gain_q <= 32
+        left = 32 - output.gain_q
+        return 0 <= left <= 30 and abs(output.gain_word) <= _LARGEST >> left
 
     def keeps_window(self, processor: ProcessorName, table_storage_bits: int) -> bool:
         """Return True if no 16 ticks leave the window in which the C checks clamp and slew guard for all of them."""

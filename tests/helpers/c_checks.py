@@ -39,6 +39,7 @@ from c_requests import (
     the_queue,
 )
 from c_runs import (
+    gains_that_fit,
     jumps_that_32_bits_do_not_tell,
     limits,
     no_run_beyond_a_limit,
@@ -55,7 +56,7 @@ CHECKS: tuple[Check, ...] = (
     the_largest_schedules, the_first_word_again, offsets_that_overflow, other_converters,
     converters_that_do_not_fit, requests_that_do_not_fit,
     words_too_wide_for_their_storage, lines_of_the_status, one_buffer_for_both,
-    runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, slew_guards, runs_take_place,
+    runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, gains_that_fit, slew_guards, runs_take_place,
     jumps_that_32_bits_do_not_tell, positions, renderings,
 )  # fmt: skip
 

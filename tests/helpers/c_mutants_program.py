@@ -49,13 +49,6 @@ MUTANTS: tuple[Mutant, ...] = (
             ),
         },
     ),
-    *changed(
-        "dac_program.c",
-        "wide",
-        {
-            "runs where the gain does not fit": ("if (left > 14)", "if (left > 40)"),
-        },
-    ),
     *removed(
         "dac_program.c",
         "checks",
@@ -116,6 +109,10 @@ MUTANTS: tuple[Mutant, ...] = (
                 "if (way > steepest && p->table[i] > p->table[i + 1])",
             ),
             "an advance is a word": ("(uint64_t)b->step.high + 1; ", "UINT64_C(32768);    "),
+            "runs where the gain does not fit": (
+                "largest_gain(p) > (uint32_t)INT32_MAX >> left",
+                "largest_gain(p) > (uint32_t)INT32_MAX >> left << 1",
+            ),
             "words of 7 bits": ("p->bits >= 8", "p->bits >= 7"),
             "any word behind the last one": (
                 "DAC_TABLE_WORD(p->table[p->length]) == DAC_TABLE_WORD(p->table[0])",

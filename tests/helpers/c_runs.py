@@ -267,6 +267,22 @@ def slew_guards(libraries: Libraries) -> None:
             assert done == (16 if abs(away) <= max_step else 0), f"from {away} codes beside it, by {max_step}"
 
 
+def gains_that_fit(libraries: Libraries) -> None:
+    """Words of few bits have large gains: up to where one of 32 fraction bits fits, and behind it."""
+    for bits, beside, sign in product((8, 11, 12, 13), (-1, 0, 1), (1, -1)):
+        wave = wave_program(SequencerShape(16, 1, 6, bits, 1, 6, bits), 0)
+        gain = sign * ((1 << wave.x.output.gain_q - 1) + beside)
+        output = replace(wave.x.output, gain_word=gain, offset_word=32768 << wave.x.output.gain_q, code_min=0)
+        output = replace(output, code_max=65535, park_code=32768, max_step=9000)
+        axis = replace(wave.x, words=wave.x.words // 3, output=output)
+        program = replace(wave, x=axis, y=replace(axis, words=np.roll(axis.words, 3)))
+        twin = Twin(libraries.narrow, program, (32768, 32768))
+        twin.commit(program)
+        twin.play(1)
+        twin.ask("arm", "trigger")
+        twin.play(2 * wave.schedule.ticks, "fill")
+
+
 def limits(libraries: Libraries) -> None:
     """A wave whose peaks are so many codes beyond the limits or short of them, in runs wherever there is room."""
     for library in libraries:

@@ -51,8 +51,8 @@ def test_a_limit_takes_the_smallest_table_within_it(tmp_path: Path) -> None:
 
 
 def test_a_table_without_runs_takes_what_ticks_take(tmp_path: Path) -> None:
-    """With products of 64 bits, runs need words of at least two bits less than the converter has."""
-    few, enough = (played(planned(tmp_path, f"x.table.bits = {bits}").x) for bits in (13, 14))
+    """With products of 64 bits, runs need a gain that fits 32 bits with 32 fraction bits."""
+    few, enough = (played(planned(tmp_path, f"x.table.bits = {bits}", "- [limits]").x) for bits in (10, 11))
     in_runs, by_tick, _ = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
     assert (sample_costs([few], "cortex-m4"), sample_costs([enough], "cortex-m4")) == ([by_tick], [in_runs])
     assert by_tick > 5 * in_runs

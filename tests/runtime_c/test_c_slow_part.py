@@ -508,8 +508,8 @@ MUTANTS = {
         "        if (false)",
     ),
     "the gain of the axis is the largest": (
-        "    if (p->slow == NULL)\n#endif\n        largest",
-        "#endif\n        largest",
+        "        if (distance(p->slow->gains[i], 0) > largest)",
+        "        if (false)",
     ),
     "a window is as wide with any ramp": (" || ramp <= bank->ramp_most ?", " || true ?"),
     "runs without a window": (WINDOW, WINDOW.replace("if (out_of_window >> bank->run_bits != 0)", "if (false)")),

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.rest
 
 # Scans of the benchmark by name; percent by which what is told may differ; whether runs are played.
 BUILDS = [
-    ("cortex-m4", "words of 12 bits", 1.0, False),
+    ("cortex-m4", "words of 11 bits", 1.0, False),
     pytest.param(*("cortex-m0plus", "lines of 313 ticks, of 60 nm", 1.0, True), marks=LONG_TEST),
     ("riscv32", "a converter in two's complement", 1.0, True),
     pytest.param(*("cortex-m4", "no `max_slew_v_per_s`", 1.0, True), marks=LONG_TEST),
