@@ -26,7 +26,7 @@ from tablegen.config.schema import Table
 from tablegen.emit.render import render
 from tablegen.fixedpoint.program import Mode
 from tablegen.planning.line_plan import make_plan
-from tablegen.planning.table_costs import FILE, PROCESSORS, MeasuredRun, SampleCount
+from tablegen.planning.table_costs import FILE, LEAST_BLOCK, PROCESSORS, MeasuredRun, SampleCount
 from tablegen.verification.c.emulate import COMPILERS, CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
@@ -82,7 +82,7 @@ def _fills(
         program = compile_bare(folder / "count.elf", sources, core, None, options, macro_values)
     machine = Processor(program, core)
     window_bits = int(REFUSED_STEPS * (1.0 + plan.x.steepest) + 1.0).bit_length() - 1
-    ways = (0, 0), (1, 0), (0, window_bits)
+    ways = (0, 0, 0), (1, 0, 0), (0, window_bits, 0), (0, 0, LEAST_BLOCK)
     straight, coded = (SampleCount(*(_mean(machine, coded, *way) for way in ways)) for coded in (False, True))
     return straight, coded
 
@@ -92,9 +92,12 @@ def sequencer() -> list[Path]:
     return [path for path in c_runtime() if path.name != "dac_fourier.c"]
 
 
-def _mean(machine: Processor, coded: bool, by_tick: int, window_bits: int) -> float:
-    """Count fills of a program from its start, in windows of so many bits of a code; 0: in those that it has."""
-    machine.call("count_start", int(coded), by_tick, window_bits)
+def _mean(machine: Processor, coded: bool, by_tick: int, window_bits: int, block: int) -> float:
+    """Count fills of a program from its start, in windows of so many bits of a code and blocks of so many ticks.
+
+    Where they are 0, as the program has them.
+    """
+    machine.call("count_start", int(coded), by_tick, window_bits, block)
     if machine.word("refused"):
         raise RuntimeError(f"the runtime refuses the program: {machine.word('refused')}")
     fills = FILLS_BY_TICK if by_tick or window_bits else FILLS

@@ -28,7 +28,7 @@ from tablegen.fixedpoint.frame_words import BITS
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.frame_costs import FILE, TICKS, WORDS, LineCost
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, SampleCount
+from tablegen.planning.table_costs import LEAST_BLOCK, PROCESSORS, MeasuredRun, SampleCount
 from tablegen.verification.c.emulate import Processor, compile_bare
 
 COUNTED = Path(__file__).parent / "slow_count.c"
@@ -54,6 +54,7 @@ class Scan(NamedTuple):
     coded: bool = False
     without_runs: bool = False
     fast: bool = False  # so fast that every run is refused
+    block: int = 0  # ticks of a block of a run, where they are not those of the program
 
 
 def every_run() -> list[MeasuredRun]:
@@ -65,7 +66,7 @@ def slow_count(core: str, run: MeasuredRun) -> SampleCount:
     """Count a sample of an axis with both tables, of 64 words over lines of 1,250 ticks."""
     machine = _machine(core, run)
     scan = Scan(coded=run.coded)
-    scans = scan, scan._replace(without_runs=True), scan._replace(fast=True)
+    scans = scan, scan._replace(without_runs=True), scan._replace(fast=True), scan._replace(block=LEAST_BLOCK)
     return SampleCount(*(round(_sample(machine, run, one), 1) for one in scans))
 
 
@@ -190,6 +191,7 @@ def _start(machine: Processor, run: MeasuredRun, scan: Scan) -> None:
         "coded": int(scan.coded),
         "mixed": int(scan.second),
         "without_runs": int(scan.without_runs),
+        "block": scan.block,
         "window_bits": int(2.0 * steepest + 1.0).bit_length() - 1 if scan.fast else 0,
     }
     for name, array in arrays.items():

@@ -11,7 +11,7 @@ int32_t gains[KNOTS];
 int16_t ratios[KNOTS];
 uint32_t line_ticks, frame_lines, index_bits, slow_index_bits, word_bits, code_bits, gain_word;
 uint32_t coded, mixed, without_runs; /* two's complement; a second table; as of a program that has no runs */
-uint32_t window_bits;                /* of the codes of a window, if it is not 0 */
+uint32_t window_bits, block;         /* of the codes of a window, and ticks of a block, unless it is 0 */
 uint32_t refused;
 
 static dac_word memory[2][MOST_WORDS + DAC_WORDS_BEHIND];
@@ -89,6 +89,8 @@ void count_start(void)
         dac_bank *bank = &sequencer.bank[i];
         if (without_runs != 0)
             bank->x.run_most = bank->x.line_most = bank->y.run_most = bank->y.line_most = 0;
+        if (block != 0)
+            bank->x.run_block = bank->y.run_block = (uint8_t)block;
         if (window_bits != 0) {
             dac_set_window(&bank->x, (uint8_t)window_bits);
             dac_set_window(&bank->y, (uint8_t)window_bits);

@@ -14,8 +14,8 @@ uint32_t refused;
 void bench_main(void) {}
 
 /* Both axes play x. Codes are two's complement if `coded`; there are no runs if `ticks`, as of a program that allows
- * none; their windows have 2^`bits` codes, unless it is 0. */
-void count_start(uint32_t coded, uint32_t ticks, uint32_t bits)
+ * none; their windows have 2^`bits` codes, and their blocks `block` ticks, unless it is 0. */
+void count_start(uint32_t coded, uint32_t ticks, uint32_t bits, uint32_t block)
 {
     dac_converter x = x_converter, y = y_converter;
     dac_program program = scan;
@@ -34,6 +34,8 @@ void count_start(uint32_t coded, uint32_t ticks, uint32_t bits)
         dac_bank *bank = &sequencer.bank[i];
         if (ticks != 0)
             bank->x.run_most = 0;
+        if (block != 0)
+            bank->x.run_block = (uint8_t)block;
         if (bits != 0)
             dac_set_window(&bank->x, (uint8_t)bits);
         bank->y = bank->x;

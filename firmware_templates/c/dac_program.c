@@ -302,9 +302,44 @@ static int32_t steepest_step(const dac_bank_axis *b, const dac_axis_program *p)
 #if DAC_LONG_MULTIPLY
 enum { WINDOWS = 4 };
 #else
-enum { WINDOWS = 32 };
+enum { WINDOWS = 32, LEAST_BLOCK = 4 };
 #endif
 enum { RAMP = 4 }; /* codes of a tick for which a window has room */
+
+#if !DAC_LONG_MULTIPLY
+#if DAC_SLOW_PART
+/* The bits by which runs scale the gain. */
+static unsigned run_up(const dac_bank_axis *b, const dac_axis_program *p)
+{
+#if DAC_TABLE_STORAGE_BITS != 16
+    return DAC_UP(p->bits, b->guard);
+#elif DAC_SHAPING
+    return b->order != 0 ? DAC_UP(p->bits, b->guard) : 0u;
+#else
+    (void)b;
+    (void)p;
+    return 0;
+#endif
+}
+#endif
+
+/* Codes that a block may move by: half a window, and on a line with a ramp the spread of its samples. */
+static int32_t reach(const dac_bank_axis *b, const dac_axis_program *p, uint8_t bits)
+{
+    const int32_t half = INT32_C(1) << bits >> 1;
+#if DAC_SLOW_PART
+    if (p->slow != NULL) {
+        const uint32_t gain = largest_gain(p);
+        const uint64_t codes = (uint64_t)gain << dac_ramp_spread(gain << run_up(b, p)) >> p->gain_q;
+        return codes < (uint32_t)half ? (int32_t)codes : half;
+    }
+#else
+    (void)b;
+    (void)p;
+#endif
+    return half;
+}
+#endif
 
 /* Widens a window of 2^bits codes, to at most `widest`, until no block of a run leaves it, if the slew guard cannot act
  * on these codes. Only the first one, which follows any code, is then checked against the guard. */
@@ -330,6 +365,11 @@ static uint8_t widened(dac_bank_axis *b, const dac_axis_program *p, uint8_t bits
         bits++;
     if (INT32_C(1) << bits >> 1 > p->max_step)
         b->run_entry = p->max_step - aside;
+#if !DAC_LONG_MULTIPLY
+    block = DAC_RUN * step + 2 * aside;
+    for (; !b->holds && block > reach(b, p, bits) && b->run_block > LEAST_BLOCK; b->run_block /= 2)
+        block = block / 2 + 1;
+#endif
     return bits;
 }
 
@@ -343,6 +383,7 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 
     b->run_most = 0;
     b->run_entry = 0;
+    b->run_block = DAC_RUN;
     /* Runs of a spline take less than half a segment from tick to tick. */
     if (CUBIC(p) && p->hold_ticks == 1 && p->phase_period <= 2 * p->length)
         return;

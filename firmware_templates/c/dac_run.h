@@ -89,6 +89,18 @@ static inline void dac_set_window(dac_bank_axis *bank, uint8_t bits)
     bank->run_room = bank->code_max - bank->code_min + 1 - (INT32_C(1) << bits);
 }
 
+#if DAC_SLOW_PART && !DAC_LONG_MULTIPLY
+/* Returns the spread of samples on a line with a ramp, of a gain as runs scale it; see dac_short.h. */
+DAC_CODE_ATTR static inline uint8_t dac_ramp_spread(uint32_t gain)
+{
+    uint8_t spread = 30 + DAC_FINE;
+
+    for (; gain != 0; gain >>= 1)
+        spread--;
+    return spread > 19 + DAC_FINE ? 19 + DAC_FINE : spread;
+}
+#endif
+
 /* Returns true if a window with this lower end is inside the limits. */
 DAC_CODE_ATTR static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
 {

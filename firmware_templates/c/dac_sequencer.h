@@ -289,7 +289,7 @@ typedef struct {
 
 /* One axis of a bank: its program, and values derived from it when it was loaded. */
 typedef struct {
-    uint8_t holds, guard, gain_q, run_bits, run_spread;
+    uint8_t holds, guard, gain_q, run_bits, run_spread, run_block;
 #if DAC_SPLINE
     uint8_t cubic;
 #endif

@@ -180,7 +180,7 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     const int32_t unrounded = (int32_t)(((int64_t)gain * begin + offset) >> (below + DAC_FINE));
     const uint32_t first = (uint32_t)(unrounded - axis->code), half = (uint32_t)bank->run_half;
     const bool fed = kind.feeder != NULL;
-    uint32_t done = 0, sample = (uint32_t)begin;
+    uint32_t left = s.ticks, sample = (uint32_t)begin;
 #if DAC_SPLINE
     dac_track track;
 
@@ -198,8 +198,8 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
     b.fine_ramp = (uint32_t)ramp & DAC_FINE_MASK;
 #endif
 #endif
-    while (done < s.ticks) {
-        const uint32_t length = dac_block_of(s.ticks - done);
+    while (left != 0) {
+        const uint32_t length = left < bank->run_block ? left : bank->run_block;
         const uint32_t origin = sample - spread;
 #if DAC_TABLE_STORAGE_BITS == 16
         uint32_t low = (UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE);
@@ -297,9 +297,9 @@ DAC_ALWAYS_INLINE uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *b
             offset += ramp * (int64_t)length;
 #endif
         sample = origin + b.rise;
-        done += length;
+        left -= length;
     }
-    return done;
+    return s.ticks - left;
 }
 
 #endif

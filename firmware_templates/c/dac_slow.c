@@ -125,10 +125,6 @@ DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
 #else
     const bool scaled = SHAPED(bank) || DAC_TABLE_STORAGE_BITS != 16;
     const unsigned up = scaled ? DAC_UP(bank->bits, bank->guard) : 0u; /* as in dac_program.c */
-    uint8_t spread = 30 + DAC_FINE;
-
-    for (uint32_t gain = (uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain) << up; gain != 0; gain >>= 1)
-        spread--;
 #if DAC_SHAPING || DAC_TABLE_STORAGE_BITS != 16
     const int64_t half = DAC_TABLE_STORAGE_BITS == 16 || SHAPED(bank) ? (int64_t)1 << (bank->gain_q - 1u) : 0;
 
@@ -136,7 +132,7 @@ DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
     bank->run_offset = (bank->offset - half) * ((int64_t)1 << up);
     bank->run_ramp = bank->ramp * ((int64_t)1 << up);
 #endif
-    bank->run_spread = spread > 19 + DAC_FINE ? 19 + DAC_FINE : spread;
+    bank->run_spread = dac_ramp_spread((uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain) << up);
     if (DAC_RUN * (ramp << up) > INT64_C(1) << (30 + DAC_FINE))
         bank->run_most = 0;
 #endif

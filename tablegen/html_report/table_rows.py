@@ -54,7 +54,7 @@ class AxisTables:
     """The tables of one axis by memory, and one that a device renders from Fourier words.
 
     ``rendered`` is None where no table that a device renders keeps the error. ``shaped`` is true if the output is.
-    ``remedy`` says what gives the axis runs, where it moves too far in 16 ticks.
+    ``remedy`` says what gives the axis runs, where it moves too far for them.
     """
 
     axis: Literal["x", "y"]

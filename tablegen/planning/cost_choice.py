@@ -23,7 +23,7 @@ def played_table(program: Program, steepest: float) -> PlayedTable:
 
 
 def remedy_for_runs(setup: Setup, played: Mapping[str, PlayedTable]) -> str:
-    """Say which axis moves too far in 16 ticks for runs, where, and what gives it some; empty where none does.
+    """Say which axis moves too far for runs, where, and what gives it some; empty where none does.
 
     Without ``[cost]`` that is said of all processors.
     """
@@ -34,10 +34,11 @@ def remedy_for_runs(setup: Setup, played: Mapping[str, PlayedTable]) -> str:
         if not without:
             continue
         where = "" if len(without) == len(names) else f" on {' and '.join(without)}"
-        moved = f"{16.0 * table.steepest:.0f}"
+        ticks = table.block(without[0], table.run.table_storage_bits, table.step)
+        moved = f"{ticks * table.steepest:.0f}"
         return (
-            f"{axis} has no runs{where}: it moves {moved} codes in 16 ticks; a lower line rate or a smaller size gives "
-            f"it some"
+            f"{axis} has no runs{where}: it moves {moved} codes in {ticks} ticks; a lower line rate or a smaller size "
+            f"gives it some"
         )
     return ""
 

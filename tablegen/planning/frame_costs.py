@@ -16,8 +16,10 @@ from msgspec.structs import replace
 
 from tablegen.config.schema import ProcessorName
 from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.fixedpoint.spline import SPLINE_UNIT
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.table_costs import IN_RUNS, PROCESSORS, MeasuredRun, PlayedTable, SampleCount, played_together
+from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable, SampleCount, played_together
 
 FILE = Path(__file__).with_name("frame_costs.json")
 TICKS, WORDS = 1250, 64  # of the line and of the tables whose samples are measured
@@ -51,16 +53,25 @@ def played_frame_table(program: FrameProgram, max_step: int, steepest: float) ->
     shape = TableShape(fast.mode, len(fast.words), fast.bits)
     gain = max(abs(program.output.gain_word), int(np.max(np.abs(program.gains.words))))
     output = replace(program.output, max_step=max_step, gain_word=gain)
-    return PlayedTable(shape, fast.phase.ticks, fast.hold, output, steepest)
+    return PlayedTable(shape, fast.phase.ticks, fast.hold, output, steepest, True, _moves(program, gain))
+
+
+def _moves(program: FrameProgram, gain: int) -> int:
+    """Return the most that the words of a line move a code by in a tick, as dac_program.c finds it."""
+    fast, ratio = program.fast, int(np.max(np.abs(program.ratios.words)))
+    words, second = (np.abs(np.diff(each, append=each[:1])) for each in (fast.words, program.second))
+    rise = int(np.max(words + ((ratio * second) >> 12) + 1))
+    unit, bits = (SPLINE_UNIT, 18) if fast.mode == "cubic" else (1 << guard_bits(fast.bits), 15)
+    way = (len(fast.words) << bits) // fast.phase.ticks + 1  # from tick to tick
+    return (gain * ((unit * rise * way >> bits) + 3) >> program.output.gain_q) + 1
 
 
 def frame_costs(axes: Sequence[PlayedTable], processor: ProcessorName) -> list[float]:
     """Return the instructions for a sample of each of the axes that are played together, with their slow parts."""
-    runs, column = played_together(axes, processor)
-    lines, in_runs, costs = line_costs()[processor], column == IN_RUNS, []
-    for axis, run in zip(axes, runs, strict=True):
-        here = lines.of(axis.shape.length, in_runs) / axis.period
-        costs.append(round(slow_counts()[run][processor][column] + here - lines.of(WORDS, in_runs) / TICKS, 1))
+    lines, costs = line_costs()[processor], []
+    for axis, played in zip(axes, played_together(axes, processor), strict=True):
+        here = lines.of(axis.shape.length, played.in_runs) / axis.period - lines.of(WORDS, played.in_runs) / TICKS
+        costs.append(round(played.instructions(slow_counts()[played.run][processor]) + here, 1))
     return costs
 
 

@@ -54,7 +54,7 @@ TILTED = (
 class SampleCost(Struct, frozen=True):
     """The instructions for a sample of an axis in C on a processor, and the limit of the scan file.
 
-    ``remedy`` says why the axes have no runs and what gives them some, where one of them moves too far in 16 ticks.
+    ``remedy`` says why the axes have no runs and what gives them some, where one of them moves too far.
     """
 
     processor: ProcessorName

@@ -153,7 +153,7 @@ def test_a_limit_takes_the_least_memory_within_it(built: tablegen.TurnedBuild) -
     between = shapes[: shapes.index(limited.shape)]
     assert free in between
     assert all(one == free or limit.costs.get(one, 1e3) > 60.0 or search.rated(one, 2.5) is None for one in between)
-    assert min(one.bits for one, takes in limit.costs.items() if takes <= 60.0) == 14
+    assert min(one.bits for one, takes in limit.costs.items() if takes <= 60.0) == 12
 
 
 def test_a_limit_that_no_tables_keep_names_the_cheapest(built: tablegen.TurnedBuild) -> None:

@@ -53,7 +53,7 @@ def test_a_limit_takes_the_smallest_table_within_it(tmp_path: Path) -> None:
 def test_a_table_without_runs_takes_what_ticks_take(tmp_path: Path) -> None:
     """With products of 64 bits, runs need a gain that fits 32 bits with 32 fraction bits."""
     few, enough = (played(planned(tmp_path, f"x.table.bits = {bits}", "- [limits]").x) for bits in (10, 11))
-    in_runs, by_tick, _ = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
+    in_runs, by_tick, *_ = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m4"]
     assert (sample_costs([few], "cortex-m4"), sample_costs([enough], "cortex-m4")) == ([by_tick], [in_runs])
     assert by_tick > 5 * in_runs
     assert sample_costs([few, enough], "cortex-m4") == [by_tick, by_tick]
@@ -62,7 +62,8 @@ def test_a_table_without_runs_takes_what_ticks_take(tmp_path: Path) -> None:
     assert sample_costs([short], "riscv32") == [counts()[MeasuredRun(16, 16, False)]["cubic"]["riscv32"][1]]
 
 
-FAST = ("timing.line_rate_hz = 1600", "timing.pixels = 50")
+FAST = ("timing.line_rate_hz = 1600", "timing.pixels = 50")  # 95 codes a tick
+FASTER = ("timing.line_rate_hz = 4000", "timing.pixels = 20", "x.size_nm = 300", "- [limits]")  # 363
 
 
 def counted(tmp_path: Path, processor: str, *edits: str) -> list[float]:
@@ -78,21 +79,30 @@ def test_a_scan_without_a_slew_rate_takes_what_runs_take(tmp_path: Path, process
     assert counted(tmp_path, processor, "- amplifier.max_slew_v_per_s") == [in_runs, in_runs]
 
 
+def test_lines_that_move_far_take_what_short_blocks_take(tmp_path: Path) -> None:
+    """With products of 32 bits the blocks of x have 8 ticks, and those of y 16, as all have on a Cortex-M4."""
+    count = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m0plus"]
+    x, y = counted(tmp_path, "cortex-m0plus", *FAST)
+    assert (x, y) == (round(count.of_block(8), 1), count.in_runs)
+    assert count.in_runs == count.of_block(16) < x < count.of_block(4) == count.in_blocks
+    assert counted(tmp_path, "cortex-m4", *FAST) == [19.4, 19.4]
+
+
 def test_a_scan_that_moves_too_far_for_runs_takes_what_refused_runs_take(tmp_path: Path) -> None:
     """Both axes do, whatever the table; a Cortex-M4 has wider windows, and runs."""
-    in_runs, by_tick, refused = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m0plus"]
-    assert counted(tmp_path, "cortex-m0plus", *FAST) == [refused, refused]
-    assert counted(tmp_path, "cortex-m4", *FAST) == [19.4, 19.4]
-    assert in_runs < 0.2 * by_tick < 0.2 * refused
-    moves = "codes in 16 ticks; a lower line rate or a smaller size gives it some"
-    assert counted(tmp_path, "riscv32", *FAST) != [29.6, 29.6]
+    count = counts()[MeasuredRun(16, 16, False)]["interpolated"]["cortex-m0plus"]
+    assert counted(tmp_path, "cortex-m0plus", *FASTER) == [count.refused, count.refused]
+    assert counted(tmp_path, "cortex-m4", *FASTER) == [19.4, 19.4]
+    assert count.in_runs < 0.2 * count.by_tick < 0.2 * count.refused
+    moves = "codes in 4 ticks; a lower line rate or a smaller size gives it some"
+    assert counted(tmp_path, "riscv32", *FASTER) != [29.6, 29.6]
     assert moves in " ".join(run("show", tmp_path / "scan.toml", "--all", "--no-plot").out.split())
     for auto in ((), AUTO):
-        with_limit = write_pair(tmp_path, edited(SCAN, *FAST, *auto, f'{COST}"cortex-m0plus"\nmax_instructions = 50'))
-        outcome = run("check", with_limit)
+        limited = write_pair(tmp_path, edited(SCAN, *FASTER, *auto, f'{COST}"cortex-m0plus"\nmax_instructions = 50'))
+        outcome = run("check", limited)
         assert outcome.status != 0
         assert moves in " ".join(outcome.err.split())
-    of_all = run("tables", write_pair(tmp_path, edited(SCAN, *FAST)), "--axis", "x").out
+    of_all = run("tables", write_pair(tmp_path, edited(SCAN, *FASTER)), "--axis", "x").out
     assert "x has no runs on cortex-m0plus and riscv32: it moves" in " ".join(of_all.split())
 
 

@@ -7,27 +7,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from c_library import LOADED, Device, Library, compile_library, converter_of
-from programs import random_dual, shaped
+from c_library import LOADED, Device, Library, Twin, compile_library, converter_of
+from frame_programs import scan_program, shaped_scan
+from programs import random_dual, random_schedule, shaped
 from replacing import replace
-from test_c_slow_part import runtime_with
+from test_c_slow_part import CUBIC, LINEAR, SLOW, WIDE, library_of, runtime_with
 
 from tablegen.config.schema import ProcessorName
 from tablegen.device.dual_program import DualProgram
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.frame_costs import played_frame_table
 from tablegen.planning.table_costs import PlayedTable
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 # Two banks are derived for a load, x first.
 PROBE = {
     "/* Derives the windows of dac_axis_run, if runs are possible. */": (
-        "uint32_t probe_runs, probe_windows; int32_t probe_x_step, probe_step;"
+        "uint32_t probe_runs, probe_windows, probe_blocks; int32_t probe_x_step, probe_step;"
     ),
     "    b->park_code = p->park_code;\n    allow_runs(b, p);": (
         "    b->park_code = p->park_code;\n    allow_runs(b, p);\n    probe_runs = probe_runs << 16 | b->run_most;"
         "    probe_windows = probe_windows << 16 | b->run_bits;\n"
+        "    probe_blocks = probe_blocks << 16 | b->run_block;\n"
         "    probe_x_step = probe_step;\n    probe_step = steepest_step(b, p);"
     ),
 }
@@ -55,9 +59,18 @@ def tables(program: DualProgram) -> list[PlayedTable]:
     ]
 
 
-def both(probe: c_uint32) -> tuple[int, int]:
-    """Return what a probe has of x and of y."""
-    return probe.value >> 16, probe.value & 0xFFFF
+class Probes:
+    """What the C has derived of a program that was loaded."""
+
+    def __init__(self, library: Library) -> None:
+        names = ("probe_runs", "probe_windows", "probe_blocks")
+        self._probes = [c_uint32.in_dll(library.dll, name) for name in names]
+        self._steps = [c_int32.in_dll(library.dll, name) for name in ("probe_x_step", "probe_step")]
+
+    def axes(self) -> list[tuple[int, int, int, int]]:
+        """Return the most ticks of a run, bits of a window, ticks of a block and the largest step, of x and of y."""
+        x, y = ([probe.value >> shift & 0xFFFF for probe in self._probes] for shift in (16, 0))
+        return [(*derived, step.value) for derived, step in zip((x, y), self._steps, strict=True)]
 
 
 def largest_step(axis: Program) -> int:
@@ -80,9 +93,8 @@ def steps_and_windows(device: str, shaping: int, folder: Path, edits: dict[str, 
     more = (*options, "-DDAC_SPLINE=1", f"-DDAC_SHAPING={shaping}")
     runtime = runtime_with(PROBE | edits, folder / "runtime")
     library = Library(compile_library(folder / "runs.so", bits, bits, runtime=runtime, more=more))
-    runs, windows = (c_uint32.in_dll(library.dll, name) for name in ("probe_runs", "probe_windows"))
-    steps = [c_int32.in_dll(library.dll, name) for name in ("probe_x_step", "probe_step")]
-    seen, widened = Counter[bool](), Counter[bool]()
+    probes = Probes(library)
+    seen, widened, blocks = Counter[bool](), Counter[bool](), Counter[int]()
     rng = np.random.default_rng(5)
     for shape in SHAPES[bits]:
         for longest, gentle in product((6, 40, 300), (False, True)):
@@ -93,15 +105,18 @@ def steps_and_windows(device: str, shaping: int, folder: Path, edits: dict[str, 
                 program = replace(program, x=guarded(program.x), y=guarded(program.y))
             loading = Device(library, *(converter_of(axis.output) for axis in (program.x, program.y)))
             assert loading.load(program) == LOADED
-            axes = zip(tables(program), (program.x, program.y), both(runs), both(windows), steps, strict=True)
-            for table, axis, most, window, step in axes:
+            found = zip(tables(program), (program.x, program.y), probes.axes(), strict=True)
+            for table, axis, (most, window, block, step) in found:
                 assert table.has_runs(processor, bits) == (most != 0), (shape, table)
                 seen[most != 0] += 1
-                assert largest_step(axis) <= step.value, (shape, table)
+                assert largest_step(axis) <= step, (shape, table)
                 if most != 0:
-                    assert table.window(processor, bits, step.value) == 1 << window, (shape, table, step.value)
+                    assert table.window(processor, bits, step) == 1 << window, (shape, table, step)
+                    assert table.block(processor, bits, step) == block, (shape, table, step)
                     widened[1 << window > table.window(processor, bits, 1 << 30)] += 1
+                    blocks[block] += 1
     assert min(seen[True], seen[False], widened[True], widened[False]) > 5
+    assert sorted(blocks) == ([16] if "long" in device else [4, 8, 16])
 
 
 @pytest.mark.common
@@ -109,6 +124,43 @@ def steps_and_windows(device: str, shaping: int, folder: Path, edits: dict[str, 
 @pytest.mark.parametrize("shaping", [0, 3])
 def test_runs_are_where_costs_expect_them(device: str, shaping: int, tmp_path: Path) -> None:
     steps_and_windows(device, shaping, tmp_path, {})
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("shaping", [0, 3])
+def test_blocks_at_an_angle_are_where_costs_expect_them(device: str, shaping: int, tmp_path: Path) -> None:
+    """Steps of the words that are mixed in, with the largest gain of a line; and room for a ramp."""
+    processor, bits, options = DEVICES[device]
+    more = (*options, *SLOW, "-DDAC_SPLINE=1", f"-DDAC_SHAPING={shaping}")
+    runtime = runtime_with(PROBE, tmp_path / "runtime")
+    library = library_of(compile_library(tmp_path / "runs.so", bits, bits, 2, runtime=runtime, more=more))
+    probes, blocks, rng = Probes(library), Counter[int](), np.random.default_rng(4)
+    schedule = replace(random_schedule(rng, 90, 1), lines=5)
+    shapes = (WIDE if bits == 32 else LINEAR + CUBIC) * 12
+    for shape in shapes:
+        program = scan_program(rng, shape, schedule)
+        gentle = replace(program, x=slowed(rng, program.x), y=slowed(rng, program.y))
+        if shaping:
+            gentle = shaped_scan(rng, gentle, shaping)
+        assert Twin(library, gentle).device.load(gentle) == LOADED
+        for axis, (most, window, block, step) in zip((gentle.x, gentle.y), probes.axes(), strict=True):
+            table = played_frame_table(axis, axis.output.max_step, 0.0)
+            assert table.has_runs(processor, bits) == (most != 0), table
+            assert table.moves == step, table
+            if most != 0:
+                assert table.window(processor, bits, step) == 1 << window, table
+                assert table.block(processor, bits, step) == block, table
+                blocks[block] += 1
+    assert sorted(blocks) == ([16] if "long" in device else [4, 8, 16])
+
+
+def slowed(rng: np.random.Generator, axis: FrameProgram) -> FrameProgram:
+    """Return the axis with any part of its gains, and a slew guard that cannot act."""
+    part = int(rng.choice([1, 2, 5, 20, 100]))
+    output = replace(axis.output, gain_word=axis.output.gain_word // part, max_step=(1 << 24) - 1)
+    gains = replace(axis.gains, words=axis.gains.words // part)
+    return replace(axis, fast=replace(axis.fast, output=output), gains=gains)
 
 
 @pytest.mark.rest
@@ -124,3 +176,10 @@ def test_runs_are_where_costs_expect_them(device: str, shaping: int, tmp_path: P
 def test_a_bound_that_is_too_low_is_found(edit: tuple[str, str], tmp_path: Path) -> None:
     with pytest.raises(AssertionError):
         steps_and_windows("long, 16", 0, tmp_path, dict([edit]))
+
+
+@pytest.mark.rest
+def test_blocks_that_are_too_long_are_found(tmp_path: Path) -> None:
+    """No code would tell: a block that leaves its window is played tick by tick."""
+    with pytest.raises(AssertionError):
+        steps_and_windows("short, 16", 0, tmp_path, {"block = block / 2 + 1;": "block = block / 4;"})

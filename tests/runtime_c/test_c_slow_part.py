@@ -549,7 +549,7 @@ SHORT_SHAPED_MUTANTS = {
     ),
     "short shaped runs have no ramp": ("    bank->run_ramp = bank->ramp * ((int64_t)1 << up);\n", ""),
     "short shaped runs begin with a small ramp": ("axis->rise * (INT64_C(1) << up)", "axis->rise"),
-    "the spread is that of the unshaped gain": (" : bank->gain) << up; gain", " : bank->gain); gain"),
+    "the spread is that of the unshaped gain": (" : bank->gain) << up);", " : bank->gain));"),
 }
 SHORT_MUTANTS = {
     "a ramp is added twice": ("        b->rest += b->ramp;", "        b->rest += 2 * b->ramp;"),
@@ -558,7 +558,10 @@ SHORT_MUTANTS = {
         "    if (kind.ramps)\n        offset += axis->rise * (INT64_C(1) << up);\n",
         "",
     ),
-    "the spread is that of the axis": ("    bank->run_spread = spread > 19 + DAC_FINE ? 19 + DAC_FINE : spread;\n", ""),
+    "the spread is that of the axis": (
+        "    bank->run_spread = dac_ramp_spread((uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain) << up);\n",
+        "",
+    ),
 }
 _FORK = get_context("fork")
 

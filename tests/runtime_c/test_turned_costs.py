@@ -56,13 +56,13 @@ def test_a_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: s
         ("cortex-m4", "the example", 1.0),
         ("cortex-m4", "no `max_slew_v_per_s`", 1.0),
         pytest.param("cortex-m4", "lines of 313 ticks", 3.0, marks=LONG_TEST),
-        pytest.param("cortex-m0plus", "lines of 313 ticks", 8.0, marks=LONG_TEST),
+        ("cortex-m0plus", "lines of 313 ticks", 4.0),
     ],
 )
 def test_a_straight_build_takes_what_it_is_told(benchmark: ModuleType, core: str, name: str, percent: float) -> None:
-    """That runs are refused would be seen: it makes eight of one."""
+    """That runs are refused would be seen: it makes seven of one."""
     build = benchmark.straight(benchmark.STRAIGHT[name], core)
     counted, told = benchmark.counted(build, core), benchmark.told_straight(build)
     assert abs(told - counted) <= 0.01 * percent * counted
     in_runs = counts()[MeasuredRun(16, 16, False)]["interpolated"][core].in_runs
-    assert (counted < 1.1 * in_runs) == (core == "cortex-m4")
+    assert counted < 1.1 * in_runs
