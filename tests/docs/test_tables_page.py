@@ -79,25 +79,24 @@ def _whole(mark: str) -> list[list[str]]:
 
 
 def test_emitted_scans_take_what_they_are_told() -> None:
-    """The page has two scans whose runs are refused; of them the counts differ by up to 8 %, of others by 1 %."""
+    """In runs, of all processors, and tick by tick."""
     rows = _whole("whole")
     assert len(rows) > 8
     for name, *pairs in rows:
-        most = 8.0 if "of 300 nm" in name or "max_slew" in name else 1.0
         for counted, told in (map(float, pair.split(", ")) for pair in pairs):
-            assert abs(told / counted - 1.0) <= 0.01 * most, (name, counted, told)
+            assert abs(told / counted - 1.0) <= 0.012, (name, counted, told)
 
 
 def test_emitted_scans_at_0_degrees_take_what_they_are_told() -> None:
-    """Without the slew rate of the amplifier a Cortex-M4 takes eight times the instructions."""
+    """Without the slew rate of the amplifier they take 2 % more at most, and fast lines 10 %."""
     rows = {name: [tuple(map(float, pair.split(", "))) for pair in pairs] for name, *pairs in _whole("straight")}
     assert len(rows) == 4
     for name, pairs in rows.items():
         for counted, told in pairs:
-            assert (-13.0 if "max_slew" in name or "313" in name else -1.0) <= 100.0 * (1.0 - told / counted) < 3.0, (
-                name
-            )
-    assert rows["no `max_slew_v_per_s`"][0][0] > 8.0 * rows["the example"][0][0]
+            assert -0.01 <= 1.0 - told / counted < 0.03, name
+    for name, most in (("no `max_slew_v_per_s`", 1.02), ("lines of 313 ticks", 1.1)):
+        for (counted, _), (example, _) in zip(rows[name], rows["the example"], strict=True):
+            assert counted < most * example, name
 
 
 @pytest.mark.rest
@@ -121,7 +120,7 @@ def test_a_direct_table_takes_what_lines_take(benchmark: ModuleType) -> None:
     """In runs the same loop plays both; a tick that is played by itself takes one or two instructions less."""
     run_of = MeasuredRun(16, 16, False)
     counted = benchmark.mode_costs.instructions("cortex-m4", run_of, "direct")
-    in_runs, by_tick, _ = counts()[run_of]["interpolated"]["cortex-m4"]
+    in_runs, by_tick, *_ = counts()[run_of]["interpolated"]["cortex-m4"]
     assert counted.in_runs == pytest.approx(in_runs, abs=0.2)
     assert 0.0 <= by_tick - counted.by_tick < 2.0
 
