@@ -339,8 +339,7 @@ class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             Meta(
                 ge=1e-3,
                 le=1e12,
-                description="maximum slew rate at the piezo; without it the slew guard is twice the steepest step, and "
-                "C takes several times the instructions",
+                description="maximum slew rate at the piezo; without it the slew guard is twice the steepest step",
             ),
         ]
         | None
