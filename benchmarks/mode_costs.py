@@ -26,7 +26,8 @@ from tablegen.config.schema import Table
 from tablegen.emit.render import render
 from tablegen.fixedpoint.program import Mode
 from tablegen.planning.line_plan import make_plan
-from tablegen.planning.table_costs import FILE, LEAST_BLOCK, PROCESSORS, MeasuredRun, SampleCount
+from tablegen.planning.played_table import LEAST_BLOCK, PROCESSORS, MeasuredRun
+from tablegen.planning.table_costs import FILE, SampleCount
 from tablegen.verification.c.emulate import COMPILERS, CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent

@@ -28,7 +28,8 @@ from tablegen.fixedpoint.frame_words import BITS
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.frame_costs import FILE, TICKS, WORDS, LineCost
-from tablegen.planning.table_costs import LEAST_BLOCK, PROCESSORS, MeasuredRun, SampleCount
+from tablegen.planning.played_table import LEAST_BLOCK, PROCESSORS, MeasuredRun
+from tablegen.planning.table_costs import SampleCount
 from tablegen.verification.c.emulate import Processor, compile_bare
 
 COUNTED = Path(__file__).parent / "slow_count.c"

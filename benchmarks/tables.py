@@ -30,8 +30,9 @@ from tablegen.html_report.tables_text import tables_text
 from tablegen.planning import frame_costs
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.other_table import maker_of, with_table
+from tablegen.planning.played_table import PROCESSORS, MeasuredRun
 from tablegen.planning.table_choice import possible_shapes
-from tablegen.planning.table_costs import FILE, PROCESSORS, MeasuredRun, counts
+from tablegen.planning.table_costs import FILE, counts
 from tablegen.planning.table_search import TableSearch
 
 HERE = Path(__file__).parent

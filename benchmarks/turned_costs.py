@@ -25,7 +25,7 @@ from turned_scans import turned_setup
 from tablegen.api.build import Build, build
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.planning.frame_costs import frame_costs
-from tablegen.planning.table_costs import PROCESSORS
+from tablegen.planning.played_table import PROCESSORS
 from tablegen.planning.turned_plan import played_frame
 from tablegen.verification.c.emulate import Processor, compile_bare
 

@@ -23,7 +23,8 @@
 #endif
 #endif
 
-#define DAC_RUN 16 /* ticks of a run that share one check of clamp and slew guard */
+#define DAC_RUN 16 /* ticks of a run that share one check of clamp and slew guard, at most */
+#define DAC_SPLINE_UNIT 12 /* units of a sample of a spline, for the LSB of a word */
 
 /* One advance: 96-bit addition. The step is ceil(2^n / period), n = 79 + index bits, or 82 + index bits of a cubic
  * table, so that after k < period advances the position exceeds the exact k 2^n / period by less than k, and
@@ -115,8 +116,6 @@ DAC_CODE_ATTR static inline int32_t dac_lerp(int32_t here, int32_t there, uint32
 #endif
 
 #if DAC_SPLINE || DAC_SLOW_PART
-#define DAC_SPLINE_UNIT 12 /* units of a sample for the LSB of a word */
-
 /* The segment of a cubic spline that begins at a word, by powers of half of the fraction. */
 typedef struct {
     int32_t b0, b1, b2, b3;

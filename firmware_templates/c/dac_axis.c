@@ -55,7 +55,7 @@ DAC_CODE_ATTR bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool
     return dac_axis_approach(axis, bank, clamped);
 }
 
-/* The fast path has one check of clamp and slew guard for DAC_RUN ticks.
+/* The fast path has one check of clamp and slew guard for a block of DAC_RUN ticks, or of fewer.
  *
  * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, inside the
  * limits. If all codes of a run are in it, no limit is met, and the clamp would have changed nothing. Nor would the

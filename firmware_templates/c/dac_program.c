@@ -288,14 +288,15 @@ static uint32_t largest_gain(const dac_axis_program *p)
  * straight line, or on a spline, which is nowhere steeper than its steepest two words are. */
 static int32_t steepest_step(const dac_bank_axis *b, const dac_axis_program *p)
 {
-    const uint32_t unit = CUBIC(p) ? 12 : UINT32_C(1) << b->guard; /* of a sample, for the LSB of a word */
-    const uint64_t words = (uint64_t)b->step.high + 1;             /* from one advance to the next, with a fraction */
+    const uint32_t unit = CUBIC(p) ? DAC_SPLINE_UNIT : UINT32_C(1) << b->guard; /* of a sample, for an LSB of a word */
+    const uint64_t words = (uint64_t)b->step.high + 1; /* from one advance to the next, with a fraction */
     const uint32_t rise = steepest_words(p);
     /* Both samples are rounded, by less than 1 each. */
     const uint64_t move = (unit * rise * words >> (CUBIC(p) ? 18 : 15)) + 3;
+    const uint64_t codes = (largest_gain(p) * move >> p->gain_q) + 1;
 
-    /* Words may have more bits than the program says. */
-    return rise >> 25 != 0 || move >> 26 != 0 ? INT32_MAX : (int32_t)(largest_gain(p) * move >> p->gain_q) + 1;
+    /* Words may have more bits than the program says, so that a product is cut off. */
+    return rise >> 25 != 0 || move >> 26 != 0 || codes > INT32_MAX ? INT32_MAX : (int32_t)codes;
 }
 
 /* Windows of a run in the range of codes, at least: 32 bits hold none that is wider than a 32nd. */

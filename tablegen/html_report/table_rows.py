@@ -18,7 +18,8 @@ from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.cost_choice import played_table, remedy_for_runs
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
-from tablegen.planning.table_costs import PROCESSORS, cells, sample_costs
+from tablegen.planning.played_table import PROCESSORS
+from tablegen.planning.table_costs import cells, sample_costs
 from tablegen.planning.table_front import table_front
 from tablegen.waveform.sampler import Sampler
 

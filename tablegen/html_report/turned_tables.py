@@ -16,8 +16,8 @@ from tablegen.fixedpoint.frame_program import RATIO_BITS, SECOND_BITS
 from tablegen.fixedpoint.frame_words import FrameShape
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.planning.frame_tables import CostLimit
+from tablegen.planning.played_table import PROCESSORS
 from tablegen.planning.table_choice import allowed_lsb
-from tablegen.planning.table_costs import PROCESSORS
 from tablegen.planning.turned_plan import TurnedAxis, TurnedPlan, frame_table_search, played_frame, shape_costs
 
 _GAIN_STORAGE_BITS = 32  # of a knot of the gain in C

@@ -21,7 +21,7 @@ from tablegen.planning.timing import AxisTiming
 from tablegen.waveform.series import FourierSeries
 
 if TYPE_CHECKING:
-    from tablegen.planning.table_costs import PlayedTable
+    from tablegen.planning.played_table import PlayedTable
 
 
 class AxisTable(Struct, frozen=True, eq=False):

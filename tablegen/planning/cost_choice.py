@@ -8,8 +8,9 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import Cost
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.played_table import PROCESSORS, PlayedTable
 from tablegen.planning.table_choice import choose
-from tablegen.planning.table_costs import PROCESSORS, PlayedTable, sample_costs
+from tablegen.planning.table_costs import sample_costs
 
 if TYPE_CHECKING:
     from tablegen.planning.table_maker import TableMaker

@@ -11,15 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-from msgspec.structs import replace
-
 from tablegen.config.schema import ProcessorName
-from tablegen.fixedpoint.frame_program import FrameProgram
-from tablegen.fixedpoint.interpolation import guard_bits
-from tablegen.fixedpoint.spline import SPLINE_UNIT
-from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable, SampleCount, played_together
+from tablegen.planning.played_table import PROCESSORS, MeasuredRun, PlayedTable
+from tablegen.planning.table_costs import SampleCount, played_together
 
 FILE = Path(__file__).with_name("frame_costs.json")
 TICKS, WORDS = 1250, 64  # of the line and of the tables whose samples are measured
@@ -42,28 +36,6 @@ class LineCost(NamedTuple):
         """Return the instructions for a line whose table has so many words."""
         whole = self.line + words * self.word if in_runs else self.line_by_tick + words * self.word_by_tick
         return whole if second else whole - self.second - words * self.word_by_tick
-
-
-def played_frame_table(program: FrameProgram, max_step: int, steepest: float) -> PlayedTable:
-    """Return the table over the line of an axis with a slow part and a second table, whose slew guard is given.
-
-    ``max_step`` and ``steepest``, the largest step of a tick, are in codes.
-    """
-    fast = program.fast
-    shape = TableShape(fast.mode, len(fast.words), fast.bits)
-    gain = max(abs(program.output.gain_word), int(np.max(np.abs(program.gains.words))))
-    output = replace(program.output, max_step=max_step, gain_word=gain)
-    return PlayedTable(shape, fast.phase.ticks, fast.hold, output, steepest, True, _moves(program, gain))
-
-
-def _moves(program: FrameProgram, gain: int) -> int:
-    """Return the most that the words of a line move a code by in a tick, as dac_program.c finds it."""
-    fast, ratio = program.fast, int(np.max(np.abs(program.ratios.words)))
-    words, second = (np.abs(np.diff(each, append=each[:1])) for each in (fast.words, program.second))
-    rise = int(np.max(words + ((ratio * second) >> 12) + 1))
-    unit, bits = (SPLINE_UNIT, 18) if fast.mode == "cubic" else (1 << guard_bits(fast.bits), 15)
-    way = (len(fast.words) << bits) // fast.phase.ticks + 1  # from tick to tick
-    return (gain * ((unit * rise * way >> bits) + 3) >> program.output.gain_q) + 1
 
 
 def frame_costs(axes: Sequence[PlayedTable], processor: ProcessorName) -> list[float]:

@@ -36,7 +36,7 @@ from tablegen.waveform.series import FourierSeries
 
 if TYPE_CHECKING:
     from tablegen.device.dual_program import ScanProgram
-    from tablegen.planning.table_costs import PlayedTable
+    from tablegen.planning.played_table import PlayedTable
     from tablegen.planning.tilt import TiltedOutput
 
 MIXED = (

@@ -10,8 +10,8 @@ from tablegen.planning.cost_choice import choose_within, costs_of, made_table, r
 from tablegen.planning.feasibility import Feasibility
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import maker_of, shape_of
+from tablegen.planning.played_table import PlayedTable
 from tablegen.planning.table_choice import allowed_lsb, choose, possible_shapes
-from tablegen.planning.table_costs import PlayedTable
 from tablegen.planning.table_search import TableSearch
 
 _TIMES = 8.0  # tables with more than this multiple of the allowed error are not listed

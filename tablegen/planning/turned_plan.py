@@ -29,7 +29,7 @@ from tablegen.fixedpoint.frame_words import FrameParts, FrameShape, quantise_fra
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.numerics.turns import sine_and_cosine_of
 from tablegen.planning.cost_choice import remedy_for_runs
-from tablegen.planning.frame_costs import frame_costs, played_frame_table
+from tablegen.planning.frame_costs import frame_costs
 from tablegen.planning.frame_motion import frame_motion
 from tablegen.planning.frame_refinement import learnt_frame_layer
 from tablegen.planning.frame_tables import (
@@ -41,7 +41,7 @@ from tablegen.planning.frame_tables import (
 )
 from tablegen.planning.known_axis import KnownAxis
 from tablegen.planning.line_plan import LinePlan, Plan, SampleCost, make_plan, mixing_key
-from tablegen.planning.table_costs import PlayedTable
+from tablegen.planning.played_table import PlayedTable, played_frame_table
 from tablegen.planning.tilt import TiltedOutput, plan_tilt
 from tablegen.waveform.series import FourierSeries
 

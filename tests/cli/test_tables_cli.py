@@ -14,7 +14,8 @@ from tablegen.config.load import load
 from tablegen.emit.constants import storage_bits
 from tablegen.fixedpoint.table_shape import MODES
 from tablegen.planning.line_plan import make_plan
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, cells, counts
+from tablegen.planning.played_table import PROCESSORS, MeasuredRun
+from tablegen.planning.table_costs import cells, counts
 
 AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
 

@@ -20,7 +20,7 @@ from tablegen.planning import turned_plan
 from tablegen.planning.frame_costs import slow_counts
 from tablegen.planning.frame_tables import CostLimit, choose_frame_tables
 from tablegen.planning.line_plan import Plan
-from tablegen.planning.table_costs import PROCESSORS, MeasuredRun, PlayedTable
+from tablegen.planning.played_table import PROCESSORS, MeasuredRun, PlayedTable
 from tablegen.planning.turned_plan import TurnedAxis, frame_table_search, shape_costs
 
 pytestmark = pytest.mark.common

@@ -14,7 +14,8 @@ from editing import SCAN, edited, run, write_pair
 from tablegen.config.load import load
 from tablegen.planning import frame_costs
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.planning.table_costs import MeasuredRun, cells, counts, measured
+from tablegen.planning.played_table import MeasuredRun
+from tablegen.planning.table_costs import cells, counts, measured
 
 PAGE = (REPOSITORY / "docs" / "tables.md").read_text("utf-8")
 ROWS = [row for row in PAGE.splitlines() if re.match(r"\| (?:[xy]|\d+ bits, \d+ ticks) \|", row)]

@@ -11,7 +11,8 @@ from tablegen.config.load import load
 from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.cost_choice import played_table
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.planning.table_costs import MeasuredRun, PlayedTable, counts, sample_costs
+from tablegen.planning.played_table import MeasuredRun, PlayedTable
+from tablegen.planning.table_costs import counts, sample_costs
 
 AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
 COST = "+ [cost]\nprocessor = "

@@ -19,8 +19,7 @@ from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.table_shape import TableShape
-from tablegen.planning.frame_costs import played_frame_table
-from tablegen.planning.table_costs import PlayedTable
+from tablegen.planning.played_table import PlayedTable, played_frame_table
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 # Two banks are derived for a load, x first.
@@ -46,7 +45,8 @@ DEVICES: dict[
 DEGREES = ((1, 1), (3, 1), (1, 3))  # of x and of y
 SHAPES = {
     16: [SequencerShape(dac, x, 4, bits, y, 5, bits) for dac in (16, 13, 8) for x, y in DEGREES for bits in (16, 8)],
-    32: [SequencerShape(dac, x, 4, bits, y, 5, bits) for dac in (24, 18, 12) for x, y in DEGREES for bits in (20, 16)],
+    32: [SequencerShape(dac, x, 4, bits, y, 5, bits) for dac in (24, 18, 12) for x, y in DEGREES for bits in (20, 16)]
+    + [SequencerShape(24, 1, 12, 8, 1, 12, 8)] * 3,  # a tick moves over a thousand words
 }
 
 
@@ -165,17 +165,18 @@ def slowed(rng: np.random.Generator, axis: FrameProgram) -> FrameProgram:
 
 @pytest.mark.rest
 @pytest.mark.parametrize(
-    "edit",
+    ("device", "shaping", "old", "new"),
     [
-        ("CUBIC(p) ? 12 :", "CUBIC(p) ? 6 :"),
-        ("UINT32_C(1) << b->guard; /* of a sample", "UINT32_C(1) << b->guard >> 1; /* of a sample"),
-        ("(CUBIC(p) ? 18 : 15)) + 3", "18) + 3"),
-        ("(int32_t)(largest_gain(p) * move >> p->gain_q) + 1", "(int32_t)(largest_gain(p) * move >> p->gain_q)"),
+        ("long, 16", 0, "CUBIC(p) ? DAC_SPLINE_UNIT :", "CUBIC(p) ? 6 :"),
+        ("long, 16", 0, "UINT32_C(1) << b->guard; /* of a sample", "UINT32_C(1) << b->guard >> 1; /* of a sample"),
+        ("long, 16", 0, "(CUBIC(p) ? 18 : 15)) + 3", "18) + 3"),
+        ("long, 16", 0, "(largest_gain(p) * move >> p->gain_q) + 1", "(largest_gain(p) * move >> p->gain_q)"),
+        ("long, 32", 3, " || codes > INT32_MAX", ""),
     ],
 )
-def test_a_bound_that_is_too_low_is_found(edit: tuple[str, str], tmp_path: Path) -> None:
+def test_a_bound_that_is_too_low_is_found(device: str, shaping: int, old: str, new: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError):
-        steps_and_windows("long, 16", 0, tmp_path, dict([edit]))
+        steps_and_windows(device, shaping, tmp_path, {old: new})
 
 
 @pytest.mark.rest

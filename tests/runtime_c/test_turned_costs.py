@@ -10,7 +10,8 @@ from building import REPOSITORY
 from sets import LONG_TEST
 
 from tablegen.planning.frame_costs import slow_counts
-from tablegen.planning.table_costs import MeasuredRun, counts, sample_costs
+from tablegen.planning.played_table import MeasuredRun
+from tablegen.planning.table_costs import counts, sample_costs
 from tablegen.planning.turned_plan import played_frame
 
 pytestmark = pytest.mark.rest
