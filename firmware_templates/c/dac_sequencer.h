@@ -394,7 +394,7 @@ unsigned dac_sequencer_idle(const dac_sequencer *s);
 
 /* Checks a program and puts it into the idle bank, where it stays until it is committed or another one is loaded. The
  * descriptor is copied, the tables are not: from now on they stay as they are, until the bank is idle again, since
- * runs rely on how far their words are apart. Cost: about 4000 instructions, and 8 to 15 for each word. */
+ * runs rely on how far their words are apart. Cost: about 4000 instructions, and 8 to 18 for each word. */
 dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 
 /* Commits the program in the idle bank: it is taken at the next line start, or on the next tick while no scan runs. */
