@@ -1,14 +1,16 @@
 """The time from a key of ``tablegen live`` to the first line of the preview and of the exact scan, and their bytes.
 
-``python benchmarks/live.py`` moves the shipped example on a virtual line of 115200 baud: the client and the plans are
-the real ones, and the device is the model. The time of the host is the processor time of this computer, without that of
-the model; the time of the line is virtual, and has the wait for the start of a line.
+``python benchmarks/live.py`` moves the shipped example on a virtual line of 115200 baud, without its ``[limits]`` and
+with them: the client and the plans are the real ones, and the device is the model. The time of the host is the
+processor time of this computer, without that of the model; the time of the line is virtual, and has the wait for the
+start of a line.
 
 ``python benchmarks/live.py --angle 30`` prints the errors of previews of the example at an angle, on an operator of
 plays: by that operator, in percent of the size.
 """
 
 import argparse
+import re
 import statistics
 import sys
 import tempfile
@@ -79,14 +81,9 @@ def _image_bytes(plan: TurnedPlan) -> int:
     return len(PreparedScan.of_turned(plan).image("table").data)
 
 
-def main() -> int:
-    """Move the example, and print the medians."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--angle", type=float, metavar="DEGREES", help="print the errors of previews at an angle")
-    if (angle_deg := parser.parse_args().angle) is not None:
-        at_angle(angle_deg)
-        return 0
-    info = info_for(PreparedScan.of_plan(make_plan(load(EXAMPLE))))
+def moved(path: Path) -> None:
+    """Move a scan, and print the medians."""
+    info = info_for(PreparedScan.of_plan(make_plan(load(path))))
     info = replace(info, features=info.features | Feature.COMMIT_MODES, more=More.MOVE)
     line = _TimedLine(model(info), baud=_BAUD, tick_hz=info.update_rate_hz, out_s=_WAY_S, back_s=_WAY_S)
     previews: list[tuple[float, float, int]] = []
@@ -99,7 +96,7 @@ def main() -> int:
         def note(_: LivePreview) -> None:
             previews.append(now())
 
-        live = Live(device, EXAMPLE, on_preview=note)
+        live = Live(device, path, on_preview=note)
         live.start()
         rows: dict[str, tuple[list[float], list[float], list[int]]] = {
             name: ([], [], []) for name in ("preview", "exact")
@@ -114,11 +111,28 @@ def main() -> int:
             for name, at in (("preview", previews[-1]), ("exact", end)):
                 for values, before, after in zip(rows[name], start, at, strict=True):
                     values.append(after - before)  # type: ignore[arg-type]
-    print(f"{len(MOVES_NM)} moves of {EXAMPLE.stem} at {_BAUD} baud, {_WAY_S * 1e3:g} ms each way; medians")
     print("            CPU ms   line ms    all ms  bytes sent")
     for name, values in rows.items():
         print(_row(name, *values))
     print(f"a preview is within {max(errors):.2g} % of the size")
+
+
+def main() -> int:
+    """Move the example without and with its limits, or print the errors of previews at an angle."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--angle", type=float, metavar="DEGREES", help="print the errors of previews at an angle")
+    if (angle_deg := parser.parse_args().angle) is not None:
+        at_angle(angle_deg)
+        return 0
+    print(f"{len(MOVES_NM)} moves of {EXAMPLE.stem} at {_BAUD} baud, {_WAY_S * 1e3:g} ms each way; medians")
+    with tempfile.TemporaryDirectory() as folder:
+        for name in (EXAMPLE.name, "scanner.toml"):
+            text = EXAMPLE.with_name(name).read_text("utf-8")
+            Path(folder, name).write_text(re.sub(r"(?ms)^\[limits\].*?(?=^\[|\Z)", "", text), "utf-8")
+        print("\nwithout [limits]: the preview does not wait for the certificate")
+        moved(Path(folder) / EXAMPLE.name)
+        print("\nwith [limits]")
+        moved(EXAMPLE)
     return 0
 
 

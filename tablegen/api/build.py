@@ -10,7 +10,7 @@ from tablegen.base.input_errors import Rejected
 from tablegen.base.warnings import Finding
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.certificate import certify as certify_plan
-from tablegen.certificate.certified_scan import certify_scan
+from tablegen.certificate.certified_scan import CertifiedScan, certify_planned, certify_scan
 from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers, first_lines
 from tablegen.certificate.scan_notes import scan_findings
 from tablegen.certificate.scan_text import scan_text
@@ -167,15 +167,23 @@ def build(
     """
     setup = setup_of(source, scan, scanner)
     output_formats = _formats(setup, formats)
-    certified = certify_scan(setup, progress)
-    if certified.broken:
-        raise BrokenLimit(list(certified.broken))
-    names = [each.name for each in output_formats]
-    built = Build(setup, certified.plan, certified.certificates, names, formats is not None)
+    built = _built(certify_scan(setup, progress), output_formats, explicit=formats is not None)
     if out is not None:
         progress("writing the files")
         built.write(out)
     return built
+
+
+def build_planned(setup: Setup, plan: Plan) -> "Build":
+    """Certify a plan that was made of a setup; errors as of ``build``."""
+    return _built(certify_planned(setup, plan), _formats(setup, None), explicit=False)
+
+
+def _built(certified: CertifiedScan, formats: Sequence[Format], *, explicit: bool) -> "Build":
+    if certified.broken:
+        raise BrokenLimit(list(certified.broken))
+    names = [each.name for each in formats]
+    return Build(certified.setup, certified.plan, certified.certificates, names, explicit)
 
 
 class Build(Result):

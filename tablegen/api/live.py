@@ -3,13 +3,15 @@
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from tablegen.api.build import Build, build
+from tablegen.api.build import Build, build_planned
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
+from tablegen.certificate.certified_scan import may_break_limits
 from tablegen.compensation.operator.frame_transient import frame_drift_nm
 from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.variants import Variant, other_settings, variants
@@ -20,11 +22,9 @@ from tablegen.device.sequencer import can_keep
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused, Unsuitable
 from tablegen.link.messages import AxisWords, DeviceState, Feature, More
-from tablegen.link.outcome import UploadResult
 from tablegen.link.prepare import PreparedScan, check
-from tablegen.link.program_image import ProgramImage
 from tablegen.planning.driven_frames import driven_frames
-from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.planning.turned_preview import turned_preview
 
@@ -93,16 +93,30 @@ class LiveScan:
 
 @dataclass(frozen=True)
 class _Scan:
-    """A scan with the values by key that make it of the file."""
+    """A scan with the values by key that make it of the file; ``build`` is None until it is certified."""
 
     settings: dict[str, Any]
     variant: Variant
-    build: Build | TurnedBuild
+    plan: AnyPlan
+    build: Build | TurnedBuild | None
 
     @property
     def straight(self) -> Plan:
         """The plan, of a scan at an angle that at 0 degrees."""
-        return self.build.plan.straight if isinstance(self.build, TurnedBuild) else self.build.plan
+        return self.plan.straight if isinstance(self.plan, TurnedPlan) else self.plan
+
+    @cached_property
+    def prepared(self) -> PreparedScan:
+        """The program that the device gets."""
+        plan = self.plan
+        return PreparedScan.of_turned(plan) if isinstance(plan, TurnedPlan) else PreparedScan.of_plan(plan)
+
+    def certified(self) -> Build | TurnedBuild:
+        """Certify the plan, unless that is done."""
+        if self.build is not None:
+            return self.build
+        assert isinstance(self.plan, Plan)
+        return build_planned(self.variant.setup, self.plan)
 
 
 @dataclass(frozen=True)
@@ -116,7 +130,7 @@ class _Playing:
     @classmethod
     def of_upload(cls, scan: _Scan, generation: int) -> "_Playing":
         """Return the state after an upload."""
-        program = scan.build.plan.program
+        program = scan.plan.program
         return cls(scan, (words_of(program.x.output), words_of(program.y.output)), generation)
 
 
@@ -134,7 +148,8 @@ class Live:
     frame can go on: the tables that the device has, with gains and offsets for the new place, size and angle.
 
     A device with ``DAC_MOVE`` plays a preview first where the schedule stays: the tables that it has, with the gain and
-    the offset that come closest to the new plan. The plan follows at once.
+    the offset that come closest to the new plan. It plays when the plan is there and keeps all limits; the plan follows
+    at once, certified.
     """
 
     def __init__(
@@ -167,7 +182,9 @@ class Live:
         """
         self._device, self._path, self._on_stage = device, Path(scan), on_stage
         self._limits = device.limits()
-        self._scan = self._planned(dict(settings or {}))
+        scan_settings = dict(settings or {})
+        planned = self._planned(scan_settings, self._variant(scan_settings))
+        self._scan = replace(planned, build=planned.certified())
         self._sent: _Scan | None = None  # by an upload whose end is not known
         self._is_sent = False  # the device has taken ``_scan``
         self._on_preview = on_preview
@@ -177,7 +194,7 @@ class Live:
     @property
     def plan(self) -> AnyPlan:
         """The plan of the last change that the device took, or of the scan file before the first."""
-        return self._scan.build.plan
+        return self._scan.plan
 
     @property
     def place(self) -> tuple[LinePlan, LinePlan]:
@@ -188,6 +205,14 @@ class Live:
     def angle_deg(self) -> float:
         """The scan angle."""
         return self._scan.variant.setup.scan.angle_deg
+
+    @property
+    def generation(self) -> int | None:
+        """The generation of the program that plays by the last answer of the device; None before the first.
+
+        That of its status is another one if a program plays that is not of this session, or the last answer was lost.
+        """
+        return None if self._playing is None else self._playing.generation
 
     def start(self) -> LiveScan:
         """Put the scan of the file into the device, and start it if the device is parked."""
@@ -235,15 +260,12 @@ class Live:
         variant = self._variant(settings)
         preview = self._preview_at_angle(variant)
         try:
-            return self._send(self._built(settings, variant), preview)
+            return self._send(self._planned(settings, variant), preview)
         except BaseException as error:  # an interrupted plan too
             lost = isinstance(error, LinkError) and not isinstance(error, Refused | Unsuitable)
             if preview is not None and not lost:
                 self._go_back()
             raise
-
-    def _planned(self, settings: dict[str, Any]) -> "_Scan":
-        return self._built(settings, self._variant(settings))
 
     def _variant(self, settings: dict[str, Any]) -> Variant:
         _, scans = variants(self._path, {key: [value] for key, value in settings.items()})
@@ -256,10 +278,14 @@ class Live:
             raise Rejected([setup.scan_file.problem("z", why)])
         return scans[0]
 
-    def _built(self, settings: dict[str, Any], variant: Variant) -> "_Scan":
+    def _planned(self, settings: dict[str, Any], variant: Variant) -> "_Scan":
+        """Plan a scan, and certify it where its certificate may exceed a limit: a preview does not wait for others."""
         setup = variant.setup
-        built = build_turned(setup, progress=self._on_stage) if setup.mixes_motions else build(setup)
-        return _Scan(settings, variant, built)
+        if setup.mixes_motions:
+            turned = build_turned(setup, progress=self._on_stage)
+            return _Scan(settings, variant, turned.plan, turned)
+        plan = make_plan(setup, sines=True)
+        return _Scan(settings, variant, plan, build_planned(setup, plan) if may_break_limits(setup, plan) else None)
 
     def _preview_at_angle(self, variant: Variant) -> LivePreview | None:
         """Play the tables of a scan at an angle with other gains and offsets, before the plan of a change is there.
@@ -289,7 +315,7 @@ class Live:
     def _go_back(self) -> None:
         """Play the scan before a preview whose plan was refused; a lost link leaves the preview."""
         with suppress(LinkError):
-            image = self._scan.build.prepared.image("auto", self._device.info)
+            image = self._scan.prepared.image("auto", self._device.info)
             result = self._device.upload(image, limits=self._limits, swap=CommitMode.KEEP)
             self._playing = _Playing.of_upload(self._scan, result.generation)
 
@@ -298,30 +324,35 @@ class Live:
         if self._sent is None:
             return
         status, previewed = self._device.status(), self._previewed
-        if status.hash.hex() == self._sent.build.prepared.digest:
+        if status.hash.hex() == self._sent.prepared.digest:
             self._scan, self._is_sent = self._sent, True
             self._playing = _Playing.of_upload(self._sent, status.generation)
         elif previewed is not None and status.moved and status.generation == previewed.generation:
             self._scan, self._playing = self._sent, previewed
         self._sent = None
 
-    def _send(self, live: "_Scan", played: LivePreview | None = None) -> LiveScan:
+    def _send(self, scan: "_Scan", played: LivePreview | None = None) -> LiveScan:
         """Send a scan; ``played`` is the preview at an angle that plays."""
-        device, plan, scan = self._device, live.build.plan, live.build.prepared
-        image = scan.image("auto", device.info)
+        device, plan, prepared = self._device, scan.plan, scan.prepared
+        image = prepared.image("auto", device.info)
         swap = self._swap(plan)
-        check(scan, image, device.info, self._limits, swap=swap)
-        before = self.plan if self._is_sent else None
+        check(prepared, image, device.info, self._limits, swap=swap)
+        before, playing = (self.plan if self._is_sent else None), self._playing
+        preview = None
         try:
-            preview, result = self._upload(image, plan, swap)
-        except (Refused, Unsuitable):
+            preview = self._move(plan)
+            built = scan.certified()
+            result = device.upload(image, limits=self._limits, swap=swap)
+        except (Refused, Unsuitable, Rejected):
+            if preview is not None and playing is not None:
+                self._move_back(playing)
             raise
         except LinkError:
-            self._sent = live
+            self._sent = scan
             raise
-        self._scan, self._is_sent = live, True
-        self._playing = _Playing.of_upload(live, result.generation)
-        x, y = LiveAxis.of_build(live.build)
+        self._scan, self._is_sent = scan, True
+        self._playing = _Playing.of_upload(scan, result.generation)
+        x, y = LiveAxis.of_build(built)
         if before is not None:
             goes_on = swap is CommitMode.KEEP and result.line is not None
             x, y = (
@@ -331,8 +362,8 @@ class Live:
                 )
             )
         return LiveScan(
-            name=scan.name,
-            digest=scan.digest,
+            name=prepared.name,
+            digest=prepared.digest,
             generation=result.generation,
             swap=None if result.already_running else swap.name.lower(),
             line_rate_hz=float(plan.schedule.line_rate),
@@ -342,19 +373,6 @@ class Live:
             y=y,
             preview=preview or played,
         )
-
-    def _upload(self, image: ProgramImage, plan: AnyPlan, swap: CommitMode) -> tuple[LivePreview | None, UploadResult]:
-        """Move to a preview where the device can, and upload the plan; what is refused leaves the scan that plays."""
-        before = self._playing
-        preview = self._move(plan)
-        try:
-            return preview, self._device.upload(image, limits=self._limits, swap=swap)
-        except (Refused, Unsuitable):
-            if preview is not None and before is not None and self._playing is not None:
-                with suppress(LinkError):  # otherwise the preview goes on
-                    moved_back = self._device.move(*before.words, self._playing.generation)
-                    self._playing = replace(before, generation=moved_back.generation)
-            raise
 
     def _move(self, plan: AnyPlan) -> LivePreview | None:
         """Play the preview of a plan that is checked; None where there is none, or the device refuses it."""
@@ -374,10 +392,17 @@ class Live:
             self._on_preview(preview)
         return preview
 
+    def _move_back(self, before: _Playing) -> None:
+        """Play the words before a preview whose plan was refused; a lost link leaves the preview."""
+        assert self._playing is not None
+        with suppress(LinkError):
+            moved_back = self._device.move(*before.words, self._playing.generation)
+            self._playing = replace(before, generation=moved_back.generation)
+
     def _preview(self, playing: _Playing, plan: AnyPlan) -> PreviewWords | None:
         """Return the words of a preview, if the device takes moves, and accepts them and the plan behind them."""
         info, limits = self._device.info, self._limits
-        tables, program = playing.tables.build.plan.program, plan.program
+        tables, program = playing.tables.plan.program, plan.program
         if More.MOVE not in info.more or not isinstance(tables, DualProgram) or not isinstance(program, DualProgram):
             return None
         now = PreviewWords(*playing.words, 0.0, 0.0).program(tables)

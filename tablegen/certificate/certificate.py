@@ -215,7 +215,7 @@ def _certify(line: LinePlan) -> Certificate:
         highest_code=high,
         headroom_low=low - output.code_min,
         headroom_high=output.code_max - high,
-        largest_step=played.largest_step() + shaping.step_excess,
+        largest_step=_largest_step(line, played),
         max_step=output.max_step,
         peak_slew_v_per_s=line.drive.v_amplitude * line.series.peak_slope() * float(line.rate),
         beyond_cutoff_db=None if resting else 10.0 * log10(max(noise, 1e-30) / power),
@@ -228,6 +228,15 @@ def _certify(line: LinePlan) -> Certificate:
         shaped=shaped_errors(line, played, _directions(line)),
         position=_position(line, played),
     )
+
+
+def _largest_step(line: LinePlan, played: EmittedPeriod) -> int:
+    return played.largest_step() + line.program.output.shaping.step_excess
+
+
+def exceeds_slew_guard(line: LinePlan) -> bool:
+    """Return True if an axis steps by more than its slew guard."""
+    return _largest_step(line, EmittedPeriod(line)) > line.program.output.max_step
 
 
 def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":

@@ -6,7 +6,7 @@ from functools import partial
 from msgspec import Struct
 
 from tablegen.base.input_errors import Problem
-from tablegen.certificate.certificate import Certificate, broken_limits, certify
+from tablegen.certificate.certificate import Certificate, broken_limits, certify, exceeds_slew_guard
 from tablegen.certificate.scan_warnings import limit_advice
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import Plan, SampleCost, make_plan
@@ -43,7 +43,13 @@ def certify_scan(
         With every contradiction between the scan, the scanner and the hardware.
     """
     progress("shaping the waveforms")
-    plan = make_plan(setup, sines)
+    return certify_planned(setup, make_plan(setup, sines), progress, remedies=remedies)
+
+
+def certify_planned(
+    setup: Setup, plan: Plan, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True
+) -> CertifiedScan:
+    """Certify the plan of a scan; parameters as for ``certify_scan``."""
     progress("measuring every tick of a line and a frame")
     certificates = certify(plan)
     advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice
@@ -51,6 +57,19 @@ def certify_scan(
     broken += [problem for line in plan.lines if (problem := too_dear(setup, line.axis, line.sample_cost))]
     broken += _beyond_limit_of_z(setup, plan)
     return CertifiedScan(setup, plan, certificates, tuple(broken))
+
+
+def may_break_limits(setup: Setup, plan: Plan) -> bool:
+    """Return True if it takes the certificate of a plan to know that no limit is exceeded.
+
+    It does where the scan file has limits of errors, and where an axis steps by more than its slew guard.
+    """
+    return (
+        plan.limits.max_error_lsb is not None
+        or plan.limits.max_scaling_error_percent is not None
+        or any(too_dear(setup, line.axis, line.sample_cost) is not None for line in plan.lines)
+        or any(exceeds_slew_guard(line) for line in plan.lines)
+    )
 
 
 def _beyond_limit_of_z(setup: Setup, plan: Plan) -> list[Problem]:

@@ -12,6 +12,7 @@ from random import Random
 from typing import Any
 from unittest.mock import patch
 
+import msgspec
 import numpy as np
 import pytest
 from building import REPOSITORY, Variant, write_variant
@@ -25,13 +26,17 @@ from tilted_scans import write_tilted
 from turned_scans import write_turned
 
 import tablegen
+from tablegen.api.build import Build, build_planned
 from tablegen.api.live import Live
 from tablegen.base.input_errors import Problem, Rejected
+from tablegen.certificate.certified_scan import may_break_limits
+from tablegen.cli.device.live import _REQUESTS as ANSWERS
 from tablegen.cli.device.live import live as live_command
 from tablegen.cli.device.live_keys import KEYS
 from tablegen.compensation.models.operator import OperatorIdentification
 from tablegen.compensation.operator.in_time import OperatorInTime, Start
 from tablegen.config.load import load
+from tablegen.config.schema import Limits
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
 from tablegen.fixedpoint.frame_program import FrameProgram
@@ -108,6 +113,7 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
         "faults": 0,
         "digest": slower["scan"]["digest"],
         "moved": False,
+        **{axis: {key: slower["scan"][axis][key] for key in ("position_nm", "size_nm")} for axis in "xy"},
     }
     words = [(line.program.output, line.program.words.tolist()) for line in same.lines]
     device_words = Bench(model(info, boot=BOOT))
@@ -135,6 +141,17 @@ def test_what_is_refused_leaves_the_scan_that_plays(info: DeviceInfo, file: Path
     assert "(jump)" in wide["error"]
     assert status["status"]["generation"] == start["scan"]["generation"]
     assert status["status"]["digest"] == start["scan"]["digest"]
+    assert status["status"]["x"]["position_nm"] == start["scan"]["x"]["position_nm"]
+
+
+def test_the_place_of_a_scan_of_somebody_else_is_not_known(info: DeviceInfo, file: Path) -> None:
+    with client(VirtualLine(model(info, boot=BOOT), baud=115200, tick_hz=500_000)) as device:
+        live = Live(device, file)
+        live.start()
+        request = ANSWERS["status"][1]
+        assert request(live, device, {})["status"]["y"] is not None
+        device.upload(PreparedScan.of_plan(planned(file, x__offset_nm=500.0)).image("auto", device.info))
+        assert request(live, device, {})["status"]["y"] is None
 
 
 def test_a_refused_change_is_forgotten(info: DeviceInfo, file: Path) -> None:
@@ -509,6 +526,51 @@ def test_a_plan_that_is_refused_behind_its_preview_leaves_the_scan_that_plays(mo
         after = live.move(10.0)
     assert after.x.position_nm == pytest.approx(before.x.position_nm + 10.0, abs=1e-6)
     assert after.preview is not None
+
+
+def test_a_preview_waits_for_its_certificate_where_that_may_break_a_limit(
+    moves: DeviceInfo, file: Path, tmp_path: Path
+) -> None:
+    """Without a limit it plays first; a certificate that refuses the plan then leaves the scan that plays."""
+    free = write_variant(tmp_path, Variant({**SCAN, "limits": {}}))
+    events: list[str] = []
+
+    def certified(*scan: Any) -> Build:
+        events.append("certificate")
+        return build_planned(*scan)
+
+    for path, order in ((file, ["certificate", "preview"]), (free, ["preview", "certificate"])):
+        machine = model(moves, boot=BOOT)
+        with client(VirtualLine(machine, baud=115200, tick_hz=500_000)) as device:
+            live = Live(device, path, on_preview=lambda _: events.append("preview"))
+            before = live.start()
+            outputs = [line.program.output for line in live.plan.lines]
+            events.clear()
+            with patch("tablegen.api.live.build_planned", certified):
+                live.move(20.0)
+                live.move(-20.0)
+            assert events == 2 * order
+            swaps = machine.player.swaps
+            broken = Rejected([Problem(str(path), 1, "limits", "would break")])
+            with patch("tablegen.api.live.build_planned", side_effect=broken), pytest.raises(Rejected, match="would"):
+                live.move(30.0)
+            assert machine.player.swaps == swaps + (0 if path is file else 2)  # there, and back
+            playing = machine.player.playing
+            assert playing is not None
+            assert [axis.output for axis in (playing.x, playing.y)] == outputs
+            assert live.move(0.0, 10.0).y.position_nm == pytest.approx(before.y.position_nm + 10.0, abs=1e-6)
+
+
+def test_a_plan_beyond_its_slew_guard_has_to_be_certified_first(file: Path) -> None:
+    plan = planned(file)
+    setup = load(file)
+    steps = max(certificate.largest_step for certificate in tablegen.certify(plan).values())
+    free = msgspec.structs.replace(plan, limits=Limits())
+    output = plan.x.program.output
+    for guard, broken in ((steps, False), (steps - 1, True)):
+        program = msgspec.structs.replace(plan.x.program, output=msgspec.structs.replace(output, max_step=guard))
+        assert may_break_limits(setup, msgspec.structs.replace(free, x=replace(plan.x, program=program))) is broken
+    assert may_break_limits(setup, plan)
 
 
 def test_a_lost_link_behind_a_preview_leaves_it_playing(moves: DeviceInfo, file: Path) -> None:

@@ -15,6 +15,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.api.live import Live
     from tablegen.link.device import Device
+    from tablegen.link.messages import DeviceStatus
 
 _LONGEST_LINE = 65_536  # characters of a request
 
@@ -169,7 +170,17 @@ def _status(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dic
             "faults": status.faults,
             "digest": status.hash.hex(),
             "moved": status.moved,
+            **_where(live_scan, status),
         }
+    }
+
+
+def _where(live_scan: "Live", status: "DeviceStatus") -> dict[str, Any]:
+    """Return position and size of each axis; null where the device plays a scan that is not of this session."""
+    if status.generation != live_scan.generation:
+        return {"x": None, "y": None}
+    return {
+        line.axis: {"position_nm": line.drive.position_nm, "size_nm": line.drive.size_nm} for line in live_scan.place
     }
 
 
