@@ -2,14 +2,20 @@
 
 import re
 import subprocess
+from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 from bus_model import BUS, MAP, make_registers
+from hdl_registers.generator.c.header import CHeaderGenerator
+from hdl_registers.parser.toml import from_toml
 from lxml import etree
+from peakrdl_cheader.exporter import CHeaderExporter
 from systemrdl import RDLCompiler
 from systemrdl.node import MemNode, RegNode
+
+FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Werror"]
 
 
 def test_the_made_files_are_up_to_date() -> None:
@@ -18,7 +24,9 @@ def test_the_made_files_are_up_to_date() -> None:
         assert path.read_text("utf-8") == text, path.name
 
 
-@pytest.mark.parametrize(("old", "new"), [("@ 0x38", "@ 0x3C"), ("park[3:3]", "park[5:5]"), ("= 48;", "= 47;")])
+@pytest.mark.parametrize(
+    ("old", "new"), [("harmonics[25:16]", "harmonics[24:16]"), ("park[3:3]", "park[5:5]"), ("= 48;", "= 47;")]
+)
 def test_a_change_of_the_map_changes_all_of_them(old: str, new: str, tmp_path: Path) -> None:
     changed = tmp_path / "dac_registers.rdl"
     text = make_registers.SOURCE.read_text("utf-8")
@@ -45,33 +53,96 @@ def test_a_map_that_the_rtl_does_not_serve_is_refused(old: str, new: str, reason
         make_registers.read_map(changed)
 
 
-def test_the_headers_have_the_numbers_of_the_map(tmp_path: Path) -> None:
-    """Read by the compiler of SystemRDL and by gcc, without the program that makes the headers."""
+def registers_of_the_map() -> dict[str, RegNode | MemNode]:
+    """Registers and memories by name, as the compiler of SystemRDL has them."""
     compiler = RDLCompiler()
     compiler.compile_file(str(BUS / "dac_registers.rdl"))
+    nodes = {node.inst_name: node for node in compiler.elaborate().top.children(unroll=True)}
+    assert all(isinstance(node, MemNode | RegNode) for node in nodes.values())
+    return nodes
+
+
+def printed_by_c(folder: Path, header: Path, values: Iterable[str]) -> list[int]:
+    """The values of expressions of C, in a program that includes a header."""
+    lines = "".join(f'printf("%lu\\n", (unsigned long)({value}));\n' for value in values)
+    includes = "".join(f"#include {name}\n" for name in ("<stddef.h>", "<stdint.h>", "<stdio.h>", f'"{header}"'))
+    (folder / "print.c").write_text(f"{includes}int main(void) {{\n{lines}return 0;\n}}\n", "ascii")
+    subprocess.run(["gcc", *FLAGS, folder / "print.c", "-o", folder / "print"], check=True)
+    return [int(line) for line in subprocess.run([folder / "print"], stdout=subprocess.PIPE, check=True).stdout.split()]
+
+
+def test_the_headers_have_the_numbers_of_the_map(tmp_path: Path) -> None:
+    """Read by the compiler of SystemRDL and by gcc, without the program that makes the headers."""
     expected = {}
-    for node in compiler.elaborate().top.children(unroll=True):
-        name = f"DAC_{node.inst_name.upper()}"
+    for name, node in registers_of_the_map().items():
+        name = f"DAC_{name.upper()}"
         expected[f"{name}_ADDRESS"] = node.absolute_address
         if isinstance(node, MemNode):
             expected[f"{name}_WORDS"] = node.get_property("mementries")
-        assert isinstance(node, MemNode | RegNode)
         for field in node.fields() if isinstance(node, RegNode) else []:
             own = f"{name}_{field.inst_name.upper()}"
             if field.width < 32:
                 expected |= {f"{own}_SHIFT": field.low, f"{own}_MASK": (2**field.width - 1) << field.low}
             if name in ("DAC_IDENTITY", "DAC_VERSION"):
                 expected[own] = field.get_property("reset")
-    lines = "".join(f'printf("%s %lu\\n", "{name}", (unsigned long){name});\n' for name in expected)
-    program = f'#include <stdio.h>\n#include "dac_registers.h"\nint main(void) {{\n{lines}return 0;\n}}\n'
-    (tmp_path / "print.c").write_text(program, "ascii")
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", f"-I{BUS}"]
-    subprocess.run(["gcc", *flags, tmp_path / "print.c", "-o", tmp_path / "print"], check=True)
-    printed = subprocess.run([tmp_path / "print"], capture_output=True, text=True, check=True).stdout
-    assert {name: int(value) for name, value in map(str.split, printed.splitlines())} == expected
+    assert printed_by_c(tmp_path, BUS / "dac_registers.h", expected) == list(expected.values())
     verilog = (BUS / "dac_registers.vh").read_text("ascii")
     constants = re.findall(r"^localparam (\w+) = 32'h([0-9A-F]{8});$", verilog, re.MULTILINE)
     assert {name: int(value, 16) for name, value in constants} == expected
+
+
+def test_hdl_registers_reads_the_toml(tmp_path: Path) -> None:
+    """Its header for C has the addresses, fields and memories of the map, and it knows who writes what."""
+    registers = from_toml("dac", BUS / "dac_registers.toml")
+    _, header = CHeaderGenerator(registers, tmp_path).create_if_needed()
+    expected = {"DAC_NUM_REGS": len(registers.register_objects)}
+    for name, node in registers_of_the_map().items():
+        if isinstance(node, MemNode):
+            words = node.get_property("mementries")
+            expected |= {f"DAC_{name}_ADDRESS".upper(): node.absolute_address, f"DAC_{name}_WORDS".upper(): words}
+            continue
+        assert isinstance(node, RegNode)
+        expected |= {f"DAC_{name}_ADDR".upper(): node.absolute_address}
+        expected |= {f"offsetof(dac_regs_t, {name})": node.absolute_address}
+        software = registers.get_register(name).mode
+        assert (software.software_can_read, software.software_can_write) == (
+            node.has_sw_readable,
+            node.has_sw_writable,
+        ), name
+        for field in node.fields():
+            own = f"DAC_{name}_{field.inst_name}".upper()
+            expected |= {f"{own}_SHIFT": field.low, f"{own}_MASK": (2**field.width - 1) << field.low}
+    assert printed_by_c(tmp_path, header, expected) == list(expected.values())
+    for name in ("identity", "version"):
+        ((field,), (own,)) = registers_of_the_map()[name].fields(), registers.get_register(name).fields
+        assert own.default_value_uint == field.get_property("reset")
+
+
+def test_peakrdl_reads_the_map(tmp_path: Path) -> None:
+    """Its header for C has the addresses, fields and memories of the map that ours has."""
+    compiler = RDLCompiler()
+    compiler.compile_file(str(BUS / "dac_registers.rdl"))
+    header = tmp_path / "registers.h"
+    CHeaderExporter().export(compiler.elaborate(), str(header), reuse_typedefs=False)
+    expected = {}
+    for register in MAP.registers:
+        expected[f"offsetof(dac_registers_t, {register.name})"] = register.address
+        for field in register.fields:
+            own = f"DAC_REGISTERS__{register.name}__{field.name}".upper()
+            expected |= {f"{own}_bp": field.low, f"{own}_bw": field.bits, f"{own}_bm": field.mask}
+            if field.constant is not None:
+                expected[f"{own}_reset"] = field.constant
+    for memory in MAP.memories:
+        expected[f"offsetof(dac_registers_t, {memory.name})"] = memory.address
+        expected[f"sizeof(((dac_registers_t *)0)->{memory.name})"] = 4 * memory.words
+    assert printed_by_c(tmp_path, header, expected) == list(expected.values())
+
+
+def test_a_gap_between_registers_is_none_of_hdl_registers(tmp_path: Path) -> None:
+    changed = tmp_path / "dac_registers.rdl"
+    changed.write_text(make_registers.SOURCE.read_text("utf-8").replace("@ 0x38", "@ 0x40"), "utf-8")
+    with pytest.raises(ValueError, match="interrupt_enable: hdl-registers has no gap"):
+        make_registers.hdl_registers(make_registers.read_map(changed))
 
 
 def schema() -> etree.XMLSchema:
@@ -104,16 +175,14 @@ def test_the_ip_xact_is_valid_and_has_all_of_the_map() -> None:
                     for one in register.iterfind("ipxact:field", names)
                 ],
             )
-    compiler = RDLCompiler()
-    compiler.compile_file(str(BUS / "dac_registers.rdl"))
     access = {(True, False): "read-only", (False, True): "write-only", (True, True): "read-write"}
     expected = {}
-    for node in compiler.elaborate().top.children(unroll=True):
+    for name, node in registers_of_the_map().items():
         if isinstance(node, MemNode):
-            expected[node.inst_name] = (node.absolute_address, node.get_property("mementries"))
+            expected[name] = (node.absolute_address, node.get_property("mementries"))
         else:
             assert isinstance(node, RegNode)
-            expected[node.inst_name] = (
+            expected[name] = (
                 node.absolute_address,
                 access[node.has_sw_readable, node.has_sw_writable],
                 [(field.inst_name, field.low, field.width) for field in node.fields()],

@@ -1,4 +1,4 @@
-"""Make the address decoder, the constants for Verilog and C, IP-XACT, and the page of the registers.
+"""Make the address decoder, the constants for Verilog and C, IP-XACT, the TOML of hdl-registers, and the page.
 
 All are made of dac_registers.rdl.
 
@@ -6,6 +6,7 @@ All are made of dac_registers.rdl.
 them. SystemRDL is read by systemrdl-compiler, which is in the extra ``test``.
 """
 
+import json
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
@@ -356,6 +357,55 @@ def _ip_xact_register(block: ET.Element, register: Register) -> None:
             _texts(own, modifiedWriteValue="oneToClear")
 
 
+def hdl_registers(registers: Map) -> str:
+    """Return ``dac_registers.toml``: the registers for the package hdl-registers, and the memories as constants.
+
+    It gives each register the next address, so that the registers of the map have to stand without a gap.
+
+    Raises
+    ------
+    ValueError
+        If there is a gap between two registers.
+    """
+    lines = [f"# Registers of dac_axi_lite and dac_wishbone, for hdl-registers. {MADE}"]
+    for at, register in enumerate(registers.registers):
+        if register.address != WORD_BYTES * at:
+            raise ValueError(f"{register.name}: hdl-registers has no gap before a register")
+        lines += _table(register.name, mode=_mode(register), description=register.text)
+        unused = 0
+        for field in register.fields:
+            if field.low > unused:
+                lines += _vector(f"{register.name}.unused_{unused}", field.low - unused, "No field.")
+            unused = field.high + 1
+            name = f"{register.name}.{field.name}"
+            if field.bits == 1:
+                lines += _table(name, type="bit", description=field.text)
+            else:
+                lines += _vector(name, field.bits, field.text, field.constant)
+    for memory in registers.memories:
+        lines += _table(f"{memory.name}_address", type="constant", value=memory.address, description=memory.text)
+        lines += _table(f"{memory.name}_words", type="constant", value=memory.words, description="Words of 32 bits.")
+    return "\n".join(lines) + "\n"
+
+
+def _mode(register: Register) -> str:
+    """Return the mode: a bit that 1 clears, and a request, are pulses."""
+    if any(field.clears for field in register.fields):
+        return "r_wpulse"
+    if not register.readable:
+        return "wpulse"
+    return "r_w" if register.writable else "r"
+
+
+def _vector(name: str, bits: int, text: str, default: int | None = None) -> list[str]:
+    known = {} if default is None else {"default_value": default}
+    return _table(name, type="bit_vector", width=bits, description=text, **known)
+
+
+def _table(name: str, **values: str | int) -> list[str]:
+    return ["", f"[{name}]", *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items())]
+
+
 def page_tables(registers: Map) -> str:
     """Return the tables of the page."""
     lines = ["| address | register | access | purpose |", "|---|---|---|---|"]
@@ -386,6 +436,7 @@ def made_files(registers: Map) -> dict[Path, str]:
         HERE / "dac_registers.vh": verilog_header(registers),
         HERE / "dac_registers.h": c_header(registers),
         HERE / "dac_registers.xml": ip_xact(registers),
+        HERE / "dac_registers.toml": hdl_registers(registers),
         PAGE: f"{before}{begin}{page_tables(registers)}{end}{after}",
     }
 
