@@ -18,6 +18,7 @@ from random import Random
 
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, run_warned, tool, write_variant
+from converter_chips import CHIPS, Codes
 from converter_chips import Board as Converters
 from converter_words import commit, follow_words, park, start
 from following import Differs
@@ -248,21 +249,22 @@ H7_FAULTS = {
 }
 
 
-def _faulty(folder: Path, port: str, old: str, new: str) -> Path:
-    """Copy the ports, with a fault in the port or in what ports to a Cortex-M7 share."""
+def _faulty(folder: Path, old: str, new: str, *among: str) -> Path:
+    """Copy the ports, with a fault in what stands once in one of these files of theirs."""
     ports = folder / "firmware"
     shutil.copytree(FIRMWARE, ports, ignore=shutil.ignore_patterns("build"))
-    files = [ports / port / "main.c", ports / "common" / "cortex_m7.h"]
+    files = [ports / name for name in among]
     texts = [file.read_text("ascii") for file in files]
     assert sum(text.count(old) for text in texts) == 1
     for file, text in zip(files, texts, strict=True):
-        file.write_text(text.replace(old, new), "ascii")
+        if old in text:
+            file.write_text(text.replace(old, new), "ascii")
     return ports
 
 
 @pytest.mark.parametrize("fault", long(["the pixel clock is not cleaned"], H7_FAULTS))
 def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
-    ports = _faulty(tmp_path, "stm32h7", *H7_FAULTS[fault])
+    ports = _faulty(tmp_path, *H7_FAULTS[fault], "stm32h7/main.c", "common/cortex_m7.h")
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
     firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", ports=ports)
     with pytest.raises((Differs, LinkError, AssertionError)):
@@ -370,7 +372,7 @@ TEENSY_FAULTS = {  # the first four are in what ports to a Cortex-M7 share
 
 @pytest.mark.parametrize("fault", one_of(8, TEENSY_FAULTS))
 def test_a_fault_of_the_teensy41_port_is_found(fault: str, tmp_path: Path) -> None:
-    ports = _faulty(tmp_path, "teensy41", *TEENSY_FAULTS[fault])
+    ports = _faulty(tmp_path, *TEENSY_FAULTS[fault], "teensy41/main.c", "common/cortex_m7.h")
     file, boot = _scan(tmp_path, "boot", H7_CHANGES)
     firmware = _firmware("teensy41", tmp_path, file, "BAUD=460800", ports=ports)
     with pytest.raises((Differs, LinkError, AssertionError)):
@@ -379,32 +381,37 @@ def test_a_fault_of_the_teensy41_port_is_found(fault: str, tmp_path: Path) -> No
 
 # The reference firmware in QEMU, whose log is what SPI of a converter is sent.
 
-QEMU_CONVERTERS = {
-    "ad5764": ("lm3s6965evb", {"dac.coding": "twos-complement"}, 1),
-    "ad5781": ("mps2_an386", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 2),
+QEMU_RATE = 20_000
+# By board and [dac] table, converters with the number of frames of their set-up. Volts are in no frame.
+QEMU_SCANS: dict[str, tuple[str, dict[str, object], dict[str, int]]] = {
+    "16 bits": ("lm3s6965evb", {}, {"ad5541a": 0, "ad5761": 2, "dac8562": 1, "ltc2668": 1}),
+    "twos-complement": ("lm3s6965evb", {"dac.coding": "twos-complement"}, {"ad5764": 0}),
+    "left-aligned": ("mps2_an386", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, {"ad5781": 1}),
+}
+QEMU_FAULTS = {  # by converter: what is in a file once, what is there instead, and the file
+    "ad5541a": ("(&SPI_CONVERTER, &x, &y,", "(&SPI_CONVERTER, &y, &x,", "cortex_m/dac_frames.c"),
+    "ad5761": ("done < converter->setups", "done < 1u", "converters/spi_words.h"),  # no range
+    "dac8562": (  # outputs A and B exchanged
+        "{UINT32_C(0x000000), UINT32_C(0x010000)}",
+        "{UINT32_C(0x010000), UINT32_C(0x000000)}",
+        "converters/dac8562.h",
+    ),
+    "ltc2668": ("UINT32_C(0x010000)}", "UINT32_C(0x020000)}", "converters/ltc2668.h"),  # output 2
+    "ad5764": (  # the lowest byte first
+        "(uint8_t)(frame >> bits)",
+        "(uint8_t)(frame >> (converter->frame_bits - 8 - bits))",
+        "converters/spi_words.h",
+    ),
+    "ad5781": ("24, 20, 0, 1,", "24, 20, 1, 1,", "converters/ad5781.h"),  # the word a bit too high
 }
 
 
-@pytest.mark.parametrize("converter", QEMU_CONVERTERS)
-def test_frames_of_a_converter_in_qemu(converter: str, tmp_path: Path) -> None:
-    """From an upload to the codes at the converter, which its model reads from the bytes of the frames."""
-    board, table, chips = QEMU_CONVERTERS[converter]
-    rate = 20_000
-    changes = {
-        **SMALL,
-        "dac.v_min": -10.0,
-        "dac.v_max": 10.0,
-        **table,
-        "dac.update_rate_hz": float(rate),
-        "timing": {**TIMING, "line_rate_hz": rate / 331},
-    }
-    file, boot = _scan(tmp_path, "boot", changes)
-    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
-    executable = _firmware(
-        "cortex_m", tmp_path, file, f"BOARD={board}", "CONTROL=link", "DAC=frames", f"CONVERTER={converter}"
-    )
+def _qemu_play(board: str, executable: Path, frame_bytes: int, scan: PreparedScan | None = None) -> bytes:
+    """Return what SPI is sent: the boot scan plays, and if another one is given, it is uploaded, plays, and parks.
+
+    ``frame_bytes`` are those of a frame of the scan.
+    """
     log = bytearray()
-    frame_bytes = 6 * scan.program.schedule.frame_ticks
 
     with LinkMachine(board.replace("_", "-"), executable) as machine:
 
@@ -421,23 +428,59 @@ def test_frames_of_a_converter_in_qemu(converter: str, tmp_path: Path) -> None:
             client.arm()
             client.trigger()
             wait(frame_bytes // 2)
-            client.upload(scan.image("fourier"), timeout_s=PATIENCE_S)
-            wait(frame_bytes * 3)  # part of it was in buffers before
-            status = client.status()
-            client.park()
-            wait(frame_bytes // 4)
-    assert status.faults == 0
-    frames = [int.from_bytes(log[at : at + 3], "big") for at in range(0, len(log) - 2, 3)]
-    seen = Converters(converter).play(frames, 1 if chips == 2 else 0)
-    codes = [(x, y) for x, y in seen if x is not None and y is not None][1:]  # the first is that of the start
-    assert len(codes) == len(frames) // 2 - (3 if chips == 2 else 2)
-    requests = [commit(boot.program), start(), commit(scan.program), park]
-    heard = follow_words(codes, requests, codes=True)
-    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+            if scan is not None:
+                client.upload(scan.image("fourier"), timeout_s=PATIENCE_S)
+                wait(frame_bytes * 2)  # part of it was in buffers before
+                assert client.status().faults == 0
+                client.park()
+                wait(frame_bytes // 4)
+    return bytes(log)
+
+
+def _qemu_codes(converter: str, setups: int, log: bytes) -> list[Codes]:
+    """Return the codes at the outputs on each tick, of which none is off; the start of the outputs had the first."""
+    board = Converters(converter)
+    size = board.chips[0].frame_bits // 8
+    frames = [int.from_bytes(log[at : at + size], "big") for at in range(0, len(log) - size + 1, size)]
+    first, *codes = board.play(frames, setups)
+    assert first == codes[0]
+    assert len(codes) == len(frames) // 2 - 2 - setups
+    return codes
+
+
+@pytest.mark.parametrize("of", QEMU_SCANS)
+def test_frames_of_converters_in_qemu(of: str, tmp_path: Path) -> None:
+    """From an upload to the codes at the converter, which its model reads from the bytes of the frames."""
+    board, table, converters = QEMU_SCANS[of]
+    changes = {
+        **SMALL,
+        "dac.v_min": -10.0,
+        "dac.v_max": 10.0,
+        **table,
+        "dac.update_rate_hz": float(QEMU_RATE),
+        "timing": {**TIMING, "line_rate_hz": QEMU_RATE / 331},
+    }
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    begin = [commit(boot.program), start()]
+    requests = [*begin, commit(scan.program), park]
+    options = [f"BOARD={board}", "CONTROL=link", "DAC=frames"]
+    for converter, setups in converters.items():
+        frame_bytes = CHIPS[converter]().frame_bits // 4 * scan.program.schedule.frame_ticks
+        firmware = _firmware("cortex_m", tmp_path, file, *options, f"CONVERTER={converter}")
+        codes = _qemu_codes(converter, setups, _qemu_play(board, firmware, frame_bytes, scan))
+        heard = follow_words(codes, requests, codes=True)
+        assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+        options += ["-o", str(tmp_path / "cortex_m" / "command"), "-W", "dac_frames.c"]  # the rest is the same
+        ports = _faulty(tmp_path / converter, *QEMU_FAULTS[converter])
+        firmware = _firmware("cortex_m", tmp_path, file, *options, f"CONVERTER={converter}", ports=ports)
+        log = _qemu_play(board, firmware, frame_bytes)
+        with pytest.raises((Differs, AssertionError), match=r"^(?!not all)"):
+            follow_words(_qemu_codes(converter, setups, log), begin, codes=True)
     wrong = heard[2] + scan.program.schedule.ticks * 3
-    changed = [*codes[:wrong], (codes[wrong][0] ^ 1, codes[wrong][1]), *codes[wrong + 1 :]]
+    x, y = codes[wrong]
     with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
-        follow_words(changed, requests, codes=True)
+        follow_words([*codes[:wrong], (x ^ 1, y)], requests, codes=True)
 
 
 # Arduino: the recipe of the README, with Arduino's builder, core and libraries.
