@@ -29,8 +29,9 @@ from pipe_board import PipeBoard
 from sets import LONG_TEST, long, one_of
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
-from stm32h7_board import OFF, Stm32h7Board
+from stm32h7_board import ITCM, OFF, Stm32h7Board
 from teensy41_board import Teensy41Board
+from unicorn import UcError
 
 from tablegen.config.load import load
 from tablegen.link.device import Device
@@ -248,7 +249,13 @@ def test_stm32h7(tmp_path: Path) -> None:
     """Two AD5791 by DMA behind a data cache; codes and pixel clock are those at the converters and at the pin."""
     file, boot = _scan(tmp_path, "boot", M7_CHANGES)
     _, scan = _scan(tmp_path, "scan", {**M7_CHANGES, "x.size_nm": 40.0})
-    board = Stm32h7Board(_firmware("stm32h7", tmp_path, file, f"BAUD={M7_BAUD}"), "ad5791")
+    firmware = _firmware("stm32h7", tmp_path, file, f"BAUD={M7_BAUD}")
+    symbols = read_executable(firmware).symbols
+    assert {symbols["dac_sequencer_fill"], symbols["dac_axis_run"]} <= set(ITCM)
+    assert symbols["dac_link_work"] not in ITCM
+    size = symbols["itcm_end"] - symbols["itcm_start"]
+    assert f": {size / 1000:.1f} kB." in (FIRMWARE / "stm32h7" / "README.md").read_text("utf-8")
+    board = Stm32h7Board(firmware, "ad5791")
     _m7_play(board, scan, board.raise_trigger)
     played = _with_pixels(board, _after_setup(board))
     _follow(played, boot, scan, M7_POWER_UP, codes=True, pixels=True)
@@ -268,6 +275,7 @@ H7_FAULTS = {
     "SYNC rises early": ("SETTLE = 88", "SETTLE = 0"),
     "the pin starts nothing": ("    edge = true;", "    edge = false;"),
     "a line that rests does not wake the link": ("USART3_CR1 = 1u << 4 |", "USART3_CR1 ="),
+    "no code is copied into the ITCM": ("    copy(itcm_start, itcm_end, itcm_load);\n", ""),
     "the outputs stay off": ("play.x[at] = play.y[at] = SPI_CONVERTER.setup[i];", "play.x[at] = play.y[at] = 0;"),
 }
 
@@ -287,10 +295,10 @@ def _faulty(folder: Path, old: str, new: str, *among: str) -> Path:
 
 @pytest.mark.parametrize("fault", long(["the pixel clock is not cleaned"], H7_FAULTS))
 def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
-    ports = _faulty(tmp_path, *H7_FAULTS[fault], "stm32h7/main.c")
+    ports = _faulty(tmp_path, *H7_FAULTS[fault], "stm32h7/main.c", "stm32h7/startup.c")
     file, boot = _scan(tmp_path, "boot", M7_CHANGES)
     firmware = _firmware("stm32h7", tmp_path, file, f"BAUD={M7_BAUD}", ports=ports)
-    with pytest.raises((Differs, LinkError, AssertionError)):
+    with pytest.raises((Differs, LinkError, AssertionError, UcError)):
         follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], M7_POWER_UP, codes=True, pixels=True)
 
 
