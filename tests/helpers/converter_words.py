@@ -4,7 +4,7 @@
 have been heard; tries that the next word refutes are dropped, and those that come to the same state are one.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 
 from following import Differs
@@ -13,6 +13,7 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Sequencer
 
 Request = Callable[[Sequencer], None]
+Trial = tuple[Sequencer, list[int]]  # a model, and the ticks on which it heard requests
 
 
 def commit(program: DualProgram) -> Request:
@@ -48,31 +49,36 @@ def follow_words(
     *,
     codes: bool = False,
     pixels: bool = False,
+    wrong: Mapping[int, Sequence[tuple[int, ...]]] | None = None,
 ) -> list[int]:
     """Hold words of x and y against a device that powers up at these codes, and hears the requests in this order.
 
     With ``codes`` they are the codes at the outputs, not the words. With ``pixels`` the third of each tick is whether
-    it began a pixel. Returns the tick on which each was heard, the first one where several fit. Raises ``Differs`` at
-    the first word that the model cannot have, and if not all requests were heard.
+    it began a pixel. ``wrong`` has, by tick, other words than were played: negative controls, of which none may fit.
+    Returns the tick on which each request was heard, the first one where several fit. Raises ``Differs`` at the first
+    word that the model cannot have, and if not all requests were heard.
     """
-    tries: list[tuple[Sequencer, list[int]]] = [(Sequencer(None, codes=(power_up, power_up)), [])]
+    tries: list[Trial] = [(Sequencer(None, codes=(power_up, power_up)), [])]
+    controls = dict(wrong or {})
     at = 0
     for at, word in enumerate(words):
-        goes_on: dict[tuple[object, ...], tuple[Sequencer, list[int]]] = {}
+        fitting: dict[tuple[int, ...], dict[tuple[object, ...], Trial]] = {}  # by what the models put out
         for before, heard in tries:
             model = before
             for number in range(len(heard), len(requests) + 1):
                 trial = copy(model)
-                if _tick(trial, codes)[: 3 if pixels else 2] == word:
-                    ticks = [*heard, *[at] * (number - len(heard))]
-                    goes_on.setdefault(_state(trial, number), (trial, ticks))
+                put_out = _tick(trial, codes)[: 3 if pixels else 2]
+                ticks = [*heard, *[at] * (number - len(heard))]
+                fitting.setdefault(put_out, {}).setdefault(_state(trial, number), (trial, ticks))
                 if number < len(requests):
                     model = copy(model)
                     requests[number](model)
-        if not goes_on:
+        assert not fitting.keys() & set(controls.pop(at, ())), f"a wrong word of tick {at} is the model's"
+        if word not in fitting:
             number = max(len(heard) for _, heard in tries)
             raise Differs(f"tick {at}: {word} after {number} of {len(requests)} requests is not the model's")
-        tries = list(goes_on.values())
+        tries = list(fitting[word].values())
+    assert not controls, "the words end before the negative controls"
     for _, heard in tries:
         if len(heard) == len(requests):
             return heard

@@ -19,6 +19,7 @@ CYCLES = 1.0  # of the processor, an instruction
 OFF = -1  # the code of an output that is off
 _CORE_HZ, _TIMER_HZ, _SPI_HZ, _UART_HZ = 400_000_000, 200_000_000, 100_000_000, 100_000_000
 _RAM = 0x24000000, 512 << 10
+ITCM = range(64 << 10)
 _TIM1, _SPI, _USART, _DMA, _DMAMUX = 0x40010000, (0x40013000, 0x40003800), 0x40004800, 0x40020000, 0x40020800
 _CR1, _DIER, _SR, _CCMR1, _CCMR2, _CCER, _CNT, _ARR = (
     _TIM1 + at for at in (0, 0xC, 0x10, 0x18, 0x1C, 0x20, 0x24, 0x2C)
@@ -94,6 +95,7 @@ class Stm32h7Board(CortexBoard):
     def __init__(self, executable: Path, converter: str) -> None:
         devices = {0x40000000: 0x30000, 0x52000000: 0x3000, 0x58000000: 0x30000, PRIVATE: 0x1000}
         super().__init__(executable, arm_const.UC_CPU_ARM_CORTEX_M7, CYCLES, _RAM, devices)
+        self.uc.mem_map(ITCM.start, len(ITCM))
         self.cache = DataCache(self.uc, _RAM, 16, read_executable(executable).segments)
         self.converters = Converters(converter)
         self.pixels: list[bool] = []

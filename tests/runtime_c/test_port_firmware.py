@@ -12,12 +12,13 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
 
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, run_warned, tool, write_variant
+from converter_chips import CHIPS, Codes
 from converter_chips import Board as Converters
 from converter_words import commit, follow_words, park, start
 from following import Differs
@@ -28,8 +29,9 @@ from pipe_board import PipeBoard
 from sets import LONG_TEST, long, one_of
 from sketches import own_warnings, run_builder
 from stm32_board import Stm32Board
-from stm32h7_board import OFF, Stm32h7Board
+from stm32h7_board import ITCM, OFF, Stm32h7Board
 from teensy41_board import Teensy41Board
+from unicorn import UcError
 
 from tablegen.config.load import load
 from tablegen.link.device import Device
@@ -67,14 +69,29 @@ def _firmware(port: str, folder: Path, scan: Path, *more: str, ports: Path = FIR
     return target / "firmware.elf"
 
 
-def _play(board: FarEnd, tick_hz: int, baud: int, scan: PreparedScan, form: str) -> None:
-    """The boot scan plays, another one is uploaded meanwhile, plays for more than a frame, and parks."""
+def _play(
+    board: FarEnd,
+    tick_hz: int,
+    baud: int,
+    scan: PreparedScan,
+    form: str,
+    begin_s: float = 0.02,
+    raise_trigger: Callable[[], None] | None = None,
+) -> None:
+    """The boot scan plays, another one is uploaded meanwhile, plays for more than a frame, and parks.
+
+    The pin of a trigger starts it where there is one. What comes in the first ``begin_s``, before the UART is on, is
+    lost.
+    """
     line = Line(board, baud=baud, tick_hz=tick_hz)
     frame = scan.program.schedule.frame_ticks / tick_hz
-    line.sleep(0.02)  # what comes before the UART is on is lost
+    line.sleep(begin_s)
     with Device(line.open, random=Random(8), sleep=line.sleep) as client:
+        if raise_trigger is not None:
+            raise_trigger()  # ignored: not armed
+            line.sleep(0.1 * frame)
         client.arm()
-        client.trigger()
+        (raise_trigger or client.trigger)()
         line.sleep(frame / 3)
         client.upload(scan.image(form), timeout_s=20.0)
         line.sleep(1.3 * frame)
@@ -85,14 +102,26 @@ def _play(board: FarEnd, tick_hz: int, baud: int, scan: PreparedScan, form: str)
     assert status.bad_frames == 0
 
 
-def _follow(words: list[tuple[int, int]], boot: PreparedScan, scan: PreparedScan) -> None:
+def _follow(
+    words: Sequence[tuple[int, ...]],
+    boot: PreparedScan,
+    scan: PreparedScan,
+    power_up: int = 0,
+    *,
+    codes: bool = False,
+    pixels: bool = False,
+) -> None:
+    """Hold the words of a boot scan, and of one that was uploaded and parked, against the model.
+
+    As negative controls, each word of a tick is another one; a frame before the end, that of the uploaded scan.
+    """
     requests = [commit(boot.program), start(), commit(scan.program), park]
-    heard = follow_words(words, requests)
-    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
-    wrong = heard[2] + scan.program.schedule.ticks * 3
-    x, y = words[wrong]
-    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
-        follow_words([*words[:wrong], (x ^ 1, y), *words[wrong + 1 :]], requests)
+    frame = scan.program.schedule.frame_ticks
+    at = len(words) - frame
+    wrong = [tuple(word ^ (other == place) for other, word in enumerate(words[at])) for place in range(len(words[at]))]
+    heard = follow_words(words, requests, power_up, codes=codes, pixels=pixels, wrong={at: wrong})
+    assert heard[2] < at < heard[3]
+    assert heard[3] - heard[2] > frame
 
 
 @pytest.fixture(scope="module")
@@ -159,76 +188,78 @@ def test_stm32(tmp_path: Path) -> None:
     _follow(board.words, boot, scan)
 
 
-H7_RATE = 500_000
-H7_CHANGES: dict[str, object] = {
+# Ports to a Cortex-M7: two AD5791 at 500 kHz.
+
+M7_RATE, M7_BAUD = 500_000, 921_600
+M7_CHANGES: dict[str, object] = {
     **SMALL,
     "dac.bits": 20,
     "dac.v_min": -10.0,
     "dac.v_max": 10.0,
-    "dac.update_rate_hz": float(H7_RATE),
-    "timing": {**TIMING, "line_rate_hz": H7_RATE / 331},
+    "dac.update_rate_hz": float(M7_RATE),
+    "timing": {**TIMING, "line_rate_hz": M7_RATE / 331},
 }
-H7_POWER_UP = 1 << 19  # 0 V
+M7_POWER_UP = 1 << 19  # 0 V
 
 
-def _h7_play(firmware: Path, scan: PreparedScan) -> list[tuple[int, int, int]]:
-    """Return codes and pixels: an edge of the pin starts the boot scan, another one is uploaded, plays, and parks."""
-    board = Stm32h7Board(firmware, "ad5791")
+def _m7_play(
+    board: Stm32h7Board | Teensy41Board, scan: PreparedScan, raise_trigger: Callable[[], None] | None = None
+) -> None:
+    """Play the boot scan and an uploaded one: see ``_play``."""
     board.tick(1)
-    line = Line(board, baud=460800, tick_hz=H7_RATE)
-    frame = scan.program.schedule.frame_ticks / H7_RATE
-    line.sleep(0.002)
-    with Device(line.open, random=Random(8), sleep=line.sleep) as client:
-        board.raise_trigger()  # ignored: not armed
-        line.sleep(0.1 * frame)
-        client.arm()
-        board.raise_trigger()
-        line.sleep(frame / 3)
-        client.upload(scan.image("table"), timeout_s=20.0)
-        line.sleep(1.3 * frame)
-        status = client.status()
-        client.park()
-        line.sleep(0.1 * frame)
-    assert status.faults == 0
-    assert status.bad_frames == 0
-    # The first tick twice: off, switched on, and then as the model has it.
-    assert board.words[0] == (OFF, OFF)
-    assert board.words[1] == board.words[2]
-    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][2:]
+    _play(board, M7_RATE, M7_BAUD, scan, "table", 0.002, raise_trigger)
 
 
-def _h7_play_boot(firmware: Path, converter: str = "ad5791", setups: int = 1) -> list[tuple[int, int, int]]:
-    """Return codes and pixels of the first lines of the boot scan, without those before the end of the set-up."""
-    board = Stm32h7Board(firmware, converter)
+def _m7_play_boot(board: Stm32h7Board | Teensy41Board, raise_trigger: Callable[[], None] | None = None) -> None:
+    """Play the first lines of the boot scan."""
     board.tick(1)
-    line = Line(board, baud=460800, tick_hz=H7_RATE)
+    line = Line(board, baud=M7_BAUD, tick_hz=M7_RATE)
     line.sleep(0.002)
     with Device(line.open, random=Random(8), sleep=line.sleep, timeout_s=0.02) as client:
         client.arm()
-        board.raise_trigger()
-        line.sleep(2 * 331 / H7_RATE)
-    assert board.words[0] == (OFF, OFF)
-    return [(x, y, pixel) for (x, y), pixel in zip(board.words, board.pixels, strict=False)][1 + setups :]
+        (raise_trigger or client.trigger)()
+        line.sleep(2 * 331 / M7_RATE)
+        assert client.status().faults == 0
 
 
-def _h7_follow(played: list[tuple[int, int, int]], boot: PreparedScan, scan: PreparedScan) -> list[int]:
-    requests = [commit(boot.program), start(), commit(scan.program), park]
-    return follow_words(played, requests, H7_POWER_UP, codes=True, pixels=True)
+def _after_setup(board: Stm32h7Board | Teensy41Board, setups: int = 1) -> list[tuple[int, int]]:
+    """Return the codes at the converters from the end of the set-up, before which they are off.
+
+    The first tick was there before the set-up, and is there again.
+    """
+    assert board.words[:setups] == [(OFF, OFF)] * setups
+    if setups == 1:  # no reset: the output is switched on at the first tick's code
+        assert board.words[1] == board.words[2]
+    return board.words[1 + setups :]
+
+
+def _with_pixels(board: Stm32h7Board, codes: list[tuple[int, int]]) -> list[tuple[int, int, int]]:
+    """Add to each of the last codes whether it began a pixel."""
+    pixels = board.pixels[len(board.words) - len(codes) :]
+    return [(x, y, pixel) for (x, y), pixel in zip(codes, pixels, strict=False)]
+
+
+def _h7_play_boot(firmware: Path, converter: str = "ad5791", setups: int = 1) -> list[tuple[int, int, int]]:
+    board = Stm32h7Board(firmware, converter)
+    _m7_play_boot(board, board.raise_trigger)
+    return _with_pixels(board, _after_setup(board, setups))
 
 
 def test_stm32h7(tmp_path: Path) -> None:
     """Two AD5791 by DMA behind a data cache; codes and pixel clock are those at the converters and at the pin."""
-    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
-    _, scan = _scan(tmp_path, "scan", {**H7_CHANGES, "x.size_nm": 40.0})
-    played = _h7_play(_firmware("stm32h7", tmp_path, file, "BAUD=460800"), scan)
-    heard = _h7_follow(played, boot, scan)
-    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    file, boot = _scan(tmp_path, "boot", M7_CHANGES)
+    _, scan = _scan(tmp_path, "scan", {**M7_CHANGES, "x.size_nm": 40.0})
+    firmware = _firmware("stm32h7", tmp_path, file, f"BAUD={M7_BAUD}")
+    symbols = read_executable(firmware).symbols
+    assert {symbols["dac_sequencer_fill"], symbols["dac_axis_run"]} <= set(ITCM)
+    assert symbols["dac_link_work"] not in ITCM
+    size = symbols["itcm_end"] - symbols["itcm_start"]
+    assert f": {size / 1000:.1f} kB." in (FIRMWARE / "stm32h7" / "README.md").read_text("utf-8")
+    board = Stm32h7Board(firmware, "ad5791")
+    _m7_play(board, scan, board.raise_trigger)
+    played = _with_pixels(board, _after_setup(board))
+    _follow(played, boot, scan, M7_POWER_UP, codes=True, pixels=True)
     assert sum(pixel for _, _, pixel in played) > 2 * 50 * 4
-    wrong = heard[2] + scan.program.schedule.ticks * 3
-    x, y, pixel = played[wrong]
-    for other in ((x ^ 1, y, pixel), (x, y, 1 - pixel)):  # negative controls
-        with pytest.raises(Differs, match=f"tick {wrong}"):
-            _h7_follow([*played[:wrong], other, *played[wrong + 1 :]], boot, scan)
 
 
 H7_FAULTS = {
@@ -244,29 +275,31 @@ H7_FAULTS = {
     "SYNC rises early": ("SETTLE = 88", "SETTLE = 0"),
     "the pin starts nothing": ("    edge = true;", "    edge = false;"),
     "a line that rests does not wake the link": ("USART3_CR1 = 1u << 4 |", "USART3_CR1 ="),
+    "no code is copied into the ITCM": ("    copy(itcm_start, itcm_end, itcm_load);\n", ""),
     "the outputs stay off": ("play.x[at] = play.y[at] = SPI_CONVERTER.setup[i];", "play.x[at] = play.y[at] = 0;"),
 }
 
 
-def _faulty(folder: Path, port: str, old: str, new: str) -> Path:
-    """Copy the ports, with a fault in the port or in what ports to a Cortex-M7 share."""
+def _faulty(folder: Path, old: str, new: str, *among: str) -> Path:
+    """Copy the ports, with a fault in what stands once in one of these files of theirs."""
     ports = folder / "firmware"
     shutil.copytree(FIRMWARE, ports, ignore=shutil.ignore_patterns("build"))
-    files = [ports / port / "main.c", ports / "common" / "cortex_m7.h"]
+    files = [ports / name for name in among]
     texts = [file.read_text("ascii") for file in files]
     assert sum(text.count(old) for text in texts) == 1
     for file, text in zip(files, texts, strict=True):
-        file.write_text(text.replace(old, new), "ascii")
+        if old in text:
+            file.write_text(text.replace(old, new), "ascii")
     return ports
 
 
 @pytest.mark.parametrize("fault", long(["the pixel clock is not cleaned"], H7_FAULTS))
 def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> None:
-    ports = _faulty(tmp_path, "stm32h7", *H7_FAULTS[fault])
-    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
-    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", ports=ports)
-    with pytest.raises((Differs, LinkError, AssertionError)):
-        follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True, pixels=True)
+    ports = _faulty(tmp_path, *H7_FAULTS[fault], "stm32h7/main.c", "stm32h7/startup.c")
+    file, boot = _scan(tmp_path, "boot", M7_CHANGES)
+    firmware = _firmware("stm32h7", tmp_path, file, f"BAUD={M7_BAUD}", ports=ports)
+    with pytest.raises((Differs, LinkError, AssertionError, UcError)):
+        follow_words(_h7_play_boot(firmware), [commit(boot.program), start()], M7_POWER_UP, codes=True, pixels=True)
 
 
 @pytest.mark.parametrize(
@@ -278,46 +311,28 @@ def test_a_fault_of_the_stm32h7_port_is_found(fault: str, tmp_path: Path) -> Non
     ],
 )
 def test_a_converter_of_the_stm32h7_port(converter: str, table: dict[str, object], setups: int, tmp_path: Path) -> None:
-    changes = {**H7_CHANGES, **table}
+    changes = {**M7_CHANGES, **table}
     file, boot = _scan(tmp_path, "boot", changes)
-    firmware = _firmware("stm32h7", tmp_path, file, "BAUD=460800", f"CONVERTER={converter}")
+    firmware = _firmware("stm32h7", tmp_path, file, f"BAUD={M7_BAUD}", f"CONVERTER={converter}")
     played = _h7_play_boot(firmware, converter, setups)
     power_up = 1 << int(str(changes["dac.bits"])) - 1
     heard = follow_words(played, [commit(boot.program), start()], power_up, codes=True, pixels=True)
     assert len(played) - heard[1] > 331
 
 
-# Teensy 4.1: the scans of the STM32H7.
+def test_teensy41(tmp_path: Path) -> None:
+    """Two AD5791 by DMA behind a data cache; codes are those at the converters."""
+    file, boot = _scan(tmp_path, "boot", M7_CHANGES)
+    _, scan = _scan(tmp_path, "scan", {**M7_CHANGES, "x.size_nm": 40.0})
+    board = Teensy41Board(_firmware("teensy41", tmp_path, file, f"BAUD={M7_BAUD}"), "ad5791")
+    _m7_play(board, scan)
+    _follow(_after_setup(board), boot, scan, M7_POWER_UP, codes=True)
 
 
 def _teensy_play_boot(firmware: Path) -> list[tuple[int, int]]:
-    """Return the codes of the first lines of the boot scan, without those before the end of the set-up."""
     board = Teensy41Board(firmware, "ad5791")
-    board.tick(1)
-    line = Line(board, baud=460800, tick_hz=H7_RATE)
-    line.sleep(0.002)
-    with Device(line.open, random=Random(8), sleep=line.sleep, timeout_s=0.02) as client:
-        client.arm()
-        client.trigger()
-        line.sleep(2 * 331 / H7_RATE)
-        assert client.status().faults == 0
-    # The first tick twice: off, switched on, and then as the model has it.
-    assert board.words[0] == (OFF, OFF)
-    assert board.words[1] == board.words[2]
-    return board.words[2:]
-
-
-def test_teensy41(tmp_path: Path) -> None:
-    """Two AD5791 by DMA behind a data cache; codes are those at the converters."""
-    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
-    played = _teensy_play_boot(_firmware("teensy41", tmp_path, file, "BAUD=460800"))
-    requests = [commit(boot.program), start()]
-    heard = follow_words(played, requests, H7_POWER_UP, codes=True)
-    assert len(played) - heard[1] > 2 * 331
-    wrong = heard[1] + 331
-    x, y = played[wrong]
-    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
-        follow_words([*played[:wrong], (x ^ 1, y), *played[wrong + 1 :]], requests, H7_POWER_UP, codes=True)
+    _m7_play_boot(board)
+    return _after_setup(board)
 
 
 TEENSY_FAULTS = {  # the first four are in what ports to a Cortex-M7 share
@@ -370,41 +385,46 @@ TEENSY_FAULTS = {  # the first four are in what ports to a Cortex-M7 share
 
 @pytest.mark.parametrize("fault", one_of(8, TEENSY_FAULTS))
 def test_a_fault_of_the_teensy41_port_is_found(fault: str, tmp_path: Path) -> None:
-    ports = _faulty(tmp_path, "teensy41", *TEENSY_FAULTS[fault])
-    file, boot = _scan(tmp_path, "boot", H7_CHANGES)
-    firmware = _firmware("teensy41", tmp_path, file, "BAUD=460800", ports=ports)
+    ports = _faulty(tmp_path, *TEENSY_FAULTS[fault], "teensy41/main.c", "common/cortex_m7.h")
+    file, boot = _scan(tmp_path, "boot", M7_CHANGES)
+    firmware = _firmware("teensy41", tmp_path, file, f"BAUD={M7_BAUD}", ports=ports)
     with pytest.raises((Differs, LinkError, AssertionError)):
-        follow_words(_teensy_play_boot(firmware), [commit(boot.program), start()], H7_POWER_UP, codes=True)
+        follow_words(_teensy_play_boot(firmware), [commit(boot.program), start()], M7_POWER_UP, codes=True)
 
 
 # The reference firmware in QEMU, whose log is what SPI of a converter is sent.
 
-QEMU_CONVERTERS = {
-    "ad5764": ("lm3s6965evb", {"dac.coding": "twos-complement"}, 1),
-    "ad5781": ("mps2_an386", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, 2),
+QEMU_RATE = 20_000
+# By board and [dac] table, converters with the number of frames of their set-up. Volts are in no frame.
+QEMU_SCANS: dict[str, tuple[str, dict[str, object], dict[str, int]]] = {
+    "16 bits": ("lm3s6965evb", {}, {"ad5541a": 0, "ad5761": 2, "dac8562": 1, "ltc2668": 1}),
+    "twos-complement": ("lm3s6965evb", {"dac.coding": "twos-complement"}, {"ad5764": 0}),
+    "left-aligned": ("mps2_an386", {"dac.bits": 18, "dac.word_bits": 20, "dac.align": "left"}, {"ad5781": 1}),
+}
+QEMU_FAULTS = {  # by converter: what is in a file once, what is there instead, and the file
+    "ad5541a": ("(&SPI_CONVERTER, &x, &y,", "(&SPI_CONVERTER, &y, &x,", "cortex_m/dac_frames.c"),
+    "ad5761": ("done < converter->setups", "done < 1u", "converters/spi_words.h"),  # no range
+    "dac8562": (  # outputs A and B exchanged
+        "{UINT32_C(0x000000), UINT32_C(0x010000)}",
+        "{UINT32_C(0x010000), UINT32_C(0x000000)}",
+        "converters/dac8562.h",
+    ),
+    "ltc2668": ("UINT32_C(0x010000)}", "UINT32_C(0x020000)}", "converters/ltc2668.h"),  # output 2
+    "ad5764": (  # the lowest byte first
+        "(uint8_t)(frame >> bits)",
+        "(uint8_t)(frame >> (converter->frame_bits - 8 - bits))",
+        "converters/spi_words.h",
+    ),
+    "ad5781": ("24, 20, 0, 1,", "24, 20, 1, 1,", "converters/ad5781.h"),  # the word a bit too high
 }
 
 
-@pytest.mark.parametrize("converter", QEMU_CONVERTERS)
-def test_frames_of_a_converter_in_qemu(converter: str, tmp_path: Path) -> None:
-    """From an upload to the codes at the converter, which its model reads from the bytes of the frames."""
-    board, table, chips = QEMU_CONVERTERS[converter]
-    rate = 20_000
-    changes = {
-        **SMALL,
-        "dac.v_min": -10.0,
-        "dac.v_max": 10.0,
-        **table,
-        "dac.update_rate_hz": float(rate),
-        "timing": {**TIMING, "line_rate_hz": rate / 331},
-    }
-    file, boot = _scan(tmp_path, "boot", changes)
-    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
-    executable = _firmware(
-        "cortex_m", tmp_path, file, f"BOARD={board}", "CONTROL=link", "DAC=frames", f"CONVERTER={converter}"
-    )
+def _qemu_play(board: str, executable: Path, frame_bytes: int, scan: PreparedScan | None = None) -> bytes:
+    """Return what SPI is sent: the boot scan plays, and if another one is given, it is uploaded, plays, and parks.
+
+    ``frame_bytes`` are those of a frame of the scan.
+    """
     log = bytearray()
-    frame_bytes = 6 * scan.program.schedule.frame_ticks
 
     with LinkMachine(board.replace("_", "-"), executable) as machine:
 
@@ -421,23 +441,53 @@ def test_frames_of_a_converter_in_qemu(converter: str, tmp_path: Path) -> None:
             client.arm()
             client.trigger()
             wait(frame_bytes // 2)
-            client.upload(scan.image("fourier"), timeout_s=PATIENCE_S)
-            wait(frame_bytes * 3)  # part of it was in buffers before
-            status = client.status()
-            client.park()
-            wait(frame_bytes // 4)
-    assert status.faults == 0
-    frames = [int.from_bytes(log[at : at + 3], "big") for at in range(0, len(log) - 2, 3)]
-    seen = Converters(converter).play(frames, 1 if chips == 2 else 0)
-    codes = [(x, y) for x, y in seen if x is not None and y is not None][1:]  # the first is that of the start
-    assert len(codes) == len(frames) // 2 - (3 if chips == 2 else 2)
-    requests = [commit(boot.program), start(), commit(scan.program), park]
-    heard = follow_words(codes, requests, codes=True)
-    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
-    wrong = heard[2] + scan.program.schedule.ticks * 3
-    changed = [*codes[:wrong], (codes[wrong][0] ^ 1, codes[wrong][1]), *codes[wrong + 1 :]]
-    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
-        follow_words(changed, requests, codes=True)
+            if scan is not None:
+                client.upload(scan.image("fourier"), timeout_s=PATIENCE_S)
+                wait(frame_bytes * 2)  # part of it was in buffers before
+                assert client.status().faults == 0
+                client.park()
+                wait(frame_bytes // 4)
+    return bytes(log)
+
+
+def _qemu_codes(converter: str, setups: int, log: bytes) -> list[Codes]:
+    """Return the codes at the outputs on each tick, of which none is off; the start of the outputs had the first."""
+    board = Converters(converter)
+    size = board.chips[0].frame_bits // 8
+    frames = [int.from_bytes(log[at : at + size], "big") for at in range(0, len(log) - size + 1, size)]
+    first, *codes = board.play(frames, setups)
+    assert first == codes[0]
+    assert len(codes) == len(frames) // 2 - 2 - setups
+    return codes
+
+
+@pytest.mark.parametrize("of", QEMU_SCANS)
+def test_frames_of_converters_in_qemu(of: str, tmp_path: Path) -> None:
+    """From an upload to the codes at the converter, which its model reads from the bytes of the frames."""
+    board, table, converters = QEMU_SCANS[of]
+    changes = {
+        **SMALL,
+        "dac.v_min": -10.0,
+        "dac.v_max": 10.0,
+        **table,
+        "dac.update_rate_hz": float(QEMU_RATE),
+        "timing": {**TIMING, "line_rate_hz": QEMU_RATE / 331},
+    }
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    begin = [commit(boot.program), start()]
+    options = [f"BOARD={board}", "CONTROL=link", "DAC=frames"]
+    for converter, setups in converters.items():
+        frame_bytes = CHIPS[converter]().frame_bits // 4 * scan.program.schedule.frame_ticks
+        firmware = _firmware("cortex_m", tmp_path, file, *options, f"CONVERTER={converter}")
+        codes = _qemu_codes(converter, setups, _qemu_play(board, firmware, frame_bytes, scan))
+        _follow(codes, boot, scan, codes=True)
+        options += ["-o", str(tmp_path / "cortex_m" / "command"), "-W", "dac_frames.c"]  # the rest is the same
+        ports = _faulty(tmp_path / converter, *QEMU_FAULTS[converter])
+        firmware = _firmware("cortex_m", tmp_path, file, *options, f"CONVERTER={converter}", ports=ports)
+        log = _qemu_play(board, firmware, frame_bytes)
+        with pytest.raises((Differs, AssertionError), match=r"^(?!not all)"):
+            follow_words(_qemu_codes(converter, setups, log), begin, codes=True)
 
 
 # Arduino: the recipe of the README, with Arduino's builder, core and libraries.

@@ -3,8 +3,8 @@
 
 #include "stm32h7.h"
 
-extern uint32_t data_start[], data_end[], bss_start[], bss_end[], stack_top[];
-extern const uint32_t data_load[];
+extern uint32_t data_start[], data_end[], bss_start[], bss_end[], stack_top[], itcm_start[], itcm_end[];
+extern const uint32_t data_load[], itcm_load[];
 
 int main(void);
 void dma_interrupt(void);
@@ -14,13 +14,19 @@ void trigger_interrupt(void);
 void reset(void);
 void fault(void);
 
+static void copy(uint32_t *to, const uint32_t *end, const uint32_t *from)
+{
+    while (to != end)
+        *to++ = *from++;
+}
+
 void reset(void)
 {
-    const uint32_t *from = data_load;
-    for (uint32_t *to = data_start; to != data_end; to++)
-        *to = *from++;
+    copy(data_start, data_end, data_load);
+    copy(itcm_start, itcm_end, itcm_load);
     for (uint32_t *to = bss_start; to != bss_end; to++)
         *to = 0;
+    barrier(); /* no instruction of the ITCM was fetched before it was there */
     main();
 }
 

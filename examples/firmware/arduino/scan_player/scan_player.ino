@@ -6,6 +6,7 @@
 
 #include "src/arduino_scan.h"
 #include "src/control.h"
+#include "src/mcp4922.h"
 #include "src/names.h"
 #include "src/scan.h"
 #include "src/uart.h"
@@ -31,12 +32,13 @@ static dac_output codes[2][2 * HALF];
 static volatile bool full[2];       // set by refill(), cleared by tick()
 static volatile uint8_t underruns;  // counted by tick(), reported by refill(): a consumer does not interrupt itself
 
-static_assert(CONSTANT(_X_DAC_BITS) == 12 && CONSTANT(_Y_DAC_BITS) == 12, "the MCP4922 has 12 bits");
+static_assert(DAC_SPI_FITS(mcp4922, CONSTANT(_X)) && DAC_SPI_FITS(mcp4922, CONSTANT(_Y)),
+              "the scan has another [dac] table than mcp4922.h");
 
-static void send(uint16_t channel, dac_output code)
+static void send(uint32_t frame)
 {
     digitalWrite(SELECT, LOW);
-    SPI.transfer16((uint16_t)(channel | 0x3000u | code));  // gain 1, on
+    SPI.transfer16((uint16_t)frame);
     digitalWrite(SELECT, HIGH);
 }
 
@@ -51,8 +53,8 @@ static void tick()
         underruns = (uint8_t)(underruns + 1);  // the outputs keep their values
         return;
     }
-    send(0x0000, codes[half][2 * at]);
-    send(0x8000, codes[half][2 * at + 1]);
+    send(dac_spi_frame(&mcp4922, 0, codes[half][2 * at]));
+    send(dac_spi_frame(&mcp4922, 1, codes[half][2 * at + 1]));
     if (++at != HALF)
         return;
     at = 0;
