@@ -6,16 +6,18 @@
  *     #include "annexin_200nm.h"
  *     #define DAC_TABLE_STORAGE_BITS ANNEXIN_200NM_TABLE_STORAGE_BITS
  *
- * Or give single options to the compiler with -D, or change a copy of this file. Options are plain numbers, the same
- * for all files: objects that were compiled with different ones do not link (with an assembler of GNU or LLVM for ELF).
+ * Or give single options to the compiler with -D, or change a copy of this file. A package for Arduino, PlatformIO or
+ * ESP-IDF brings what its scan needs in tablegen_options.h. Options are plain numbers, the same for all files: objects
+ * that were compiled with different ones do not link (with an assembler of GNU or LLVM for ELF).
  */
 #ifndef DAC_CONFIG_H
 #define DAC_CONFIG_H
 
 #ifdef DAC_CONFIG_FILE
 #include DAC_CONFIG_FILE
-#elif defined(__AVR__) && defined(__has_include)
-#if __has_include("tablegen_options.h") /* of an Arduino library, which has no options of a compiler */
+#endif
+#ifdef __has_include
+#if __has_include("tablegen_options.h") /* of a package: what its scan needs, for options that have no value yet */
 #include "tablegen_options.h"
 #endif
 #endif

@@ -1,4 +1,4 @@
-"""What all templates in C share: literals, and the options that a file needs beyond the defaults of the runtime."""
+"""What all C shares: literals, and the options that a file needs beyond the defaults of the runtime, or defines."""
 
 from collections.abc import Mapping
 
@@ -17,3 +17,9 @@ def literal(value: int) -> str:
 def beyond_defaults(options: Mapping[str, int]) -> dict[str, int]:
     """Return the options above the defaults of a runtime, by their names without ``DAC_``."""
     return {key: value for key, value in options.items() if not key.endswith("_BITS") or value > LEAST_STORAGE_BITS}
+
+
+def option_lines(options: Mapping[str, int]) -> list[str]:
+    """Return lines that define each option of the runtime, unless it has a value already."""
+    lines = ((f"#ifndef {name}", f"#define {name} {value}", "#endif") for name, value in options.items())
+    return [line for three in lines for line in three]

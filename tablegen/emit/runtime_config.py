@@ -5,6 +5,7 @@ from pathlib import Path
 
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import read_bytes
+from tablegen.emit.c_text import option_lines
 from tablegen.emit.formats.c import runtime_options
 from tablegen.emit.stored import stored_content
 from tablegen.emit.turned import turned_options
@@ -64,9 +65,8 @@ def config_header(needed: Mapping[str, Options]) -> bytes:
         " *",
         " * All files are compiled with -DDAC_CONFIG_FILE naming this header, which dac_config.h then includes.",
         " */",
+        *option_lines(highest_options(needed)),
     ]
-    for key, value in highest_options(needed).items():
-        lines += [f"#ifndef {key}", f"#define {key} {value}", "#endif"]
     return ("\n".join(lines) + "\n").encode("ascii")
 
 

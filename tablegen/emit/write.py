@@ -24,6 +24,7 @@ _OF_PACKAGES = {
     "lib.rs",
     "library.json",
     "library.properties",
+    "tablegen_options.h",
     "zephyr/CMakeLists.txt",
     "zephyr/Kconfig",
     "zephyr/module.yml",

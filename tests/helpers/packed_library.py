@@ -8,11 +8,13 @@ from pathlib import Path
 
 from building import NAME
 from limits import PATIENCE_S
-from short_scans import model_ticks
+from short_scans import CUBIC, model_ticks
 
 from tablegen.device.dual_program import DualProgram
 
 TICKS = 40
+# A scan that needs another value than the default of each option that a package has.
+DEMANDING = {"dac.bits": 18, "dac.shaping": "second", "x.table": {**CUBIC, "bits": 18}, "y.table.bits": 18}
 MAIN = f"""
 #include <stdio.h>
 #include <{NAME}.h>

@@ -264,6 +264,16 @@ def test_a_scan_that_the_options_do_not_cover_does_not_compile(pair: tuple[Path,
     assert tablegen("runtime", survey, detail).out == header.read_text("ascii")
 
 
+def test_the_header_serves_beside_the_runtime_without_flags(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    """As ``tablegen_options.h``, for sketches of several scans of one width; the control is the same without it."""
+    folder = tmp_path / "sketch"
+    shutil.copytree(pair[1], folder)
+    source = folder / "detail_program.c"
+    assert "detail needs DAC_SPLINE=1" in compiled(source, tmp_path / "a.o").stderr
+    assert tablegen("runtime", pair[1], "-o", folder / "tablegen_options.h").status == 0
+    assert compiled(source, tmp_path / "a.o").stderr == ""
+
+
 def test_tables_with_words_of_another_size_do_not_link(pair: tuple[Path, Path], tmp_path: Path) -> None:
     """An old NAME.o beside a new NAME_program.o: its words are of 16 bits, and would be read as 32."""
     survey, _ = pair

@@ -13,7 +13,7 @@ from tablegen.base.resources import c_link, c_runtime, c_store
 
 EVERYTHING = [*c_runtime(), *c_link(), *c_store()]
 # Their types stand below everything, the functions that they declare above.
-WRITTEN = {"tablegen_options.h"}  # by a build for an Arduino
+WRITTEN = {"tablegen_options.h"}  # by a build in the formats of some packages
 PUBLIC = {"dac_sequencer.h", "dac_link.h", "dac_store.h"}
 Graph = Mapping[str, set[str]]
 # What these compile makes other calls.

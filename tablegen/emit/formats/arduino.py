@@ -3,20 +3,13 @@
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.c import public_headers
-
-# An AVR copies constants into its RAM unless they are read from flash.
-_OPTIONS = """\
-/* Options of the runtime on an AVR, which dac_config.h includes, since a library has no options of a compiler. */
-#ifndef DAC_PROGMEM
-#define DAC_PROGMEM 1 /* tables stay in flash; 0 for the serial link, whose tables are in RAM */
-#endif
-"""
+from tablegen.emit.package_options import options_header
 
 
 class Arduino(Format):
     """The format arduino: ``library.properties``, which makes the folder of a build a library of that scan.
 
-    On an AVR the tables of the library stay in flash.
+    Its options are in a header, since neither a sketch nor a library has options of a compiler.
     """
 
     name = "arduino"
@@ -25,7 +18,7 @@ class Arduino(Format):
     needs = ("c",)
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """Render the properties; Arduino's builder requires author and maintainer, which a scan does not have."""
+        """Render both; Arduino's builder requires author and maintainer, which a scan does not have."""
         properties = {
             "name": content.name,
             "version": content.version,
@@ -38,7 +31,7 @@ class Arduino(Format):
             "paragraph": f"Build {content.hash}",
         }
         lines = "".join(f"{key}={value}\n" for key, value in properties.items())
-        return {"library.properties": lines.encode("ascii"), "tablegen_options.h": _OPTIONS.encode("ascii")}
+        return {"library.properties": lines.encode("ascii"), **options_header(content)}
 
 
 FORMAT = Arduino()

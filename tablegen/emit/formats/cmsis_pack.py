@@ -1,5 +1,6 @@
 """The description of a CMSIS-Pack, whose component has the files of the format c."""
 
+from tablegen.emit.c_text import option_lines
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.c import packaged_files, runtime_options
@@ -40,7 +41,7 @@ class CmsisPack(Format):
             f'    <component Cclass="Scan" Cgroup="Sequencer" Cversion="{content.version}">',
             f"      <description>Tables of {content.name}, and the sequencer that plays them</description>",
             "      <Pre_Include_Global_h>",
-            *_options(content),
+            *option_lines(runtime_options(content)),
             "      </Pre_Include_Global_h>",
             "      <files>",
             *(f'        <file category="{_CATEGORIES[name[-1]]}" name="{name}"/>' for name in files),
@@ -53,9 +54,3 @@ class CmsisPack(Format):
 
 
 FORMAT = CmsisPack()
-
-
-def _options(content: Content) -> list[str]:
-    """Return the options of the runtime for every file of a project, unless the project sets them itself."""
-    options = runtime_options(content).items()
-    return [line for name, value in options for line in (f"#ifndef {name}", f"#define {name} {value}", "#endif")]

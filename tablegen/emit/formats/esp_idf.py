@@ -3,6 +3,7 @@
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.c import packaged_files
+from tablegen.emit.package_options import options_header
 
 
 class EspIdf(Format):
@@ -10,14 +11,15 @@ class EspIdf(Format):
 
     name = "esp-idf"
     purpose = "component of ESP-IDF of the format c: the folder of the build, put into the components folder"
-    file_names = "CMakeLists.txt, idf_component.yml"
+    file_names = "CMakeLists.txt, idf_component.yml, tablegen_options.h"
     needs = ("c",)
     comment = "#"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """Render both files; they name the C files, so that those of other formats are neither built nor packed."""
+        """Render the files; they name the C files, so that those of other formats are neither built nor packed."""
         head = f"# {content.name}, tablegen {content.version}, build {content.hash}"
-        written = packaged_files(content)
+        options = options_header(content)
+        written = [*packaged_files(content), *options]
         component = [
             head,
             "idf_component_register(",
@@ -38,6 +40,7 @@ class EspIdf(Format):
         return {
             "CMakeLists.txt": ("\n".join(component) + "\n").encode("ascii"),
             "idf_component.yml": ("\n".join(manifest) + "\n").encode("ascii"),
+            **options,
         }
 
 

@@ -5,6 +5,7 @@ import json
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.c import packaged_files, public_headers
+from tablegen.emit.package_options import options_header
 
 
 class PlatformIO(Format):
@@ -12,12 +13,13 @@ class PlatformIO(Format):
 
     name = "platformio"
     purpose = "PlatformIO library of the format c: the folder of the build, for lib_deps or the lib folder"
-    file_names = "library.json"
+    file_names = "library.json, tablegen_options.h"
     needs = ("c",)
 
     def files(self, content: Content) -> dict[str, bytes]:
         """Render the manifest; it names the C files, so that those of other formats are neither built nor packed."""
-        written = packaged_files(content)
+        options = options_header(content)
+        written = [*packaged_files(content), *options]
         manifest = {
             "name": content.name,
             "version": content.version,
@@ -32,7 +34,7 @@ class PlatformIO(Format):
             "export": {"include": written},
             "description": f"Scan {content.name}, played by its sequencer. Build {content.hash}",
         }
-        return {"library.json": (json.dumps(manifest, indent=2) + "\n").encode("ascii")}
+        return {"library.json": (json.dumps(manifest, indent=2) + "\n").encode("ascii"), **options}
 
 
 FORMAT = PlatformIO()

@@ -8,12 +8,13 @@ import pytest
 from building import NAME, Build, run
 from formatted import Formatted, check_finds_a_flip, formatted
 from sets import LONG_TEST
-from short_scans import model_ticks, short
+from short_scans import CUBIC, model_ticks, short
 from sketches import own_warnings, run_builder, simulated_output
 
 from tablegen.version import __version__
 
 TICKS = 40
+WIDE = {"dac.bits": 20, "x.table.bits": 20, "y.table.bits": 20}
 MEGA = "mega:cpu=atmega2560"
 # What a header-only build has no objects for.
 OBJECTS = f"""
@@ -125,11 +126,13 @@ def objects(tmp_path: Path) -> set[str]:
     [
         pytest.param({"emit.formats": ["arduino"]}, marks=LONG_TEST),
         {"emit.formats": ["arduino", "verilog"]},
-        {"emit.formats": ["arduino"], "emit.header_only": True},
+        {"emit.formats": ["arduino"], "emit.header_only": True, **WIDE},
+        {"emit.formats": ["arduino"], "dac.shaping": "second", "x.table": CUBIC},
     ],
-    ids=["alone", "with Verilog", "header-only"],
+    ids=["alone", "with Verilog", "header-only, 20 bits", "shaped and cubic"],
 )
 def test_a_sketch_plays_the_model(tmp_path: Path, changes: dict[str, object]) -> None:
+    """Without an option of the compiler, whatever the scan needs."""
     built = library(tmp_path, changes)
     done = compiled(tmp_path, built)
     assert done.returncode == 0, done.stderr
@@ -137,7 +140,7 @@ def test_a_sketch_plays_the_model(tmp_path: Path, changes: dict[str, object]) ->
     assert f"Using library scan at version {__version__} in folder: {tmp_path}/libraries/scan " in done.stdout
     assert objects(tmp_path) == {name for name in built.files if name.endswith(".c")}
     verilog = [name for name in built.files if name.endswith((".v", ".vh", ".mem"))]
-    assert bool(verilog) == (changes["emit.formats"] != ["arduino"])
+    assert bool(verilog) == ("verilog" in built.plan.formats)
     assert not any(name in done.stdout for name in verilog)
     symbols = run(["avr-nm", "-C", tmp_path / "compiled" / "play.ino.elf"]).stdout
     assert set(re.findall(rf"^[0-9a-f]+ (\w) {NAME}_[xy]_table$", symbols, re.MULTILINE)) <= {"t", "T"}
@@ -162,24 +165,14 @@ def test_without_a_maintainer_the_builder_refuses_it(tmp_path: Path) -> None:
     assert "Missing 'maintainer' from library in" in done.stderr
 
 
-WIDE = {"emit.formats": ["arduino"], "dac.bits": 18, "x.table.bits": 18, "y.table.bits": 18}
-
-
 @pytest.mark.rest
-def test_words_of_18_bits_do_not_compile_without_flags(tmp_path: Path) -> None:
-    built = library(tmp_path, WIDE)
+def test_without_its_options_a_wide_scan_does_not_compile(tmp_path: Path) -> None:
+    """A negative control: the runtime takes the widths from the library's header."""
+    built = library(tmp_path, {"emit.formats": ["arduino"], **WIDE})
+    (tmp_path / "libraries" / "scan" / "tablegen_options.h").unlink()
     done = compiled(tmp_path, built)
     assert done.returncode != 0
     assert "compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table" in done.stderr
-
-
-@pytest.mark.rest
-def test_words_of_18_bits_compile_with_flags_of_the_platform(tmp_path: Path) -> None:
-    built = library(tmp_path, WIDE)
-    widths = "-DDAC_TABLE_STORAGE_BITS=32 -DDAC_OUTPUT_STORAGE_BITS=32"
-    flags = (f"compiler.c.extra_flags={widths}", f"compiler.cpp.extra_flags=-DDECIMAL_DIG=__DECIMAL_DIG__ {widths}")
-    done = compiled(tmp_path, built, *(each for flag in flags for each in ("-prefs", flag)))
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.rest

@@ -1,6 +1,7 @@
 """The CMSIS-Pack: read by cmsis-pack-manager, and its component compiled and played with what its description says."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,6 +17,7 @@ from short_scans import CUBIC, short
 from tablegen.version import __version__
 
 FILE = f"tablegen.{NAME}.pdsc"
+VERSION = r"\d+\.\d+\.\d+(-[0-9A-Za-z.-]+)?"  # of a component; one of Python before a release is none
 
 
 @pytest.fixture(scope="module")
@@ -69,14 +71,16 @@ def test_cmsis_pack_manager_skips_files_of_no_category(built: Formatted, tmp_pat
 
 
 def test_its_names_are_those_that_the_schema_has(built: Formatted, tmp_path: Path) -> None:
-    """By the documentation of packs: vendor and name make the name of the file, and parts of names are short."""
+    """Vendor and name make the name of the file, parts of names are short, and versions have three numbers."""
     long = short(tmp_path, {"emit.formats": ["cmsis-pack"], "name": "a" * 48})
     for content in (built.files[FILE], long.files[f"tablegen.{'a' * 48}.pdsc"]):
         package = ElementTree.fromstring(content)
         assert [child.tag for child in package] == [
             "vendor", "name", "description", "url", "releases", "taxonomy", "components"
         ]  # fmt: skip
+        assert all(re.fullmatch("[A-Za-z0-9_-]+", package.findtext(key, "")) for key in ("vendor", "name"))
         (component,) = package.iter("component")
+        assert re.fullmatch(VERSION, component.attrib["Cversion"])
         assert all(2 <= len(component.attrib[key]) <= 32 for key in ("Cclass", "Cgroup"))
         (release,) = package.iter("release")
         assert release.attrib == {"version": __version__}

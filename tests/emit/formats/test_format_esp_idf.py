@@ -7,7 +7,7 @@ import pytest
 import yaml
 from building import NAME, run_clean
 from formatted import Formatted, check_finds_a_flip, formatted
-from packed_library import MAIN, plays_the_model, run_offline, unpacked
+from packed_library import DEMANDING, MAIN, plays_the_model, run_offline, unpacked
 from short_scans import short
 
 from tablegen.version import __version__
@@ -47,12 +47,13 @@ def test_it_names_the_c_files_of_the_build(built: Formatted) -> None:
 
 def test_a_changed_build_is_found(tmp_path: Path) -> None:
     built = formatted(tmp_path, "short", "esp-idf")
-    check_finds_a_flip(built, "esp-idf", ["CMakeLists.txt", "idf_component.yml"])
+    check_finds_a_flip(built, "esp-idf", ["CMakeLists.txt", "idf_component.yml", "tablegen_options.h"])
 
 
 @pytest.mark.rest
 def test_what_the_component_manager_packs_plays_the_model(tmp_path: Path) -> None:
-    built = short(tmp_path, {"emit.formats": ["esp-idf", "verilog"]})
+    """Without an option of the compiler, whatever the scan needs."""
+    built = short(tmp_path, {"emit.formats": ["esp-idf", "verilog"], **DEMANDING})
     checked = run_offline([MANAGER, "manifest", "lint", "idf_component.yml"], built.folder)
     assert checked.returncode == 0, checked.stdout + checked.stderr
     command = [MANAGER, "component", "pack", "--name", NAME, "--dest-dir", tmp_path / "dist"]

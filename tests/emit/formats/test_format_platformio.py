@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from building import NAME, run_clean
 from formatted import Formatted, check_finds_a_flip, formatted
-from packed_library import MAIN, plays_the_model, run_offline, unpacked
+from packed_library import DEMANDING, MAIN, plays_the_model, run_offline, unpacked
 from short_scans import short
 
 from tablegen.version import __version__
@@ -40,7 +40,7 @@ def test_a_header_only_build_has_its_own_headers(tmp_path: Path) -> None:
 
 
 def test_a_changed_build_is_found(tmp_path: Path) -> None:
-    check_finds_a_flip(formatted(tmp_path, "short", "platformio"), "platformio", ["library.json"])
+    check_finds_a_flip(formatted(tmp_path, "short", "platformio"), "platformio", ["library.json", "tablegen_options.h"])
 
 
 def pack(folder: Path, own: Path) -> subprocess.CompletedProcess[str]:
@@ -52,7 +52,8 @@ def pack(folder: Path, own: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.rest
 def test_what_platformio_packs_plays_the_model(tmp_path: Path) -> None:
-    built = short(tmp_path, {"emit.formats": ["platformio", "verilog"]})
+    """Without an option of the compiler, whatever the scan needs."""
+    built = short(tmp_path, {"emit.formats": ["platformio", "verilog"], **DEMANDING})
     done = pack(built.folder, tmp_path / "own")
     assert done.returncode == 0, done.stdout + done.stderr
     packed = tmp_path / "packed"

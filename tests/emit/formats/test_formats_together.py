@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -15,8 +16,10 @@ from verifying import verdicts
 from tablegen.base.input_errors import Unphysical
 from tablegen.emit.format import Format
 from tablegen.emit.formats import get, own_names
+from tablegen.emit.package_options import OPTIONS_HEADER
 from tablegen.emit.stored import stored_content
 from tablegen.emit.waveforms import MOST_TICKS
+from tablegen.emit.write import names_of_build
 from tablegen.manifest.read import read_build
 
 OF_SAMPLES = ("csv", "npz", "pwl", "wav")
@@ -34,11 +37,20 @@ def test_each_file_is_a_format_and_has_a_test() -> None:
 
 
 def test_no_two_formats_write_a_file(together: Formatted) -> None:
+    """But for the options of packages, which are the same in all of them."""
     content = stored_content(read_build(together.folder))
-    names = [name for each in own_names() for name in get(each).files(content)]
+    written = [file for each in own_names() for file in get(each).files(content).items()]
+    assert {name for (name, _), count in Counter(written).items() if count > 1} == {OPTIONS_HEADER}
+    names = [name for name, _ in set(written)]
     names += [path.name for each in own_names() for path in get(each).runtime()]
     assert len({name.lower() for name in names}) == len(names)  # on file systems that do not tell cases apart either
     assert {*names, "manifest.json"} == together.files.keys()
+
+
+def test_the_next_build_knows_each_file_as_one_of_a_build(together: Formatted) -> None:
+    """So that it removes those of a format that is no longer chosen."""
+    names = together.files.keys() - {"manifest.json"}
+    assert set(names_of_build(NAME, names)) == names
 
 
 @pytest.mark.parametrize("name", own_names())
