@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from building import BENCHES, tool
 from programs import random_dual
-from stream_scripts import play
+from stream_scripts import crowded_windows, play
 
 from tablegen.base.resources import verilog_runtime
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, program_words
-from tablegen.device.widths import AxisWidths, Widths, least_widths, misfits
+from tablegen.device.widths import AxisWidths, Widths, cut_words, least_widths, misfits
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import PROGRAM, Script
 from tablegen.verification.verilog.sequencer_bench import SequencerBench
@@ -75,7 +75,7 @@ def law(played: list[tuple[int, int]], widths: Widths) -> list[bool]:
     good[0], good[1] = 8, 1
     for what, word in played:
         at, writes = what & 0x3F, bool(what & WRITE)
-        spoils = writes and bool(misfits([*good[:at], word, *good[at + 1 :]], widths))
+        spoils = writes and bool(cut_words([*good[:at], word, *good[at + 1 :]], widths))
         begins = writes and at == 0
         found.append(not spoilt and not spoils and (not empty or begins))
         empty = (empty or (bool(what & DISCARD) and spoilt)) and not begins
@@ -138,6 +138,38 @@ def test_a_line_that_is_too_long_is_refused_and_the_old_one_plays_on(low_area: i
     run = SequencerBench("icarus", SHAPE, tmp_path, widths).play(script)
     assert run.equal, run
     assert script.swaps == 2
+
+
+@pytest.mark.common
+def test_a_window_has_a_tick_for_each_pixel(tmp_path: Path) -> None:
+    """Or none: pixels and ticks about the edge, committed with the last word that was written or soon after."""
+    rng = np.random.default_rng(30)
+    program = random_dual(rng, SHAPE, (20, 24), lines=(2, 3))
+    script = Script()
+    crowded_windows(rng, script, program, (2 << 8) - 1, 400)
+    script.tick_every(3)
+    play(script, random_dual(rng, SHAPE, (20, 24), kind="tame", lines=(2, 3)))
+    script.wait_ticks(60)
+    widths = {"TICK_BITS": 8, "LINE_BITS": 4, "PERIOD_BITS": 9}
+    run = SequencerBench("icarus", SHAPE, tmp_path, widths).play(script)
+    assert run.equal, run
+    verdicts = [state.flags[2] for _, state in script.states]
+    assert 100 < sum(verdicts) < 300
+
+
+def test_misfits_are_words_that_are_cut_and_pixels_without_ticks() -> None:
+    """The pixels are named once, and only where a window has ticks."""
+    widths = WIDTHS["defaults"]
+    words = [0] * 48
+    words[0] = words[1] = 8
+    pixels, forward, backward = (SCAN_WORDS.index(name) for name in ("pixels", "forward_count", "backward_count"))
+    words[pixels] = 5
+    for ticks, names in (((0, 0), []), ((5, 0), []), ((5, 4), ["scan.pixels"]), ((4, 5), ["scan.pixels"])):
+        words[forward], words[backward] = ticks
+        assert misfits(words, widths) == names
+        assert cut_words(words, widths) == []
+    words[pixels] = 1 << 25
+    assert misfits(words, widths) == cut_words(words, widths) == ["scan.pixels"]
 
 
 @pytest.mark.parametrize("seed", range(4))

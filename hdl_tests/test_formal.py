@@ -282,7 +282,7 @@ MUTANTS = {
         "(write && committed) ||",
     ),
     "commit_of_what_does_not_fit": ("sequencer", "dac_sequencer", "1'b0, sound_commit,", "1'b0, host_commit,"),
-    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits)", ""),
+    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (commits && !fits)", ""),
     "commit_lost": ("scan", "dac_bank", "withdraw || take", "withdraw || take || (committed && !bank)"),
     "commit_not_withdrawn": ("scan", "dac_bank", "reset || withdraw || take", "reset || take"),
     # g. what stops a scan

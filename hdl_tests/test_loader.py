@@ -17,10 +17,12 @@ from loader_bridge import BREAK, NO_STOP_BIT, PULSE, Simulation, assembler
 from loader_device import Loader, LoaderDevice, limited, told_to_be
 from loader_dialogues import Dialogue, Differs, objection
 from loader_mutants import MUTANTS
+from programs import pixels_near_ticks
 from replacing import replace
 from sets import long
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.device.schedule import has_ticks_for_pixels
 from tablegen.device.widths import AxisWidths, Widths, misfits
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request, Upload
@@ -172,6 +174,29 @@ def settle_lines(loader: Loader, words: list[int]) -> None:
             assert (answer.type == 0xFF and (refusal.reason, refusal.detail)) == (expected or False), lines
 
 
+def crowded_windows(loader: Loader, words: list[int]) -> None:
+    """Pixels and ticks of windows about the edge: a pixel has a tick, or the window has none."""
+    rng = np.random.default_rng(30)
+    ticks, *_ = struct.unpack_from("<I", _BYTES)
+    names = ("pixels", "forward_count", "backward_count")
+    seen = set()
+    with Simulation(loader.compiled, words) as simulation:
+        talk = Talk()
+        LoaderDevice(simulation, loader.info, 1).tick(50)
+        simulation.talk(talk.hello())
+        for numbers in pixels_near_ticks(rng, ticks, 24):
+            data = bytearray(_BYTES)
+            for name, word in (*zip(names, numbers, strict=True), ("forward_first", 0), ("backward_first", 0)):
+                struct.pack_into("<I", data, 4 * SCAN_WORDS.index(name), word)
+            fits = has_ticks_for_pixels(*numbers)
+            wire = upload(simulation, talk, resealed(BOOT_IMAGE, bytes(data)))
+            simulation.ticks(20)
+            refusals = talk.refusals(wire + simulation.talk())
+            assert refusals == ([] if fits else [(Reason.SCHEDULE, 0)]), numbers
+            seen.add(fits)
+    assert len(seen) == 2
+
+
 def refused_by_the_sequencer(loader: Loader, words: list[int]) -> None:
     """What passes the checks of a loader that is wrong about its sequencer: the host is told, and the next is taken."""
     too_far = AxisLimits(0, TOP, 1 << 20, TOP)
@@ -202,7 +227,7 @@ def refused_by_the_sequencer(loader: Loader, words: list[int]) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("what", [settle_lines, refused_by_the_sequencer])
+@pytest.mark.parametrize("what", [settle_lines, crowded_windows, refused_by_the_sequencer])
 def test_what_does_not_fit_is_refused_with_a_reason(what: Callable[[Loader, list[int]], None], loader: Loader) -> None:
     what(loader, [])
 
@@ -352,6 +377,7 @@ FINDERS: dict[str, Callable[[Loader, list[int]], object]] = {
     "frames": golden_frames,
     "limits": exact_limits,
     "settle lines": settle_lines,
+    "pixels": crowded_windows,
     "refused": refused_by_the_sequencer,
     "uploads": lambda loader, words: [checked_uploads(loader, seed, 40, words) for seed in range(8)],
     **{
@@ -367,6 +393,7 @@ FOUND_SOON = {
     "a distance past the end is not seen",
     "code_min may be one less",
     "settle_lines may be 256",
+    "pixels of the retrace are not checked",
     "the sequencer's refusal is not told",
     "a word may have more bits",
     "the offset is ignored",

@@ -201,6 +201,13 @@ static bool inside(const dac_link_image *image, unsigned window, uint32_t length
     return first <= length && count <= length - first;
 }
 
+/* Whether each pixel has a tick of a window, if that has any. */
+static bool has_pixels(const dac_link_image *image, unsigned window)
+{
+    const uint32_t count = dac_link_program_word(image, 0, window + 1);
+    return count == 0 || dac_link_program_word(image, 0, DAC_LINK_PIXELS) <= count;
+}
+
 static bool good_schedule(const dac_link_image *image)
 {
     const uint32_t ticks = dac_link_program_word(image, 0, DAC_LINK_LINE_TICKS);
@@ -210,7 +217,7 @@ static bool good_schedule(const dac_link_image *image)
         && inside(image, DAC_LINK_FORWARD, ticks) && inside(image, DAC_LINK_BACKWARD, ticks)
         && inside(image, DAC_LINK_UP, lines) && inside(image, DAC_LINK_DOWN, lines)
         && dac_link_program_word(image, 0, DAC_LINK_TURN_TICK) <= ticks
-        && dac_link_program_word(image, 0, DAC_LINK_PIXELS) <= ticks
+        && has_pixels(image, DAC_LINK_FORWARD) && has_pixels(image, DAC_LINK_BACKWARD)
         && dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) <= 1;
 }
 

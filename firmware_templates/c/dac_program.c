@@ -6,6 +6,12 @@ static bool inside(const dac_window *window, uint32_t length)
     return window->first <= length && window->count <= length - window->first;
 }
 
+/* Whether each pixel has a tick of a window, if that has any. */
+static bool has_pixels(const dac_window *window, uint32_t pixels)
+{
+    return window->count == 0 || pixels <= window->count;
+}
+
 #if DAC_PIXEL_TABLE
 /* Whether pixels of at least a tick fill a window of so many ticks. */
 static bool fill_window(const uint16_t *counts, uint32_t pixels, uint32_t ticks)
@@ -29,7 +35,7 @@ static bool good_pixels(const dac_schedule *p)
 static bool good_schedule(const dac_schedule *p)
 {
     return p->line_ticks - 1 < UINT32_C(1) << 24 && p->frame_lines != 0 && p->frame_lines <= INT32_MAX / p->line_ticks
-        && p->turn_tick <= p->line_ticks && p->pixels <= p->line_ticks
+        && p->turn_tick <= p->line_ticks && has_pixels(&p->forward, p->pixels) && has_pixels(&p->backward, p->pixels)
         && inside(&p->forward, p->line_ticks) && inside(&p->backward, p->line_ticks)
         && inside(&p->up, p->frame_lines) && inside(&p->down, p->frame_lines);
 }

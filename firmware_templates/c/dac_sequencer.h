@@ -114,7 +114,7 @@ typedef struct {
 typedef struct {
     uint32_t line_ticks;  /* 1..2^24 */
     uint32_t frame_lines; /* line_ticks * frame_lines < 2^31 */
-    uint32_t pixels;      /* pixels per window */
+    uint32_t pixels;      /* pixels per window; not more than its ticks, unless it has none */
     uint32_t settle_lines;
     uint32_t turn_tick;           /* first tick of the backward sweep */
     dac_window forward, backward; /* ticks of a line */
@@ -252,7 +252,7 @@ typedef enum {
     DAC_LOADED = 0,
     DAC_BUSY,            /* a committed program has not been taken yet */
     DAC_OTHER_CONVERTER, /* made for other bits, coding or alignment, or too wide for DAC_OUTPUT_STORAGE_BITS */
-    DAC_BAD_SCHEDULE,    /* empty, too long, a window outside its line or frame, or pixels that do not fill it */
+    DAC_BAD_SCHEDULE,    /* empty, too long, a window outside its line or frame, or pixels that do not fit or fill it */
     DAC_BAD_TABLE,       /* missing, length or width out of range, or the word behind the last one is not the first */
     DAC_BAD_PERIOD,      /* the period does not fit the schedule */
     DAC_BAD_OUTPUT,      /* gain, offset, codes or step out of range */

@@ -24,26 +24,30 @@ schedule:
         ld1 rest
         jnz no_schedule
         ld4 answer
-        st4 answer+4
+        st4 answer+4            ; the period of y, unless it steps
         ld #255
         cmp4 [p]                ; settle_lines, which the sequencer counts in 8 bits
         jnc no_schedule
         ld4 t2
         cmp4 [p]                ; turn_tick
         jnc no_schedule
-        call window
-        call window
+        call windows
         ld4 t3
         st4 t1
-        call window
-        call window
-        ld4 t2
-        cmp4 [p]                ; pixels
-        jnc no_schedule
+        call windows
+        ld4 [p]                 ; pixels
+        st4 t0
         ld4 [p]                 ; y_steps
+        jz of_frame
         cmp #2
         jc no_schedule
-
+        ld4 t3
+        st4 answer+4
+of_frame:
+        ldp FORWARD_COUNT
+        call ticks_of_pixels
+        ldp BACKWARD_COUNT
+        call ticks_of_pixels
 
         ld #9
 ; The first a checks, each of x and of y.
@@ -66,7 +70,45 @@ one:    st4 detail
         jz fourier
         sub #1
         jz words
-        jmp load_axis
+
+; Not a check: the words of the axis, and before x those of the program, go into the sequencer.
+load_axis:
+        ld1 detail
+        jnz tables
+        ld #WITHDRAW            ; the sequencer commits nothing after a program that did not fit, until it is discarded
+        request
+        ld #0
+        setregion
+        setp
+        saveq
+        ld #4
+        st1 size
+        ldp IMAGE
+        ld #48
+        call counted
+        call load
+tables: call words_at
+        saveq
+        ld #0
+        setp
+        exchange
+        ld1 size
+        cmp #4
+        ld1 detail
+        jnc of_table
+        add #2
+of_table:
+        add #1
+        setregion
+        call load
+        jmp checked
+load:   call word
+        exchange
+        write
+        exchange
+        inc2 count
+        jnc load
+        ret
 
 ; p is where byte a of the page of the axis is, or of its constants.
 page:   add2 x_page
@@ -86,14 +128,23 @@ place:  add2 at
         setp
         ret
 
-; Checks the window at p against t1, the number of its ticks or lines.
+; Checks the two windows at p against t1, the number of their ticks or lines; `window` one of them.
+windows:
+        call window
 window: ld4 [p]
         add4 [p]
         jc no_schedule
         st4 t0
         ld4 t1
+at_least:
         cmp4 t0
         jnc no_schedule
+        ret
+
+; Checks that a window, whose ticks are at p, has one for each of t0 pixels, or none at all.
+ticks_of_pixels:
+        ld4 [p]
+        jnz at_least
         ret
 
 ; answer = t0 times t1, the lower 32 bits; rest is 0 if those are all.
@@ -101,7 +152,7 @@ multiply:
         ld #0
         st4 answer
         st1 rest
-        ld #32
+        ld #0xe0                ; 32 digits
         st1 distance
 digit:  ld4 answer
         add a
@@ -119,10 +170,8 @@ digit_1:
         jnc digit_2
         inc1 rest
 digit_2:
-        ld1 distance
-        sub #1
-        st1 distance
-        jnz digit
+        inc1 distance
+        jnc digit
         ld4 answer
         ret
 
@@ -218,11 +267,6 @@ period: ld4 t2
         ld1 detail
         jz as_wanted
         ld4 answer+4
-        st4 t1
-        ldp Y_STEPS
-        ld4 [p]
-        jz as_wanted
-        ld4 t3
         st4 t1
 as_wanted:
         ld #0
@@ -395,45 +439,6 @@ wide_word:
         add4 detail
         st4 detail
         jmp no_word
-
-; Not a check: the words of the axis, and before x those of the program, go into the sequencer.
-load_axis:
-        ld1 detail
-        jnz tables
-        ld #WITHDRAW            ; the sequencer commits nothing after a program that did not fit, until it is discarded
-        request
-        ld #0
-        setregion
-        setp
-        saveq
-        ld #4
-        st1 size
-        ldp IMAGE
-        ld #48
-        call counted
-        call load
-tables: call words_at
-        saveq
-        ld #0
-        setp
-        exchange
-        ld1 size
-        cmp #4
-        ld1 detail
-        jnc of_table
-        add #2
-of_table:
-        add #1
-        setregion
-        call load
-        jmp checked
-load:   call word
-        exchange
-        write
-        exchange
-        inc2 count
-        jnc load
-        ret
 
 ; Loads the word of size bytes at p.
 word:   ld1 size

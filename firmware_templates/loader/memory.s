@@ -55,7 +55,8 @@
 .equ IMAGE, 0x300
 .equ PAGE_X, 0x340
 
-.equ Y_STEPS, 0x334
+.equ FORWARD_COUNT, 0x314
+.equ BACKWARD_COUNT, 0x31c
 
 ; Variables
 .at 0x6a

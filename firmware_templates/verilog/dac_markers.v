@@ -29,6 +29,7 @@ module dac_markers #(
     output wire                 pixel_marker,
     output reg                  backward_marker,
     output reg                  images,          // the tick is inside both windows, after the settling lines
+    output reg                  pixels_fit,      // used windows have ticks for those written three clocks ago or more
     // with PIXEL_INDEX_BITS
     input  wire                 table_write,
     input  wire [15:0]          table_address,
@@ -110,30 +111,43 @@ module dac_markers #(
         .clock(clock), .write(write && write_address == SETTLE_LINES), .data(write_data[7:0]), .load(load),
         .value(settle_lines)
     );
-    wire [TICK_BITS:0] forward_count, backward_count;  // window lengths of the idle program
+    // Window lengths of the idle program, and pixels less ticks of a window less 1: negative where each pixel has a
+    // tick. With more pixels than ticks dac_pixels would count beyond its bits.
+    wire [TICK_BITS:0] forward_count, backward_count;
     reg [TICK_BITS:0] idle_pixels, pixels;
+    wire [TICK_BITS+1:0] idle_forward_less = {1'b0, idle_pixels} + {1'b1, ~forward_count};
+    wire [TICK_BITS+1:0] idle_backward_less = {1'b0, idle_pixels} + {1'b1, ~backward_count};
+    reg forward_has_ticks, backward_has_ticks;
+    reg signed [TICK_BITS+1:0] pixels_less_1, forward_less, backward_less;
     initial begin
         idle_pixels = 0;
         pixels = 0;
-    end
-    reg signed [TICK_BITS+1:0] forward_less, backward_less;  // pixels - ticks of a window
-    initial begin
+        forward_has_ticks = 0;
+        backward_has_ticks = 0;
+        pixels_less_1 = 0;
         forward_less = 0;
         backward_less = 0;
+        pixels_fit = 1'b0;
     end
     always @(posedge clock) begin
         if (write && write_address == PIXELS) idle_pixels <= write_data[TICK_BITS:0];
+        if (write && write_address == FORWARD_COUNT) forward_has_ticks <= write_data[TICK_BITS:0] != 0;
+        if (write && write_address == BACKWARD_COUNT) backward_has_ticks <= write_data[TICK_BITS:0] != 0;
+        pixels_fit <= (idle_forward_less[TICK_BITS+1] || !forward_has_ticks) &&
+                      (idle_backward_less[TICK_BITS+1] || !backward_has_ticks);
         if (load_1) begin
             pixels <= idle_pixels;
-            forward_less <= $signed({1'b0, idle_pixels}) - $signed({1'b0, forward_count});
-            backward_less <= $signed({1'b0, idle_pixels}) - $signed({1'b0, backward_count});
+            pixels_less_1 <= $signed({1'b0, idle_pixels}) - 1;
+            forward_less <= idle_forward_less;
+            backward_less <= idle_backward_less;
         end
     end
     wire images_pixels = runs_2 && (forward_imaging || backward_imaging);
     wire counted;
     dac_pixels #(.BITS(TICK_BITS)) pixel_starts (
         .clock(clock), .tick(tick_2), .opens(forward_opens || backward_opens), .imaging(images_pixels),
-        .pixels(pixels), .pixels_less_count(forward_imaging ? forward_less : backward_less), .pixel(counted)
+        .pixels_less_1(pixels_less_1), .pixels_less_count_less_1(forward_imaging ? forward_less : backward_less),
+        .pixel(counted)
     );
     generate
         if (PIXEL_INDEX_BITS != 0) begin : pixel_table
@@ -150,7 +164,7 @@ module dac_markers #(
         end else begin : equal_pixels
             assign pixel_marker = counted;
             assign {accepted, checking, refused} = {commit, 2'b00};
-            wire unused_table = &{PIXEL_TABLE, table_write, table_address, discard, bank};
+            wire unused_table = &{PIXEL_TABLE, table_write, table_address, discard, bank, pixels};
         end
     endgenerate
 

@@ -11,8 +11,8 @@ module dac_pixels #(
     input  wire                   tick,
     input  wire                   opens,   // the first tick of a window
     input  wire                   imaging,
-    input  wire [BITS:0]          pixels,  // pixels per window, from the program
-    input  wire signed [BITS+1:0] pixels_less_count,
+    input  wire signed [BITS+1:0] pixels_less_1,  // pixels per window, from the program
+    input  wire signed [BITS+1:0] pixels_less_count_less_1,  // negative: the window has a tick for each pixel
     output reg                    pixel
 );
     // i pixels - count (strobes), less another count, so that its sign decides; below `pixels`, and not below -count.
@@ -25,7 +25,8 @@ module dac_pixels #(
     always @(posedge clock)
         if (tick) begin
             pixel <= imaging && starts;
-            behind <= (opens ? {BITS+2{1'b0}} : behind) + (starts ? pixels_less_count : $signed({1'b0, pixels}));
+            // Minus the inverse is plus the value and the 1 that it lacks.
+            behind <= (opens ? {BITS+2{1'b0}} : behind) - ~(starts ? pixels_less_count_less_1 : pixels_less_1);
         end
 endmodule
 

@@ -224,10 +224,11 @@ module dac_sequencer #(
 
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
     wire idle_writable, rendered, rendering, unrendered, slow_exists, slow_fits, checking, misfilled;
-    reg host_write, host_commit;
+    reg host_write, host_commit, scan_written;
     initial begin
         host_write = 0;
         host_commit = 0;
+        scan_written = 0;
     end
     // A write to a place that does not exist is refused: cut to the bits of a memory, its address would be another one.
     wire exists =
@@ -250,6 +251,9 @@ module dac_sequencer #(
     initial address = 0;
     reg [31:0] data;
     initial data = 0;
+    // A commit waits until the words just before it have been compared: whether windows have ticks for the pixels.
+    wire waits = host_commit && (scan_write || scan_written);
+    wire commits = host_commit && !scan_write && !scan_written;
     assign writable = !checking && idle_writable && !rendering && !host_commit;
     initial refused = 1'b0;
     always @(posedge clock) begin
@@ -257,11 +261,12 @@ module dac_sequencer #(
         scan_write <= accepted_write && write_region == PROGRAM && write_address[15:4] == SCAN_PAGE;
         x_write <= accepted_write && write_region == PROGRAM && write_address[15:4] == X_PAGE;
         y_write <= accepted_write && write_region == PROGRAM && write_address[15:4] == Y_PAGE;
-        host_commit <= commit && writable && !withdraw && !reset;
+        scan_written <= scan_write;
+        host_commit <= ((commit && writable) || waits) && !withdraw && !reset;
         region <= write_region;
         address <= write_address;
         data <= write_data;
-        if ((write && !(writable && exists)) || (host_commit && !fits) || misfilled || unrendered)
+        if ((write && !(writable && exists)) || (commits && !fits) || misfilled || unrendered)
             refused <= 1'b1;
         else if (clear_faults || reset)
             refused <= 1'b0;
@@ -271,9 +276,10 @@ module dac_sequencer #(
     wire [23:0] table_data;
     wire unused_bits = &{table_address, table_data};  // upper bits, unused for short tables and words
 
-    // A program with a word that does not fit its register is not committed, nor is a part of a program.
-    wire words_fit, whole;
-    wire fits = words_fit && whole && slow_fits;
+    // A program with a word that does not fit its register is not committed, nor is a part of a program, nor one with
+    // more pixels than ticks of a window.
+    wire words_fit, whole, pixels_fit;
+    wire fits = words_fit && whole && slow_fits && pixels_fit;
     wire sound_commit;  // later where a table of pixels has to be read
     dac_fit #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
@@ -350,9 +356,9 @@ module dac_sequencer #(
         .clock(clock), .write(scan_write), .write_address(address[3:0]), .write_data(data), .take(take), .load(load_0),
         .tick(tick_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0), .tick_number(tick_number),
         .line_number(line_number), .line_marker(line_3), .frame_marker(frame_3), .pixel_marker(pixel_3),
-        .backward_marker(backward_3), .images(images_3), .table_write(host_write && region == PIXEL_TICKS),
-        .table_address(address), .discard(reset || withdraw), .commit(host_commit && fits), .bank(bank),
-        .accepted(sound_commit), .checking(checking), .refused(misfilled)
+        .backward_marker(backward_3), .images(images_3), .pixels_fit(pixels_fit),
+        .table_write(host_write && region == PIXEL_TICKS), .table_address(address), .discard(reset || withdraw),
+        .commit(commits && fits), .bank(bank), .accepted(sound_commit), .checking(checking), .refused(misfilled)
     );
 
     wire done, x_reached, y_reached, x_clamped, y_clamped, overrun;

@@ -58,13 +58,13 @@ module sequencer_properties
             assert (!committed && !uut__banks__draining);
     end
     // f. A program that does not fit is not committed, and that is said. A refused write is said, and one to a place that does not exist; a commit stays until it is taken, withdrawn or reset.
-    wire uut__fits;
+    wire uut__commits, uut__fits;
     reg before, refused_write, refused_commit, was_committed, may_go;
     initial before = 0;
     always @(posedge clock) begin
         before <= 1;
         refused_write <= write && !accepted;
-        refused_commit <= uut__host_commit && !uut__fits;
+        refused_commit <= uut__commits && !uut__fits;
         was_committed <= committed;
         may_go <= uut__take || withdraw || reset;
     end

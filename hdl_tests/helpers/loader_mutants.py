@@ -120,7 +120,20 @@ MUTANTS = (
         "call multiply",
         "uploads",
     ),
-    Mutant("a window may end outside", _CHECKS, "ld4 t1 / cmp4 t0 / jnc no_schedule", "ld4 t1 / cmp4 t0", "uploads"),
+    Mutant("a window may end outside", _CHECKS, "ld4 t1 / at_least:", "ld4 t1 / ret / at_least:", "uploads"),
+    Mutant(
+        "pixels of the trace are not checked",
+        _CHECKS,
+        "ldp FORWARD_COUNT / call ticks_of_pixels",
+        "",
+        "pixels",
+    ),
+    Mutant("pixels of the retrace are not checked", _CHECKS, "ldp BACKWARD_COUNT / call ticks_of_pixels", "", "pixels"),
+    Mutant(
+        "a window without ticks has no pixels", _CHECKS, "ld4 [p] / jnz at_least", "ld4 [p] / jmp at_least", "pixels"
+    ),
+    Mutant("a period of y is that of its steps", _CHECKS, "ld4 [p] / jz of_frame", f"ld4 [p] / {_NOTHING}", "uploads"),
+    Mutant("steps of y are lost", _CHECKS, "ld4 t3 / st4 answer+4", "ld4 t3", "uploads"),
     Mutant("a word may have more bits", _CHECKS, "cmp4 t3 / jc wide_word", "cmp4 t3", "uploads"),
     Mutant("a park code may lie outside", _CHECKS, "cmp4 t2 / jnc no_output / jmp checked", "jmp checked", "uploads"),
     Mutant("settle_lines may be 256", _CHECKS, "ld #255 / cmp4 [p]", "ld #255 / add #1 / cmp4 [p]", "settle lines"),

@@ -1,5 +1,6 @@
 """Programs for the sequencer's benches: random ones, whatever the arithmetic allows, with no plan behind them."""
 
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import Literal
 
@@ -35,7 +36,7 @@ def random_schedule(rng: Generator, ticks: int, lines: int) -> Schedule:
     turn = int(rng.integers(0, ticks + 1))
     forward = random_window(rng, turn) if turn else Window(0, 0)
     behind = random_window(rng, ticks - turn) if turn < ticks else Window(0, 0)
-    most = max(forward.count, behind.count, 1)
+    most, fewest = (pick([n for n in (forward.count, behind.count) if n], default=1) for pick in (max, min))
     turn_line = int(rng.integers(0, lines + 1))
     up = random_window(rng, turn_line) if turn_line else Window(0, 0)
     down = random_window(rng, lines - turn_line) if turn_line < lines else Window(0, 0)
@@ -44,7 +45,7 @@ def random_schedule(rng: Generator, ticks: int, lines: int) -> Schedule:
         lines=lines,
         update_rate_hz=Fraction(1000),
         requested_hz=1.0,
-        pixels=int(rng.integers(1, most + 1)),
+        pixels=min(int(rng.integers(1, most + 1)), fewest),
         settle_lines=int(rng.integers(0, 4)),
         turn_tick=turn,
         forward=forward,
@@ -53,6 +54,14 @@ def random_schedule(rng: Generator, ticks: int, lines: int) -> Schedule:
         up=up,
         down=Window(turn_line + down.first, down.count),
     )
+
+
+def pixels_near_ticks(rng: Generator, most: int, cases: int) -> Iterator[tuple[int, int, int]]:
+    """Pixels and the ticks of both windows, 0 to ``most``, mostly such that one more or less decides if they fit."""
+    for _ in range(cases):
+        near = int(rng.choice([1, 2, most >> 1, most - 1, int(rng.integers(1, most))]))
+        pixels, forward, backward = rng.choice([0, 1, near - 1, near, near, near + 1, most], 3).tolist()
+        yield pixels, forward, backward
 
 
 def parts(rng: Generator, pixels: int, ticks: int) -> tuple[int, ...]:

@@ -587,7 +587,7 @@ def _scan() -> Iterator[Mutant]:
         "{trigger, 1'b0, commit && writable, 1'b0}",
     )
     yield Mutant(
-        "a commit comes in spite of a withdrawal", "dac_sequencer", "writable && !withdraw && !reset", "writable"
+        "a commit comes in spite of a withdrawal", "dac_sequencer", "|| waits) && !withdraw && !reset", "|| waits)"
     )
     yield Mutant("y's words go to x as well", "dac_sequencer", "address[15:4] == X_PAGE", "address[15:4] != SCAN_PAGE")
 
@@ -696,6 +696,19 @@ def _markers() -> Iterator[Mutant]:
         "opens || behind[BITS+1] == 0 || behind == -1",
     )
     yield Mutant("no pixel at the opening of a window", "dac_pixels", "opens || !behind[BITS+1]", "!behind[BITS+1]")
+    for breaks, file, old, new in (
+        ("more pixels than ticks of the trace fit", "dac_markers", "(idle_forward_less[TICK_BITS+1] ||", "(1'b1 ||"),
+        ("more pixels than ticks of the retrace fit", "dac_markers", "(idle_backward_less[TICK_BITS+1] ||", "(1'b1 ||"),
+        ("pixels do not fit a trace without ticks", "dac_markers", "|| !forward_has_ticks)", "|| 1'b0)"),
+        ("pixels do not fit a retrace without ticks", "dac_markers", "|| !backward_has_ticks)", "|| 1'b0)"),
+        ("a pixel a tick is too many", "dac_markers", "{1'b1, ~backward_count};", "{1'b1, ~backward_count} + 1;"),
+        ("pixels are not looked at", "dac_sequencer", "&& slow_fits && pixels_fit", "&& slow_fits"),
+        ("a commit does not wait for its write", "dac_sequencer", "host_commit && !scan_write &&", "host_commit &&"),
+        ("a commit does not wait for the write before it", "dac_sequencer", "!scan_write && !scan_written;",
+         "!scan_write;"),
+        ("a commit that waits is lost", "dac_sequencer", "((commit && writable) || waits)", "(commit && writable)"),
+    ):  # fmt: skip
+        yield Mutant(breaks, file, old, new, "direct")
 
 
 def _verdict() -> Iterator[Mutant]:

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.random import Generator
-from programs import Kind, random_dual, random_fourier, rendered, shaped, with_table
+from programs import Kind, pixels_near_ticks, random_dual, random_fourier, rendered, shaped, with_table
 from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.registers import PAGE_WORDS, program_words
-from tablegen.device.schedule import Window
+from tablegen.device.registers import PAGE_WORDS, SCAN_WORDS, program_words
+from tablegen.device.schedule import Window, has_ticks_for_pixels
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -308,6 +308,34 @@ def refusals(script: Script, playing: DualProgram, other: DualProgram) -> None:
     script.wait_ticks(other.schedule.ticks + 4 * ticks)
 
 
+def crowded_windows(rng: Generator, script: Script, program: DualProgram, most: int, cases: int) -> None:
+    """Commit about as many pixels as a window has ticks, on the clock of the last word or soon after; at rest.
+
+    Words are written in any order, and those that stay are not written again: what was refused needs no withdrawal.
+    """
+    script.come_to_rest()
+    script.load(program)
+    addresses = [SCAN_WORDS.index(name) for name in ("pixels", "forward_count", "backward_count")]
+    written = [-1, -1, -1]
+    for case, words in enumerate(pixels_near_ticks(rng, most, cases)):
+        changes = [at for at in rng.permutation(3).tolist() if written[at] != words[at]] or [case % 3]
+        written, fits = list(words), has_ticks_for_pixels(*words)
+        for at in changes[:-1]:
+            script.write(PROGRAM, [words[at]], addresses[at])
+        if case % 4 == 0:
+            script.write_unfit(addresses[changes[-1]], words[changes[-1]], at_once=True)
+        else:
+            script.write(PROGRAM, [words[changes[-1]]], addresses[changes[-1]])
+            script.wait(case % 4 - 1)
+            script.commit_unfit()
+        script.wait(6)
+        if fits:
+            script.refused = False
+            script.model.commit(program)  # no tick takes it
+        script.state(f"{words[0]} pixels in {words[1]} and {words[2]} ticks", rests=True)
+        script.request("withdraw", *(["clear_faults"] if case % 3 == 0 or not fits else []))
+
+
 def in_any_order(rng: Generator, script: Script, program: DualProgram, other: DualProgram) -> None:
     """Every word of a program by itself, in a random order, each of them written twice: first another one.
 
@@ -389,6 +417,8 @@ def sweep(
     random_play(rng, script, shape, len(script.expected) + samples, (pace,))
     if refused:
         script.request("withdraw", "clear_faults")
+        crowded_windows(rng, script, tame, (2 << 24) - 1, 60)
+        script.tick_every(pace)
         refusals(script, smooth, tame)
     else:
         counts_after_a_clear(script, tame)

@@ -111,6 +111,14 @@ class Schedule(Struct, frozen=True):
         return self.forward.first + forward, self.backward.first + backward
 
 
+def has_ticks_for_pixels(pixels: int, forward_count: int, backward_count: int) -> bool:
+    """Return True if each window that has ticks has at least one for each pixel.
+
+    All devices refuse a program of which this is not true: a pixel would have no tick, and accumulators overflow.
+    """
+    return all(not count or pixels <= count for count in (forward_count, backward_count))
+
+
 def pixel_starts(window: Window, pixels: int) -> Ints:
     """Return the ticks at which pixels start: tick i of the window where floor(i pixels / count) rises.
 

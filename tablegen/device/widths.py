@@ -1,7 +1,8 @@
 """The check that a program fits the registers of a device of given widths, and the least widths that it fits.
 
-The arithmetic of ``dac_fit.v``, which refuses the commit of any other program: a value that does not fit would be
-another one in its register. Widths are the parameters of ``dac_sequencer``, in lower case.
+``dac_sequencer`` refuses the commit of any other program. ``dac_fit.v`` has the arithmetic of ``cut_words``: a value
+that does not fit would be another one in its register. ``dac_markers.v`` compares pixels with the ticks of windows.
+Widths are the parameters of ``dac_sequencer``, in lower case.
 """
 
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 from tablegen.device.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS
-from tablegen.device.schedule import Schedule
+from tablegen.device.schedule import Schedule, has_ticks_for_pixels
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import Shaping
@@ -39,10 +40,19 @@ class Widths(Struct, frozen=True):
 
 
 def misfits(words: Sequence[int], widths: Widths) -> list[str]:
-    """Return the words of a program that do not fit, as ``scan.line_ticks`` or ``y.gain``, in order of address.
+    """Return the words of a program that do not fit, as ``scan.line_ticks`` or ``y.gain``.
 
+    They are those of ``cut_words``, and behind them ``scan.pixels`` where a window has fewer ticks, but not none.
     ``words`` are those of ``program_words``, unsigned, 48 of them.
     """
+    names = cut_words(words, widths)
+    if has_ticks_for_pixels(*(words[SCAN_WORDS.index(name)] for name in ("pixels", "forward_count", "backward_count"))):
+        return names
+    return [*names, *(["scan.pixels"] if "scan.pixels" not in names else [])]
+
+
+def cut_words(words: Sequence[int], widths: Widths) -> list[str]:
+    """Return the words of a program that registers would cut, in order of address; ``words`` as of ``misfits``."""
     pages = [words[page * PAGE_WORDS : (page + 1) * PAGE_WORDS] for page in range(3)]
     names = [f"scan.{name}" for name, word in zip(SCAN_WORDS, pages[0], strict=False) if not _scan(name, word, widths)]
     for axis, page, own in (("x", pages[1], widths.x), ("y", pages[2], widths.y)):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.device.dual_program import AxisProgram
-from tablegen.device.schedule import MAXIMUM_LINE_TICKS
+from tablegen.device.schedule import MAXIMUM_LINE_TICKS, has_ticks_for_pixels
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, PHASE_BITS
@@ -76,7 +76,7 @@ def _schedule_is_good(contents: Contents) -> bool:
     return (
         all(contents.scan(f"{name}_first") + contents.scan(f"{name}_count") <= length for name, length in windows)
         and contents.scan("turn_tick") <= ticks
-        and contents.scan("pixels") <= ticks
+        and has_ticks_for_pixels(*(contents.scan(name) for name in ("pixels", "forward_count", "backward_count")))
         and contents.scan("y_steps") <= 1
     )
 

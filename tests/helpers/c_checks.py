@@ -10,6 +10,7 @@ from c_devices import Check, Libraries
 from c_library import Library
 from c_loading import (
     converters_that_do_not_fit,
+    crowded_windows,
     offsets_that_overflow,
     other_converters,
     refusals,
@@ -53,7 +54,7 @@ from c_runs import (
 CHECKS: tuple[Check, ...] = (
     layout, converter_words, converter_words_of_runs, several_programs, a_fill_that_wants_no_markers,
     markers_known_again, status_of_power_up, the_first_trigger, the_queue, answers, banks, commits, reports, refusals,
-    the_largest_schedules, the_first_word_again, offsets_that_overflow, other_converters,
+    crowded_windows, the_largest_schedules, the_first_word_again, offsets_that_overflow, other_converters,
     converters_that_do_not_fit, requests_that_do_not_fit,
     words_too_wide_for_their_storage, lines_of_the_status, one_buffer_for_both,
     runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, gains_that_fit, slew_guards, runs_take_place,

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from ctypes import addressof, byref, c_int32
 
+import numpy as np
 from c_devices import Libraries, device_for, flat
 from c_library import (
     BAD_OUTPUT,
@@ -17,9 +18,11 @@ from c_library import (
     Device,
     Window,
 )
+from programs import pixels_near_ticks
 from replacing import replace
 
 from tablegen.device.schedule import Window as Lines
+from tablegen.device.schedule import has_ticks_for_pixels
 
 
 def _changed(program: CProgram, path: str, value: object) -> CProgram:
@@ -63,11 +66,11 @@ def refusals(libraries: Libraries) -> None:
     refused: list[tuple[int, str, object]] = [
         *((BAD_SCHEDULE, f"schedule.{key}", value) for key, value in (
             ("line_ticks", 0), ("line_ticks", (1 << 24) + 1), ("frame_lines", 0), ("frame_lines", 1 << 26),
-            ("frame_lines", 1 << 31), ("frame_lines", (1 << 32) - 1), ("turn_tick", 33), ("pixels", 33),
+            ("frame_lines", 1 << 31), ("frame_lines", (1 << 32) - 1), ("turn_tick", 33), ("pixels", 9),
             *((side, Window(*window)) for side, window in (
                 ("forward", (33, 0)), ("forward", (0, 33)), ("forward", (31, 2)), ("forward", (2**32 - 1, 2)),
                 ("backward", (33, 0)), ("backward", (1, 32)), ("up", (3, 0)), ("up", (1, 2)), ("down", (2, 1)),
-                ("down", (0, 3)),
+                ("down", (0, 3)), ("forward", (0, 3)), ("backward", (16, 3)),
             )),
         )),
         *_axis_refusals("x", 8), *_axis_refusals("y", 8),
@@ -79,8 +82,9 @@ def refusals(libraries: Libraries) -> None:
         assert not device.commit(), f"{path} = {value}: committed"
     accepted: list[tuple[str, object]] = [
         *((f"schedule.{key}", value) for key, value in (
-            ("turn_tick", 32), ("turn_tick", 0), ("pixels", 32), ("pixels", 0), ("settle_lines", (1 << 32) - 1),
-            ("forward", Window(32, 0)), ("forward", Window(0, 32)), ("forward", Window(31, 1)), ("down", Window(0, 2)),
+            ("turn_tick", 32), ("turn_tick", 0), ("pixels", 8), ("pixels", 0), ("settle_lines", (1 << 32) - 1),
+            ("forward", Window(32, 0)), ("forward", Window(0, 32)), ("forward", Window(28, 4)),
+            ("backward", Window(28, 4)), ("backward", Window(0, 0)), ("down", Window(0, 2)),
         )),
         *((f"{axis}.{key}", value) for axis in "xy" for key, value in (
             ("gain_word", (1 << 17) - 1), ("gain_word", -(1 << 17)), ("code_min", 0), ("code_min", 500),
@@ -103,6 +107,23 @@ def refusals(libraries: Libraries) -> None:
         got = device.load(program)
         assert got == reason, f"{several}: {got}"
     device.alive.append(axes)
+
+
+def crowded_windows(libraries: Libraries) -> None:
+    """Programs have a tick in each window for each pixel, or no tick; in short lines and in the longest."""
+    device = device_for(libraries.narrow, flat(1))
+    rng = np.random.default_rng(30)
+    for ticks in (32, 1 << 24):
+        program, axes = libraries.narrow.program(flat(1))
+        program.schedule.line_ticks = program.x.phase_period = ticks
+        program.y.phase_period = 2 * ticks
+        for pixels, forward, backward in pixels_near_ticks(rng, ticks, 400):
+            program.schedule.pixels = pixels
+            program.schedule.forward = Window(ticks - forward, forward)
+            program.schedule.backward = Window(0, backward)
+            fits = has_ticks_for_pixels(pixels, forward, backward)
+            assert device.load(program) == (LOADED if fits else BAD_SCHEDULE), (pixels, forward, backward)
+        device.alive.append(axes)
 
 
 def the_largest_schedules(libraries: Libraries) -> None:

@@ -55,7 +55,9 @@ MUTANTS: tuple[Mutant, ...] = (
         {
             "a window may begin behind its line": "window->first <= length && ",
             "a frame of no lines": "p->frame_lines != 0 && ",
-            "more pixels than ticks": " && p->pixels <= p->line_ticks",
+            "more pixels than ticks of the trace": "has_pixels(&p->forward, p->pixels) && ",
+            "more pixels than ticks of the retrace": " && has_pixels(&p->backward, p->pixels)",
+            "a window without ticks has no pixels": "window->count == 0 || ",
             "forward is not looked at": "inside(&p->forward, p->line_ticks) && ",
             "backward is not looked at": "&& inside(&p->backward, p->line_ticks)",
             "up is not looked at": "inside(&p->up, p->frame_lines) && ",

@@ -253,9 +253,9 @@ MUTANTS = [
         "        && dac_link_program_word(image, 0, DAC_LINK_TURN_TICK) <= ticks\n",
         "",
     ),
-    Mutant(
-        "pixels are not checked", CHECK, "        && dac_link_program_word(image, 0, DAC_LINK_PIXELS) <= ticks\n", ""
-    ),
+    Mutant("pixels of the trace are not checked", CHECK, "has_pixels(image, DAC_LINK_FORWARD) && ", ""),
+    Mutant("pixels of the retrace are not checked", CHECK, " && has_pixels(image, DAC_LINK_BACKWARD)\n", "\n"),
+    Mutant("a window without ticks has no pixels", CHECK, "count == 0 || ", ""),
     Mutant("steps are not checked", CHECK, "\n        && dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) <= 1;", ";"),
     Mutant("periods are not checked", CHECK, "        if (!good_period(l, image, axis))\n", "        if (false)\n"),
     Mutant(

@@ -11,10 +11,12 @@ from link_device import HostDevice
 from link_images import damaged, random_image, random_limits
 from link_programs import make_scan
 from link_talk import Talk, is_answer
+from programs import pixels_near_ticks
 from replacing import replace
 from sets import common, one_of
 
 from tablegen.device.dual_program import ScanProgram
+from tablegen.device.schedule import Window, has_ticks_for_pixels
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
 from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
@@ -128,6 +130,25 @@ def test_the_jump_of_y_is_the_largest_there_can_be(first: Callable[[Ints], int])
         assert bench.objection(image) == expected
         contents = take_apart(image.data, image.info.x, image.info.y)
         assert first_objection(contents, *limits, bench.playing) == expected
+
+
+def test_each_pixel_has_a_tick_of_each_window() -> None:
+    """Or the window has none: pixels and ticks about the edge, as the model judges them."""
+    rng = np.random.default_rng(30)
+    program = make_scan(1).program
+    everything = (AxisLimits(0, (1 << 16) - 1, 1 << 24, 1 << 24),) * 2
+    bench = Bench(program, "parked", everything, SequencerShape(16, 1, 7, 16, 1, 6, 16))
+    ticks, seen = program.schedule.ticks, set()
+    for pixels, forward, backward in pixels_near_ticks(rng, ticks, 60):
+        windows = {"forward": Window(ticks - forward, forward), "backward": Window(0, backward)}
+        changed = replace(program, schedule=replace(program.schedule, pixels=pixels, **windows))
+        image = make_image(changed, "00" * 32)
+        expected = None if has_ticks_for_pixels(pixels, forward, backward) else (Reason.SCHEDULE, 0)
+        contents = take_apart(image.data, image.info.x, image.info.y)
+        assert first_objection(contents, *everything, bench.playing) == expected
+        assert bench.objection(image) == expected, (pixels, forward, backward)
+        seen.add(expected)
+    assert len(seen) == 2
 
 
 def test_every_check_was_met() -> None:

@@ -19,7 +19,7 @@ _MANY_FRAMES = 0x8001  # a counter of fewer bits would count one
 _UNUSED_PAGES = (48, 144, 272, 1040, 32784)  # one bit more than a used one, or two bits
 _LONGER = 6000  # ticks by which a line is longer where that costs nothing
 _SWAPS = 14
-_REFUSAL_CLOCKS = 2  # clocks until a refusal is visible
+_REFUSAL_CLOCKS = 4  # clocks until a refusal is visible, of a commit on the clock of a write
 _WIDE_TICKS = 44  # ticks, fewer than the model has in a line, a frame or a window of such a program
 _IN_TURN: tuple[Kind, ...] = ("clamped", "held", "free", "free", "held")
 
@@ -315,8 +315,10 @@ class Requests:
         for discards in ("withdraw", "reset"):
             script.write(PROGRAM, words[:1])
             script.write_unfit(address, word)
+            script.wait(_REFUSAL_CLOCKS)
             script.write(PROGRAM, [words[address]], first=address)
             script.commit_unfit()  # a right word over a wrong one is not enough
+            script.wait(_REFUSAL_CLOCKS)
             script.request(discards, "clear_faults")
             script.write(PROGRAM, words[1:], first=1)
             script.commit_unfit()  # nor is a program without its beginning

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
-from tablegen.device.widths import AxisWidths, Widths, misfits
+from tablegen.device.widths import AxisWidths, Widths, cut_words
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO
 from tablegen.verification.play.placement import Placement
@@ -14,6 +14,8 @@ USED = [
     *range(len(SCAN_WORDS)),
     *(page * PAGE_WORDS + at for page in (1, 2) for at in range(len(AXIS_WORDS))),
 ]  # addresses of the words of a program
+_PIXELS = SCAN_WORDS.index("pixels")
+_COUNTS = [SCAN_WORDS.index(f"{window}_count") for window in ("forward", "backward")]
 _MASK = (1 << 32) - 1
 _ZEROS = (MAXIMUM_ZERO, MAXIMUM_ZERO + 1, 255)
 Fits = Callable[[int, int], bool]  # address, word
@@ -34,11 +36,12 @@ def c_edges(shape: SequencerShape, words: Sequence[int], shaping: int) -> list[t
     """
     scan = {name: words[at] for at, name in enumerate(SCAN_WORDS)}
     line, lines = scan["line_ticks"], scan["frame_lines"]
-    wrong = {"line_ticks": [0, line + 1], "frame_lines": [0], "turn_tick": [line + 1], "pixels": [line + 1]}
+    wrong = {"line_ticks": [0, line + 1], "frame_lines": [0], "turn_tick": [line + 1]}
     for window, length in (("forward", line), ("backward", line), ("up", lines), ("down", lines)):
         wrong |= {f"{window}_first": [length + 1], f"{window}_count": [length - scan[f"{window}_first"] + 1]}
     outside = [(SCAN_WORDS.index(name), word) for name, values in wrong.items() for word in values]
     outside.append((SCAN_WORDS.index("y_steps"), 1 - scan["y_steps"]))
+    outside += _crowded(words)
     for page, bits in ((1, shape.x_word_bits), (2, shape.y_word_bits)):
         axis = {name: words[page * PAGE_WORDS + at] for at, name in enumerate(AXIS_WORDS)}
         most = 1 << (bits + guard_bits(bits) - 1)
@@ -60,11 +63,12 @@ def c_edges(shape: SequencerShape, words: Sequence[int], shaping: int) -> list[t
 def edges(words: Sequence[int], widths: Widths) -> tuple[list[tuple[int, int]], list[dict[int, int]]]:
     """Return words at the edges of what fits a device, as (address, word), and the last that fit as whole programs.
 
-    ``words`` are a program that fits.
+    ``words`` are a program that fits. The first of them would be cut by their registers; those of more pixels than
+    ticks of a window are the last.
     """
 
     def fits(address: int, word: int) -> bool:
-        return not misfits([*words[:address], word, *words[address + 1 :]], widths)
+        return not cut_words([*words[:address], word, *words[address + 1 :]], widths)
 
     outside: list[tuple[int, int]] = []
     inside: list[list[tuple[int, int]]] = []
@@ -74,8 +78,19 @@ def edges(words: Sequence[int], widths: Widths) -> tuple[list[tuple[int, int]], 
         inside.append([(address, word) for word in last])
     programs = []
     for number in range(max(map(len, inside))):
-        programs.append(dict(one[number % len(one)] for one in inside if one))
-    return outside, programs
+        program = dict(one[number % len(one)] for one in inside if one)
+        most = [ticks for ticks in (program[address] for address in _COUNTS) if ticks]
+        programs.append(program | {_PIXELS: min([program[_PIXELS], *most])})
+    return outside + _crowded(words), programs
+
+
+def _crowded(words: Sequence[int]) -> list[tuple[int, int]]:
+    """Return words that leave a pixel of a program without a tick in a window, as (address, word)."""
+    used = [address for address in _COUNTS if words[address]]
+    if not used:
+        return []
+    crowded = [(_PIXELS, min(words[address] for address in used) + 1)]
+    return crowded + [(address, words[_PIXELS] - 1) for address in used if words[_PIXELS] > 1]
 
 
 def _edges(address: int, fits: Fits) -> tuple[list[int], list[int]]:

@@ -40,7 +40,7 @@ def wide_program(part: Part, like: DualProgram) -> WideProgram:
         schedule = replace(schedule, up=Window(0, 2), down=Window(0, 0))
         count = _TICK + _FIRST + 1
         highest = {"line_ticks": _TICK + 12, "turn_tick": _TICK + 8, "forward_count": count, "pixels": count}
-        highest |= {"backward_first": _TICK + 20}
+        highest |= {"backward_first": _TICK + 20, "backward_count": count}  # it has a tick for each pixel, too
     else:
         ticks, lines = schedule.ticks, _MODEL_LINES
         schedule = replace(schedule, lines=lines, settle_lines=0, up=Window(1, lines - 1), down=Window(lines - 1, 1))
