@@ -34,6 +34,7 @@ ELSEWHERE = {
     "operator.md": "tests/docs/test_operator_page.py",
     "python.md": "tests/api/test_python_page.py",
     "report.md": "not run",
+    "start/projects.md": "tests/docs/test_firmware_projects.py",
     "sweep.md": "tests/docs/test_sweep_page.py",
     "tables.md": "tests/docs/test_tables_page.py",
     "upload.md": "tests/docs/test_link_docs.py",
@@ -62,10 +63,10 @@ def test_every_page_that_shows_commands_is_run_or_in_the_list() -> None:
     with_commands = {name for name, path in pages.items() if COMMANDS.search(path.read_text("utf-8"))}
     assert with_commands - {*PAGES} == {*ELSEWHERE}
     listed = (REPOSITORY / "tests" / "README.md").read_text("utf-8").partition("**Pages.**")[2].partition("\n\n")[0]
-    assert {*re.findall(r"`(\w+\.md)`", listed)} == {*ELSEWHERE}
+    assert {*re.findall(r"`([\w/]+\.md)`", listed)} == {*ELSEWHERE}
     for name, where in ELSEWHERE.items():
         if where != "not run":
-            assert name in (REPOSITORY / where).read_text("utf-8"), where
+            assert Path(name).name in (REPOSITORY / where).read_text("utf-8"), where
 
 
 # Negative controls

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 import tarfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -51,6 +52,13 @@ def run_offline(command: Sequence[str | Path], folder: Path, **settings: str) ->
         timeout=PATIENCE_S,
         check=False,
     )
+
+
+def pack_platformio(folder: Path, own: Path) -> subprocess.CompletedProcess[str]:
+    """Pack a library with PlatformIO into ``own / "packed.tar.gz"``, with nothing of the user."""
+    own.mkdir()
+    command = [sys.executable, "-m", "platformio", "pkg", "pack", folder, "--output", own / "packed.tar.gz"]
+    return run_offline(command, own, PLATFORMIO_CORE_DIR=str(own), PLATFORMIO_SETTING_ENABLE_TELEMETRY="no")
 
 
 def unpacked(archive: Path, folder: Path) -> set[str]:

@@ -73,7 +73,8 @@ def run_page(page: Path, folder: Path, before: str = "") -> list[str]:
 
     They make what a reader of the page has already: the files of ``tablegen init``, a build.
     """
-    (folder / "examples").symlink_to(REPOSITORY / "examples")
+    if not (folder / "examples").exists():
+        (folder / "examples").symlink_to(REPOSITORY / "examples")
     script = script_of(page.read_text("utf-8"))
     text, outputs = [f"set -e\n{before}\n"], []
     for number, step in enumerate(script.steps):

@@ -1,4 +1,4 @@
-"""The C runtime as text and as symbols: warnings, static analysers, C++, what it exports and what it asks for."""
+"""The C runtime as text and as symbols: warnings, static analysers, what it exports and what it asks for."""
 
 import re
 from collections.abc import Sequence
@@ -101,23 +101,6 @@ def of_a_choice(pair: Any) -> Any:
 )
 def test_no_warnings(choice: str, compiler: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)
-
-
-@pytest.mark.common
-@pytest.mark.parametrize("compiler", ["g++", "clang++"])
-def test_the_header_is_cplusplus(compiler: str, tmp_path: Path) -> None:
-    """Included from C++17 it has C linkage, and its program is an initialiser."""
-    unit, header = tmp_path / "unit.cpp", HEADERS["dac_sequencer.h"]
-    unit.write_text(
-        '#include "dac_sequencer.h"\nstatic dac_sequencer sequencer;\nint main()\n{\n    const dac_converter c = {};\n'
-        "    dac_sequencer_init(&sequencer, &c, &c);\n    return dac_sequencer_commit(&sequencer);\n}\n"
-    )
-    warnings = [each for each in WARNINGS if "prototypes" not in each]
-    run_clean(["gcc" if compiler == "g++" else "clang", "-std=c99", "-c", *SOURCES], tmp_path)
-    objects = sorted(tmp_path.glob("*.o"))
-    program = tmp_path / "unit"
-    run_clean([compiler, "-std=c++17", *warnings, f"-I{header.parent}", unit, *objects, "-o", program])
-    run_clean([program])
 
 
 # clang's takes its time.

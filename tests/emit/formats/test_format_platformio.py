@@ -1,14 +1,12 @@
 """The PlatformIO library: its manifest by PlatformIO's own check, packed by it, and played from the package."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from building import NAME, run_clean
 from formatted import Formatted, check_finds_a_flip, formatted
-from packed_library import DEMANDING, MAIN, plays_the_model, run_offline, unpacked
+from packed_library import DEMANDING, MAIN, pack_platformio, plays_the_model, unpacked
 from short_scans import short
 
 from tablegen.version import __version__
@@ -43,18 +41,11 @@ def test_a_changed_build_is_found(tmp_path: Path) -> None:
     check_finds_a_flip(formatted(tmp_path, "short", "platformio"), "platformio", ["library.json", "tablegen_options.h"])
 
 
-def pack(folder: Path, own: Path) -> subprocess.CompletedProcess[str]:
-    """Pack a library, with nothing of the user."""
-    own.mkdir()
-    command = [sys.executable, "-m", "platformio", "pkg", "pack", folder, "--output", own / "packed.tar.gz"]
-    return run_offline(command, own, PLATFORMIO_CORE_DIR=str(own), PLATFORMIO_SETTING_ENABLE_TELEMETRY="no")
-
-
 @pytest.mark.rest
 def test_what_platformio_packs_plays_the_model(tmp_path: Path) -> None:
     """Without an option of the compiler, whatever the scan needs."""
     built = short(tmp_path, {"emit.formats": ["platformio", "verilog"], **DEMANDING})
-    done = pack(built.folder, tmp_path / "own")
+    done = pack_platformio(built.folder, tmp_path / "own")
     assert done.returncode == 0, done.stdout + done.stderr
     packed = tmp_path / "packed"
     names = unpacked(tmp_path / "own" / "packed.tar.gz", packed)
@@ -74,6 +65,6 @@ def test_a_version_that_is_none_is_refused(tmp_path: Path) -> None:
     built = short(tmp_path, {"emit.formats": ["platformio"]})
     wrong = built.files["library.json"].replace(f'"{__version__}"'.encode(), b'"none"')
     (built.folder / "library.json").write_bytes(wrong)
-    done = pack(built.folder, tmp_path / "own")
+    done = pack_platformio(built.folder, tmp_path / "own")
     assert done.returncode != 0
     assert "version" in done.stdout + done.stderr

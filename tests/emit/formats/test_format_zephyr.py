@@ -6,68 +6,29 @@ from pathlib import Path
 import kconfiglib
 import pytest
 import yaml
-from building import NAME, Build, run_clean
+import zephyr_tree
+from building import NAME, Build
 from editing import run, write_pair
 from formatted import Formatted, check_finds_a_flip, formatted
 from packed_library import MAIN, plays_the_model
 from short_scans import CUBIC, short
+from zephyr_tree import options
 
 SYMBOL = f"TABLEGEN_{NAME.upper()}"
 FILES = ("zephyr/module.yml", "zephyr/Kconfig", "zephyr/CMakeLists.txt")
-# What Zephyr does with a module, as far as this one goes: values of Kconfig as variables, one global list of macros and
-# folders of headers, and libraries that are linked whether an application asks for them or not.
+# That of docs/start/projects.md, with C alone.
 PROJECT = """
 cmake_minimum_required(VERSION 3.20)
+list(APPEND ZEPHYR_EXTRA_MODULES ${CMAKE_CURRENT_SOURCE_DIR}/module)
+find_package(Zephyr REQUIRED HINTS $ENV{ZEPHYR_BASE})
 project(play C)
-set(CMAKE_C_STANDARD 99)
-file(STRINGS ${CMAKE_CURRENT_SOURCE_DIR}/.config settings REGEX "^CONFIG_")
-foreach(setting ${settings})
-    string(REGEX MATCH "^([^=]+)=(.*)$" _ ${setting})
-    set(${CMAKE_MATCH_1} ${CMAKE_MATCH_2})
-endforeach()
-add_library(zephyr_interface INTERFACE)
-add_library(app STATIC main.c)
-add_executable(play empty.c)
-target_link_libraries(app PUBLIC zephyr_interface)
-target_link_libraries(play app)
-function(zephyr_include_directories)
-    foreach(folder ${ARGN})
-        get_filename_component(whole ${folder} ABSOLUTE)
-        target_include_directories(zephyr_interface INTERFACE ${whole})
-    endforeach()
-endfunction()
-function(zephyr_compile_definitions)
-    target_compile_definitions(zephyr_interface INTERFACE ${ARGN})
-endfunction()
-macro(zephyr_library_named name)
-    set(ZEPHYR_CURRENT_LIBRARY ${name})
-    add_library(${name} STATIC)
-    target_link_libraries(${name} PUBLIC zephyr_interface)
-    target_link_libraries(app PUBLIC ${name})
-endmacro()
-function(zephyr_library_sources)
-    target_sources(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
-endfunction()
-add_subdirectory(MODULE MODULE)
+target_sources(app PRIVATE main.c)
 """
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Formatted:
     return formatted(tmp_path_factory.mktemp("zephyr"), "short", "zephyr")
-
-
-def options(folder: Path, *settings: str) -> kconfiglib.Kconfig:
-    """The options of the module in a tree as Zephyr makes one, with the settings of an application."""
-    module = yaml.safe_load((folder / "zephyr" / "module.yml").read_bytes())
-    tree, own = folder.parent / "Kconfig", folder.parent / "prj.conf"
-    generated = f"config ZEPHYR_{module['name'].upper()}_MODULE\n\tbool\n\tdefault y\n"
-    source = folder / module["build"]["kconfig"]
-    tree.write_text(f'menu "{module["name"]}"\nosource "{source}"\n{generated}endmenu\n', "ascii")
-    own.write_text("".join(f"{setting}\n" for setting in settings), "ascii")
-    loaded = kconfiglib.Kconfig(str(tree), warn_to_stderr=False)
-    loaded.load_config(str(own))
-    return loaded
 
 
 def values(loaded: kconfiglib.Kconfig) -> dict[str, str]:
@@ -123,17 +84,9 @@ def test_kconfiglib_refuses_a_file_that_is_none(built: Formatted, tmp_path: Path
 def compiled(tmp_path: Path, folder: Path, *settings: str) -> Path:
     """Compile an application with a module, and return it."""
     shutil.copytree(folder, tmp_path / "module")
-    loaded = options(tmp_path / "module", *settings)
-    assert loaded.warnings == []
-    loaded.write_config(str(tmp_path / ".config"))
-    module = yaml.safe_load((tmp_path / "module" / "zephyr" / "module.yml").read_bytes())
-    place = f"module/{module['build']['cmake']}"
-    (tmp_path / "CMakeLists.txt").write_text(PROJECT.replace("MODULE", place), "ascii")
+    (tmp_path / "CMakeLists.txt").write_text(PROJECT, "ascii")
     (tmp_path / "main.c").write_text(MAIN, "ascii")
-    (tmp_path / "empty.c").write_text("", "ascii")
-    run_clean(["cmake", "-S", tmp_path, "-B", tmp_path / "made"])
-    run_clean(["cmake", "--build", tmp_path / "made"])
-    return tmp_path / "made" / "play"
+    return zephyr_tree.compiled(tmp_path, tmp_path / "module", tmp_path / "made", *settings)
 
 
 def module_of(tmp_path: Path, changes: dict[str, object]) -> Build:
@@ -143,11 +96,14 @@ def module_of(tmp_path: Path, changes: dict[str, object]) -> Build:
 @pytest.mark.rest
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"dac.bits": 18, "x.table.bits": 18, "y.table.bits": 18}, {"dac.shaping": "second", "x.table": CUBIC}],
-    ids=["16 bits", "18 bits", "shaped and cubic"],
+    [{"dac.bits": 18, "x.table.bits": 18, "y.table.bits": 18}, {"dac.shaping": "second", "x.table": CUBIC}],
+    ids=["18 bits", "shaped and cubic"],
 )
 def test_an_application_plays_the_model(tmp_path: Path, changes: dict[str, object]) -> None:
-    """With one line in its settings: macros of the runtime are those of the module."""
+    """With one line in its settings: macros of the runtime are those of the module.
+
+    ``tests/docs/test_firmware_projects.py`` has one of 16 bits.
+    """
     built = module_of(tmp_path, changes)
     assert plays_the_model(compiled(tmp_path, built.folder, f"CONFIG_{SYMBOL}=y"), built.plan.program)
 
