@@ -6,7 +6,8 @@
 # make test-long what is seldom worth its time: more seeds and combinations, tables of docs, 100,000 random swaps
 # make durations where CPU time goes, by folder and by test, into build/durations.txt (OF=tests/emit: of these alone)
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
-# make instructions what the C takes on Cortex-M, into docs/instructions.md
+# make instructions what the C takes on Cortex-M and RISC-V, into docs/instructions.md, and what tables take, into the
+#                package and docs/tables.md
 # make link      what an upload takes, into docs/upload.md
 # make fuzz      a million inputs for the C link, plain and with splines and shaping, with sanitizers, on from the corpus
 # make bench     tablegen beside what others use, into benchmarks/results.md (ONLY=line: that section)
@@ -105,9 +106,12 @@ resources: $(VENV)/installed-test
 	$(BIN)/python benchmarks/resources.py --write
 
 instructions: $(VENV)/installed-test
-	@.ci/system-packages gcc-arm-none-eabi
+	@.ci/system-packages gcc-arm-none-eabi gcc-riscv64-unknown-elf yosys nextpnr-ice40
 	$(BIN)/python benchmarks/firmware.py --write
 	$(BIN)/python benchmarks/firmware_link.py --write
+	$(BIN)/python benchmarks/tables.py --costs
+	$(BIN)/python benchmarks/turned_costs.py --write
+	$(BIN)/python benchmarks/tables.py --write
 
 link: $(VENV)/installed-test
 	@.ci/system-packages gcc-arm-none-eabi
