@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from editing import SCAN, SCANNER, edited, write_pair
 from foreign_plants import BIAS, TEN, V_MAX, BoucWen, Core, Floats, ForeignPlant, JilesAtherton, ManyPlays, record
+from msgspec.structs import replace
 from operator_files import operator_file as operator_file_of_plays
 from stepped_plants import play_of
 
@@ -21,6 +22,7 @@ from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.virtual.preisach import Preisach
 
 SIMPLE = "simple"  # an operator that no fit has made
+UNCOUPLED = 0.0, 0.0
 SAMPLES = 320  # of a line, on which foreign piezos are stepped
 
 
@@ -67,23 +69,43 @@ def operator_bytes(piezo: str, axis: str) -> bytes:
     return operator_file(fit, "x" if axis == "x" else "y", V_MAX)
 
 
-def write_turned(folder: Path, angle_deg: float, *edits: str, piezo: str = SIMPLE, size_nm: float = 300.0) -> Path:
-    """The example at an angle, of so many lines, with an operator on both axes."""
+def write_turned(
+    folder: Path,
+    angle_deg: float,
+    *edits: str,
+    piezo: str = SIMPLE,
+    size_nm: float = 300.0,
+    coupling: tuple[float, float] = UNCOUPLED,
+) -> Path:
+    """The example at an angle, of so many lines, with an operator on both axes; coupling is ``x_per_y, y_per_x``."""
     for axis in "xy":
         (folder / f"operator_{axis}.toml").write_bytes(operator_bytes(piezo, axis))
     sizes = (f"x.size_nm = {size_nm}", f"y.size_nm = {size_nm}", "timing.lines = 48")
     scan = f"angle_deg = {angle_deg}\n" + edited(SCAN, *EDITS, *sizes, *edits)
-    return write_pair(folder, scan, edited(SCANNER, *OPERATORS))
+    coupled = f"+ [coupling]\nx_per_y = {coupling[0]}\ny_per_x = {coupling[1]}"
+    return write_pair(folder, scan, edited(SCANNER, *OPERATORS, *([] if coupling == UNCOUPLED else [coupled])))
 
 
-def turned_setup(folder: Path, angle_deg: float, *edits: str, piezo: str = SIMPLE, size_nm: float = 300.0) -> Setup:
+def turned_setup(
+    folder: Path,
+    angle_deg: float,
+    *edits: str,
+    piezo: str = SIMPLE,
+    size_nm: float = 300.0,
+    coupling: tuple[float, float] = UNCOUPLED,
+) -> Setup:
     """The setup of it."""
-    return load(write_turned(folder, angle_deg, *edits, piezo=piezo, size_nm=size_nm))
+    return load(write_turned(folder, angle_deg, *edits, piezo=piezo, size_nm=size_nm, coupling=coupling))
 
 
-def on_the_piezo(plan: TurnedPlan, piezo: str) -> dict[str, float]:
-    """Errors of the emitted integers on the piezo itself: stepped over the frame, with its creep and dynamics."""
-    return frame_errors(plan, *(moved(plan, piezo, axis) for axis in "xy"), _phases(plan))
+def on_the_piezo(plan: TurnedPlan, piezo: str, coupling: tuple[float, float] = UNCOUPLED) -> dict[str, float]:
+    """Errors of the emitted integers on the piezo itself: stepped over the frame, with its creep and dynamics.
+
+    Its axes are coupled by ``x_per_y, y_per_x``, whatever the plan knows of it.
+    """
+    x, y = (moved(plan, piezo, axis) for axis in "xy")
+    sample = x + coupling[0] * y, y + coupling[1] * x
+    return frame_errors(plan, *sample, _phases(plan), replace(plan.geometry, x_per_y=0.0, y_per_x=0.0))
 
 
 def moved(plan: TurnedPlan, piezo: str, axis: str) -> Floats:
