@@ -192,6 +192,7 @@ def test_words_can_be_written_in_any_order(tmp_path: Path) -> None:
     for _ in range(8):
         program, other = (random_dual(rng, shape, kind="tame") for _ in range(2))
         in_any_order(rng, script, program, other)
+        script.wait_ticks(2)  # behind a word of the scan page a commit is two clocks later
         script.request("commit", "arm", program=program)
         script.wait_ticks(3)
         script.request("trigger")
