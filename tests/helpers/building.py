@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import tomllib
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -209,7 +210,7 @@ def changed(path: Path, changes: Changes) -> dict[str, Any]:
         if value is REMOVED:
             del table[last]
         else:
-            table[last] = value
+            table[last] = deepcopy(value)  # a later change of a key inside it is no change of the caller
     return values
 
 
