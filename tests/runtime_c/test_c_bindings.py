@@ -57,7 +57,7 @@ def test_a_program_in_cplusplus_plays_the_model(compiler: str, built: Build, tmp
     assert plays_the_model(linked(built, tmp_path, tmp_path / "main.o"), built.plan.program)
 
 
-@pytest.mark.rest
+@pytest.mark.long
 def test_a_program_in_zig_plays_the_model(built: Build, tmp_path: Path) -> None:
     """Zig 0.17 has no ``@cImport`` any more: a command translates the header.
 
