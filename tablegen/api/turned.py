@@ -47,7 +47,7 @@ def build_turned(
     out : str or Path, optional
         Directory; files of an earlier build there are removed.
     formats : sequence of str, optional
-        "c" and "verilog"; by default those of the scan, or "c" alone.
+        "c", "verilog" and packages of them; by default those of the scan, or "c" alone.
     progress : callable
         Called with a text for each stage.
 

@@ -4,7 +4,7 @@ Units are part of every name. The ranges are defined here only: the decoder chec
 them.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct
 
@@ -462,7 +462,21 @@ class Cost(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 DEFAULT_FORMATS = ("c", "verilog")
-FORMATS_WITH_Z = ("c", "verilog")  # which have a second sequencer
+SequencerFormat = Literal[
+    "c",
+    "verilog",
+    "arduino",
+    "cargo",
+    "cmsis-pack",
+    "constraints",
+    "esp-idf",
+    "fusesoc",
+    "platformio",
+    "zephyr",
+]
+"""A format that plays every scan: a sequencer, or a package around one. Others have the tables of a line and a frame.
+"""
+SEQUENCER_FORMATS: tuple[str, ...] = get_args(SequencerFormat)
 
 
 class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -11,7 +11,7 @@ from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
 from tablegen.config.load import Setup
 from tablegen.config.names import of_the_runtime
-from tablegen.config.schema import FORMATS_WITH_Z
+from tablegen.config.schema import SEQUENCER_FORMATS
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen, failing_as_format, files_of, runtime_paths
@@ -22,13 +22,13 @@ from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifest_file, require_readable
 from tablegen.planning.clock import slow_clocks_per_tick
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.planning.sine_setup import PIXEL_FORMATS
 from tablegen.version import __version__
 
 # Names of plain files that manifests can list; only a file in a sub-folder has a name without a suffix.
 _PART = "[A-Za-z0-9_][A-Za-z0-9_-]*"
 _SUFFIX = r"(\.[A-Za-z0-9][A-Za-z0-9_]*)"
 _FILE_NAME = re.compile(rf"({_PART}/)+{_PART}{_SUFFIX}*|{_PART}{_SUFFIX}+")
+_SEQUENCERS = f"one of {', '.join(SEQUENCER_FORMATS)}"
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:
@@ -60,10 +60,10 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     files: dict[str, bytes] = {}
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in chosen_formats:
-        if plan.schedule.pixel_table is not None and each.name not in PIXEL_FORMATS:
-            raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take c or verilog")
-        if plan.z is not None and each.name not in FORMATS_WITH_Z:
-            raise Unphysical(f"{each.name!r} plays no output z; take c or verilog, or leave [z] out")
+        if plan.schedule.pixel_table is not None and each.name not in SEQUENCER_FORMATS:
+            raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take {_SEQUENCERS}")
+        if plan.z is not None and each.name not in SEQUENCER_FORMATS:
+            raise Unphysical(f"{each.name!r} plays no output z; leave [z] out, or take {_SEQUENCERS}")
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each, plan.z is not None)

@@ -10,6 +10,7 @@ from tablegen.emit.c_text import beyond_defaults, literal
 from tablegen.emit.constants import LEAST_STORAGE_BITS, axis_constants, sequence_constants, storage_bits
 from tablegen.emit.templates import comment_safe, rows, template
 from tablegen.emit.turned_content import TurnedContent
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.numerics.arrays import Ints
@@ -25,6 +26,14 @@ def slow_c_files(content: TurnedContent, storage: dict[str, int]) -> dict[str, b
         f"{content.name}_program.c": "c/turned_program.c.j2",
     }
     return {name: template(source, context, literal) for name, source in sources.items()}
+
+
+def slow_constants(content: TurnedContent) -> dict[str, int]:
+    """Return all numbers of the header of a scan, those of its schedule and of both axes, without the scan's name."""
+    constants = sequence_constants(content.program.schedule)
+    for letter, axis in zip("XY", content.axes, strict=True):
+        constants |= {f"{letter}_{key}": value for key, value in _axis_constants(axis).items()}
+    return constants
 
 
 def slow_storage(programs: Sequence[ScanProgram]) -> dict[str, int]:
@@ -54,11 +63,6 @@ def _context(content: TurnedContent, storage: dict[str, int]) -> dict[str, Any]:
 def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
     program = content.axes["xy".index(axis)]
     prefix = f"{content.name}_{axis}"
-    constants = {
-        key: value
-        for key, value in axis_constants(program.fast, 0).items()
-        if not key.startswith("FOURIER") and key != "HARMONICS"
-    }
     arrays = {
         "table": (f"{content.name}_word", _with_first_again(program.fast.words)),
         "second": ("int8_t", program.second),
@@ -70,7 +74,7 @@ def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
         "axis": axis,
         "prefix": prefix,
         "PREFIX": prefix.upper(),
-        "constants": constants,
+        "constants": _axis_constants(program),
         "shaped": bool(program.output.shaping.order),
         "arrays": [
             {"name": f"{prefix}_{key}", "type": kind, "length": len(words), "rows": rows(words)}
@@ -84,6 +88,11 @@ def _axis(content: TurnedContent, axis: str) -> dict[str, Any]:
         "slow_gain_word": program.slow.gain_word,
         "slow_offset_word": program.slow.offset_word,
     }
+
+
+def _axis_constants(axis: FrameProgram) -> dict[str, int]:
+    constants = axis_constants(axis.fast, 0)
+    return {key: value for key, value in constants.items() if not key.startswith("FOURIER") and key != "HARMONICS"}
 
 
 def _with_first_again(words: Ints) -> Ints:

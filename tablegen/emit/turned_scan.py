@@ -6,10 +6,12 @@ from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.certificate.turned_errors import TurnedCertificate
 from tablegen.certificate.turned_summary import turned_summary
 from tablegen.config.load import Setup
+from tablegen.config.schema import SEQUENCER_FORMATS
 from tablegen.device.clocks import least_slow_clocks
+from tablegen.emit.formats import chosen
 from tablegen.emit.render import format_rejected
 from tablegen.emit.templates import comment_safe
-from tablegen.emit.turned import TURNED_FORMATS, require_format, turned_files, turned_runtime
+from tablegen.emit.turned import require_format, turned_files, turned_runtime
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.turned_record import turned_manifest, turned_record
@@ -26,11 +28,14 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
     Rejected
         For a format that a scan at an angle does not have.
     """
-    names = tuple(dict.fromkeys(formats or setup.scan.emit.formats or ("c",)))
-    if not set(names) <= set(TURNED_FORMATS):
-        why = "a scan at an angle, on coupled axes or with drift has the formats c and verilog"
-        raise format_rejected(setup, why, explicit=formats is not None)
-    return names
+    names = formats or setup.scan.emit.formats or ("c",)
+    for name in names:
+        if name not in SEQUENCER_FORMATS:
+            why = f"{name!r} holds no scan at an angle, on coupled axes or with drift; formats of one are " + ", ".join(
+                SEQUENCER_FORMATS
+            )
+            raise format_rejected(setup, why, explicit=formats is not None)
+    return tuple(each.name for each in chosen(names))
 
 
 def turned_clocks(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, explicit: bool = False) -> int:

@@ -16,7 +16,7 @@ from tablegen.base.input_errors import shortened
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import other_than_file, other_than_folder, read_bytes
 from tablegen.config.names import why_not_a_name
-from tablegen.config.schema import DEFAULT_FORMATS, FORMATS_WITH_Z, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
+from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH, SEQUENCER_FORMATS
 from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
@@ -182,8 +182,8 @@ def _stored_z(plain: Any, manifest: Manifest) -> "tuple[StraightZ, ScanProgram]"
     from tablegen.manifest.frame_fields import StraightZ
 
     z = msgspec.convert(plain, StraightZ)
-    if not set(manifest.formats) <= set(FORMATS_WITH_Z):
-        raise ValueError("formats: a scan with the output z has the formats c and verilog alone")
+    if not set(manifest.formats) <= set(SEQUENCER_FORMATS):
+        raise ValueError(f"formats: those of a scan with the output z are {', '.join(SEQUENCER_FORMATS)}")
     if not _finite(z):
         raise ValueError("z holds a number that is not finite")
     return z, program_beside(z.program(manifest.sequence), manifest.sequence.schedule)

@@ -9,6 +9,7 @@ from msgspec import Meta, Struct
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import read_bytes
 from tablegen.config.names import why_not_a_name
+from tablegen.config.schema import SEQUENCER_FORMATS, SequencerFormat
 from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.manifest.fields import BuildFileName, Digest, FileName, ManifestSequence, Version
@@ -52,7 +53,7 @@ class TurnedManifest(Struct, kw_only=True):
     files: dict[BuildFileName, Digest]
     sequence: ManifestSequence
     turned: TurnedFields
-    formats: Annotated[list[Literal["c", "verilog"]], Meta(min_length=1, max_length=2)] = msgspec.field(
+    formats: Annotated[list[SequencerFormat], Meta(min_length=1, max_length=len(SEQUENCER_FORMATS))] = msgspec.field(
         default_factory=lambda: ["c"]
     )
     clocks_per_tick: Annotated[int, Meta(ge=0, lt=1 << 31)] = 0

@@ -6,13 +6,12 @@ from msgspec.structs import replace
 
 from tablegen.base.input_errors import Problems
 from tablegen.config.load import Setup
-from tablegen.config.schema import DEFAULT_FORMATS, Scan
+from tablegen.config.schema import DEFAULT_FORMATS, SEQUENCER_FORMATS, Scan
 
 SINE = (
-    "a sine is for `check`, `show`, `build` with the formats c and verilog, `verify`, `upload`, `readback`, `live` "
+    "a sine is for `check`, `show`, `build` with formats that have a sequencer, `verify`, `upload`, `readback`, `live` "
     "and `simulate`; leave this out, or take 'line', for anything else"
 )
-PIXEL_FORMATS = ("c", "verilog")  # which play a table of pixels
 _DEFAULT_PIXEL_FORMATS = ("c",)  # a build of today keeps its files
 _HARMONICS = "a sine has one harmonic of the drive; leave this out, or take motion = 'line'"
 
@@ -49,10 +48,10 @@ def sine_setup(setup: Setup, problems: Problems) -> Setup:
             file, "x.refinement", "the layer belongs to a straight line; leave it out, or take motion = 'line'"
         )
     for i, name in enumerate(scan.emit.formats or ()):
-        if name not in PIXEL_FORMATS:
+        if name not in SEQUENCER_FORMATS:
             why = (
-                f"{name!r} has no table of pixels, which a sine needs; take formats = ['c', 'verilog'], "
-                "or motion = 'line'"
+                f"{name!r} has no table of pixels, which a sine needs; take motion = 'line', or one of "
+                f"{', '.join(SEQUENCER_FORMATS)}"
             )
             problems.add(file, f"emit.formats[{i}]", why)
     x = replace(scan.x, band_limit=replace(limit, harmonics=1, max_scaling_error_percent=None, cutoff_hz=None))

@@ -120,7 +120,12 @@ def _target(folder: Path, formats: Sequence[str], target: str | None) -> Literal
 def _content_of(stored: StoredTurned) -> TurnedContent:
     manifest = stored.manifest
     return TurnedContent(
-        manifest.name, manifest.hash, stored.program, clocks_per_tick=manifest.clocks_per_tick, z=stored.z
+        manifest.name,
+        manifest.hash,
+        stored.program,
+        manifest.tablegen,
+        clocks_per_tick=manifest.clocks_per_tick,
+        z=stored.z,
     )
 
 

@@ -9,6 +9,7 @@ from editing import SCANNER, run
 from turned_scans import turned_setup, write_turned
 
 import tablegen
+from tablegen.config.schema import SEQUENCER_FORMATS
 
 SHORT = ("timing.lines = 16", "x.band_limit.harmonics = 12", "timing.line_rate_hz = 400")
 
@@ -130,14 +131,13 @@ def test_another_format_is_refused(scan: Path, tmp_path: Path) -> None:
     outcome = run("build", scan, "-o", tmp_path / "out", "-f", "csv")
     assert outcome.status == 2
     assert outcome.err.splitlines() == [
-        "formats: a scan at an angle, on coupled axes or with drift has the formats c and verilog"
+        "formats: 'csv' holds no scan at an angle, on coupled axes or with drift; formats of one are "
+        + ", ".join(SEQUENCER_FORMATS)
     ]
     path = write_turned(tmp_path, 30.0, *SHORT, "+ [emit]\nformats = ['c', 'csv']")
     outcome = run("check", path)
     assert outcome.status == 2
-    assert (
-        "emit.formats: a scan at an angle, on coupled axes or with drift has the formats c and verilog" in outcome.err
-    )
+    assert "emit.formats: 'csv' holds no scan at an angle, on coupled axes or with drift; formats" in outcome.err
 
 
 def test_a_limit_that_is_exceeded_ends_with_its_status(tmp_path: Path) -> None:

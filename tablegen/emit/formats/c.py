@@ -21,6 +21,7 @@ from tablegen.emit.constants import (
 )
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
+from tablegen.emit.package import CPackage
 from tablegen.emit.templates import comment_safe, rows, template
 from tablegen.emit.turned_content import content_beside
 from tablegen.fixedpoint.output import GAIN_BITS
@@ -84,14 +85,25 @@ def arrays_file(content: Content) -> str:
     return f"{content.name}.h" if content.header_only else f"{content.name}.c"
 
 
-def public_headers(content: Content) -> list[str]:
+def c_package(content: Content) -> CPackage:
+    """Return the C of a build as a package names it."""
+    return CPackage(
+        content.name,
+        content.version,
+        content.hash,
+        sorted([*FORMAT.files(content), *(path.name for path in FORMAT.runtime())]),
+        public_headers(content.name, header_only=content.header_only, with_z=content.z is not None),
+        runtime_options(content),
+        scan_constants(content),
+        content.header_only,
+        content.z is not None,
+    )
+
+
+def public_headers(name: str, *, header_only: bool = False, with_z: bool = False) -> list[str]:
     """List the headers that an application includes: constants, and the objects of the program unless header-only."""
-    return [f"{content.name}.h", "dac_sequencer.h" if content.header_only else f"{content.name}_program.h"]
-
-
-def packaged_files(content: Content) -> list[str]:
-    """List all C files of a build with their headers, the runtime's too, for a package that names them."""
-    return sorted([*FORMAT.files(content), *(path.name for path in FORMAT.runtime())])
+    headers = [f"{name}.h", "dac_sequencer.h" if header_only else f"{name}_program.h"]
+    return [*headers, *([f"{name}_z_program.h"] if with_z else [])]
 
 
 def runtime_options(content: Content) -> dict[str, int]:

@@ -4,16 +4,17 @@ from pathlib import Path
 
 from tablegen.base.resources import resource_folder
 from tablegen.emit.c_text import literal
-from tablegen.emit.constants import is_wide, scan_constants
-from tablegen.emit.content import Content
-from tablegen.emit.format import Format
-from tablegen.emit.formats.c import packaged_files, runtime_options
+from tablegen.emit.constants import is_wide
+from tablegen.emit.package import CPackage
+from tablegen.emit.package_format import PackageOfC
 from tablegen.emit.templates import template
 
-ROOM_BYTES = 768  # of a sequencer: 712 with all options on a machine of 64 bits; the bridge does not compile in less
+# Of a sequencer on a machine of 64 bits with all options: 768 bytes, 1008 with a slow part. The bridge does not compile
+# in less.
+_ROOM_BYTES, _ROOM_BYTES_WITH_SLOW_PART = 768, 1024
 
 
-class Cargo(Format):
+class Cargo(PackageOfC):
     """The format cargo: ``Cargo.toml``, ``lib.rs`` and ``build.rs`` make the folder of a build a crate.
 
     The files stand beside the C and not in ``src``: a folder of that name would be all that Arduino compiles.
@@ -22,13 +23,12 @@ class Cargo(Format):
     name = "cargo"
     purpose = "crate of Rust (no_std) around the format c: the folder of the build, as a dependency with a path"
     file_names = "Cargo.toml, lib.rs, build.rs"
-    needs = ("c",)
 
-    def files(self, content: Content) -> dict[str, bytes]:
+    def package_files(self, package: CPackage) -> dict[str, bytes]:
         """Render the manifest of the crate, its interface, and the program that compiles the C files."""
-        context = _context(content)
+        context = _context(package)
         return {
-            "Cargo.toml": _manifest(content),
+            "Cargo.toml": _manifest(package),
             "lib.rs": template("cargo/lib.rs.j2", context, literal),
             "build.rs": template("cargo/build.rs.j2", context, literal),
         }
@@ -41,21 +41,21 @@ class Cargo(Format):
 FORMAT = Cargo()
 
 
-def _crate(content: Content) -> str:
+def _crate(package: CPackage) -> str:
     """Return the name of the crate; with ``tablegen_`` before it, no scan has that of a keyword or of ``core``."""
-    return f"tablegen_{content.name}"
+    return f"tablegen_{package.name}"
 
 
-def _manifest(content: Content) -> bytes:
+def _manifest(package: CPackage) -> bytes:
     """Return ``Cargo.toml``; ``links`` lets Cargo refuse a second sequencer before the linker does."""
-    names = ["Cargo.toml", "lib.rs", "build.rs", *packaged_files(content)]
+    names = ["Cargo.toml", "lib.rs", "build.rs", *package.files]
     lines = [
         "[package]",
-        f'name = "{_crate(content)}"',
-        f'version = "{content.version}"',
+        f'name = "{_crate(package)}"',
+        f'version = "{package.version}"',
         'edition = "2021"',
         'rust-version = "1.63"',
-        f'description = "Scan {content.name}, played by its sequencer. Build {content.hash}"',
+        f'description = "Scan {package.name}, played by its sequencer. Build {package.hash}"',
         'build = "build.rs"',
         'links = "dac_sequencer"',
         "publish = false",
@@ -69,20 +69,22 @@ def _manifest(content: Content) -> bytes:
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def _context(content: Content) -> dict[str, object]:
+def _context(package: CPackage) -> dict[str, object]:
     """Return the variables of both templates."""
-    options, names = runtime_options(content), packaged_files(content)
+    options, names = package.options, package.files
     return {
-        "version": content.version,
-        "name": content.name,
-        "NAME": content.name.upper(),
-        "crate": _crate(content),
-        "hash": content.hash,
-        "header_only": content.header_only,
+        "version": package.version,
+        "name": package.name,
+        "NAME": package.name.upper(),
+        "crate": _crate(package),
+        "hash": package.hash,
+        "header_only": package.header_only,
+        "sequencers": [("", package.name), *([("_z", f"{package.name}_z")] if package.with_z else [])],
+        "with_z": package.with_z,
         "sources": [name for name in names if name.endswith(".c")],
         "headers": [name for name in names if name.endswith(".h")],
         "options": list(options.items()),
         "word_bytes": options["DAC_OUTPUT_STORAGE_BITS"] // 8,
-        "room": ROOM_BYTES,
-        "constants": [(key, value, is_wide(key)) for key, value in scan_constants(content).items()],
+        "room": _ROOM_BYTES_WITH_SLOW_PART if "DAC_SLOW_PART" in options else _ROOM_BYTES,
+        "constants": [(key, value, is_wide(key)) for key, value in package.constants.items()],
     }

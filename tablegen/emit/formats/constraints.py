@@ -5,9 +5,8 @@ from math import ceil, floor
 from pathlib import Path
 
 from tablegen.base.resources import resource_folder
-from tablegen.emit.content import Content
-from tablegen.emit.format import Format
-from tablegen.emit.formats.verilog import FORMAT as VERILOG
+from tablegen.emit.package import VerilogPackage
+from tablegen.emit.package_format import PackageOfVerilog
 
 _FIRST = "dac_synchronise_first"  # the first flip-flop of every synchroniser
 _NO_CLOCK = "The scan has no [emit] clock_hz: constrain the clock here."
@@ -16,49 +15,48 @@ _GENERATED = "constraint out if a PLL makes the clock, and the tool derives it."
 _CROSSING = "Signals of other clock domains are not timed up to the first flip-flop of their dac_synchronise."
 
 
-class Constraints(Format):
+class Constraints(PackageOfVerilog):
     """The format constraints: a file of timing constraints for each tool, and two scripts in Tcl."""
 
     name = "constraints"
     purpose = "constraints of Vivado, Quartus, Diamond, Radiant and Gowin, two scripts in Tcl, and a synchroniser"
     file_names = "NAME.xdc, NAME.lpf, NAME_*.sdc, NAME_*.tcl, dac_synchronise.v"
-    needs = ("verilog",)
 
-    def files(self, content: Content) -> dict[str, bytes]:
+    def package_files(self, package: VerilogPackage) -> dict[str, bytes]:
         """Render the constraints and the scripts."""
-        name = content.name
+        name = package.name
         texts = {
             f"{name}.xdc": [
-                *_create_clock(content),
+                *_create_clock(package),
                 *_comments("#", _CROSSING),
                 f"set_false_path -quiet -to [get_cells -quiet -hierarchical -filter {{NAME =~ *{_FIRST}_reg*}}]",
             ],
             f"{name}_quartus.sdc": [
-                *_create_clock(content),
+                *_create_clock(package),
                 "derive_pll_clocks",
                 "derive_clock_uncertainty",
                 *_comments("#", _CROSSING),
                 f"set_false_path -to [get_registers -compatibility_mode {{*{_FIRST}*}}]",
             ],
             f"{name}_radiant.sdc": [
-                *_create_clock(content),
+                *_create_clock(package),
                 *_comments("#", _CROSSING),
                 f"set_false_path -to [get_cells {{*{_FIRST}*}}]",
             ],
             f"{name}_gowin.sdc": [
-                *_create_clock(content, "//"),
+                *_create_clock(package, "//"),
                 *_comments("//", _CROSSING),
                 f"set_false_path -to [get_regs {{*{_FIRST}*}}]",
             ],
             f"{name}.lpf": [
-                *_frequency(content),
+                *_frequency(package),
                 *_comments("#", _CROSSING),
                 f'BLOCK PATH TO CELL "*{_FIRST}*" ;',
             ],
-            f"{name}_vivado.tcl": _vivado(content),
-            f"{name}_quartus.tcl": _quartus(content),
+            f"{name}_vivado.tcl": _vivado(package),
+            f"{name}_quartus.tcl": _quartus(package),
         }
-        return {file: _text(file, f"{name}, build {content.hash}", lines) for file, lines in texts.items()}
+        return {file: _text(file, f"{name}, build {package.hash}", lines) for file, lines in texts.items()}
 
     def runtime(self) -> list[Path]:
         """Return the synchroniser, which no other format has."""
@@ -77,34 +75,34 @@ def _comments(mark: str, *lines: str) -> list[str]:
     return [f"{mark} {line}" for line in lines]
 
 
-def _create_clock(content: Content, mark: str = "#") -> list[str]:
+def _create_clock(package: VerilogPackage, mark: str = "#") -> list[str]:
     """Return the clock of the build in SDC; its period is rounded down to whole ps."""
-    if not content.clocks_per_tick:
+    if not package.clocks_per_tick:
         return _comments(mark, _NO_CLOCK)
-    period_ps = floor(10**12 / (content.clocks_per_tick * content.schedule.update_rate_hz))
+    period_ps = floor(10**12 / (package.clocks_per_tick * package.update_rate_hz))
     period = f"{period_ps // 1000}.{period_ps % 1000:03d}"
     return [
-        *_comments(mark, _PORT.format(name=content.name), _GENERATED),
-        f"create_clock -name {content.name}_clock -period {period} [get_ports {{clock}}]",
+        *_comments(mark, _PORT.format(name=package.name), _GENERATED),
+        f"create_clock -name {package.name}_clock -period {period} [get_ports {{clock}}]",
     ]
 
 
-def _frequency(content: Content) -> list[str]:
+def _frequency(package: VerilogPackage) -> list[str]:
     """Return the clock of the build as a preference of Lattice; its frequency is rounded up to whole Hz."""
-    if not content.clocks_per_tick:
+    if not package.clocks_per_tick:
         return _comments("#", _NO_CLOCK)
-    clock_hz = ceil(content.clocks_per_tick * content.schedule.update_rate_hz)
+    clock_hz = ceil(package.clocks_per_tick * package.update_rate_hz)
     return [
-        *_comments("#", _PORT.format(name=content.name), _GENERATED),
+        *_comments("#", _PORT.format(name=package.name), _GENERATED),
         f'FREQUENCY PORT "clock" {clock_hz // 10**6}.{clock_hz % 10**6:06d} MHz ;',
     ]
 
 
-def _build_files(content: Content) -> dict[str, list[str]]:
+def _build_files(package: VerilogPackage) -> dict[str, list[str]]:
     """Return the files of the build that a tool reads, by their ending."""
-    runtime = [path.name for path in (*VERILOG.runtime(), *FORMAT.runtime())]
-    written = sorted(VERILOG.files(content))
-    modules = [*(each for each in written if each.endswith(".v")), *sorted(runtime)]
+    modules = sorted([*package.modules, *(path.name for path in FORMAT.runtime())])
+    written = package.written
+    modules = [*(each for each in written if each.endswith(".v")), *modules]
     return {ending: [each for each in written if each.endswith(ending)] for ending in (".vh", ".mem")} | {".v": modules}
 
 
@@ -115,8 +113,8 @@ def _tcl_list(variable: str, names: Iterable[str]) -> list[str]:
 _FOLDER = "set folder [file dirname [file normalize [info script]]]"
 
 
-def _vivado(content: Content) -> list[str]:
-    files = _build_files(content)
+def _vivado(package: VerilogPackage) -> list[str]:
+    files = _build_files(package)
     return [
         "# Adds the build to the open project: source it in the Tcl console, or in a script.",
         _FOLDER,
@@ -126,12 +124,12 @@ def _vivado(content: Content) -> list[str]:
         "}",
         "set_property include_dirs \\",
         "    [concat [get_property include_dirs [current_fileset]] [list $folder]] [current_fileset]",
-        f"add_files -norecurse -fileset [current_fileset -constrset] [file join $folder {content.name}.xdc]",
+        f"add_files -norecurse -fileset [current_fileset -constrset] [file join $folder {package.name}.xdc]",
     ]
 
 
-def _quartus(content: Content) -> list[str]:
-    files = _build_files(content)
+def _quartus(package: VerilogPackage) -> list[str]:
+    files = _build_files(package)
     return [
         "# Adds the build to the open project: source it in the Tcl console, in a script, or in the .qsf.",
         "# SYNTHESIS tells dac_boot that this is no simulation.",
@@ -146,5 +144,5 @@ def _quartus(content: Content) -> list[str]:
         "}",
         "set_global_assignment -name SEARCH_PATH $folder",
         'set_global_assignment -name VERILOG_MACRO "SYNTHESIS=1"',
-        f"set_global_assignment -name SDC_FILE [file join $folder {content.name}_quartus.sdc]",
+        f"set_global_assignment -name SDC_FILE [file join $folder {package.name}_quartus.sdc]",
     ]

@@ -1,27 +1,25 @@
 """A core description for FuseSoC, in its CAPI 2, which names the files of the Verilog format."""
 
-from tablegen.emit.content import Content
-from tablegen.emit.format import Format
-from tablegen.emit.formats.verilog import FORMAT as VERILOG
+from tablegen.emit.package import VerilogPackage
+from tablegen.emit.package_format import PackageOfVerilog
 
 
-class FuseSoC(Format):
+class FuseSoC(PackageOfVerilog):
     """The format fusesoc: ``NAME.core``, which makes ``NAME_top`` a core that others depend on."""
 
     name = "fusesoc"
     purpose = "core of FuseSoC: NAME_top of the format verilog, with all its files, as tablegen::NAME"
     file_names = "NAME.core"
-    needs = ("verilog",)
     comment = "#"
 
-    def files(self, content: Content) -> dict[str, bytes]:
+    def package_files(self, package: VerilogPackage) -> dict[str, bytes]:
         """Render the core."""
-        name = content.name
-        written = sorted(VERILOG.files(content))
-        sources = [*(each for each in written if each.endswith(".v")), *sorted(path.name for path in VERILOG.runtime())]
+        name = package.name
+        written = package.written
+        sources = [*(each for each in written if each.endswith(".v")), *package.modules]
         lines = [
             "CAPI=2:",
-            f"# {name}, tablegen {content.version}, build {content.hash}",
+            f"# {name}, tablegen {package.version}, build {package.hash}",
             f"name: tablegen::{name}",
             f"description: Scan {name}, played by its sequencer",
             "filesets:",

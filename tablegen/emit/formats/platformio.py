@@ -2,28 +2,26 @@
 
 import json
 
-from tablegen.emit.content import Content
-from tablegen.emit.format import Format
-from tablegen.emit.formats.c import packaged_files, public_headers
+from tablegen.emit.package import CPackage
+from tablegen.emit.package_format import PackageOfC
 from tablegen.emit.package_options import options_header
 
 
-class PlatformIO(Format):
+class PlatformIO(PackageOfC):
     """The format platformio: ``library.json``, which makes the folder of a build a library of that scan."""
 
     name = "platformio"
     purpose = "PlatformIO library of the format c: the folder of the build, for lib_deps or the lib folder"
     file_names = "library.json, tablegen_options.h"
-    needs = ("c",)
 
-    def files(self, content: Content) -> dict[str, bytes]:
+    def package_files(self, package: CPackage) -> dict[str, bytes]:
         """Render the manifest; it names the C files, so that those of other formats are neither built nor packed."""
-        options = options_header(content)
-        written = [*packaged_files(content), *options]
+        options = options_header(package)
+        written = [*package.files, *options]
         manifest = {
-            "name": content.name,
-            "version": content.version,
-            "headers": public_headers(content),
+            "name": package.name,
+            "version": package.version,
+            "headers": package.headers,
             "frameworks": "*",
             "platforms": "*",
             "build": {
@@ -32,7 +30,7 @@ class PlatformIO(Format):
                 "srcFilter": ["-<*>", *(f"+<{name}>" for name in written if name.endswith(".c"))],
             },
             "export": {"include": written},
-            "description": f"Scan {content.name}, played by its sequencer. Build {content.hash}",
+            "description": f"Scan {package.name}, played by its sequencer. Build {package.hash}",
         }
         return {"library.json": (json.dumps(manifest, indent=2) + "\n").encode("ascii"), **options}
 

@@ -18,6 +18,7 @@ from tablegen.emit.constants import (
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
+from tablegen.emit.package import VerilogPackage
 from tablegen.emit.templates import comment_safe, template
 from tablegen.emit.verilog_text import literal, value_range
 from tablegen.emit.verilog_top import pixel_memory, sine_memory, top_file
@@ -66,6 +67,20 @@ class Verilog(Format):
 
 
 FORMAT = Verilog()
+
+
+def verilog_package(content: Content) -> VerilogPackage:
+    """Return the Verilog of a build as a package names it."""
+    modules = [*FORMAT.runtime(), *(FORMAT.runtime_of_z() if content.z is not None else ())]
+    return VerilogPackage(
+        content.name,
+        content.version,
+        content.hash,
+        sorted(FORMAT.files(content)),
+        sorted(path.name for path in modules),
+        content.clocks_per_tick,
+        content.schedule.update_rate_hz,
+    )
 
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
