@@ -462,7 +462,8 @@ class Cost(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 DEFAULT_FORMATS = ("c", "verilog")
-FORMATS_WITH_Z = ("c", "verilog")  # which have a second sequencer
+_PACKAGES_WITH_Z = ("arduino", "cmsis-pack", "constraints", "esp-idf", "fusesoc", "platformio", "zephyr")
+FORMATS_WITH_Z = (*DEFAULT_FORMATS, *_PACKAGES_WITH_Z)  # which have a second sequencer
 
 
 class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -63,7 +63,9 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
         if plan.schedule.pixel_table is not None and each.name not in PIXEL_FORMATS:
             raise Unphysical(f"{each.name!r} has no table of pixels, which a sine needs; take c or verilog")
         if plan.z is not None and each.name not in FORMATS_WITH_Z:
-            raise Unphysical(f"{each.name!r} plays no output z; take c or verilog, or leave [z] out")
+            raise Unphysical(
+                f"{each.name!r} plays no output z; take {', '.join(FORMATS_WITH_Z)}, or leave [z] out of the scan"
+            )
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each, plan.z is not None)
@@ -117,11 +119,12 @@ def render_scan(
         For an unknown format, for a scan that a format cannot hold, for a clock that is too slow for its output z, and
         for a build that could not be read back.
     """
-    if plan.program_of_z is not None and "verilog" in (plan.formats if formats is None else formats):
-        problems = Problems()
-        slow_clocks_per_tick(setup, plan.program_of_z, problems, "z")
-        problems.stop_if_any()
     try:
+        names = [each.name for each in chosen(plan.formats if formats is None else formats)]
+        if plan.program_of_z is not None and "verilog" in names:
+            problems = Problems()
+            slow_clocks_per_tick(setup, plan.program_of_z, problems, "z")
+            problems.stop_if_any()
         files = render(plan, certificates, formats)
         require_readable(files[MANIFEST])
     except (UnknownFormat, Unphysical) as error:

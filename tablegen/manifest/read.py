@@ -182,8 +182,8 @@ def _stored_z(plain: Any, manifest: Manifest) -> "tuple[StraightZ, ScanProgram]"
     from tablegen.manifest.frame_fields import StraightZ
 
     z = msgspec.convert(plain, StraightZ)
-    if not set(manifest.formats) <= set(FORMATS_WITH_Z):
-        raise ValueError("formats: a scan with the output z has the formats c and verilog alone")
+    if others := set(manifest.formats) - set(FORMATS_WITH_Z):
+        raise ValueError(f"formats: {', '.join(sorted(others))} cannot hold the output z, which the scan has")
     if not _finite(z):
         raise ValueError("z holds a number that is not finite")
     return z, program_beside(z.program(manifest.sequence), manifest.sequence.schedule)

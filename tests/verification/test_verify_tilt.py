@@ -251,7 +251,14 @@ def test_a_changed_word_of_z_is_heard_without_an_operator(straight: Path, tmp_pa
 def test_what_does_not_take_z_without_an_operator_says_so(straight: Path, tmp_path: Path) -> None:
     scan = straight.parent / "scan.toml"
     refusals = {
-        ("build", scan, "-o", tmp_path / "out", "-f", "vhdl"): "formats: 'vhdl' plays no output z; take c or verilog",
+        (
+            "build",
+            scan,
+            "-o",
+            tmp_path / "out",
+            "-f",
+            "vhdl",
+        ): "formats: 'vhdl' plays no output z; take c, verilog, ",
         ("upload", straight, "--port", tmp_path / "none"): "out: the link sends no output z",
         ("verify", straight, "--target", "cortex-m"): "which no emulator plays",
     }

@@ -85,8 +85,12 @@ def arrays_file(content: Content) -> str:
 
 
 def public_headers(content: Content) -> list[str]:
-    """List the headers that an application includes: constants, and the objects of the program unless header-only."""
-    return [f"{content.name}.h", "dac_sequencer.h" if content.header_only else f"{content.name}_program.h"]
+    """List the headers that an application includes: constants, and the objects of the program unless header-only.
+
+    Those of the program of z stand behind, where the scan has this output.
+    """
+    own = [f"{content.name}.h", "dac_sequencer.h" if content.header_only else f"{content.name}_program.h"]
+    return own if content.z is None else [*own, f"{content.name}_z.h", f"{content.name}_z_program.h"]
 
 
 def packaged_files(content: Content) -> list[str]:

@@ -8,6 +8,7 @@ from tablegen.base.resources import resource_folder
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.verilog import FORMAT as VERILOG
+from tablegen.emit.formats.verilog import packaged_modules
 
 _FIRST = "dac_synchronise_first"  # the first flip-flop of every synchroniser
 _NO_CLOCK = "The scan has no [emit] clock_hz: constrain the clock here."
@@ -102,7 +103,7 @@ def _frequency(content: Content) -> list[str]:
 
 def _build_files(content: Content) -> dict[str, list[str]]:
     """Return the files of the build that a tool reads, by their ending."""
-    runtime = [path.name for path in (*VERILOG.runtime(), *FORMAT.runtime())]
+    runtime = [*packaged_modules(content), *(path.name for path in FORMAT.runtime())]
     written = sorted(VERILOG.files(content))
     modules = [*(each for each in written if each.endswith(".v")), *sorted(runtime)]
     return {ending: [each for each in written if each.endswith(ending)] for ending in (".vh", ".mem")} | {".v": modules}

@@ -3,6 +3,7 @@
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.verilog import FORMAT as VERILOG
+from tablegen.emit.formats.verilog import packaged_modules
 
 
 class FuseSoC(Format):
@@ -18,7 +19,7 @@ class FuseSoC(Format):
         """Render the core."""
         name = content.name
         written = sorted(VERILOG.files(content))
-        sources = [*(each for each in written if each.endswith(".v")), *sorted(path.name for path in VERILOG.runtime())]
+        sources = [*(each for each in written if each.endswith(".v")), *packaged_modules(content)]
         lines = [
             "CAPI=2:",
             f"# {name}, tablegen {content.version}, build {content.hash}",

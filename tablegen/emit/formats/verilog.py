@@ -68,6 +68,11 @@ class Verilog(Format):
 FORMAT = Verilog()
 
 
+def packaged_modules(content: Content) -> list[str]:
+    """List the modules of a build that are the same in every one, for a package that names them."""
+    return sorted(path.name for path in (*FORMAT.runtime(), *(() if content.z is None else FORMAT.runtime_of_z())))
+
+
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """Return the number of constants of the Verilog header, and those that are missing or wrong in it."""
     name, expected = f"{content.name}.vh", _constants(content)

@@ -4,6 +4,8 @@ from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats.c import packaged_files, runtime_options
 
+_SETTINGS = ("DAC_SHAPING", "DAC_SPLINE")  # options of the runtime that an application may raise
+
 
 class Zephyr(Format):
     """The format zephyr: ``zephyr/module.yml``, ``Kconfig`` and ``CMakeLists.txt`` make the folder of a build a module.
@@ -64,12 +66,12 @@ def _kconfig(content: Content) -> list[str]:
 def _cmake(content: Content) -> list[str]:
     """Return the library of the C files; the options of the runtime are those of the application too."""
     symbol, options = _symbol(content), runtime_options(content)
-    widths = [f"    {name}={value}" for name, value in options.items() if name.endswith("_BITS")]
+    fixed = [f"    {name}={value}" for name, value in options.items() if name not in _SETTINGS]
     return [
         f"if(CONFIG_{symbol})",
         "  zephyr_include_directories(..)",
         "  zephyr_compile_definitions(",
-        *widths,
+        *fixed,
         f"    DAC_SHAPING=${{CONFIG_{symbol}_SHAPING}}",
         f"    DAC_SPLINE=$<BOOL:${{CONFIG_{symbol}_SPLINE}}>",
         "  )",
