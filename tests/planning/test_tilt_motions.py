@@ -29,6 +29,7 @@ from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.tilt import TiltedOutput
+from tablegen.planning.turned_plan import make_turned_plan
 
 LSB_NM = NM_PER_V * 100.0 / 65536.0
 LOW, HIGH = 0.1, 0.9  # window of x in the example
@@ -138,12 +139,18 @@ def test_axes_with_operators_keep_their_plan(tmp_path: Path) -> None:
     assert not setup.mixes_motions
     assert load(write_tilted(tmp_path, 0.0)).mixes_motions
     assert load(write_tilted(tmp_path, 30.0, *STEPS)).mixes_motions
+    assert not load(write_tilted(tmp_path, 0.0, "x.motion = 'sine'")).mixes_motions
     with_z, without = make_plan(setup), make_plan(replace(setup, scan=replace(setup.scan, z=None)))
     assert without.z is None
     assert with_z.z is not None
     for ours, others in zip(with_z.lines, without.lines, strict=True):
         assert np.array_equal(ours.program.words, others.program.words)
         assert ours.program.output == others.program.output
+
+
+def test_a_build_does_not_choose_the_motion_of_axes_with_operators(tmp_path: Path) -> None:
+    with pytest.raises(Rejected, match=r"x\.motion: a line with z is planned as one at an angle, and a sine is not"):
+        make_turned_plan(load(write_tilted(tmp_path, 0.0, "x.motion = 'auto'")))
 
 
 @pytest.mark.parametrize(

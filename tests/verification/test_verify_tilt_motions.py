@@ -16,11 +16,13 @@ from tilted_scans import (
     SLOPE_X,
     SLOPE_Y,
     STEPS,
+    UP_DOWN,
     fitted_plane,
     triangle,
     volts_of,
     wanted_y,
     write_sine,
+    write_stepped,
     write_straight,
 )
 
@@ -40,16 +42,17 @@ from tablegen.verification.verilog.turned_play import TurnedPlay
 
 NAME, LSB_NM = "annexin_200nm", NM_PER_V * 100.0 / 65536.0
 PIXEL, VALID = 1 << FLAGS.index("pixel"), 1 << FLAGS.index("valid")
-BUILDS = ("stepped", "sine", "stepped sine")
+BUILDS = ("stepped", "up and down", "sine", "stepped sine")
 PART = 40  # ticks of the Verilog
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Builds of a line with steps of y, without an operator, and of a sine with a ramp and with steps."""
+    """Builds of a line with steps of y, without an operator and with two, and of a sine with a ramp and with steps."""
     folder = {what: tmp_path_factory.mktemp(what.replace(" ", "_")) for what in BUILDS}
     scans = {
         "stepped": write_straight(folder["stepped"], *STEPS),
+        "up and down": write_stepped(folder["up and down"], *UP_DOWN),
         "sine": write_sine(folder["sine"]),
         "stepped sine": write_sine(folder["stepped sine"], STEPS[0], STEPS[2]),
     }
@@ -59,7 +62,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("what", ["stepped", "stepped sine"])
+@pytest.mark.parametrize("what", ["stepped", "up and down", "stepped sine"])
 def test_a_build_is_verified(what: str, folders: dict[str, Path]) -> None:
     report = verify(folders[what], "c")
     assert report.failures == []
@@ -127,25 +130,25 @@ def test_the_plane_of_what_the_c_plays(what: str, folders: dict[str, Path], tmp_
     assert np.array_equal(markers | own, of_z | own)
     assert np.array_equal(markers & PIXEL, of_z & PIXEL) != sine
     starts, x_nm, line = places(stored, markers)
-    assert len(starts) == 2 * schedule.pixels * schedule.up.count
+    assert len(starts) == 2 * schedule.pixels * (schedule.up.count + schedule.down.count)
     stops = np.array([start + 1 + np.argmax((markers[start + 1 :] & PIXEL != 0) | (markers[start + 1 :] & VALID == 0))
                       for start in starts])  # fmt: skip
     heights = NM_PER_V * (volts_of(words) - OFFSET_V)
     z_nm = np.array([np.mean(heights[start:stop]) for start, stop in zip(starts, stops, strict=True)])
-    within = 0.5 if "stepped" in what else (0.5 * (starts + stops) / schedule.ticks) % 1.0
-    y_nm = wanted_y((line + within) / schedule.lines, 0.95)
     middles = 0.5 * (starts + stops) / schedule.ticks % 1.0
+    steps, turn = what != "sine", 0.5 if schedule.down.count else 0.95
+    y_nm = wanted_y((line + (0.5 if steps else middles)) / schedule.lines, turn)
     if not sine:
         x_nm = SIZE_NM * (triangle(middles, 0.5) - 0.5)
     assert np.max(np.abs(z_nm - SLOPE_X * x_nm - SLOPE_Y * y_nm)) < (3.0 if sine else 1.0) * LSB_NM
     slopes = fitted_plane(x_nm, y_nm, z_nm)
     assert max(abs(slopes[0] - SLOPE_X), abs(slopes[1] - SLOPE_Y)) * SIZE_NM < (0.5 if sine else 0.2) * LSB_NM
-    wrong = wanted_y((line + (middles if "stepped" in what else 0.5)) / schedule.lines, 0.95)
+    wrong = wanted_y((line + (middles if steps else 0.5)) / schedule.lines, turn)
     assert np.max(np.abs(z_nm - SLOPE_X * x_nm - SLOPE_Y * wrong)) > 20.0 * LSB_NM
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("what", long(["stepped sine"], ["stepped", "stepped sine"]))
+@pytest.mark.parametrize("what", long(["up and down"], ["up and down", "stepped", "stepped sine"]))
 def test_the_top_of_z_plays_the_model(what: str, folders: dict[str, Path], tmp_path: Path) -> None:
     """Its modules have no table of pixels; a changed word is heard."""
     folder = copytree(folders[what], tmp_path / "out")
