@@ -35,9 +35,6 @@ def plan_straight_z(
     scan, problems = setup.scan, Problems()
     tilt = scan.z
     assert tilt is not None
-    if scan.emit.header_only:
-        problems.add(setup.scan_file, "emit.header_only", "the program of z has files of its own; leave this out")
-    problems.stop_if_any()
     z = None
     with problems.at(setup.scan_file, "z"):
         shares = tilt.slope_x * sizes_nm[0], tilt.slope_y * sizes_nm[1]

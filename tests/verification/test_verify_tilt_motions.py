@@ -70,6 +70,20 @@ def test_a_build_is_verified(what: str, folders: dict[str, Path]) -> None:
 
 
 @pytest.mark.common
+def test_z_has_files_beside_tables_in_a_header(folders: dict[str, Path], tmp_path: Path) -> None:
+    """The same as beside tables in a file; all of it is verified."""
+    edits = (*STEPS, "+ [emit]\nheader_only = true\nformats = ['c']")
+    tablegen.build(write_straight(tmp_path, *edits), tmp_path / "out")
+    folder, own = folders["stepped"], {path.name for path in (tmp_path / "out").glob(f"{NAME}*")}
+    assert own == {f"{NAME}{end}" for end in (".h", "_z.h", "_z.c", "_z_program.h", "_z_program.c")}
+    words = [(each / f"{NAME}_z.c").read_text("ascii").split("{")[1:] for each in (folder, tmp_path / "out")]
+    assert words[0] == words[1]
+    report = verify(tmp_path / "out", "c")
+    assert report.failures == []
+    assert {"c, z, steps", "c, z, fills"} < {check.subject for check in report.checks}
+
+
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("what", "key", "value", "says"),
     [
