@@ -77,10 +77,8 @@ def _beyond_limit_of_z(setup: Setup, plan: Plan) -> list[Problem]:
     limit = plan.limits.max_error_lsb
     if plan.z is None or limit is None or plan.z.errors.error_lsb <= limit:
         return []
-    why = (
-        f"z errs by up to {plan.z.errors.error_lsb:.4g} LSB, above {limit:g}; more harmonics of x bring it closer to "
-        "the plane"
-    )
+    nearer = "more harmonics of x bring" if plan.schedule.pixel_table is None else "a smaller slope brings"
+    why = f"z errs by up to {plan.z.errors.error_lsb:.4g} LSB, above {limit:g}; {nearer} it closer to the plane"
     return [setup.scan_file.problem("limits.max_error_lsb", why)]
 
 

@@ -14,6 +14,7 @@ def tilt_rows(z: "TiltedOutput") -> list[tuple[str, str]]:
     centre = volts.v_zero + volts.v_per_code * z.offset
     return [
         ("tilt", f"{z.slope_x:+g} of x and {z.slope_y:+g} of y, by {z.nm_per_v:g} nm/V"),
+        *_motion(z),
         ("drive at the piezo", f"{ends[0]:.6g}..{ends[1]:.6g} V, {centre:.6g} V in the centre of the scan"),
         ("error", f"max {errors.error_lsb:.3f} LSB, {errors.error_nm:.2g} nm, over all imaged ticks"),
         (
@@ -23,3 +24,19 @@ def tilt_rows(z: "TiltedOutput") -> list[tuple[str, str]]:
         ),
         ("step", f"at most {codes.steepest} of {output.max_step} codes a tick"),
     ]
+
+
+def _motion(z: "TiltedOutput") -> list[tuple[str, str]]:
+    """List what z follows where it is no straight line in x, or no ramp in y."""
+    from tablegen.planning.tilt_motion import TiltMotion  # here: most scans have no z
+
+    motion = z.motion
+    if not isinstance(motion, TiltMotion):
+        return []
+    rows = []
+    if motion.place is not None:
+        rows.append(("x", "the position that the operator predicts for the sine"))
+    if motion.steps:
+        room = f"{200.0 * motion.step_room:.3g} % of a line"
+        rows.append(("y", f"the level of each line; between lines it moves within {room}"))
+    return rows

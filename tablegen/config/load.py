@@ -80,10 +80,12 @@ class Setup(Struct, frozen=True, dict=True):
     def mixes_motions(self) -> bool:
         """True if x or y follows the line and the frame: at an angle, on coupled axes, or with drift.
 
-        A scan with z is planned as one of these where both axes have an operator.
+        A scan with z is planned as one of these where both axes have an operator, and move as they do at an angle.
         """
-        turned = bool(self.scan.angle_deg % 360.0) or (self.scan.z is not None and self.has_operators)
-        return turned or bool(self.scanner.coupling) or any(self.scan.drift_nm_per_s)
+        scan = self.scan
+        usual = scan.x.motion != "sine" and scan.y.motion != "step"
+        turned = bool(scan.angle_deg % 360.0) or (scan.z is not None and self.has_operators and usual)
+        return turned or bool(self.scanner.coupling) or any(scan.drift_nm_per_s)
 
     @property
     def has_operators(self) -> bool:

@@ -117,11 +117,12 @@ def render_scan(
         For an unknown format, for a scan that a format cannot hold, for a clock that is too slow for its output z, and
         for a build that could not be read back.
     """
-    if plan.program_of_z is not None and "verilog" in (plan.formats if formats is None else formats):
-        problems = Problems()
-        slow_clocks_per_tick(setup, plan.program_of_z, problems, "z")
-        problems.stop_if_any()
     try:
+        names = [each.name for each in chosen(plan.formats if formats is None else formats)]
+        if plan.program_of_z is not None and "verilog" in names:
+            problems = Problems()
+            slow_clocks_per_tick(setup, plan.program_of_z, problems, "z")
+            problems.stop_if_any()
         files = render(plan, certificates, formats)
         require_readable(files[MANIFEST])
     except (UnknownFormat, Unphysical) as error:

@@ -15,13 +15,17 @@ from tablegen.manifest.frame_fields import TurnedCodes, TurnedZ
 
 
 class ShownTilt(Struct, frozen=True, eq=False):
-    """The output z of a manifest, its program, and its certificate; errors are at the imaged ticks."""
+    """The output z of a manifest, its program, and its certificate; errors are at the imaged ticks.
+
+    With ``steps`` y moves in steps.
+    """
 
     fields: TurnedZ
     program: FrameProgram
     codes: TurnedCodes
     error_lsb: float
     error_nm: float
+    steps: bool = False
 
 
 def shown_tilt(subject: Subject | TurnedSubject) -> ShownTilt | None:
@@ -30,7 +34,8 @@ def shown_tilt(subject: Subject | TurnedSubject) -> ShownTilt | None:
         if (z := subject.z) is None:
             return None
         stated = z.certificate
-        return ShownTilt(z, z.program(subject.manifest.sequence), stated.codes, stated.error_lsb, stated.error_nm)
+        program, steps = z.program(subject.manifest.sequence), subject.manifest.axes.y.line.hold_ticks > 1
+        return ShownTilt(z, program, stated.codes, stated.error_lsb, stated.error_nm, steps)
     of_z, certificate = subject.manifest.turned.z, subject.manifest.certificate
     codes, errors = certificate.codes.get("z"), certificate.z
     if of_z is None or codes is None or errors is None:
@@ -43,9 +48,12 @@ def tilt_section(z: ShownTilt, max_error_lsb: float | None) -> Section:
     fields, output, codes = z.fields, z.fields.output, z.codes
     low, high = sorted(_volts(z, code) for code in (codes.least, codes.most))
     share = 100.0 * (codes.most - codes.least + 1) / (1 << output.dac_bits)
+    level = row("with the steps of y", "the level of each line, a smooth step between lines", "", "")
+    steps = [level] if z.steps else []
     rows = [
         row("slope along x", _slope(fields.slope_x), "", ""),
         row("slope along y", _slope(fields.slope_y), "", ""),
+        *steps,
         row("piezo", f"{fields.nm_per_v:g} nm/V, taken as linear", "", ""),
         row("height over the frame", f"{figure((high - low) * abs(fields.nm_per_v), 4)} nm from end to end", "", ""),
         row("drive at the piezo", f"{low:.6g}..{high:.6g} V", "", ""),

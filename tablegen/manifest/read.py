@@ -182,8 +182,8 @@ def _stored_z(plain: Any, manifest: Manifest) -> "tuple[StraightZ, ScanProgram]"
     from tablegen.manifest.frame_fields import StraightZ
 
     z = msgspec.convert(plain, StraightZ)
-    if not set(manifest.formats) <= set(SEQUENCER_FORMATS):
-        raise ValueError(f"formats: those of a scan with the output z are {', '.join(SEQUENCER_FORMATS)}")
+    if others := set(manifest.formats) - set(SEQUENCER_FORMATS):
+        raise ValueError(f"formats: {', '.join(sorted(others))} cannot hold the output z, which the scan has")
     if not _finite(z):
         raise ValueError("z holds a number that is not finite")
     return z, program_beside(z.program(manifest.sequence), manifest.sequence.schedule)

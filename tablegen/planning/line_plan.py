@@ -264,7 +264,8 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         from tablegen.planning.straight_tilt import plan_straight_z  # here: most scans have no z
 
         sizes_nm = x.drive.size_nm, y.drive.size_nm
-        plan = replace(plan, z=plan_straight_z(setup, schedule, sizes_nm, x.series.harmonics))
+        place = x.drive.shape.place if isinstance(x.drive.shape, SineLine) else None
+        plan = replace(plan, z=plan_straight_z(setup, schedule, sizes_nm, x.series.harmonics, place))
     return plan
 
 

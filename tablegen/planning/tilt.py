@@ -1,5 +1,6 @@
 """Plan the output z of a scan on a tilted sample: a share of both motions, on a piezo that is taken as linear."""
 
+from dataclasses import fields
 from functools import cached_property
 from math import floor
 
@@ -9,8 +10,7 @@ from msgspec.structs import replace
 
 from tablegen.base.figures import at_most
 from tablegen.base.input_errors import Problems
-from tablegen.compensation.hold import hold_inverse
-from tablegen.compensation.operator.turned_frame import FrameMotion, linear_frame
+from tablegen.compensation.operator.turned_frame import FrameMotion
 from tablegen.config.load import Setup
 from tablegen.config.schema import Tilt
 from tablegen.device.schedule import Schedule
@@ -21,6 +21,8 @@ from tablegen.fixedpoint.output import Output
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.numerics.driver import Driver
 from tablegen.planning.frame_motion import frame_motion
+from tablegen.planning.tilt_drive import TiltDrive, tilt_drive
+from tablegen.planning.tilt_motion import TiltMotion
 from tablegen.waveform.series import FourierSeries
 
 _SAMPLES = 512  # of a line, at which the reach of z is taken
@@ -78,7 +80,12 @@ class TiltedOutput(Struct, frozen=True, eq=False, dict=True):
 
 
 def plan_tilt(
-    setup: Setup, schedule: Schedule, harmonics: int, shares: tuple[float, float], problems: Problems
+    setup: Setup,
+    schedule: Schedule,
+    harmonics: int,
+    shares: tuple[float, float],
+    problems: Problems,
+    place: FourierSeries | None = None,
 ) -> TiltedOutput | None:
     """Plan the output z; None where ``problems`` grew.
 
@@ -90,6 +97,8 @@ def plan_tilt(
         Those of its line.
     shares
         The nm that z moves along the line and along the frame, from x = 0 to 1 of each.
+    place
+        The predicted position over a line where x moves as a sine.
     """
     tilt, piezo, hardware = setup.scan.z, setup.scanner.z, setup.hardware("z")
     assert tilt is not None
@@ -101,14 +110,21 @@ def plan_tilt(
         return None
     centre, offset = driver.share(tilt.offset_v), converter.code(tilt.offset_v)
     motion = frame_motion(setup, schedule, harmonics, centre, *shares)
-    slow, fast = linear_frame(motion, piezo.nm_per_v * driver.span)
+    if place is not None or setup.scan.y.motion == "step":
+        shared = {each.name: getattr(motion, each.name) for each in fields(motion)}
+        motion = TiltMotion(**shared, schedule=schedule, place=place, steps=setup.scan.y.motion == "step")
+    drive = None
+    with problems.at(setup.scan_file, "y.motion"):
+        drive = tilt_drive(motion, piezo.nm_per_v * driver.span, schedule, driver.span / converter.v_per_code)
+    if drive is None:
+        return None
     park_v = tilt.offset_v if tilt.park_v is None else tilt.park_v
     output = make_output(replace(hardware.dac, output=None), converter, driver, park_v)
-    volts = driver.volts(_on_grid(slow, fast, motion.lines))
+    volts = driver.volts(_on_grid(drive.slow, drive.fast, motion.lines))
     ends: tuple[float, float] = _sorted(converter.code(float(np.min(volts))), converter.code(float(np.max(volts))))
     program = None
     if _fits(output, ends):
-        program = _quantised(output, converter, driver, slow, fast, schedule)
+        program = _quantised(output, converter, driver, drive, schedule)
         ends = played_extremes(program)[:2]
     if program is None or not _fits(output, ends):
         problems.add(setup.scan_file, _key(tilt), _what_fits(tilt, converter, output, offset, ends))
@@ -138,19 +154,18 @@ def _on_grid(slow: FourierSeries, fast: FourierSeries, lines: int) -> Floats:
 
 
 def _quantised(
-    output: Output, converter: Converter, driver: Driver, slow: FourierSeries, fast: FourierSeries, schedule: Schedule
+    output: Output, converter: Converter, driver: Driver, drive: TiltDrive, schedule: Schedule
 ) -> FrameProgram:
-    """Return the integers of z, without a slew guard: one table a line, and a slow part."""
-    nothing = np.zeros(fast.harmonics)
+    """Return the integers of z, without a slew guard."""
     parts = FrameParts(
-        fast=fast.times(*hold_inverse(fast.harmonics, schedule.ticks, steps=False)),
-        second=FourierSeries(0.0, nothing, nothing),
-        slow=FourierSeries(0.0, slow.a, slow.b),
-        gains=np.ones(2),
-        ratios=np.zeros(2),
-        spacing=schedule.lines,
+        fast=drive.fast,
+        second=drive.second,
+        slow=FourierSeries(0.0, drive.slow.a, drive.slow.b),
+        gains=drive.gains,
+        ratios=drive.ratios,
+        spacing=drive.spacing,
         codes=driver.span / converter.v_per_code,
-        offset=converter.code(driver.volts(slow.a0)),
+        offset=converter.code(driver.volts(drive.slow.a0)),
     )
     return quantise_frame(parts, output, schedule.ticks, schedule.lines)
 

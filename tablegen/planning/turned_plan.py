@@ -190,6 +190,9 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     problems = Problems()
     if scan.y.motion != "ramp":
         problems.add(setup.scan_file, "y.motion", "a scan at an angle moves y on every tick; leave this out")
+    if scan.x.motion == "auto" and mixing_key(setup)[1] == "z":
+        why = "a line with z is planned as one at an angle, and a sine is not, so no build compares them; take one"
+        problems.add(setup.scan_file, "x.motion", why)
     for axis in ("x", "y"):
         if getattr(scan, axis).refinement is not None:
             problems.add(setup.scan_file, f"{axis}.refinement", "was learnt at 0 degrees, and does not serve an angle")

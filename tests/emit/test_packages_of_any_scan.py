@@ -22,6 +22,7 @@ from tilted_scans import write_straight, write_tilted
 
 import tablegen
 from tablegen.api.turned import build_turned
+from tablegen.base.input_errors import Rejected
 from tablegen.config.schema import SEQUENCER_FORMATS
 from tablegen.device.dual_program import ScanProgram
 from tablegen.manifest.read import read_build
@@ -122,6 +123,13 @@ def test_a_changed_package_is_found(turned: Path, tmp_path: Path, package: str) 
         file.write("other\n")
     failures = verify(tmp_path / "out", "files").failures
     assert any("files: " in each and Path(package).name in each and "manifest" in each for each in failures), failures
+
+
+def test_the_clock_of_z_is_checked_for_a_package_of_verilog(tmp_path: Path) -> None:
+    """Though its formats do not name Verilog; z takes 93 clocks a tick."""
+    scan = write_straight(tmp_path, "+ [emit]\nclock_hz = 46e6\nformats = ['fusesoc']")
+    with pytest.raises(Rejected, match="the sequencer of z takes 93"):
+        _ = tablegen.build(scan).files
 
 
 def programs(folder: Path) -> list[ScanProgram]:

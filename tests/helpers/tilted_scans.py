@@ -5,6 +5,9 @@ from pathlib import Path
 
 import numpy as np
 from editing import SCAN, SCANNER, edited, write_pair
+from foreign_plants import ForeignPlant, ManyPlays
+from operator_files import operator_file
+from sine_scans import response_csv, sine_scan, text_of
 from turned_scans import write_turned
 
 from tablegen.numerics.arrays import Floats, Ints
@@ -12,6 +15,13 @@ from tablegen.numerics.arrays import Floats, Ints
 LINES, SIZE_NM, TURN, SLOW_TURN = 24, 300.0, 0.5, 0.95
 SHORT = (f"timing.lines = {LINES}", "x.band_limit.harmonics = 24", "timing.line_rate_hz = 400")
 SLOPE_X, SLOPE_Y, NM_PER_V, OFFSET_V = 0.02, -0.05, 5.0, 20.0
+UP_DOWN = ("y.turn = 0.5", "y.band_limit.directions = 'both'", "y.band_limit.window = [0.1, 0.9]")
+STEPS = ("y.motion = 'step'", "y.band_limit.harmonics = 8", "- amplifier.max_slew_v_per_s")
+SINE = (
+    "- x.band_limit.harmonics", "x.motion = 'sine'", "timing.line_rate_hz = 2e3", "dac.update_rate_hz = 1e6",
+    "timing.pixels = 32", "timing.lines = 24", "y.band_limit.harmonics = 8", f"x.size_nm = {SIZE_NM}",
+    f"y.size_nm = {SIZE_NM}",
+)  # fmt: skip
 Z = f"+ [z]\nslope_x = {SLOPE_X}\nslope_y = {SLOPE_Y}\noffset_v = {OFFSET_V}"
 OF_SCANNER = f"+ [z]\nnm_per_v = {NM_PER_V}\nv_max = 100.0"
 
@@ -30,9 +40,28 @@ def write_straight(folder: Path, *edits: str) -> Path:
     return write_pair(folder, edited(SCAN, *SHORT, *sizes, Z, *edits), edited(SCANNER, OF_SCANNER))
 
 
+def write_stepped(folder: Path, *edits: str) -> Path:
+    """Write the frame at 0 degrees whose y moves in steps, on axes with operators."""
+    return write_tilted(folder, 0.0, *STEPS, *edits)
+
+
+def write_sine(folder: Path, *edits: str) -> Path:
+    """Write lines of 2 kHz with a sine on x, which has an operator and a measured response."""
+    response = response_csv(ForeignPlant(ManyPlays()), 150e3)
+    sine_scan(folder, text_of(operator_file("x")), response, *SINE, *edits)
+    for name, table in (("scan.toml", Z), ("scanner.toml", OF_SCANNER)):
+        (folder / name).write_text(edited((folder / name).read_text("utf-8"), table), "utf-8")
+    return folder / "scan.toml"
+
+
 def triangle(phase: Floats, turn: float) -> Floats:
     """Return positions from 0 to 1 and back to 0 over a period."""
     return np.asarray(np.interp(phase, [0.0, turn, 1.0], [0.0, 1.0, 0.0]))
+
+
+def wanted_y(phase: Floats, turn: float) -> Floats:
+    """Return the wanted y in nm of a scan at 0 degrees, from its centre, at phases of the frame."""
+    return np.asarray(SIZE_NM * (triangle(phase, turn) - 0.5))
 
 
 def wanted_places(angle_deg: float, line: Ints, t: Floats) -> tuple[Floats, Floats]:

@@ -181,11 +181,6 @@ def test_z_of_a_line_scan_follows_x_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("edits", "says"),
     [
-        (
-            ("y.motion = 'step'", "y.band_limit.harmonics = 8", "- amplifier.max_slew_v_per_s"),
-            "y.motion: z follows y on every tick; take 'ramp'",
-        ),
-        (("+ [emit]\nheader_only = true",), "emit.header_only: the program of z has files of its own"),
         (("z.slope_y = -0.9",), "z.slope_y: the tilt leaves the 0..99.9985 V of z; the largest that fits here is"),
         (("angle_deg = 30.0",), "x.hysteresis: is no operator"),
     ],

@@ -215,14 +215,19 @@ def linear_frame(motion: FrameMotion, nm_per_drive: float) -> tuple[FourierSerie
         The slow part over the frame, about the centre of the motion, and the line without its mean, of v_max.
     """
     line, half = _LinearFrame(motion, nm_per_drive).line(), motion.harmonics
+    # A window that is not in the middle of a line gives the line a mean, which no table of a line has.
+    slow = linear_slow(motion, nm_per_drive, float(line[0]))
+    fast = FourierSeries(0.0, line[1 : half + 1].copy(), line[half + 1 :].copy())
+    return slow, rounded_series(fast)
+
+
+def linear_slow(motion: FrameMotion, nm_per_drive: float, mean: float) -> FourierSeries:
+    """Return the slow part of a linear piezo's drive, about the centre of the motion, and the mean of a line."""
     # Within a line the slow part goes straight to the start of the next one: those behind imaged lines count as well.
     ends = np.flatnonzero(motion.imaged | np.roll(motion.imaged, 1)) / motion.lines
     heights = (motion.slow_nm / nm_per_drive) * (motion.slow(ends) - 0.5)
     slow = _SlowFit(ends, motion.slow_harmonics).of(heights)
-    # A window that is not in the middle of a line gives the line a mean, which no table of a line has.
-    slow = FourierSeries(slow.a0 + motion.centre + float(line[0]), slow.a, slow.b)
-    fast = FourierSeries(0.0, line[1 : half + 1].copy(), line[half + 1 :].copy())
-    return _rounded_series(slow), _rounded_series(fast)
+    return rounded_series(FourierSeries(slow.a0 + motion.centre + mean, slow.a, slow.b))
 
 
 class _LinearFrame:
@@ -334,9 +339,9 @@ class _FrameLearner(_LinearFrame):
         fit = _KnotFit(np.flatnonzero(motion.imaged), motion.lines, spacing)
         moves = abs(motion.fast_nm) > _AT_REST * motion.longest_nm
         drive = FrameDrive(
-            slow=_rounded_series(slow),
-            fast=_rounded_series(self._inverse(self._series(mean * first if moves else 0.0 * first))),
-            second=_rounded_series(self._inverse(self._series(second if moves else 0.0 * second))),
+            slow=rounded_series(slow),
+            fast=rounded_series(self._inverse(self._series(mean * first if moves else 0.0 * first))),
+            second=rounded_series(self._inverse(self._series(second if moves else 0.0 * second))),
             gains=_rounded(fit.of(gain / mean)) if moves else np.ones(fit.knots),
             ratios=_rounded(fit.of(share * mean / gain)) if moves else np.zeros(fit.knots),
             spacing=spacing,
@@ -396,7 +401,8 @@ def _rounded(values: Floats) -> Floats:
     return np.asarray(np.rint(values * _ROUNDING) / _ROUNDING)
 
 
-def _rounded_series(series: FourierSeries) -> FourierSeries:
+def rounded_series(series: FourierSeries) -> FourierSeries:
+    """Return a series whose coefficients are multiples of 2^-30."""
     return FourierSeries(round(series.a0 * _ROUNDING) / _ROUNDING, _rounded(series.a), _rounded(series.b))
 
 

@@ -103,7 +103,7 @@ def c_package(content: Content) -> CPackage:
 def public_headers(name: str, *, header_only: bool = False, with_z: bool = False) -> list[str]:
     """List the headers that an application includes: constants, and the objects of the program unless header-only."""
     headers = [f"{name}.h", "dac_sequencer.h" if header_only else f"{name}_program.h"]
-    return [*headers, *([f"{name}_z_program.h"] if with_z else [])]
+    return [*headers, *([f"{name}_z.h", f"{name}_z_program.h"] if with_z else [])]
 
 
 def runtime_options(content: Content) -> dict[str, int]:

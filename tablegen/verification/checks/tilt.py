@@ -53,17 +53,29 @@ def _distance(
 ) -> tuple[int, float]:
     """Return how many codes are imaged, and the largest distance of one from the wanted height, in LSB."""
     t = (np.arange(schedule.ticks) + 0.5) / schedule.ticks
-    place, (low, high) = _triangle(t, x.drive.turn), x.fourier.window
-    both = x.fourier.directions == "both"
-    ticks: Ints = np.flatnonzero((place >= low) & (place <= high) & (both | (t <= x.drive.turn)))
+    place, ticks = _line(t, schedule, x)
     fast, worst = z.fast_nm * (place[ticks] - 0.5), 0.0
+    within = np.full(len(ticks), 0.5) if y.line.hold_ticks > 1 else t[ticks]  # steps have the level of the middle
     lines = [line for line in range(schedule.lines) if line in schedule.up or line in schedule.down]
     for line in lines:
-        slow = z.slow_nm * (_triangle((line + t[ticks]) / schedule.lines, y.drive.turn) - 0.5)
+        slow = z.slow_nm * (_triangle((line + within) / schedule.lines, y.drive.turn) - 0.5)
         plane = (z.offset_v + (fast + slow) / z.nm_per_v - z.output.v_zero) / z.output.v_per_code
         codes = program.output.clamp(program.at(line, ticks))
         worst = max(worst, float(np.max(np.abs(codes - plane))))
     return len(lines) * len(ticks), worst
+
+
+def _line(t: Floats, schedule: Schedule, x: ManifestAxis) -> tuple[Floats, Ints]:
+    """Return the places of x from 0 to 1 at phases of the ticks of a line, and which ticks are imaged."""
+    if (predicted := x.fourier.place) is not None:
+        n = np.arange(1, len(predicted.a) + 1)
+        turns = 2.0 * np.pi * n * t[:, None]
+        place = predicted.a0 + np.cos(turns) @ np.array(predicted.a) + np.sin(turns) @ np.array(predicted.b)
+        windows = (schedule.forward, schedule.backward)
+        return place, np.concatenate([np.arange(one.first, one.stop) for one in windows])
+    place, (low, high) = _triangle(t, x.drive.turn), x.fourier.window
+    both = x.fourier.directions == "both"
+    return place, np.flatnonzero((place >= low) & (place <= high) & (both | (t <= x.drive.turn)))
 
 
 def _triangle(phase: Floats, turn: float) -> Floats:
