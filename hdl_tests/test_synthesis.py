@@ -158,8 +158,8 @@ def test_a_change_of_the_verilog_changes_the_digest(tmp_path: Path, old: str) ->
 @pytest.mark.parametrize(
     "name",
     long(
-        ["axis_serial", "axis_ECP5_16", "axis_7-series_24"],
-        ["axis", "axis_serial", "loader", "axis_ECP5_16", "axis_ECP5_24", "axis_7-series_16", "axis_7-series_24"],
+        ["axis_serial", "axis_serial_ECP5", "axis_7-series_24"],
+        ["axis", "axis_serial", "loader", "axis_serial_ECP5", "axis_ECP5_16", "axis_7-series_16", "axis_7-series_24"],
     ),
 )
 def test_meets_the_requirements(name: str) -> None:
@@ -170,8 +170,9 @@ def test_meets_the_requirements(name: str) -> None:
     holds(name, result.cells, result.mhz, result.counts["multipliers"])
     if pinned():
         assert [str(result.counts[kind]) for kind in ("LUT", "FF", "RAM", "multipliers")] == row[5:9]
-    if pinned() and result.cells is not None and result.mhz is not None:
+    if pinned() and result.cells is not None:
         assert abs(result.cells - int(row[4])) <= 10  # packing depends on the seed
+    if pinned() and result.mhz is not None:
         assert result.mhz >= int(row[9]) - 0.5
 
 
