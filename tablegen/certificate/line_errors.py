@@ -200,11 +200,11 @@ class EmittedPeriod:
         """Return max |error| over every tick; of shaped codes, that of the position."""
         if self.shaped is not None:
             return float(np.max(np.abs(self.shaped.position_errors)))
-        return self._figures[0]
+        return max(float(np.max(np.abs(errors))) for errors in self._end_errors)
 
     def error_moments(self) -> tuple[float, float]:
         """Return mean and mean square of the error over every tick, along a run by a parabola of three of its ticks."""
-        return self._figures[1:]
+        return self._moments_of_error
 
     def power(self) -> float:
         """Return the mean square of the codes about their mean."""
@@ -240,15 +240,14 @@ class EmittedPeriod:
         return codes - self._target_codes(starts), codes - self._target_codes(self.runs.lasts)
 
     @cached_property
-    def _figures(self) -> tuple[float, float, float]:
-        """The largest error, the mean, and the mean square."""
-        largest, sums = 0.0, np.zeros(2)
+    def _moments_of_error(self) -> tuple[float, float]:
+        """The mean of the error, and the mean square."""
+        sums = np.zeros(2)
         for which in self._chunks():
             n, (first, last) = self.runs.lengths_of(which), (errors[which] for errors in self._end_errors)
-            largest = max(largest, float(np.max(np.abs(first))), float(np.max(np.abs(last))))
             sums += self._moments(which, n, first, last)
         mean, square = sums / self.runs.ticks
-        return largest, float(mean), float(square)
+        return float(mean), float(square)
 
     def _moments(self, which: slice, n: Ints, first: Floats, last: Floats) -> tuple[float, float]:
         """Sum the error and its square over the ticks of some runs, with the errors of their ends."""
