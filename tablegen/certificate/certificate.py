@@ -171,9 +171,11 @@ def steps_beyond_guard(periods: EmittedPeriods) -> bool:
 
 def certify(plan: Plan, periods: EmittedPeriods | None = None) -> dict[str, Certificate]:
     """Measure the certificates of both axes; ``periods`` are those of the plan, where figures were measured already."""
-    periods = periods or EmittedPeriods(plan)
-    certificates: dict[str, Certificate] = {line.axis: _certify(line, periods.axes[line.axis]) for line in plan.lines}
-    if (pixels := periods.pixels) is not None:
+    certificates: dict[str, Certificate] = {  # without periods one after the other, since long ones take memory
+        line.axis: _certify(line, EmittedPeriod(line) if periods is None else periods.axes[line.axis])
+        for line in plan.lines
+    }
+    if (pixels := plan.pixel_errors if periods is None else periods.pixels) is not None:
         certificates["x"] = _with_pixels(certificates["x"], pixels)
     return certificates
 

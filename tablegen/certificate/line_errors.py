@@ -29,6 +29,7 @@ _CHUNK_RUNS = 1 << 14  # runs whose figures are summed together
 # Numbers that are computed at a time: so few that the memory of one part serves the next. Larger arrays go back to
 # the system, and each page of the next ones is fetched anew, which takes longer than the arithmetic.
 _CHUNK = 1 << 12
+_MOST_KEPT_RUNS = 1 << 18  # runs whose errors are kept; of more they are computed again where they are needed
 _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
@@ -200,7 +201,8 @@ class EmittedPeriod:
         """Return max |error| over every tick; of shaped codes, that of the position."""
         if self.shaped is not None:
             return float(np.max(np.abs(self.shaped.position_errors)))
-        return max(float(np.max(np.abs(errors))) for errors in self._end_errors)
+        parts = (errors(which) for which in self._chunks() for errors in (self._errors_at_begin, self._errors_at_end))
+        return max(float(np.max(np.abs(errors))) for errors in parts)
 
     def error_moments(self) -> tuple[float, float]:
         """Return mean and mean square of the error over every tick, along a run by a parabola of three of its ticks."""
@@ -231,11 +233,26 @@ class EmittedPeriod:
         """Yield parts of the runs that fit into the cache together."""
         return (slice(at, at + _CHUNK_RUNS) for at in range(0, len(self.runs.starts), _CHUNK_RUNS))
 
+    def _errors_at_begin(self, which: slice) -> Floats:
+        """Return the errors at the first tick of some runs, shape (n,)."""
+        if self.runs.by_tick:
+            return self._by_tick[which]
+        if len(self.runs.starts) > _MOST_KEPT_RUNS:
+            return self.runs.codes[which] - self._target_codes(self.runs.starts[which])
+        return self._end_errors[0][which]
+
+    def _errors_at_end(self, which: slice) -> Floats:
+        """Return the errors at the last tick of some runs, shape (n,)."""
+        if self.runs.by_tick:
+            return self._by_tick[which]
+        if len(self.runs.starts) > _MOST_KEPT_RUNS:
+            ends = self.runs.starts[which] + self.runs.lengths_of(which) - 1
+            return self.runs.codes[which] - self._target_codes(ends)
+        return self._end_errors[1][which]
+
     @cached_property
     def _end_errors(self) -> tuple[Floats, Floats]:
         """The errors at the first and at the last tick of each run, each of shape (runs,)."""
-        if self.runs.by_tick:
-            return self._by_tick, self._by_tick
         codes, starts = self.runs.codes, self.runs.starts
         return codes - self._target_codes(starts), codes - self._target_codes(self.runs.lasts)
 
@@ -244,7 +261,7 @@ class EmittedPeriod:
         """The mean of the error, and the mean square."""
         sums = np.zeros(2)
         for which in self._chunks():
-            n, (first, last) = self.runs.lengths_of(which), (errors[which] for errors in self._end_errors)
+            n, first, last = self.runs.lengths_of(which), self._errors_at_begin(which), self._errors_at_end(which)
             sums += self._moments(which, n, first, last)
         mean, square = sums / self.runs.ticks
         return float(mean), float(square)
@@ -277,13 +294,13 @@ class EmittedPeriod:
         """
         if self.runs.by_tick:
             return np.arange(first, stop), self._by_tick[first:stop]
-        starts, (at_begin, at_end) = self.runs.starts, self._end_errors
+        starts = self.runs.starts
         begins = slice(*np.searchsorted(starts, (first, stop)).tolist())
-        ends = slice(*(np.searchsorted(starts[1:], (first + 1, stop + 1))).tolist())
-        last = slice(-1 if first < self.runs.ticks <= stop else len(starts), None)
+        first_end, behind = np.searchsorted(starts[1:], (first + 1, stop + 1)).tolist()
+        ends = slice(first_end, behind if stop < self.runs.ticks else len(starts))
         return (
-            np.concatenate([starts[begins], starts[1:][ends] - 1, np.full(len(starts[last]), self.runs.ticks - 1)]),
-            np.concatenate([at_begin[begins], at_end[:-1][ends], at_end[last]]),
+            np.concatenate([starts[begins], starts[ends] + self.runs.lengths_of(ends) - 1]),
+            np.concatenate([self._errors_at_begin(begins), self._errors_at_end(ends)]),
         )
 
 
