@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tablegen.api.result import Result
 from tablegen.base.input_errors import Rejected
 from tablegen.base.warnings import Finding
-from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.certificate import Certificate, EmittedPeriods
 from tablegen.certificate.certificate import certify as certify_plan
 from tablegen.certificate.certified_scan import CertifiedScan, certify_planned, certify_scan
 from tablegen.certificate.error_answer import ErrorAnswer, duration, error_answers, first_lines
@@ -174,9 +174,9 @@ def build(
     return built
 
 
-def build_planned(setup: Setup, plan: Plan) -> "Build":
-    """Certify a plan that was made of a setup; errors as of ``build``."""
-    return _built(certify_planned(setup, plan), _formats(setup, None), explicit=False)
+def build_planned(setup: Setup, periods: EmittedPeriods) -> "Build":
+    """Certify the plan of some periods, which was made of a setup; errors as of ``build``."""
+    return _built(certify_planned(setup, periods.plan, periods=periods), _formats(setup, None), explicit=False)
 
 
 def _built(certified: CertifiedScan, formats: Sequence[Format], *, explicit: bool) -> "Build":

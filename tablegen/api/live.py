@@ -11,9 +11,11 @@ from tablegen.api.build import Build, build_planned
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.certificate.certified_scan import may_break_limits
+from tablegen.certificate.certificate import EmittedPeriods
+from tablegen.certificate.certified_scan import breaks_limit
 from tablegen.compensation.operator.frame_transient import frame_drift_nm
 from tablegen.config.image_keys import IMAGES, SIZES
+from tablegen.config.load import Setup
 from tablegen.config.variants import Variant, other_settings, variants
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
@@ -93,12 +95,17 @@ class LiveScan:
 
 @dataclass(frozen=True)
 class _Scan:
-    """A scan with the values by key that make it of the file; ``build`` is None until it is certified."""
+    """A scan with the values by key that make it of the file.
+
+    Either ``build`` is there, or the ``periods`` of a plan that breaks no limit, which is to be certified.
+    """
 
     settings: dict[str, Any]
     variant: Variant
+    setup: Setup
     plan: AnyPlan
     build: Build | TurnedBuild | None
+    periods: EmittedPeriods | None = None
 
     @property
     def straight(self) -> Plan:
@@ -115,8 +122,8 @@ class _Scan:
         """Certify the plan, unless that is done."""
         if self.build is not None:
             return self.build
-        assert isinstance(self.plan, Plan)
-        return build_planned(self.variant.setup, self.plan)
+        assert self.periods is not None
+        return build_planned(self.setup, self.periods)
 
 
 @dataclass(frozen=True)
@@ -183,7 +190,7 @@ class Live:
         self._device, self._path, self._on_stage = device, Path(scan), on_stage
         self._limits = device.limits()
         scan_settings = dict(settings or {})
-        planned = self._planned(scan_settings, self._variant(scan_settings))
+        planned = self._planned(scan_settings, *self._variant(scan_settings))
         self._scan = replace(planned, build=planned.certified())
         self._sent: _Scan | None = None  # by an upload whose end is not known
         self._is_sent = False  # the device has taken ``_scan``
@@ -204,7 +211,7 @@ class Live:
     @property
     def angle_deg(self) -> float:
         """The scan angle."""
-        return self._scan.variant.setup.scan.angle_deg
+        return self._scan.setup.scan.angle_deg
 
     @property
     def generation(self) -> int | None:
@@ -257,17 +264,17 @@ class Live:
         """
         self._settle()
         settings = other_settings(self._scan.settings, settings)
-        variant = self._variant(settings)
-        preview = self._preview_at_angle(variant)
+        variant, setup = self._variant(settings)
+        preview = self._preview_at_angle(setup)
         try:
-            return self._send(self._planned(settings, variant), preview)
+            return self._send(self._planned(settings, variant, setup), preview)
         except BaseException as error:  # an interrupted plan too
             lost = isinstance(error, LinkError) and not isinstance(error, Refused | Unsuitable)
             if preview is not None and not lost:
                 self._go_back()
             raise
 
-    def _variant(self, settings: dict[str, Any]) -> Variant:
+    def _variant(self, settings: dict[str, Any]) -> tuple[Variant, Setup]:
         _, scans = variants(self._path, {key: [value] for key, value in settings.items()})
         if len(scans) != 1:
             why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
@@ -276,28 +283,35 @@ class Live:
         if setup.scan.z is not None:
             why = "`live` sends no output z; leave [z] out, or build the C into the firmware"
             raise Rejected([setup.scan_file.problem("z", why)])
-        return scans[0]
+        return scans[0], setup
 
-    def _planned(self, settings: dict[str, Any], variant: Variant) -> "_Scan":
-        """Plan a scan, and certify it where its certificate may exceed a limit: a preview does not wait for others."""
-        setup = variant.setup
+    def _planned(self, settings: dict[str, Any], variant: Variant, setup: Setup) -> "_Scan":
+        """Plan a scan, and measure what limits are compared with; a preview does not wait for the whole certificate.
+
+        Raises
+        ------
+        BrokenLimit
+            If the scan exceeds a limit.
+        """
         if setup.mixes_motions:
             turned = build_turned(setup, progress=self._on_stage)
-            return _Scan(settings, variant, turned.plan, turned)
-        plan = make_plan(setup, sines=True)
-        return _Scan(settings, variant, plan, build_planned(setup, plan) if may_break_limits(setup, plan) else None)
+            return _Scan(settings, variant, setup, turned.plan, turned)
+        periods = EmittedPeriods(make_plan(setup, sines=True))
+        if breaks_limit(setup, periods):
+            return _Scan(settings, variant, setup, periods.plan, build_planned(setup, periods))  # raises, with remedies
+        return _Scan(settings, variant, setup, periods.plan, None, periods)
 
-    def _preview_at_angle(self, variant: Variant) -> LivePreview | None:
+    def _preview_at_angle(self, setup: Setup) -> LivePreview | None:
         """Play the tables of a scan at an angle with other gains and offsets, before the plan of a change is there.
 
         A MOVE cannot say them: they go as a program. None where the device or a limit does not take them.
         """
         before, device = self.plan, self._device
-        if not (self._is_sent and isinstance(before, TurnedPlan) and variant.setup.mixes_motions):
+        if not (self._is_sent and isinstance(before, TurnedPlan) and setup.mixes_motions):
             return None
         if Feature.COMMIT_MODES not in device.info.features:  # it would restart the frame
             return None
-        preview = turned_preview(variant.setup, before)
+        preview = turned_preview(setup, before)
         if preview is None or not is_accepted(preview.program, self._limits, before.program, device.info.shaping):
             return None
         scan = PreparedScan(before.name, program_digest(preview.program), preview.program, None, None)

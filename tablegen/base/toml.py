@@ -6,6 +6,8 @@ known to be valid by then, notes the line of each key.
 
 import re
 import tomllib
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", '"': '"', "\\
 # of all keys of three parts or more, since each part takes the parser a kilobyte.
 _MAXIMUM_PARTS, _MAXIMUM_PARTS_OF_ALL = 20, 50_000
 _MAXIMUM_DIGITS = 4300  # digits of a decimal number that Python converts
+_FILES_REMEMBERED, _MOST_REMEMBERED = 4, 1 << 16  # files that are not parsed twice, and characters of one
 
 
 def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
@@ -50,10 +53,11 @@ def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
         If it is not TOML.
     """
     text = text.replace("\r\n", "\n")
-    _refuse_long_keys(text, name)
     try:
-        values = tomllib.loads(text)
-        return values, Document(name, _KeyLines(text).locate())
+        if len(text) > _MOST_REMEMBERED:
+            return _parsed(text, name)
+        values, document = _remembered(text, name)
+        return deepcopy(values), document
     except tomllib.TOMLDecodeError as error:
         raise Rejected([_syntax_problem(name, text, str(error))]) from None
     except RecursionError:
@@ -61,6 +65,16 @@ def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
     except ValueError:  # the parser does not convert the longest decimal numbers, and does not say where they are
         line, digits = _long_number(text)
         raise Rejected([Problem(name, line, "", f"a number of {digits} digits is too long")]) from None
+
+
+def _parsed(text: str, name: str) -> tuple[dict[str, Any], Document]:
+    _refuse_long_keys(text, name)
+    values = tomllib.loads(text)
+    return values, Document(name, _KeyLines(text).locate())
+
+
+# A scan that is changed while it plays is read again at each change, with its scanner, and neither text is another.
+_remembered = lru_cache(maxsize=_FILES_REMEMBERED)(_parsed)
 
 
 _PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""

@@ -1,6 +1,7 @@
 """The certificate of a build, measured on every emitted integer of one whole period of each axis, and its limits."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from math import floor, log10, sqrt
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from msgspec.structs import replace
 
 from tablegen.base.input_errors import Document, Problem
 from tablegen.base.remedies import CAUSE_REMEDIES, REMEDIES, FindingCode
-from tablegen.certificate.expected import certified_expectation
+from tablegen.certificate.expected import certified_expectation, known_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
     LayerEffect,
@@ -28,6 +29,40 @@ from tablegen.planning.pixel_errors import PixelErrors
 
 if TYPE_CHECKING:
     from tablegen.certificate.position_errors import ArrivingErrors
+
+
+class LimitedFigures(Struct, frozen=True):
+    """The figures of an axis that are compared with limits, of its certificate or without the rest of it."""
+
+    max_error_lsb: float
+    largest_step: int
+    max_step: int
+    scaling: dict[str, ScalingError]
+    expected: Expectation | None
+    pixels: PixelErrors | None
+
+    @property
+    def scaling_error_percent(self) -> float:
+        """The larger scaling error of both directions; ripple shorter than a chord counts in full."""
+        return max((self._own(side) for side in self.scaling), default=0.0)
+
+    @property
+    def size_error_percent(self) -> float:
+        """The larger size error of both directions, with its sign."""
+        return max((error.size for error in self.scaling.values()), key=abs, default=0.0)
+
+    @property
+    def scaling_on_scanner(self) -> tuple[str, float, float] | None:
+        """The worse direction, its expected error on the scanner and that of the waveform, in percent.
+
+        None where nothing is expected. The errors may add up.
+        """
+        figures = {} if self.expected is None else self.expected.scaling
+        both = [(side, figure.value, self._own(side)) for side, figure in figures.items()]
+        return max(both, key=lambda one: one[1] + one[2], default=None)
+
+    def _own(self, side: str) -> float:
+        return max(self.scaling[side].total, self.scaling[side].band_limit)
 
 
 class Certificate(Struct, frozen=True):
@@ -65,14 +100,21 @@ class Certificate(Struct, frozen=True):
     pixels: PixelErrors | None = None
 
     @property
+    def limited(self) -> LimitedFigures:
+        """The figures that limits are compared with."""
+        return LimitedFigures(
+            self.max_error_lsb, self.largest_step, self.max_step, self.scaling, self.expected, self.pixels
+        )
+
+    @property
     def scaling_error_percent(self) -> float:
         """The larger scaling error of both directions; ripple shorter than a chord counts in full."""
-        return max((self._own(side) for side in self.scaling), default=0.0)
+        return self.limited.scaling_error_percent
 
     @property
     def size_error_percent(self) -> float:
         """The larger size error of both directions, with its sign."""
-        return max((error.size for error in self.scaling.values()), key=abs, default=0.0)
+        return self.limited.size_error_percent
 
     @property
     def scaling_on_scanner(self) -> tuple[str, float, float] | None:
@@ -80,18 +122,60 @@ class Certificate(Struct, frozen=True):
 
         None where nothing is expected. The errors may add up.
         """
-        figures = {} if self.expected is None else self.expected.scaling
-        both = [(side, figure.value, self._own(side)) for side, figure in figures.items()]
-        return max(both, key=lambda one: one[1] + one[2], default=None)
-
-    def _own(self, side: str) -> float:
-        return max(self.scaling[side].total, self.scaling[side].band_limit)
+        return self.limited.scaling_on_scanner
 
 
-def certify(plan: Plan) -> dict[str, Certificate]:
-    """Measure the certificates of both axes."""
-    certificates: dict[str, Certificate] = {line.axis: _certify(line) for line in plan.lines}
-    if (pixels := plan.pixel_errors) is not None:
+class EmittedPeriods:
+    """The emitted period of each axis of a plan, measured as far as a caller needs it: no figure of it twice."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+
+    @cached_property
+    def axes(self) -> dict[str, EmittedPeriod]:
+        """The period of each axis, "x" and "y"."""
+        return {line.axis: EmittedPeriod(line) for line in self.plan.lines}
+
+    @cached_property
+    def pixels(self) -> PixelErrors | None:
+        """The errors of pixels that are taken where the piezo is; None where they have equal lengths."""
+        return self.plan.pixel_errors
+
+
+def limited_figures(periods: EmittedPeriods) -> dict[str, LimitedFigures]:
+    """Measure what limits of errors are compared with, without the rest of the certificates.
+
+    All figures are those of the certificates, but for ``expected``: without an operator it has no figure that a limit
+    is compared with, and is left out; the uncertainty by the steps of the converter, which no limit counts, is missing.
+    """
+    plan = periods.plan
+    return {
+        line.axis: LimitedFigures(
+            max_error_lsb=periods.axes[line.axis].largest_error(),
+            largest_step=_largest_step(line, periods.axes[line.axis]),
+            max_step=line.program.output.max_step,
+            scaling=_scaling(line, periods.axes[line.axis]),
+            expected=known_expectation(line),
+            pixels=periods.pixels if line.axis == "x" else None,
+        )
+        for line in plan.lines
+    }
+
+
+def steps_beyond_guard(periods: EmittedPeriods) -> bool:
+    """Return True if an axis steps by more than its slew guard."""
+    return any(
+        _largest_step(line, periods.axes[line.axis]) > line.program.output.max_step for line in periods.plan.lines
+    )
+
+
+def certify(plan: Plan, periods: EmittedPeriods | None = None) -> dict[str, Certificate]:
+    """Measure the certificates of both axes; ``periods`` are those of the plan, where figures were measured already."""
+    certificates: dict[str, Certificate] = {  # without periods one after the other, since long ones take memory
+        line.axis: _certify(line, EmittedPeriod(line) if periods is None else periods.axes[line.axis])
+        for line in plan.lines
+    }
+    if (pixels := plan.pixel_errors if periods is None else periods.pixels) is not None:
         certificates["x"] = _with_pixels(certificates["x"], pixels)
     return certificates
 
@@ -111,7 +195,7 @@ def _with_pixels(certificate: Certificate, pixels: PixelErrors) -> Certificate:
 
 def broken_limits(
     plan: Plan,
-    certificates: dict[str, Certificate],
+    certificates: Mapping[str, Certificate | LimitedFigures],
     file: Document,
     advise: Callable[[str], str] = lambda _: "",
     hardware_problem: Callable[[str, str, str], Problem] | None = None,
@@ -160,7 +244,7 @@ def broken_limits(
     return problems
 
 
-def _expected_excess(certificate: Certificate, limit: float) -> tuple[FindingCode, str] | None:
+def _expected_excess(certificate: Certificate | LimitedFigures, limit: float) -> tuple[FindingCode, str] | None:
     """Return how the errors of the waveform and of the scanner together exceed a limit; None where they do not.
 
     The uncertainty is not counted: no change of the scan makes it smaller.
@@ -194,8 +278,8 @@ def cause_of(line: LinePlan, parts: ScalingError) -> str:
     return "table" if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits else "converter"
 
 
-def _certify(line: LinePlan) -> Certificate:
-    played, output, shaping = EmittedPeriod(line), line.program.output, line.program.output.shaping
+def _certify(line: LinePlan, played: EmittedPeriod) -> Certificate:
+    output, shaping = line.program.output, line.program.output.shaping
     codes = played.runs.codes
     mean, square = played.error_moments()
     noise = square - mean * mean
@@ -232,11 +316,6 @@ def _certify(line: LinePlan) -> Certificate:
 
 def _largest_step(line: LinePlan, played: EmittedPeriod) -> int:
     return played.largest_step() + line.program.output.shaping.step_excess
-
-
-def exceeds_slew_guard(line: LinePlan) -> bool:
-    """Return True if an axis steps by more than its slew guard."""
-    return _largest_step(line, EmittedPeriod(line)) > line.program.output.max_step
 
 
 def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":

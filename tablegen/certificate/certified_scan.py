@@ -6,7 +6,14 @@ from functools import partial
 from msgspec import Struct
 
 from tablegen.base.input_errors import Problem
-from tablegen.certificate.certificate import Certificate, broken_limits, certify, exceeds_slew_guard
+from tablegen.certificate.certificate import (
+    Certificate,
+    EmittedPeriods,
+    broken_limits,
+    certify,
+    limited_figures,
+    steps_beyond_guard,
+)
 from tablegen.certificate.scan_warnings import limit_advice
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import Plan, SampleCost, make_plan
@@ -47,11 +54,16 @@ def certify_scan(
 
 
 def certify_planned(
-    setup: Setup, plan: Plan, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True
+    setup: Setup,
+    plan: Plan,
+    progress: Callable[[str], object] = lambda _: None,
+    *,
+    remedies: bool = True,
+    periods: EmittedPeriods | None = None,
 ) -> CertifiedScan:
-    """Certify the plan of a scan; parameters as for ``certify_scan``."""
+    """Certify the plan of a scan; parameters as for ``certify_scan`` and ``certify``."""
     progress("measuring every tick of a line and a frame")
-    certificates = certify(plan)
+    certificates = certify(plan, periods)
     advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice
     broken = broken_limits(plan, certificates, setup.scan_file, advise, setup.hardware_problem)
     broken += [problem for line in plan.lines if (problem := too_dear(setup, line.axis, line.sample_cost))]
@@ -59,17 +71,14 @@ def certify_planned(
     return CertifiedScan(setup, plan, certificates, tuple(broken))
 
 
-def may_break_limits(setup: Setup, plan: Plan) -> bool:
-    """Return True if it takes the certificate of a plan to know that no limit is exceeded.
-
-    It does where the scan file has limits of errors, and where an axis steps by more than its slew guard.
-    """
-    return (
-        plan.limits.max_error_lsb is not None
-        or plan.limits.max_scaling_error_percent is not None
-        or any(too_dear(setup, line.axis, line.sample_cost) is not None for line in plan.lines)
-        or any(exceeds_slew_guard(line) for line in plan.lines)
-    )
+def breaks_limit(setup: Setup, periods: EmittedPeriods) -> bool:
+    """Return True if a plan exceeds a limit: what its certificate is refused for, without the rest of it."""
+    plan, limits = periods.plan, periods.plan.limits
+    if any(too_dear(setup, line.axis, line.sample_cost) is not None for line in plan.lines):
+        return True
+    if limits.max_error_lsb is None and limits.max_scaling_error_percent is None:
+        return steps_beyond_guard(periods)
+    return bool(broken_limits(plan, limited_figures(periods), setup.scan_file) or _beyond_limit_of_z(setup, plan))
 
 
 def _beyond_limit_of_z(setup: Setup, plan: Plan) -> list[Problem]:

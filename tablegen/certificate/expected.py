@@ -29,12 +29,19 @@ def expected_of(line: LinePlan) -> Expectation | None:
     """
     if line.layer is not None:
         return None
-    both = line.band_limit.directions == "both"
-    known = line.drive.shape.identification.expectation
+    known = known_expectation(line)
     if known is not None:
-        return known if both else known.forward_only
-    rounding = _rounding(line) if both else None
+        return known
+    rounding = _rounding(line) if line.band_limit.directions == "both" else None
     return None if rounding is None else Expectation("laws", mismatch=Figure(rounding[0]), stroke=rounding[1])
+
+
+def known_expectation(line: LinePlan) -> Expectation | None:
+    """Return the expectation by the operator of an axis; None without one, where the laws know the mismatch at most."""
+    known = line.drive.shape.identification.expectation
+    if known is None or line.layer is not None:
+        return None
+    return known if line.band_limit.directions == "both" else known.forward_only
 
 
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:

@@ -17,7 +17,7 @@ from tablegen.certificate.shaped_periods import ShapedPeriods
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.line import Sweep
 from tablegen.fixedpoint.runs import runs_of
-from tablegen.numerics.arrays import Floats, Ints, union_sorted
+from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.extremes import extreme_points, extreme_ticks
 from tablegen.waveform.sampler import Expansion, Sampler, on_grid
@@ -25,7 +25,11 @@ from tablegen.waveform.series import FourierSeries, values
 
 CHORD = 0.05  # share of the line, about one lattice constant of the paper's images
 _POINTS_PER_HARMONIC = 16  # points per harmonic over the window, for analytic slopes
-_CHUNK_RUNS = 1 << 14  # runs that are worked out together, in the cache
+_CHUNK_RUNS = 1 << 14  # runs whose figures are summed together
+# Numbers that are computed at a time: so few that the memory of one part serves the next. Larger arrays go back to
+# the system, and each page of the next ones is fetched anew, which takes longer than the arithmetic.
+_CHUNK = 1 << 12
+_MOST_KEPT_RUNS = 1 << 18  # runs whose errors are kept; of more they are computed again where they are needed
 _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
@@ -55,6 +59,20 @@ class LayerEffect(Struct, frozen=True):
     scaling: float
 
 
+class FollowedSweep(Struct, frozen=True, eq=False):
+    """The modelled piezo on one direction of a line, without rounding; arrays have the shape (n,).
+
+    ``deviation`` is where it is less ``position``, in shares of the line; ``speed`` is its speed over the line's, and
+    ``target_speed`` that of the target. ``steepness`` is the slope of the branch.
+    """
+
+    position: Floats
+    deviation: Floats
+    speed: Floats
+    target_speed: Floats
+    steepness: Floats
+
+
 class TickErrors:
     """The errors of every tick of a period."""
 
@@ -78,19 +96,19 @@ class TickErrors:
         """
         return self._errors[k]
 
-    def corners(self, first: int, stop: int) -> Ints:
-        """Return all ticks in [first, stop).
+    def corners(self, first: int, stop: int) -> tuple[Ints, Floats]:
+        """Return all ticks in [first, stop), and their errors.
 
         Returns
         -------
-        Ints
-            Ticks, shape (stop - first,).
+        ticks, errors
+            Each of shape (stop - first,).
         """
-        return np.arange(first, stop)
+        return np.arange(first, stop), self._errors[first:stop]
 
     def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
         """Yield the ticks [first, stop) in parts that are computed together."""
-        return pairwise([first, *range(first + _CHUNK_RUNS, stop, _CHUNK_RUNS), stop])
+        return pairwise([first, *range(first + _CHUNK, stop, _CHUNK), stop])
 
 
 class EmittedPeriod:
@@ -103,6 +121,8 @@ class EmittedPeriod:
         self._line = line
         self._hold = line.program.hold
         self._expansions: dict[int, tuple[FourierSeries, Expansion]] = {}
+        self._followed: dict[str, FollowedSweep] = {}
+        self._scaling: dict[str, ScalingError] = {}
         self._reference = Sampler(line.series, line.program.phase.ticks)
         # Between its extremes the float waveform is monotonic, so that errors are largest where runs begin and end.
         self.runs = runs_of(line.program.rounded).split_at(self._extremes())
@@ -128,10 +148,22 @@ class EmittedPeriod:
             self._expansions[id(series)] = series, Expansion(series)  # the series is kept, so that no other has its id
         return self._expansions[id(series)][1]
 
+    def followed(self, side: str, branch: Sweep) -> FollowedSweep:
+        """Follow one direction, "forward" or "backward", once; ``branch`` is the branch u(x) of this direction."""
+        if side not in self._followed:
+            self._followed[side] = _followed(self._line, self, side, branch)
+        return self._followed[side]
+
+    def scaling_error(self, side: str, branch: Sweep) -> ScalingError:
+        """Compute the scaling error of one direction once; parameters as of ``followed``."""
+        if side not in self._scaling:
+            self._scaling[side] = _scaling_error(self._line, self, side, branch)
+        return self._scaling[side]
+
     def _target_codes(self, k: Ints) -> Floats:
         codes = np.empty(len(k))
-        for at in range(0, len(k), _CHUNK_RUNS):
-            chunk = slice(at, at + _CHUNK_RUNS)
+        for at in range(0, len(k), _CHUNK):
+            chunk = slice(at, at + _CHUNK)
             advances = k[chunk] if self._hold == 1 else k[chunk] // self._hold
             codes[chunk] = self._line.float_codes(self._reference.at(advances))
         return codes
@@ -169,11 +201,12 @@ class EmittedPeriod:
         """Return max |error| over every tick; of shaped codes, that of the position."""
         if self.shaped is not None:
             return float(np.max(np.abs(self.shaped.position_errors)))
-        return self._figures[0]
+        parts = (errors(which) for which in self._chunks() for errors in (self._errors_at_begin, self._errors_at_end))
+        return max(float(np.max(np.abs(errors))) for errors in parts)
 
     def error_moments(self) -> tuple[float, float]:
         """Return mean and mean square of the error over every tick, along a run by a parabola of three of its ticks."""
-        return self._figures[1:]
+        return self._moments_of_error
 
     def power(self) -> float:
         """Return the mean square of the codes about their mean."""
@@ -193,25 +226,45 @@ class EmittedPeriod:
 
     def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
         """Yield the ticks [first, stop) in parts whose runs are computed together."""
-        edges = self.runs.starts[slice(*np.searchsorted(self.runs.starts, (first + 1, stop)))][_CHUNK_RUNS::_CHUNK_RUNS]
+        edges = self.runs.starts[slice(*np.searchsorted(self.runs.starts, (first + 1, stop)))][_CHUNK::_CHUNK]
         return pairwise([first, *edges.tolist(), stop])
 
     def _chunks(self) -> Iterator[slice]:
         """Yield parts of the runs that fit into the cache together."""
         return (slice(at, at + _CHUNK_RUNS) for at in range(0, len(self.runs.starts), _CHUNK_RUNS))
 
+    def _errors_at_begin(self, which: slice) -> Floats:
+        """Return the errors at the first tick of some runs, shape (n,)."""
+        if self.runs.by_tick:
+            return self._by_tick[which]
+        if len(self.runs.starts) > _MOST_KEPT_RUNS:
+            return self.runs.codes[which] - self._target_codes(self.runs.starts[which])
+        return self._end_errors[0][which]
+
+    def _errors_at_end(self, which: slice) -> Floats:
+        """Return the errors at the last tick of some runs, shape (n,)."""
+        if self.runs.by_tick:
+            return self._by_tick[which]
+        if len(self.runs.starts) > _MOST_KEPT_RUNS:
+            ends = self.runs.starts[which] + self.runs.lengths_of(which) - 1
+            return self.runs.codes[which] - self._target_codes(ends)
+        return self._end_errors[1][which]
+
     @cached_property
-    def _figures(self) -> tuple[float, float, float]:
-        """The largest error, the mean, and the mean square."""
-        largest, sums = 0.0, np.zeros(2)
+    def _end_errors(self) -> tuple[Floats, Floats]:
+        """The errors at the first and at the last tick of each run, each of shape (runs,)."""
+        codes, starts = self.runs.codes, self.runs.starts
+        return codes - self._target_codes(starts), codes - self._target_codes(self.runs.lasts)
+
+    @cached_property
+    def _moments_of_error(self) -> tuple[float, float]:
+        """The mean of the error, and the mean square."""
+        sums = np.zeros(2)
         for which in self._chunks():
-            n, starts = self.runs.lengths_of(which), self.runs.starts[which]
-            first = self._by_tick[which] if self.runs.by_tick else self.runs.codes[which] - self._target_codes(starts)
-            last = first if self.runs.by_tick else self.runs.codes[which] - self._target_codes(starts + n - 1)
-            largest = max(largest, float(np.max(np.abs(first))), float(np.max(np.abs(last))))
+            n, first, last = self.runs.lengths_of(which), self._errors_at_begin(which), self._errors_at_end(which)
             sums += self._moments(which, n, first, last)
         mean, square = sums / self.runs.ticks
-        return largest, float(mean), float(square)
+        return float(mean), float(square)
 
     def _moments(self, which: slice, n: Ints, first: Floats, last: Floats) -> tuple[float, float]:
         """Sum the error and its square over the ticks of some runs, with the errors of their ends."""
@@ -231,20 +284,24 @@ class EmittedPeriod:
         square = square + bend * (2.0 * arch * mean + arch_square * bend)
         return float(np.sum(n * (mean + arch * bend))), float(np.sum(n * square))
 
-    def corners(self, first: int, stop: int) -> Ints:
-        """Return the ticks in [first, stop) at which a run begins or ends.
+    def corners(self, first: int, stop: int) -> tuple[Ints, Floats]:
+        """Return the ticks in [first, stop) at which a run begins, those at which one ends, and their errors.
 
         Returns
         -------
-        Ints
-            Ticks, ascending, shape (n,), n <= stop - first.
+        ticks, errors
+            Each of shape (n,); the tick of a run of one is there twice.
         """
         if self.runs.by_tick:
-            return np.arange(first, stop)
+            return np.arange(first, stop), self._by_tick[first:stop]
         starts = self.runs.starts
-        begins = starts[slice(*np.searchsorted(starts, (first, stop)))]
-        ends = starts[slice(*np.searchsorted(starts, (first + 1, stop + 1)))] - 1
-        return union_sorted(begins, ends, np.arange(max(first, self.runs.ticks - 1), min(stop, self.runs.ticks)))
+        begins = slice(*np.searchsorted(starts, (first, stop)).tolist())
+        first_end, behind = np.searchsorted(starts[1:], (first + 1, stop + 1)).tolist()
+        ends = slice(first_end, behind if stop < self.runs.ticks else len(starts))
+        return (
+            np.concatenate([starts[begins], starts[ends] + self.runs.lengths_of(ends) - 1]),
+            np.concatenate([self._errors_at_begin(begins), self._errors_at_end(ends)]),
+        )
 
 
 def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
@@ -266,12 +323,15 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     ScalingError
         The total and its parts: band limit, quantisation, model; the size error with its sign.
     """
+    return played.scaling_error(side, branch)
+
+
+def _scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
     low, high = line.band_limit.window
-    position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
-    deviation, speed, target_speed = _followed(line, played, side, position)
-    sweep = position if side == "forward" else 1.0 - position
-    steepness = branch.slope(sweep)
-    chords = [_chords(line, one, side, position, deviation, steepness) for one in played.arriving()]
+    followed = played.followed(side, branch)
+    deviation, speed, target_speed = followed.deviation, followed.speed, followed.target_speed
+    sweep = followed.position if side == "forward" else 1.0 - followed.position
+    chords = [_chords(line, one, side, followed) for one in played.arriving()]
     # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'; the last one is of its middle.
     triangle = 1.0 / branch.slope(branch.inverse(np.append(sweep, 0.5)))
     return ScalingError(
@@ -284,12 +344,13 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     )
 
 
-def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return where the modelled piezo is, less ``position``; its speed over the line's; and that of the target.
+def _followed(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> FollowedSweep:
+    """Follow the modelled piezo over the window.
 
     What the layer moves is no error: it is there for what the model does not know. So all is taken without it.
     """
     shape, reached = line.drive.shape, _reached(line)
+    position = np.linspace(*line.band_limit.window, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     times = shape.times(side, position)
 
     def at_times(series: FourierSeries) -> list[Floats]:
@@ -312,7 +373,9 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
         return shape.followed(side, position, series, value, slope)
 
     ideal = follow(line.target)
-    return *(ideal if reached is line.target else follow(reached)), ideal[1]
+    deviation, speed = ideal if reached is line.target else follow(reached)
+    steepness = branch.slope(position if side == "forward" else 1.0 - position)
+    return FollowedSweep(position, deviation, speed, ideal[1], steepness)
 
 
 def refined(line: LinePlan, side: str, branch: Sweep) -> LayerEffect:
@@ -344,28 +407,19 @@ def _reached(line: LinePlan) -> FourierSeries:
 
 def tick_scaling(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep, errors: TickErrors) -> float:
     """Compute the total scaling error in percent, peak to peak, of a period with these errors."""
-    low, high = line.band_limit.window
-    position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
-    deviation, _, _ = _followed(line, played, side, position)
-    steepness = branch.slope(position if side == "forward" else 1.0 - position)
-    return _peak_to_peak(_chords(line, errors, side, position, deviation, steepness)[0])
+    return _peak_to_peak(_chords(line, errors, side, played.followed(side, branch))[0])
 
 
 def _chords(
-    line: LinePlan,
-    played: EmittedPeriod | TickErrors,
-    side: str,
-    position: Floats,
-    deviation: Floats,
-    steepness: Floats,
+    line: LinePlan, played: EmittedPeriod | TickErrors, side: str, followed: FollowedSweep
 ) -> tuple[Floats, Floats]:
     """Return the least and the largest slope error (1 is 100 %) of chords inside the window: of codes, of quantisation.
 
     Of all chords those count that begin or end where a run does: between those the error of a chord is a straight
-    line. ``deviation`` and ``steepness`` of the waveform stand at ``position``. A code stands for the middle of its
-    tick.
+    line. A code stands for the middle of its tick.
     """
     ticks, turn = line.program.ticks, line.drive.turn
+    position, deviation, steepness = followed.position, followed.deviation, followed.steepness
     share = turn if side == "forward" else 1.0 - turn
     ends = sorted(float(t) * ticks for t in line.drive.shape.times(side, position[[0, -1]]))
     first, stop = ceil(ends[0] - 0.5), floor(ends[1] - 0.5) + 1
@@ -373,13 +427,13 @@ def _chords(
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
 
-    def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
+    def noise_and_total(k: Ints, errors: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the errors in the middle of ticks.
 
         Parameters
         ----------
-        k
-            Ticks of the sweep, shape (n,).
+        k, errors
+            Ticks of the sweep, and the errors of their codes, each (n,).
 
         Returns
         -------
@@ -388,21 +442,27 @@ def _chords(
         """
         t = (k + 0.5) / ticks
         where = t / turn if side == "forward" else (1.0 - t) / share
-        noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)
+        noise = errors / line.codes_per_unit / np.interp(where, position, steepness)
         return where, noise, noise + np.interp(where, position, deviation)
 
     totals, noises = [], []
     for low, high in played.stretches(first, stop - baseline):
-        begin = played.corners(low, high)
-        if not played.by_tick:
-            begin = union_sorted(begin, played.corners(low + baseline, high + baseline) - baseline)
-        if not len(begin):
+        begin, error = played.corners(low, high)
+        chords = [(begin, error, played.errors(begin + baseline))]
+        if not played.by_tick:  # those that end where a run does
+            end, end_error = played.corners(low + baseline, high + baseline)
+            chords.append((end - baseline, played.errors(end - baseline), end_error))
+        if not any(len(begin) for begin, _, _ in chords):
             begin = np.array([low])
-        x0, noise0, total0 = noise_and_total(begin)
-        x1, noise1, total1 = noise_and_total(begin + baseline)
-        total, noise = (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
-        totals += [np.min(total), np.max(total)]
-        noises += [np.min(noise), np.max(noise)]
+            chords = [(begin, played.errors(begin), played.errors(begin + baseline))]
+        for begin, errors, end_errors in chords:
+            if not len(begin):
+                continue
+            x0, noise0, total0 = noise_and_total(begin, errors)
+            x1, noise1, total1 = noise_and_total(begin + baseline, end_errors)
+            total, noise = (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
+            totals += [np.min(total), np.max(total)]
+            noises += [np.min(noise), np.max(noise)]
     return np.array([min(totals), max(totals)]), np.array([min(noises), max(noises)])
 
 

@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -231,13 +232,23 @@ class Contents:
         return Program(phase, hold, shape.mode, shape.word_bits, words, self.output(page))
 
     def program(self, page: int) -> AxisProgram:
-        """Return the program of x (1) or y (2).
+        """Return the program of x (1) or y (2); it is made once.
 
         Raises
         ------
         ValueError, OverflowError
             If it could not be played at all.
         """
+        if page not in self._programs:
+            self._programs[page] = self._program(page)
+        return self._programs[page]
+
+    @cached_property
+    def _programs(self) -> dict[int, AxisProgram]:
+        """The programs that were made, by page."""
+        return {}
+
+    def _program(self, page: int) -> AxisProgram:
         fast, slow, spacing = self.fast(page), self.slow(page), self.axis(page, "knot_spacing")
         if slow is None:
             return fast

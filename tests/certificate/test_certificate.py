@@ -8,9 +8,11 @@ from replacing import replace
 from variants import plan_of, setup_of
 
 from tablegen.base.remedies import CAUSE_REMEDIES, REMEDIES
-from tablegen.certificate.certificate import broken_limits, certify
+from tablegen.certificate.certificate import EmittedPeriods, broken_limits, certify, limited_figures
+from tablegen.certificate.certified_scan import breaks_limit, certify_planned
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.config.schema import Limits
 from tablegen.fixedpoint import runs as runs_module
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
@@ -199,6 +201,43 @@ def test_a_line_that_touches_its_own_guard_is_refused(tmp_path: Path) -> None:
     assert [(one.code, one.axis) for one in problems] == [("step-guard", "x")]
     text = list(map(str, problems))
     assert "amplifier.max_slew_v_per_s: the x axis steps by 24 codes, above its guard of 20; a lower" in text[0]
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [
+        {},
+        {"x.offset_v": "41.3", "y.offset_v": "57.7", "x.size_nm": "137"},
+        {"x.table.mode": '"cubic"', "x.table.length": "256", "x.band_limit.method": '"truncate"'},
+        {
+            "y.motion": '"step"',
+            "y.table.mode": '"direct"',
+            "y.table.length": "",
+            "y.band_limit.harmonics": "16",
+            "amplifier.max_slew_v_per_s": "",
+        },
+    ],
+)
+def test_limits_are_decided_before_the_certificate(tmp_path: Path, edits: dict[str, str]) -> None:
+    """By the same figures: a limit just below any of them is exceeded, and one just above is not."""
+    setup = setup_of(tmp_path, {**FREE, "timing.lines": "40", **edits})
+    plan = make_plan(setup)
+    certificates, periods = certify(plan), EmittedPeriods(plan)
+    figures = limited_figures(periods)
+    for axis, certificate in certificates.items():
+        assert figures[axis] == replace(certificate.limited, expected=None)
+    assert certify(plan, periods) == certificates  # what was measured before is not another figure
+    error = max(one.max_error_lsb for one in certificates.values())
+    scaling = max(max(one.scaling_error_percent, abs(one.size_error_percent)) for one in certificates.values())
+    steps = certificates["x"].largest_step
+    for share, broken in ((1.0 - 1e-9, True), (1.0, False)):
+        for limits in (Limits(max_error_lsb=share * error), Limits(max_scaling_error_percent=share * scaling)):
+            limited = replace(plan, limits=limits)
+            assert breaks_limit(setup, EmittedPeriods(limited)) is broken
+            assert bool(certify_planned(setup, limited, remedies=False).broken) is broken
+        output = replace(plan.x.program.output, max_step=steps - broken)
+        guarded = replace(plan, x=replace(plan.x, program=replace(plan.x.program, output=output)))
+        assert breaks_limit(setup, EmittedPeriods(guarded)) is broken
 
 
 def test_a_coarse_table_is_told_from_a_coarse_converter(tmp_path: Path) -> None:

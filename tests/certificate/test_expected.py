@@ -15,7 +15,8 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from operator_files import REVERSIBLE, THRESHOLDS, WEIGHTS, operator_file, write_operator_scan
 from replacing import replace
 
-from tablegen.certificate.certificate import Certificate, broken_limits, certify
+from tablegen.certificate.certificate import Certificate, EmittedPeriods, broken_limits, certify
+from tablegen.certificate.certified_scan import breaks_limit
 from tablegen.certificate.converter_errors import converter_errors
 from tablegen.certificate.expected import expected_of, rounding_mismatch
 from tablegen.certificate.line_errors import EmittedPeriod
@@ -296,6 +297,9 @@ def test_a_limit_counts_what_is_expected_and_says_which_part_is_whose(tmp_path: 
     assert run("check", with_operator(tmp_path, limit, f"x.band_limit.harmonics = {found[5]}")).status == 0
     assert run("check", with_operator(tmp_path, few)).status == 0
     assert run("check", with_operator(tmp_path, limit.replace("0.5", "3"), few)).status == 0
+    for most, broken in (("0.5", True), ("3", False)):  # before the certificate too
+        setup, plan, _ = planned(with_operator(tmp_path, limit.replace("0.5", most), few))
+        assert breaks_limit(setup, EmittedPeriods(plan)) is broken
 
 
 def test_a_limit_does_not_count_the_uncertainty_and_counts_the_size(tmp_path: Path) -> None:

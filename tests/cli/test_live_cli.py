@@ -12,7 +12,6 @@ from random import Random
 from typing import Any
 from unittest.mock import patch
 
-import msgspec
 import numpy as np
 import pytest
 from building import REPOSITORY, Variant, write_variant
@@ -29,14 +28,13 @@ import tablegen
 from tablegen.api.build import Build, build_planned
 from tablegen.api.live import Live
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.certificate.certified_scan import may_break_limits
+from tablegen.certificate.certificate import EmittedPeriods
 from tablegen.cli.device.live import _REQUESTS as ANSWERS
 from tablegen.cli.device.live import live as live_command
 from tablegen.cli.device.live_keys import KEYS
 from tablegen.compensation.models.operator import OperatorIdentification
 from tablegen.compensation.operator.in_time import OperatorInTime, Start
-from tablegen.config.load import load
-from tablegen.config.schema import Limits
+from tablegen.config.load import Setup, load
 from tablegen.config.variants import variants
 from tablegen.device.sequencer import Tick
 from tablegen.fixedpoint.frame_program import FrameProgram
@@ -528,18 +526,18 @@ def test_a_plan_that_is_refused_behind_its_preview_leaves_the_scan_that_plays(mo
     assert after.preview is not None
 
 
-def test_a_preview_waits_for_its_certificate_where_that_may_break_a_limit(
+def test_a_preview_plays_before_its_certificate_where_no_limit_breaks(
     moves: DeviceInfo, file: Path, tmp_path: Path
 ) -> None:
-    """Without a limit it plays first; a certificate that refuses the plan then leaves the scan that plays."""
+    """With limits and without; a certificate that refuses the plan nevertheless leaves the scan that plays."""
     free = write_variant(tmp_path, Variant({**SCAN, "limits": {}}))
     events: list[str] = []
 
-    def certified(*scan: Any) -> Build:
+    def certified(setup: Setup, periods: EmittedPeriods) -> Build:
         events.append("certificate")
-        return build_planned(*scan)
+        return build_planned(setup, periods)
 
-    for path, order in ((file, ["certificate", "preview"]), (free, ["preview", "certificate"])):
+    for path in (file, free):
         machine = model(moves, boot=BOOT)
         with client(VirtualLine(machine, baud=115200, tick_hz=500_000)) as device:
             live = Live(device, path, on_preview=lambda _: events.append("preview"))
@@ -549,28 +547,46 @@ def test_a_preview_waits_for_its_certificate_where_that_may_break_a_limit(
             with patch("tablegen.api.live.build_planned", certified):
                 live.move(20.0)
                 live.move(-20.0)
-            assert events == 2 * order
+            assert events == 2 * ["preview", "certificate"]
             swaps = machine.player.swaps
             broken = Rejected([Problem(str(path), 1, "limits", "would break")])
             with patch("tablegen.api.live.build_planned", side_effect=broken), pytest.raises(Rejected, match="would"):
                 live.move(30.0)
-            assert machine.player.swaps == swaps + (0 if path is file else 2)  # there, and back
+            assert machine.player.swaps == swaps + 2  # there, and back
             playing = machine.player.playing
             assert playing is not None
             assert [axis.output for axis in (playing.x, playing.y)] == outputs
             assert live.move(0.0, 10.0).y.position_nm == pytest.approx(before.y.position_nm + 10.0, abs=1e-6)
 
 
-def test_a_plan_beyond_its_slew_guard_has_to_be_certified_first(file: Path) -> None:
-    plan = planned(file)
-    setup = load(file)
-    steps = max(certificate.largest_step for certificate in tablegen.certify(plan).values())
-    free = msgspec.structs.replace(plan, limits=Limits())
-    output = plan.x.program.output
-    for guard, broken in ((steps, False), (steps - 1, True)):
-        program = msgspec.structs.replace(plan.x.program, output=msgspec.structs.replace(output, max_step=guard))
-        assert may_break_limits(setup, msgspec.structs.replace(free, x=replace(plan.x, program=program))) is broken
-    assert may_break_limits(setup, plan)
+def test_no_byte_of_a_change_beyond_a_limit_is_sent(moves: DeviceInfo, tmp_path: Path) -> None:
+    """A limit of errors between those of two places refuses the move before its preview; one above both does not."""
+    middle = write_variant(tmp_path, Variant(SCAN))
+    places = [line.drive.position_nm for line in planned(middle).lines]
+
+    def figure(key: str, by_nm: float) -> float:
+        plan = planned(middle, x__offset_nm=places[0] + by_nm, y__offset_nm=places[1] + by_nm)
+        of = {"max_error_lsb": "max_error_lsb", "max_scaling_error_percent": "scaling_error_percent"}[key]
+        return max(getattr(certificate, of) for certificate in tablegen.certify(plan).values())
+
+    for key in ("max_error_lsb", "max_scaling_error_percent"):
+        here, by_nm = figure(key, 0.0), max(range(-90, 91, 15), key=partial(figure, key))
+        there = figure(key, by_nm)
+        assert there > 1.001 * here
+        for limit, swaps in ((0.5 * (here + there), 0), (1.0001 * there, 2)):
+            path = write_variant(tmp_path, Variant({**SCAN, "limits": {key: limit}}))
+            machine = model(moves, boot=BOOT)
+            with client(VirtualLine(machine, baud=115200, tick_hz=500_000)) as device:
+                live = Live(device, path)
+                live.start()
+                before = device._session.exchange.bytes_sent, machine.player.swaps
+                if swaps:
+                    live.move(by_nm, by_nm)
+                else:
+                    with pytest.raises(Rejected, match=key):
+                        live.move(by_nm, by_nm)
+                assert (device._session.exchange.bytes_sent > before[0]) is bool(swaps)
+                assert machine.player.swaps == before[1] + swaps
 
 
 def test_a_lost_link_behind_a_preview_leaves_it_playing(moves: DeviceInfo, file: Path) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from replacing import replace
 
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import chebyshev
@@ -50,6 +51,22 @@ def test_envelopes_rise_and_do_not_cross() -> None:
         assert np.all(lower <= upper)
         assert min(np.diff(lower).min(), np.diff(upper).min()) > 0.0
         assert [lower[0], upper[0], lower[-1], upper[-1]] == [0.0, 0.0, 1.0, 1.0]
+
+
+@pytest.mark.common
+@given(st.floats(0.0, 0.6), st.floats(0.02, 0.4))
+def test_branches_are_sums_of_settled_plays(low: float, stroke: float) -> None:
+    """To the last bit, added in the order of the rows; one that is missing is seen."""
+    weights = np.array([[3.0, 0.0, 2.0, 1.0], [0.0, 1.0, 0.0, 0.0], [0.5, 0.25, 0.0, 0.7]])
+    family, u = Plays(THRESHOLDS, weights, np.array([1.0, 0.3]), BENDS), low + stroke * np.linspace(0.0, 1.0, 40)
+    for going, branch in zip((True, False), family.branches(u, low, low + stroke), strict=True):
+        total = u + 0.3 * (u * u)
+        for weighted, row in zip(plays(u, low, low + stroke, going, THRESHOLDS, BENDS), weights, strict=True):
+            for play, weight in zip(weighted, row.tolist(), strict=True):
+                total = total + weight * play
+        assert branch.tolist() == total.tolist() == family.branch(u, low, low + stroke, going).tolist()
+        fewer = replace(family, weights=np.where(weights == 0.25, 0.0, weights))
+        assert fewer.branch(u, low, low + stroke, going).tolist() != branch.tolist()
 
 
 def test_branches_meet_where_the_drive_turns() -> None:

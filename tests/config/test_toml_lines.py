@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tablegen.base.input_errors import Rejected
-from tablegen.base.toml import read_toml
+from tablegen.base.toml import parse_toml, read_toml
 
 Path_ = tuple[str | int, ...]
 
@@ -470,3 +470,13 @@ def test_values_are_those_of_the_standard_library(folder: Path) -> None:
     file = folder / "scan.toml"
     file.write_text("a.b = 1979-05-27T07:32:00\n", encoding="utf-8")
     assert read_toml(file, "scan.toml")[0] == {"a": {"b": datetime(1979, 5, 27, 7, 32)}}
+
+
+def test_values_of_a_text_that_is_read_again_are_its_own() -> None:
+    """A caller may change what it got; another text or name is another file."""
+    text = "[x]\nsizes = [1, 2]\n"
+    (first, file), (again, _) = parse_toml(text, "a.toml"), parse_toml(text, "a.toml")
+    first["x"]["sizes"].append(3)
+    assert again == parse_toml(text, "a.toml")[0] == {"x": {"sizes": [1, 2]}}
+    assert (file.line_of("x.sizes"), parse_toml(f"\n{text}", "a.toml")[1].line_of("x.sizes")) == (2, 3)
+    assert parse_toml(text, "b.toml")[1].name == "b.toml"

@@ -42,6 +42,14 @@ class Family:
         displacement = self.plays.branch(u, low, high, rising)
         return displacement if self.bouc_wen is None else displacement + self.bouc_wen.branch(u, low, high, rising)
 
+    def branches(self, u: Floats, low: float, high: float) -> tuple[Floats, Floats]:
+        """Return ``branch`` of both ways, rising and falling."""
+        rising, falling = self.plays.branches(u, low, high)
+        if self.bouc_wen is None:
+            return rising, falling
+        loop = self.bouc_wen
+        return rising + loop.branch(u, low, high, True), falling + loop.branch(u, low, high, False)
+
     def at_decades(self, decades: float) -> "Family":
         """Return the family at a rate so many decades above that of its thresholds."""
         return _at_decades(self, decades) if self.plays.growth else self

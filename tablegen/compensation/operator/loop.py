@@ -3,9 +3,21 @@
 import numpy as np
 from msgspec import Struct
 
-from tablegen.numerics.arrays import Floats, FloatsLike, Ints, tree_sum
+from tablegen.numerics.arrays import Floats, FloatsLike, Ints, freeze, tree_sum
 
 POINTS = 1025  # points of a branch; linear between them
+
+
+def _bend_weights() -> Floats:
+    """Return P_2 at the points of a branch, half of it at its ends, shape (POINTS,)."""
+    x = 2.0 * np.arange(POINTS) / (POINTS - 1) - 1.0
+    weight = 0.5 * (3.0 * x * x - 1.0)
+    weight[[0, -1]] *= 0.5
+    freeze(weight)
+    return weight
+
+
+_BEND_WEIGHTS = _bend_weights()
 
 
 class Loop(Struct, frozen=True, eq=False):
@@ -68,11 +80,8 @@ class Loop(Struct, frozen=True, eq=False):
         Halfway between both branches there is little hysteresis. Where that curve is bent, the slope is another one at
         other drives: with b P_2 of the curve, by 12 b over the length of the stroke.
         """
-        x = 2.0 * np.arange(POINTS) / (POINTS - 1) - 1.0
-        weight = 0.5 * (3.0 * x * x - 1.0)
-        weight[[0, -1]] *= 0.5
         middle = 0.5 * (self.rising + self.falling) - 0.5
-        bend = 2.5 * float(tree_sum(weight * middle)) * 2.0 / (POINTS - 1)
+        bend = 2.5 * float(tree_sum(_BEND_WEIGHTS * middle)) * 2.0 / (POINTS - 1)
         return 12.0 * bend * (0.5 * (self.low + self.high) - mean) / (self.high - self.low)
 
     @property

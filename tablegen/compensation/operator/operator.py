@@ -100,8 +100,8 @@ class Operator:
         rising, falling = _branches(self.family, low, high)
         row = self.residual.at(stroke, centre)
         half = len(row) // 2
-        x = 2.0 * _GRID - 1.0
-        rising, falling = rising + chebyshev(row[:half], x), falling + chebyshev(row[half:], x)
+        of_rising, of_falling = chebyshev(row.reshape(2, half).T[:, :, None], 2.0 * _GRID - 1.0)
+        rising, falling = rising + of_rising, falling + of_falling
         rising, falling = _closed(rising, falling)
         mean = centre if mean is None else mean
         extent = self.expected_extent(stroke, mean, factor) * (1.0 + float(self.size.at(stroke, mean)[0]))
@@ -140,7 +140,7 @@ _GRID = np.arange(POINTS) / (POINTS - 1)
 def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
     """Return both branches of the family from 0 to 1."""
     u = low + (high - low) * _GRID
-    rising, falling = (family.branch(u, low, high, going) for going in (True, False))
+    rising, falling = family.branches(u, low, high)
     extent = float(rising[-1] - rising[0])
     return (rising - rising[0]) / extent, (falling - rising[0]) / extent
 
@@ -167,6 +167,9 @@ def _monotonic_ends(branch: Floats) -> Floats:
     """
     out = branch.copy()
     step = _LEAST_SLOPE / (POINTS - 1)
+    ends = _END_POINTS
+    if (out[:ends] <= out[1 : ends + 1] - step).all() and (out[-ends:] >= out[-ends - 1 : -1] + step).all():
+        return out  # nothing of it is flatter
     for i in range(_END_POINTS, 0, -1):
         out[i - 1] = min(out[i - 1], out[i] - step)
         out[-i] = max(out[-i], out[-i - 1] + step)
@@ -179,16 +182,16 @@ def chebyshev(coefficients: Floats, x: Floats) -> Floats:
     Parameters
     ----------
     coefficients
-        c_0, c_1, ..., shape (k,), k >= 1.
+        c_0, c_1, ..., k >= 1 of them, each a number or of one shape that broadcasts against ``x``.
     x
         Arguments in -1..1, any shape.
 
     Returns
     -------
     Floats
-        Shape of ``x``.
+        Shape of ``x``, or that of ``x`` and a coefficient together.
     """
-    one, two = np.zeros_like(x), np.zeros_like(x)
+    one, two, twice = np.zeros_like(x), np.zeros_like(x), 2.0 * x
     for coefficient in coefficients[:0:-1]:
-        one, two = float(coefficient) + 2.0 * x * one - two, one
-    return float(coefficients[0]) + x * one - two
+        one, two = coefficient + twice * one - two, one
+    return np.asarray(coefficients[0] + x * one - two)

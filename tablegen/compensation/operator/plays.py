@@ -34,7 +34,10 @@ def envelopes(u: FloatsLike, bend: Floats) -> tuple[Floats, Floats]:
         Bent drives, each of the shape of ``u``.
     """
     linear, cubic, other_linear, other_cubic = bend.tolist()
-    one, two = bent(u, linear, cubic), bent(u, other_linear, other_cubic)
+    one = bent(u, linear, cubic)
+    if (linear, cubic) == (other_linear, other_cubic):
+        return one, one
+    two = bent(u, other_linear, other_cubic)
     return np.minimum(one, two), np.maximum(one, two)
 
 
@@ -56,6 +59,18 @@ def bent(u: FloatsLike, linear: float, cubic: float) -> Floats:
     u = np.asarray(u, dtype=np.float64)
     bow = u * (1.0 - u)
     return u + linear * bow + cubic * (bow * (u - 0.5))
+
+
+def _inner_ends(low: float, high: float, bend: Floats) -> tuple[float, float]:
+    """Return the upper envelope at ``low`` and the lower one at ``high``, by the arithmetic of ``envelopes``."""
+    linear, cubic, other_linear, other_cubic = bend.tolist()
+
+    def both(u: float) -> tuple[float, float]:
+        bow = u * (1.0 - u)
+        bow_cubic = bow * (u - 0.5)
+        return u + linear * bow + cubic * bow_cubic, u + other_linear * bow + other_cubic * bow_cubic
+
+    return max(both(low)), min(both(high))
 
 
 def stretch(growth: float, decades: float) -> float:
@@ -114,28 +129,45 @@ class Plays:
         Floats
             In units of the displacement, shape of ``u``.
         """
+        return self._along(u, low, high, (rising,))[0]
+
+    def branches(self, u: Floats, low: float, high: float) -> tuple[Floats, Floats]:
+        """Return ``branch`` of both ways, rising and falling."""
+        rising, falling = self._along(u, low, high, (True, False))
+        return rising, falling
+
+    def _along(self, u: Floats, low: float, high: float, ways: tuple[bool, ...]) -> list[Floats]:
+        """Return the branches of some ways, each of the shape of ``u``."""
         power = np.ones_like(u)
         total = np.zeros_like(u)
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
+        totals = [total.copy() for _ in ways]
         # Row by row in one buffer: a table of all plays would leave the cache, and take three times as long.
         row = np.empty_like(u)
-        for bend, weights in zip(self.bends, self.weights, strict=True):
+        thresholds = (self.stretch * self.thresholds).tolist()
+        for bend, weights in zip(self.bends, self.weights.tolist(), strict=True):
+            if not any(weights):
+                continue
             lower, upper = envelopes(u, bend)
-            least, most = float(envelopes(low, bend)[1]), float(envelopes(high, bend)[0])
-            for threshold, weight in zip((self.stretch * self.thresholds).tolist(), weights.tolist(), strict=True):
+            least, most = _inner_ends(low, high, bend)
+            for threshold, weight in zip(thresholds, weights, strict=True):
                 if not weight:
                     continue
                 if not 2.0 * threshold < most - least:
-                    row[...] = 0.5 * (least + most)
-                elif rising:
-                    np.maximum(np.subtract(lower, threshold, out=row), least + threshold, out=row)
-                else:
-                    np.minimum(np.add(upper, threshold, out=row), most - threshold, out=row)
-                row *= weight
-                total += row
-        return total
+                    still = weight * (0.5 * (least + most))
+                    for total in totals:
+                        total += still
+                    continue
+                for rising, total in zip(ways, totals, strict=True):
+                    if rising:
+                        np.maximum(np.subtract(lower, threshold, out=row), least + threshold, out=row)
+                    else:
+                        np.minimum(np.add(upper, threshold, out=row), most - threshold, out=row)
+                    row *= weight
+                    total += row
+        return totals
 
 
 NO_PLAYS = Plays(np.zeros(0), np.zeros((1, 0)), np.ones(1), FIXED_BENDS[:1])
