@@ -22,6 +22,7 @@ from slow_scripts import (
     least_ticks,
     line_clocks,
     random_scan,
+    slow_modes,
     slow_pace,
     slow_play,
     slow_sources,
@@ -32,6 +33,7 @@ from stream_scripts import FAULTS, flag, occurrences
 from turned_scans import turned_setup
 
 from tablegen.api.turned import build_turned
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.registers import program_words
 from tablegen.fixedpoint.frame_program import FrameProgram, Knots, SlowTable
@@ -115,6 +117,50 @@ def test_a_long_run(cubic: SequencerBench) -> None:
     assert run.samples >= 30_000
     seen = occurrences(run.capture)
     assert all(seen[name] for name in (*FLAGS, *FAULTS[:2])), seen
+
+
+# Modes of a commit.
+
+
+def swaps_of(run: BenchRun) -> set[str]:
+    """Whether a program was swapped into a scan with line 0, or on the line that was due."""
+    swapped, playing, frame = (flag(run.capture, name) for name in ("swapped", "playing", "frame"))
+    return {"begins" if begins else "goes on" for begins in frame[np.flatnonzero(swapped & playing)]}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", common(["lines"], ["cubic", "lines", "small_counters"]))
+def test_random_commits_of_every_mode(name: str, tmp_path: Path) -> None:
+    case, script = CASES[name], SlowScript(shape=CASES[name].shape)
+    slow_modes(np.random.default_rng(sum(name.encode())), script, 16)
+    run = equal(bench_of("icarus", case.shape, tmp_path, COMMIT_MODES=1, **case.parameters), script)
+    assert swaps_of(run) == {"begins", "goes on"}
+
+
+@pytest.mark.rest
+def test_commits_of_every_mode_in_a_long_run(tmp_path: Path) -> None:
+    script = SlowScript(shape=CUBIC)
+    slow_modes(np.random.default_rng(4), script, 300)
+    run = equal(bench_of("verilator", CUBIC, tmp_path, COMMIT_MODES=1), script)
+    assert swaps_of(run) == {"begins", "goes on"}
+    assert np.count_nonzero(flag(run.capture, "swapped")) == 300
+
+
+def test_without_the_parameter_a_mode_has_no_effect(tmp_path: Path) -> None:
+    script = SlowScript(shape=LINES)
+    rng, least = np.random.default_rng(5), least_ticks(LINES, slow_pace(LINES))
+    programs = [random_scan(rng, LINES, least + 1, 3, "smooth") for _ in range(2)]
+    script.put(programs[0])
+    script.tick_every(slow_pace(LINES))
+    script.swap(programs[0])
+    script.wait_ticks(3)
+    script.start()
+    script.put(programs[1])
+    script.wait_ticks(5)
+    script.swap(programs[1])
+    script.commands[-1] |= int(CommitMode.KEEP) << 54
+    script.wait_ticks(4 * least)
+    assert swaps_of(equal(bench_of("icarus", LINES, tmp_path), script)) == {"begins"}
 
 
 # Words at the ends of their ranges.

@@ -78,6 +78,21 @@ def plays_the_model(built: Build, tmp_path: Path, pace: int = 11, by_turns: int 
 
 
 @pytest.mark.common
+def test_a_host_commits_with_a_mode(tmp_path: Path) -> None:
+    """A frame begins with the next line, goes on, or begins when it would have."""
+    built = short(tmp_path, SCANS["direct"])
+    lines = built.plan.schedule.lines
+    sources = [f"-I{built.folder}", "-Wall", "-s", "top_modes_bench", BENCHES / "top_modes_bench.v", *runtime(built)]
+    markers = {0: "11", 1: "10", 2: "11"}
+    for mode, seen in markers.items():
+        run_clean(["iverilog", "-g2005", f"-Ptop_modes_bench.MODE={mode}", *sources, "-o", tmp_path / "modes.vvp"])
+        said = run_clean(["vvp", "-n", tmp_path / "modes.vvp"], built.folder).splitlines()
+        assert said[0] == "can_keep 1"
+        number = int(said[1].removeprefix(f"{seen} line "))
+        assert (number == lines) if mode == 2 else (2 <= number < lines), said
+
+
+@pytest.mark.common
 @pytest.mark.parametrize("name", one_of(2, SCANS))
 def test_no_tool_warns_of_it(name: str, tmp_path: Path) -> None:
     built = short(tmp_path, SCANS[name])

@@ -118,6 +118,7 @@ class TablegenScan(LiteXModule):
             i_reset=ResetSignal(),
             i_tick=self._tick(int(clocks)),
             i_underrun=0,
+            i_commit_mode=0,
             o_strobe=self.strobe,
             o_x_word=self.x_word,
             o_y_word=self.y_word,

@@ -183,8 +183,8 @@ module dac_sequencer #(
         if (SLOW_PART < 0 || SLOW_PART > 1) begin : guard_25
             dac_sequencer_SLOW_PART_is_not_0_to_1 stop ();
         end
-        if (SLOW_PART != 0 && (LOW_AREA == 0 || FOURIER != 0 || SHAPING != 0 || COMMIT_MODES != 0)) begin : guard_26
-            dac_sequencer_SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_SHAPING_or_COMMIT_MODES stop ();
+        if (SLOW_PART != 0 && (LOW_AREA == 0 || FOURIER != 0 || SHAPING != 0)) begin : guard_26
+            dac_sequencer_SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_or_SHAPING stop ();
         end
         if (SLOW_PART != 0 && (X_INTERPOLATED == 0 || Y_INTERPOLATED == 0)) begin : guard_27
             dac_sequencer_SLOW_PART_plays_no_direct_table stop ();
@@ -409,7 +409,8 @@ module dac_sequencer #(
                 ) axes (
                     .clock(clock), .scan_write(scan_write), .x_write(x_write), .y_write(y_write),
                     .word_write(host_write), .region(region), .address(address), .data(data), .commit(sound_commit),
-                    .discard(reset || withdraw), .take(take), .bank(bank), .loaded(loaded), .committed(committed),
+                    .keeps(keep && same_frame), .at_frame(at_frame), .discard(reset || withdraw), .take(take),
+                    .bank(bank), .loaded(loaded), .committed(committed),
                     .prepared(prepared), .preparing(preparing), .arm(arm), .armed(armed), .trigger(trigger),
                     .park(park || reset), .running(running), .first(due), .start(start), .late(late), .tick(tick_0),
                     .load(load_0), .runs(runs_0), .begins(begins_0), .line(line_0), .line_number(line_number),

@@ -26,7 +26,8 @@ module adc_picture_bench #(
 
     annexin_200nm_top #(.START_CLOCKS(50)) scan (
         .clock(clock), .reset(1'b0), .write(1'b0), .write_region(3'd0), .write_address(16'd0), .write_data(32'd0),
-        .writable(), .refused(refused), .commit(1'b0), .withdraw(1'b0), .committed(), .booting(), .missing(missing),
+        .writable(), .refused(refused), .commit(1'b0), .commit_mode(2'd0), .withdraw(1'b0),
+        .committed(), .can_keep(), .booting(), .missing(missing),
         .arm(start), .arm_frames(16'd0), .trigger(start), .park(1'b0), .clear_faults(1'b0), .armed(), .running(),
         .tick(tick), .underrun(1'b0), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code), .x_word(), .y_word(),
         .line_marker(x_line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),

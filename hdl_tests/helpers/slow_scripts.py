@@ -11,6 +11,7 @@ from programs import random_schedule
 from replacing import replace
 
 from tablegen.base.resources import verilog_runtime
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.registers import program_words
 from tablegen.fixedpoint.frame_program import FrameProgram, Knots
@@ -76,23 +77,26 @@ class SlowScript(Script):
             self.write(parts, axis.gains.words, GAINS)
             self.write(parts, axis.ratios.words, RATIOS)
 
-    def swap(self, program: ScanProgram) -> None:
-        """Commit the program that was put: a scan plays on to the end of the next line, the one that works it out."""
+    def swap(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> None:
+        """Commit the program that was put: a scan plays on to the end of the next line, the one that works it out.
+
+        With the mode ``FRAME`` that is the last line of a frame: not the one of the commit, nor one before.
+        """
         playing = self.model.playing
         if not self.model.running or playing is None:
-            self.commit_at_rest(program)
+            self.commit_at_rest(program, mode)
             return
         # As the clock of the commit passes, so does a tick of it.
         self.wait(1 if self._until == 0 else 0)
         ticks = playing.schedule.ticks
         left = self._until - 1 + (ticks - self.model.tick) % ticks * self._period
-        self.request("commit", program=program, commit_clocks=left + 2)  # type: ignore[arg-type]
+        self.request("commit", program=program, commit_clocks=left + 2, mode=mode)  # type: ignore[arg-type]
 
-    def commit_at_rest(self, program: ScanProgram) -> None:
+    def commit_at_rest(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> None:
         """Commit while nothing plays, and wait for its first line before the ticks go on."""
         period = self._period
         self.come_to_rest()
-        self.request("commit", program=program)  # type: ignore[arg-type]
+        self.request("commit", program=program, mode=mode)  # type: ignore[arg-type]
         self.wait(line_clocks(self.shape) + 4)
         self.tick_every(period)
 
@@ -151,6 +155,31 @@ def slow_play(rng: Generator, script: SlowScript, samples: int, most_lines: int)
                 script.park()
             if script.model.running and not script.endless:
                 script.wait_ticks(2 * program.schedule.frame_ticks)
+
+
+def slow_modes(rng: Generator, script: SlowScript, swaps: int) -> None:
+    """Commits of every mode at any tick of a scan that seldom parks; most programs have the frame of the last one."""
+    pace = slow_pace(script.shape)
+    least = least_ticks(script.shape, pace)
+    script.tick_every(pace)
+    size = least + 2, 3
+    for _ in range(swaps):
+        if rng.random() < 0.35:
+            size = least + int(rng.integers(0, 9)), int(rng.integers(1, 6))
+        program = random_scan(rng, script.shape, *size, str(rng.choice(["smooth", "wild"])))
+        script.put(program)
+        if script.model.running:
+            script.wait_ticks(int(rng.integers(1, size[0])))
+        script.swap(program, CommitMode(int(rng.choice([0, 1, 1, 2]))))
+        if script.model.running and rng.random() < 0.15:
+            script.wait_ticks(int(rng.integers(1, 2 * size[0])))
+            script.park()
+        if not script.model.running:
+            script.wait_ticks(2)
+            script.start()
+        while script.waiting:
+            script.wait_ticks(1)
+        script.wait_ticks(int(rng.integers(1, 2 * size[0])))
 
 
 def _tame_ratios(program: ScanProgram) -> ScanProgram:

@@ -18,7 +18,7 @@ from mutants import Verdict
 from pair_play import ALTERNATE, PAIR_PACES, pair_script, pair_sources
 from pixel_scripts import PIXEL_TABLE, PixelScript, full_lines, refuse_tables
 from programs import random_dual
-from slow_scripts import SLOW_PART, SlowScript, slow_play, slow_sources
+from slow_scripts import SLOW_PART, SlowScript, slow_modes, slow_play, slow_sources
 from stream_benches import with_sine
 from stream_scripts import (
     counted_frames,
@@ -61,6 +61,7 @@ SHAPES = {
     "cubic low area": SequencerShape(24, 3, 3, 12, 1, 3, 12),
     "modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
     "slow": SequencerShape(24, 3, 3, 8, 1, 2, 9),
+    "slow modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
     "pair": SequencerShape(16, 1, 4, 16, 1, 3, 16),
     "pair direct": SequencerShape(8, 0, 6, 8, 1, 2, 8),
     "pair long table": SequencerShape(20, 1, 12, 20, 1, 2, 20),
@@ -80,6 +81,7 @@ SPLINES = {  # parameters, how it is placed, samples
 PIXELS = ("pixels", "pixel tables")
 PAIRS = ("pair", "pair direct", "pair long table", "pair sweep")
 BENCHES = tuple(SHAPES)
+SLOW = ("slow", "slow modes")
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,15 @@ def _pixel_script(rng: np.random.Generator, shape: SequencerShape, bench: str) -
     else:
         full_lines(rng, script, shape)
         random_play(rng, script, shape, 6000, (1, 2, 3), (8, 32), (1, 3), pixels=True)
+    return script
+
+
+def _slow_script(rng: np.random.Generator, shape: SequencerShape, bench: str) -> Script:
+    script = SlowScript(shape=shape)
+    if bench == "slow modes":
+        slow_modes(np.random.default_rng(5), script, 14)  # with a program that cannot keep the frame, on a middle line
+    else:
+        slow_play(rng, script, 700, 5)  # slow tables of both signs play by then
     return script
 
 
@@ -128,9 +139,8 @@ def script_of(bench: str) -> Script:
         play(script, within_limits(random_dual(rng, shape, (40, 40), kind="tame", lines=(2, 2))))
         script.wait_ticks(90)
         random_play(rng, script, shape, 2500, PAIR_PACES, (8, 20))
-    elif bench == "slow":
-        script = SlowScript(shape=shape)
-        slow_play(rng, script, 700, 5)  # slow tables of both signs play by then
+    elif bench in SLOW:
+        script = _slow_script(rng, shape, bench)
     elif bench == "low area":
         script.tick_every(LEAST_PACE)
         tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
@@ -163,7 +173,7 @@ def script_of(bench: str) -> Script:
 
 def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[list[Path], dict[str, int | str]]:
     """Return the sources of the bench of this name, with a mutant in them or with none, and its parameters."""
-    sources = slow_sources() if bench == "slow" else pair_sources() if bench in PAIRS else list(verilog_runtime())
+    sources = slow_sources() if bench in SLOW else pair_sources() if bench in PAIRS else list(verilog_runtime())
     folder.mkdir(parents=True, exist_ok=True)
     if mutant is not None:
         changed = folder / f"{mutant.file}.v"
@@ -171,14 +181,14 @@ def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[l
         sources[sources.index(mutant.path)] = changed
     parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
     parameters["LOW_AREA"] = int(bench == "low area")
-    parameters["COMMIT_MODES"] = int(bench == "modes")
+    parameters["COMMIT_MODES"] = int(bench in ("modes", "slow modes"))
     if bench in SHAPED:
         parameters |= SHAPED[bench][0]
     if bench in SPLINES:
         parameters |= SPLINES[bench][0]
     if bench in PAIRS:
         parameters |= ALTERNATE
-    if bench == "slow":
+    if bench in SLOW:
         parameters |= SLOW_PART
     if bench in PIXELS:
         parameters |= PIXEL_TABLE | {"PLAIN_MULTIPLIER": 1}
@@ -1050,7 +1060,7 @@ def _slow() -> Iterator[Mutant]:
             ("a program at rest leaves the half", "tick && (line || load)", "tick && line"),
             ("the lines are those of the other program", "bank ? lines_1 : lines_0;", "bank ? lines_0 : lines_1;"),
             ("the frame has no end", "line && after != playing_lines ?", "line ?"),
-            ("the line of a commit is of the program that plays", "is_idle <= changes ? preparing : needs_idle;",
+            ("the line of a commit is of the program that plays", "is_idle <= changes ? prepares : needs_idle;",
              "is_idle <= 1'b0;"),
         ),
         "dac_slow_store": (
@@ -1064,6 +1074,13 @@ def _slow() -> Iterator[Mutant]:
     }.items():  # fmt: skip
         for breaks, old, new in faults:
             yield Mutant(breaks, file, old, new, "slow")
+    for breaks, file, old, new in (
+        ("a frame goes on with the words of line 0", "dac_slow_part", "!keeps && !at_frame;", "!at_frame;"),
+        ("a frame has words of the next scan", "dac_slow_part", "preparing && (!at_frame ||", "preparing && (1'b1 ||"),
+        ("words are kept where the frame begins", "dac_sequencer", ".keeps(keep && same_frame)", ".keeps(keep)"),
+        ("each mode begins a frame", "dac_sequencer", ".keeps(keep && same_frame)", ".keeps(1'b0)"),
+    ):  # fmt: skip
+        yield Mutant(breaks, file, old, new, "slow modes")
 
 
 def _pair() -> Iterator[Mutant]:

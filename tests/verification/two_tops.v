@@ -26,7 +26,8 @@ module two_tops #(
 
     annexin_200nm_top #(.PLAIN_MULTIPLIER(1), .START_CLOCKS(50)) axes (
         .clock(clock), .reset(1'b0), .write(1'b0), .write_region(3'd0), .write_address(16'd0), .write_data(32'd0),
-        .writable(), .refused(), .commit(1'b0), .withdraw(1'b0), .committed(), .booting(booting), .missing(),
+        .writable(), .refused(), .commit(1'b0), .commit_mode(2'd0), .withdraw(1'b0),
+        .committed(), .can_keep(), .booting(booting), .missing(),
         .arm(arm), .arm_frames(arm_frames), .trigger(trigger_axes), .park(park), .clear_faults(1'b0), .armed(),
         .running(running), .tick(tick && !differ), .underrun(1'b0), .busy(), .strobe(strobe), .x_code(), .y_code(),
         .x_word(x_word), .y_word(y_word), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel),
@@ -35,7 +36,8 @@ module two_tops #(
     );
     annexin_200nm_z_top #(.START_CLOCKS(50)) z (
         .clock(clock), .reset(1'b0), .write(1'b0), .write_region(3'd0), .write_address(16'd0), .write_data(32'd0),
-        .writable(), .refused(), .commit(1'b0), .withdraw(1'b0), .committed(), .booting(booting_z), .missing(),
+        .writable(), .refused(), .commit(1'b0), .commit_mode(2'd0), .withdraw(1'b0),
+        .committed(), .can_keep(), .booting(booting_z), .missing(),
         .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(1'b0), .armed(),
         .running(running_z), .tick(tick && !differ), .underrun(1'b0), .busy(), .strobe(strobe_z), .x_code(), .y_code(),
         .x_word(z_word), .y_word(rest_word), .line_marker(line_z), .frame_marker(frame_z), .pixel_marker(pixel_z),

@@ -1,9 +1,10 @@
 // Both axes with a slow part, and which line of which program is worked out for them.
 //
-// While a line plays, the next one is worked out. A commit is `prepared` when line 0 of its program is: at once where
-// no scan runs, and otherwise in the line after it, so that the scan goes on as it is until then. Where no scan runs it
-// is line 0 of the program that plays, for the next trigger; a trigger that comes before waits, armed, and a park or a
-// reset ends it. `late` is high where the next tick begins a line that is not ready.
+// While a line plays, the next one is worked out. A commit is `prepared` when line 0 of its program is, or with `keeps`
+// the line that is due: at once where no scan runs, and otherwise in the line after it, so that the scan goes on as it
+// is until then; with `at_frame` in the last line of a frame. Where no scan runs it is line 0 of the program that
+// plays, for the next trigger; a trigger that comes before waits, armed, and a park or a reset ends it. `late` is high
+// where the next tick begins a line that is not ready.
 
 `default_nettype none
 
@@ -32,6 +33,8 @@ module dac_slow_part #(
     input  wire [31:0]          data,
     // program and scan
     input  wire                 commit,
+    input  wire                 keeps,         // the committed program continues the frame
+    input  wire                 at_frame,      // it begins with a frame
     input  wire                 discard,
     input  wire                 take,
     input  wire                 bank,
@@ -78,13 +81,15 @@ module dac_slow_part #(
 
     // The line that is needed next, and the one that is worked out, or was.
     reg [LINE_BITS-1:0] next_line, line_at;
-    reg is_idle;  // it is line 0 of the idle program
+    reg is_idle;  // it is a line of the idle program
     wire ended;
     wire [LINE_BITS:0] after = {1'b0, line_number} + 1;
     wire [LINE_BITS-1:0] line_after = line && after != playing_lines ? after[LINE_BITS-1:0] : {LINE_BITS{1'b0}};
     wire changes = tick && (line || load);
     wire needs_idle = preparing && (!running || is_idle);
-    wire [LINE_BITS-1:0] needs_line = needs_idle || !running ? {LINE_BITS{1'b0}} : next_line;
+    wire prepares = preparing && (!at_frame || line_after == {LINE_BITS{1'b0}});  // from the line that begins
+    wire from_0 = !keeps && !at_frame;  // the idle program begins with its line 0, whatever line is due
+    wire [LINE_BITS-1:0] needs_line = !running || (needs_idle && from_0) ? {LINE_BITS{1'b0}} : next_line;
     wire anew = changes || needs_idle != is_idle || needs_line != line_at;
     wire ready = ended && !anew;
     initial begin
@@ -100,8 +105,8 @@ module dac_slow_part #(
         else if (changes)
             next_line <= line_after;
         if (anew) begin
-            is_idle <= changes ? preparing : needs_idle;
-            line_at <= !changes ? needs_line : preparing ? {LINE_BITS{1'b0}} : line_after;
+            is_idle <= changes ? prepares : needs_idle;
+            line_at <= !changes ? needs_line : preparing && from_0 ? {LINE_BITS{1'b0}} : line_after;
         end
     end
     assign prepared = preparing && is_idle && ready && !committed;

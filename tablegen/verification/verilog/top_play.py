@@ -69,7 +69,8 @@ module top_play #(
 
     {name}_top #({settings}.START_CLOCKS(50)) device (
         .clock(clock), .reset(1'b0), .write(write), .write_region(word[50:48]), .write_address(word[47:32]),
-        .write_data(word[31:0]), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
+        .write_data(word[31:0]), .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0),
+        .withdraw(withdraw), .can_keep(),
         .committed(committed), .booting(booting), .missing(missing), .arm(start), .arm_frames(16'd0),
         .trigger(start), .park(1'b0), .clear_faults(1'b0), .armed(), .running(), .tick(tick), .underrun(1'b0),
         .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code), .x_word(x_word), .y_word(y_word),
