@@ -34,6 +34,7 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
         quantities += _corrections(axis, entry)
         quantities += _waveform(axis, entry)
         quantities += _certificate(axis, entry)
+        quantities += _pixels(axis, entry, subject.manifest.sequence)
         quantities += _expected(axis, entry)
         quantities += output_limits(axis, entry.output)
     manifest = subject.manifest
@@ -156,6 +157,22 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     if certificate.shaped is not None:
         yield ComparedQuantity(section, "rms error of a code", certificate.shaped.rms_code_error_lsb, "LSB")
         yield ComparedQuantity(section, "ticks on which the code changes", certificate.shaped.changes.percent, "%")
+
+
+def _pixels(axis: str, entry: ManifestAxis, sequence: ManifestSequence) -> Iterator[ComparedQuantity]:
+    """Yield lengths and errors of pixels that are taken where the piezo is; nothing where they have equal lengths."""
+    pixels, table = entry.certificate.pixels, sequence.pixel_table
+    if pixels is None or table is None:
+        return
+    section = f"{axis} pixels"
+    for side, counts in zip(("forward", "backward"), table, strict=True):
+        yield ComparedQuantity(section, f"shortest {side}", min(counts), "ticks")
+        yield ComparedQuantity(section, f"longest {side}", max(counts), "ticks")
+        yield ComparedQuantity(section, f"table {side}", digest(counts))
+        yield ComparedQuantity(section, f"rms error {side}", pixels.rms_percent[side], "%")
+        yield ComparedQuantity(section, f"largest error {side}", pixels.worst_percent[side], "%")
+        yield ComparedQuantity(section, f"scaling error {side}", pixels.scaling_percent[side], "%")
+    yield ComparedQuantity(section, "trace to retrace", pixels.mismatch_percent, "%")
 
 
 def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:

@@ -11,6 +11,7 @@ from tablegen.html_report.document import document
 from tablegen.html_report.lattice import lattice
 from tablegen.html_report.lines import lines
 from tablegen.html_report.own_image import with_own_image
+from tablegen.html_report.pixels import pixel_section
 from tablegen.html_report.playing import played_axes
 from tablegen.html_report.promises import certificate
 from tablegen.html_report.ranking import Finding, ranked
@@ -33,6 +34,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
             *([] if own is None else [own]),
             request_section(subject),
             certificate(subject),
+            *([] if (pixels := pixel_section(subject)) is None else [pixels]),
             *_of_z(subject),
             lines(subject, None),
             spectrum(subject),
