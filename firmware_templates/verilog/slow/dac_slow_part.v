@@ -87,7 +87,7 @@ module dac_slow_part #(
     wire [LINE_BITS-1:0] line_after = line && after != playing_lines ? after[LINE_BITS-1:0] : {LINE_BITS{1'b0}};
     wire changes = tick && (line || load);
     wire needs_idle = preparing && (!running || is_idle);
-    wire prepares = preparing && (!at_frame || !line || after == playing_lines);  // from the line that begins
+    wire prepares = preparing && (!at_frame || line_after == {LINE_BITS{1'b0}});  // from the line that begins
     wire from_0 = !keeps && !at_frame;  // the idle program begins with its line 0, whatever line is due
     wire [LINE_BITS-1:0] needs_line = !running || (needs_idle && from_0) ? {LINE_BITS{1'b0}} : next_line;
     wire anew = changes || needs_idle != is_idle || needs_line != line_at;
