@@ -245,7 +245,7 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
         )
         _run("yosys", "-q", "-p", script, folder=folder)
         counts = _counts(statistics.read_text("utf-8"))
-        if case.family not in PLACEMENT:
+        if case.family not in PLACEMENT or not seeds:
             return Result(counts)
         if in_chains := case.family in IN_CHAINS:
             _synthesise_in_chains(case, Path(folder), netlist)

@@ -176,6 +176,17 @@ def test_meets_the_requirements(name: str) -> None:
         assert result.mhz >= int(row[9]) - 0.5
 
 
+@pytest.mark.rest
+def test_multipliers_of_the_ecp5_are_those_of_the_page() -> None:
+    """Without a placement."""
+    counts = resources.measure(resources.CASES["axis_ECP5_16"], ()).counts
+    holds("axis_ECP5_16", None, None, counts["multipliers"])
+    if pinned():
+        assert [str(counts[kind]) for kind in ("LUT", "FF", "RAM", "multipliers")] == resources.page_rows()[
+            "axis_ECP5_16"
+        ][5:9]
+
+
 @pytest.mark.parametrize("name", [pytest.param(name, marks=LONG_TEST) for name in resources.CASES])
 def test_page_is_what_is_measured(name: str) -> None:
     case = resources.CASES[name]
