@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from replacing import replace
-from sets import common
+from sets import common, long
 from slow_scripts import (
     GAINS,
     SECOND,
@@ -144,6 +144,56 @@ def test_commits_of_every_mode_in_a_long_run(tmp_path: Path) -> None:
     run = equal(bench_of("verilator", CUBIC, tmp_path, COMMIT_MODES=1), script)
     assert swaps_of(run) == {"begins", "goes on"}
     assert np.count_nonzero(flag(run.capture, "swapped")) == 300
+
+
+def swap_in_a_short_line(bench: SequencerBench, mode: CommitMode, clocks: int) -> tuple[bool, int]:
+    """Whether the tick that begins a line takes the program for it, and the ticks that were lost before it.
+
+    The program is committed in a line that is too short for the work on it, and the tick comes so many clocks later.
+    """
+    rng, script = np.random.default_rng(4), SlowScript(shape=LINES)
+    playing, program = (random_scan(rng, LINES, 8, 3, "smooth") for _ in range(2))
+    script.put(playing)
+    script.tick_every(slow_pace(LINES))
+    script.swap(playing)
+    script.wait_ticks(3)
+    script.start()
+    script.tick_every(0)
+    script.put(program)
+    script.tick_every(500)
+    while (script.model.line, script.model.tick) != (1 if mode == CommitMode.FRAME else 0, 4):
+        script.wait_ticks(1)
+    script.request("commit", program=program, commit_clocks=1, mode=mode)
+    script._commits = None  # what is played from here on is the device's alone
+    while script.model.tick:
+        script.wait_ticks(1)
+    script.come_to_rest()
+    script.tick_every(slow_pace(LINES))
+    script.wait_ticks(8)
+    at = len(script.expected)
+    script.tick_every(0)
+    script.wait(clocks)
+    script.tick_every(5000)
+    script.wait_ticks(2)
+    run = bench.play(script)
+    return bool(flag(run.capture, "swapped")[at]), run.fault_counts[FAULTS.index("overrun")]
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("mode", long([CommitMode.KEEP], list(CommitMode)))
+def test_a_line_that_begins_as_its_work_ends_has_one_program(mode: CommitMode, tmp_path: Path) -> None:
+    """On every clock about that one a tick is lost, and the next one takes the program, or it takes it itself."""
+    bench = bench_of("icarus", LINES, tmp_path, COMMIT_MODES=1)
+    few, many = 1, line_clocks(LINES)
+    while many - few > 1:
+        clocks = (few + many) // 2
+        taken, lost = swap_in_a_short_line(bench, mode, clocks)
+        assert taken, clocks
+        few, many = (clocks, many) if lost else (few, clocks)
+    assert [swap_in_a_short_line(bench, mode, clocks) for clocks in (few - 1, few, many, many + 1)] == [
+        *[(True, 1)] * 2,
+        *[(True, 0)] * 2,
+    ]
 
 
 def test_without_the_parameter_a_mode_has_no_effect(tmp_path: Path) -> None:
