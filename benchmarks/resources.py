@@ -218,7 +218,7 @@ FLAGS = HERE / "axis_flags.v"  # around an axis with a cubic table, whose flags 
 
 
 def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -> Result:
-    """Synthesise a case of a folder of ``modules``; place it once for each seed, if there is a tool for its part."""
+    """Synthesise a case of a folder of ``modules``, and place it with each seed, if there is a tool for its part."""
     with tempfile.TemporaryDirectory() as folder:
         netlist, statistics = Path(folder, "netlist.json"), Path(folder, "statistics")
         parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())

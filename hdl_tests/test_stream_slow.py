@@ -164,7 +164,7 @@ def swap_in_a_short_line(bench: SequencerBench, mode: CommitMode, clocks: int) -
     while (script.model.line, script.model.tick) != (1 if mode == CommitMode.FRAME else 0, 4):
         script.wait_ticks(1)
     script.request("commit", program=program, commit_clocks=1, mode=mode)
-    script._commits = None  # what is played from here on is the device's alone
+    script.forget_commit()  # what is played from here on is the device's alone
     while script.model.tick:
         script.wait_ticks(1)
     script.come_to_rest()
@@ -196,6 +196,7 @@ def test_a_line_that_begins_as_its_work_ends_has_one_program(mode: CommitMode, t
     ]
 
 
+@pytest.mark.common
 def test_without_the_parameter_a_mode_has_no_effect(tmp_path: Path) -> None:
     script = SlowScript(shape=LINES)
     rng, least = np.random.default_rng(5), least_ticks(LINES, slow_pace(LINES))

@@ -8,7 +8,7 @@ from tablegen.certificate.turned_summary import turned_summary
 from tablegen.config.load import Setup
 from tablegen.config.schema import SEQUENCER_FORMATS
 from tablegen.device.clocks import least_slow_clocks
-from tablegen.emit.formats import chosen
+from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import format_rejected
 from tablegen.emit.templates import comment_safe
 from tablegen.emit.turned import require_format, turned_files, turned_runtime
@@ -29,13 +29,17 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
         For a format that a scan at an angle does not have.
     """
     names = formats or setup.scan.emit.formats or ("c",)
+    try:
+        needed = tuple(each.name for each in chosen(names))
+    except UnknownFormat as error:
+        raise format_rejected(setup, str(error), explicit=formats is not None) from None
     for name in names:
         if name not in SEQUENCER_FORMATS:
             why = f"{name!r} holds no scan at an angle, on coupled axes or with drift; formats of one are " + ", ".join(
                 SEQUENCER_FORMATS
             )
             raise format_rejected(setup, why, explicit=formats is not None)
-    return tuple(each.name for each in chosen(names))
+    return needed
 
 
 def turned_clocks(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, explicit: bool = False) -> int:

@@ -10,7 +10,7 @@ from tablegen.config.schema import DEFAULT_FORMATS, SEQUENCER_FORMATS, Scan
 
 SINE = (
     "a sine is for `check`, `show`, `build` with formats that have a sequencer, `verify`, `upload`, `readback`, `live` "
-    "and `simulate`; leave this out, or take 'line', for anything else"
+    "and `simulate`, and its build for `report` and `compare`; leave this out, or take 'line', for anything else"
 )
 _DEFAULT_PIXEL_FORMATS = ("c",)  # a build of today keeps its files
 _HARMONICS = "a sine has one harmonic of the drive; leave this out, or take motion = 'line'"

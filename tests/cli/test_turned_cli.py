@@ -134,6 +134,9 @@ def test_another_format_is_refused(scan: Path, tmp_path: Path) -> None:
         "formats: 'csv' holds no scan at an angle, on coupled axes or with drift; formats of one are "
         + ", ".join(SEQUENCER_FORMATS)
     ]
+    outcome = run("build", scan, "-o", tmp_path / "out", "-f", "cargos")
+    assert outcome.status == 2
+    assert "formats: 'cargos' is not a format; formats are arduino, " in outcome.err
     path = write_turned(tmp_path, 30.0, *SHORT, "+ [emit]\nformats = ['c', 'csv']")
     outcome = run("check", path)
     assert outcome.status == 2

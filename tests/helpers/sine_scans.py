@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 from editing import SCAN, SCANNER, edited, write_pair
-from foreign_plants import Floats, ForeignPlant
+from foreign_plants import Floats, ForeignPlant, ManyPlays
+from operator_files import operator_file
 
 from tablegen.compensation.operator.file import OperatorFile, operator_text
 from tablegen.config.load import Setup, load
@@ -31,6 +32,15 @@ def sine_scan(folder: Path, operator: bytes, response: str, *edits: str) -> Setu
         "y.band_limit.harmonics = 8", "amplifier.max_slew_v_per_s = 1e9", *edits,
     )  # fmt: skip
     return load(write_pair(folder, scan, scanner))
+
+
+def short_sine(folder: Path, *edits: str) -> Setup:
+    """A sine of 5 kHz with 48 pixels a line and 16 lines, on a piezo of plays."""
+    return sine_scan(
+        folder, text_of(operator_file("x")), response_csv(ForeignPlant(ManyPlays()), 150e3),
+        "- x.band_limit.harmonics", "x.motion = 'sine'", "timing.line_rate_hz = 5e3", "dac.update_rate_hz = 2e6",
+        "timing.pixels = 48", "timing.lines = 16", "y.band_limit.harmonics = 4", *edits,
+    )  # fmt: skip
 
 
 def response_csv(plant: ForeignPlant, highest_hz: float) -> str:

@@ -5,10 +5,8 @@ from pathlib import Path
 import pytest
 from client_rig import Bench, VirtualLine, Watched, client, info_for, model
 from editing import run
-from foreign_plants import ForeignPlant, ManyPlays
-from operator_files import operator_file
 from replacing import replace
-from sine_scans import response_csv, sine_scan, text_of
+from sine_scans import short_sine
 
 from tablegen.api.build import build as build_scan
 from tablegen.api.live import Live
@@ -26,11 +24,7 @@ PIXELS = 48
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sine")
-    setup = sine_scan(
-        folder, text_of(operator_file("x")), response_csv(ForeignPlant(ManyPlays()), 150e3),
-        "- x.band_limit.harmonics", "x.motion = 'sine'", "timing.line_rate_hz = 5e3", "dac.update_rate_hz = 2e6",
-        f"timing.pixels = {PIXELS}", "timing.lines = 16", "y.band_limit.harmonics = 4",
-    )  # fmt: skip
+    setup = short_sine(folder)
     build_scan(setup, folder / "out")
     return folder / "out"
 

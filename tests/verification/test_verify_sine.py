@@ -9,11 +9,9 @@ from shutil import copytree
 from typing import Any
 
 import pytest
-from foreign_plants import ForeignPlant, ManyPlays
 from kept_plays import own_program_alone
-from operator_files import operator_file
 from sets import long
-from sine_scans import response_csv, sine_scan, text_of
+from sine_scans import short_sine
 
 from tablegen.api.build import build as build_scan
 from tablegen.manifest.read import parse_manifest, read_build
@@ -26,11 +24,7 @@ TICKS = 3000  # that the Verilog plays of it: lines, swaps and a park
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sine")
-    setup = sine_scan(
-        folder, text_of(operator_file("x")), response_csv(ForeignPlant(ManyPlays()), 150e3),
-        "- x.band_limit.harmonics", "x.motion = 'sine'", "timing.line_rate_hz = 5e3", "dac.update_rate_hz = 2e6",
-        "timing.pixels = 48", "timing.lines = 16", "y.band_limit.harmonics = 4",
-    )  # fmt: skip
+    setup = short_sine(folder)
     build_scan(setup, folder / "out", formats=["c", "verilog"])
     return folder / "out"
 

@@ -110,7 +110,7 @@ module dac_slow_part #(
         end
     end
     assign prepared = preparing && is_idle && ready && !committed;
-    // Neither is it on the clock before a prepared program is committed: the tick would not take it.
+    // On the clock before a prepared program is committed, a tick would not take it, and play its line as an old one.
     assign late = running && first && (!ready || prepared);
 
     // A trigger of a scan that runs is the matter of dac_scan. A tick that takes a program at rest leaves its line 0.
