@@ -1,7 +1,8 @@
 """The index in Verilog: ``dac_library`` picks programs out of one memory, and the sequencer plays them.
 
-Programs are picked in turn while a scan plays: from tables and from Fourier words, out of a fast and a slow memory. A
-record that was damaged, or a number that there is not, is not committed, and what plays goes on.
+The bench of ``tablegen verify`` picks programs in turn while a scan plays: from tables and from Fourier words, out of
+a fast and a slow memory. A record that was damaged, or a number that no program has, is not committed, and what plays
+goes on.
 """
 
 import os
@@ -9,26 +10,25 @@ import shutil
 import subprocess
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import verilator
 from building import BENCHES, run_clean
 from editing import edited, run
-from libraries import BASE, NAMES, programs, write_library
+from libraries import BASE, NAMES, SINE_NAMES, write_library, write_sines
 from sets import long, one_of
 
-from tablegen.device.dual_program import DualProgram
-from tablegen.device.registers import program_words
-from tablegen.device.sequencer import Sequencer
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, program_words
 from tablegen.manifest.read import read_build
+from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.verilog.library_play import LibraryPlay
 
-BENCH, WRITES_BENCH = BENCHES / "library_bench.v", BENCHES / "library_writes_bench.v"
+WRITES_BENCH = BENCHES / "library_writes_bench.v"
 PROGRAMS = 3
-PROGRAM_WORDS = 48
-TICKS = 260  # a line of the longest, and more
-ORDER = (1, 2, 0)
+LINE_TICKS = 200  # of the longest
+OFFSET_HIGH = AXIS_WORDS.index("offset_high")
 
 
 @pytest.fixture(scope="module")
@@ -39,39 +39,28 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-@dataclass(frozen=True)
-class Played:
-    """What the bench has seen: a word for each pick, and the codes of every tick in between."""
-
-    picks: list[str]
-    codes: list[tuple[int, int, int]]
-    model: list[tuple[int, int, int]]
-
-
 def play(
     library: Path,
     work: Path,
-    order: Sequence[int] = ORDER,
     *,
     fourier: bool = False,
     clocks: int = 1,
-    memory: str = "",
-) -> Played:
-    """Simulate the sequencer behind the module in a folder of its own."""
-    work.mkdir(exist_ok=True)
-    for path in library.glob("*.mem"):
-        shutil.copyfile(path, work / path.name)
-    text = memory or memory_text(library, fourier)
-    (work / "memory.mem").write_text(text, "ascii")
-    (work / "picks.hex").write_text("".join(f"{number:x}\n" for number in order), "ascii")
-    parameters = {"PICK_COUNT": len(order), "MEMORY_WORDS": text.count("\n"), "MEMORY_CLOCKS": clocks, "TICKS": TICKS}
-    parameters["FOURIER"] = int(fourier)
-    options = [f"-Plibrary_bench.{name}={value}" for name, value in parameters.items()]
-    program = work / "bench.vvp"
-    files = [BENCH, *sorted(library.glob("dac_*.v"))]
-    run_clean(["iverilog", "-g2005", "-Wall", "-Wno-timescale", f"-I{library}", *options, "-o", program, *files])
-    run_clean(["vvp", "-n", program], work)
-    return seen((work / "capture.txt").read_text("ascii").splitlines(), programs(library))
+    most: int = 3 * LINE_TICKS,
+    names: Sequence[str] = NAMES,
+) -> Check:
+    """Play the library as ``tablegen verify`` does, with so many ticks a program at most."""
+    builds = [read_build(library / name) for name in names]
+    harmonics = max(axis.fourier.harmonics for build in builds for _, axis in build.axes)
+    one = LibraryPlay(
+        library="lines",
+        names=names,
+        programs=[build.program for build in builds],
+        harmonics=harmonics,
+        placement=Placement("blocks", fourier),
+        most_ticks=most,
+        memory_clocks=clocks,
+    )
+    return one.check(library, work, "icarus")
 
 
 def memory_text(library: Path, fourier: bool = False) -> str:
@@ -79,39 +68,24 @@ def memory_text(library: Path, fourier: bool = False) -> str:
     return (library / f"lines_library_{'fourier' if fourier else 'tables'}.mem").read_text("ascii")
 
 
-def seen(lines: list[str], stored: list[DualProgram]) -> Played:
-    """The capture beside what the model plays that takes each program on the same tick."""
-    model, picks, codes, expected = Sequencer(None), [], [], []
-    number, started = 0, False
-    for line in lines:
-        kind, *words = line.split()
-        if kind == "p":
-            number = int(words[0])
-            picks.append(str(number))
-            continue
-        if kind != "t":
-            picks[-1] += kind
-            continue
-        swapped, x, y, faults = (int(word) if word.isdigit() else -1 for word in words)  # unknown bits are x
-        if swapped:
-            model.commit(stored[number])
-        tick = model.step()
-        if swapped and not started:
-            model.arm()
-            started = model.trigger()
-        codes.append((x, y, faults | swapped << 4))
-        expected.append((tick.x, tick.y, int(tick.faults) | tick.swapped << 4))
-    return Played(picks, codes, expected)
+def edit(path: Path, right: str, wrong: str) -> None:
+    text = path.read_text("ascii")
+    assert text.count(right) == 1
+    path.write_text(text.replace(right, wrong), "ascii")
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize(("fourier", "clocks"), [(False, 1), (True, 3)])
 def test_what_is_picked_plays_as_the_model_does(library: Path, tmp_path: Path, fourier: bool, clocks: int) -> None:
-    played = play(library, tmp_path / "play", fourier=fourier, clocks=clocks)
-    assert played.picks == [str(number) for number in ORDER]
-    assert played.codes == played.model
-    assert len(played.codes) == 1 + TICKS * len(ORDER)
-    assert sum(flags >> 4 for _, _, flags in played.codes) == len(ORDER), "every pick was taken"
+    """Each program takes over within a line of the one before it."""
+    check = play(library, tmp_path / "play", fourier=fourier, clocks=clocks)
+    assert (check.failure, check.compared) == (None, "3 programs, 1701 ticks")
+
+
+@pytest.mark.rest
+def test_a_scan_of_long_lines_starts_again_with_each_pick(library: Path, tmp_path: Path) -> None:
+    check = play(library, tmp_path / "play", most=LINE_TICKS)
+    assert (check.failure, check.compared) == (None, "3 programs, 1083 ticks")
 
 
 @pytest.mark.rest
@@ -120,35 +94,87 @@ def test_a_library_of_shaped_scans_plays_with_its_own_parameters(tmp_path: Path)
     base = edited(BASE, "dac.shaping = 'second'")
     done = run("sweep", write_library(tmp_path, base=base), "-o", tmp_path / "out", "-j", "1", "-f", "verilog", "-q")
     assert done.status == 0, done.err
-    played = play(tmp_path / "out", tmp_path / "play")
-    assert played.picks == [str(number) for number in ORDER]
-    assert played.codes == played.model
-    header = tmp_path / "out" / "lines_library.vh"
+    assert play(tmp_path / "out", tmp_path / "play").failure is None
     shaping = "LINES_LIBRARY_SHAPING = 32'sd"
-    assert f"{shaping}2;" in header.read_text("ascii")
-    header.write_text(header.read_text("ascii").replace(f"{shaping}2;", f"{shaping}0;"), "ascii")
-    assert play(tmp_path / "out", tmp_path / "refused").picks == [f"{number}f" for number in ORDER]
+    edit(tmp_path / "out" / "lines_library.vh", f"{shaping}2;", f"{shaping}0;")
+    failure = play(tmp_path / "out", tmp_path / "refused").failure
+    assert failure == "lines, dac_library.v: narrow, the pick: expected a commit, got a failure"
+
+
+@pytest.fixture(scope="module")
+def sines(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library of two sines, whose pixels have tables."""
+    folder = tmp_path_factory.mktemp("sines")
+    done = run("sweep", write_sines(folder), "-o", folder / "out", "-j", "1", "-f", "verilog", "-q")
+    assert done.status == 0, done.err
+    return folder / "out"
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("fourier", long([False], [False, True]))
-def test_a_program_that_the_sequencer_refuses_has_failed(library: Path, tmp_path: Path, fourier: bool) -> None:
-    """A line of more ticks than the sequencer counts, with a CRC that is right; the program before plays on."""
-    memory = unfit(memory_text(library, fourier), 2)
-    played = play(library, tmp_path / "play", (1, 2, 0), fourier=fourier, memory=memory)
-    assert played.picks == ["1", "2f", "0"]
-    assert played.codes == played.model
-    assert sum(flags >> 4 for _, _, flags in played.codes) == 2
+def test_a_library_of_sines_has_their_pixels(sines: Path, tmp_path: Path, fourier: bool) -> None:
+    assert play(sines, tmp_path / "play", fourier=fourier, names=SINE_NAMES).failure is None
 
 
-def unfit(memory: str, number: int) -> str:
-    """The memory with a word in a record that fits no sequencer, and the CRC made right."""
-    words = [int(word, 16) for word in memory.split()]
-    start = words[number]
-    end = start + 2 + PROGRAM_WORDS + sum(count & 0x7FFFFFFF for count in words[start : start + 2])
-    words[start + 2] = 0xFFFFFFFF
+PIXEL_FAULTS = {
+    "no table is read": ("part == Y && no_pixels ? CHECK", "part == Y ? CHECK"),
+    "pixels go elsewhere": ("part == Y ? 3'd7 : 3'd0", "part == Y ? 3'd6 : 3'd0"),
+    "half of them": ("{2'd0, pixels, 1'b0}", "{3'd0, pixels}"),
+    "they are not written": (" || part == PIXELS", ""),
+}
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("fault", one_of(2, PIXEL_FAULTS))
+def test_a_fault_in_the_pixels_is_a_failed_check(sines: Path, tmp_path: Path, fault: str) -> None:
+    shutil.copytree(sines, tmp_path / "out")
+    edit(tmp_path / "out" / "dac_library.v", *PIXEL_FAULTS[fault])
+    failure = play(tmp_path / "out", tmp_path / "play", names=SINE_NAMES).failure
+    assert failure == "lines, dac_library.v: left, the pick: expected a commit, got a failure"
+
+
+def other_offset(library: Path) -> None:
+    """Change the offset word of x of the second program, and make its CRC right."""
+    path = library / "lines_library_tables.mem"
+    words = [int(word, 16) for word in path.read_text("ascii").split()]
+    start, end = words[1], words[2] - 1
+    words[start + 2 + PAGE_WORDS + OFFSET_HIGH] ^= 1 << 8
     words[end] = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in words[start:end]))
-    return "".join(f"{word:08x}\n" for word in words)
+    path.write_text("".join(f"{word:08x}\n" for word in words), "ascii")
+
+
+FAULTS = {
+    "a wrong CRC is not told": (
+        lambda library: edit(library / "dac_library.v", "failed <= word != ~crc;", "failed <= 1'b0;"),
+        "with a CRC that is wrong, the pick: expected a failure, got a commit",
+    ),
+    "a refusal is not told": (
+        lambda library: edit(library / "dac_library.v", "failed <= !committed;", "failed <= 1'b0;"),
+        "with a word that fits no sequencer, the pick: expected a failure, got a commit",
+    ),
+    "any number is a program": (
+        lambda library: edit(library / "dac_library.v", "failed <= wanted > LAST_PROGRAM;", "failed <= 1'b0;"),
+        "number 3, which no program has, the pick: expected a failure, got a commit",
+    ),
+    "another offset": (other_offset, "broad, tick "),
+    "no record": (
+        lambda library: (library / "lines_library_tables.mem").write_text("00000003\n", "ascii"),
+        "lines_library_tables.mem has no 3 records",
+    ),
+    "no header": (lambda library: (library / "lines_library.vh").unlink(), "lines_library.vh is missing"),
+}
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_a_library_is_a_failed_check(library: Path, tmp_path: Path, fault: str) -> None:
+    change, why = FAULTS[fault]
+    shutil.copytree(library, tmp_path / "out")
+    change(tmp_path / "out")
+    failure = play(tmp_path / "out", tmp_path / "play").failure
+    assert failure is not None
+    assert failure.startswith("lines, dac_library.v: ")
+    assert why in failure
 
 
 def writes(

@@ -110,8 +110,8 @@ def verify(
     Of a scan at an angle, NAME_top.v alone plays in Verilog: its boot, a frame and a line; --axis, --fourier and --seed
     have no effect.
 
-    If DIR is a library of tablegen sweep, every program of it is verified in this way, and the index is compared with
-    the programs.
+    If DIR is a library of tablegen sweep, every program of it is verified in this way, the index is compared with the
+    programs, and each program plays as the index has it: picked by dac_library.v, or out of LIBRARY_library.c.
 
     This compiles and runs the code in DIR. Do not verify a directory whose code you would not run.
 

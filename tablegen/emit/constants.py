@@ -31,8 +31,12 @@ def shaping_constants(content: Content) -> dict[str, int]:
 
 def pixel_constants(schedule: Schedule) -> dict[str, int]:
     """Return the address bits of the memory of a table of pixels in Verilog; 0 where pixels are equal."""
-    bits = max((2 * schedule.pixels - 1).bit_length(), LEAST_INDEX_BITS)
-    return {"PIXEL_INDEX_BITS": 0 if schedule.pixel_table is None else bits}
+    return {"PIXEL_INDEX_BITS": pixel_index_bits(0 if schedule.pixel_table is None else schedule.pixels)}
+
+
+def pixel_index_bits(pixels: int) -> int:
+    """Return the address bits of a memory of the ticks of so many pixels a sweep; 0 for none."""
+    return max((2 * pixels - 1).bit_length(), LEAST_INDEX_BITS) if pixels else 0
 
 
 def verilog_constants(content: Content) -> dict[str, int]:

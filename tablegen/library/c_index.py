@@ -36,6 +36,7 @@ def c_index(library: str, entries: Sequence[Entry], version: str) -> dict[str, b
             "TABLE_STORAGE_BITS": table,
             "OUTPUT_STORAGE_BITS": output,
             **({"SPLINE": 1} if behind > 1 else {}),
+            **({"PIXEL_TABLE": 1} if any(entry.table_pixels for entry in entries) else {}),
         },
         "shaping": max(axis.shaping_order for entry in entries for axis in entry.axes),
         "converters": converters,
@@ -45,7 +46,13 @@ def c_index(library: str, entries: Sequence[Entry], version: str) -> dict[str, b
             "LONGEST_NAME": max(len(entry.name) for entry in entries),
         },
         "programs": [
-            {"number": number, "name": entry.name, "NAME": entry.name.upper(), "told": _told(entry)}
+            {
+                "number": number,
+                "name": entry.name,
+                "NAME": entry.name.upper(),
+                "told": _told(entry),
+                "macro": "DAC_PIXEL_PROGRAM" if entry.table_pixels else "DAC_PROGRAM",
+            }
             for number, entry in enumerate(entries)
         ],
     }

@@ -45,13 +45,15 @@ module dac_library #(
     endgenerate
 
     localparam [31:0] LAST_PROGRAM = PROGRAMS - 1, POLYNOMIAL = 32'hEDB88320;
-    localparam [2:0] START = 3'd0, X_COUNT = 3'd1, Y_COUNT = 3'd2, PROGRAM = 3'd3, X = 3'd4, Y = 3'd5, CHECK = 3'd6;
+    localparam [2:0] START = 3'd0, X_COUNT = 3'd1, Y_COUNT = 3'd2, PROGRAM = 3'd3, X = 3'd4, Y = 3'd5, PIXELS = 3'd6;
+    localparam [2:0] CHECK = 3'd7;
     localparam [2:0] IDLE = 3'd0, WAIT = 3'd1, READ = 3'd2, WRITE = 3'd3, SUM = 3'd4, STEP = 3'd5;
     localparam [2:0] ANSWER = 3'd6;
 
     reg [2:0] state, part;     // what is being done, with a word of which part of the record
     reg [16:0] left;           // words of the part, with this one
     reg [16:0] x_left, y_left;
+    reg [13:0] pixels;         // of a sweep, whose ticks are behind the words of y
     reg x_fourier, y_fourier;
     reg [31:0] word, crc;
     reg [4:0] bit_number;
@@ -66,8 +68,9 @@ module dac_library #(
     end
 
     wire [31:0] wanted = {16'd0, number};
-    wire written = part == PROGRAM || part == X || part == Y;
+    wire written = part == PROGRAM || part == X || part == Y || part == PIXELS;
     wire last = left == 17'd1;
+    wire no_pixels = pixels == 14'd0;
     assign busy = state != IDLE;
     assign write = state == WRITE && written && writable;
 
@@ -118,14 +121,15 @@ module dac_library #(
                 write_address <= write_address + 16'd1;
                 left <= left - 17'd1;
                 if (last) begin
-                    part <= part + 3'd1;
+                    part <= part == Y && no_pixels ? CHECK : part + 3'd1;
                     write_address <= 16'd0;
-                    left <= part == Y_COUNT ? 17'd48 : part == PROGRAM ? x_left : part == X ? y_left : 17'd1;
+                    left <= part == Y_COUNT ? 17'd48 : part == PROGRAM ? x_left : part == X ? y_left :
+                            part == Y && !no_pixels ? {2'd0, pixels, 1'b0} : 17'd1;
                 end
                 if (part == X_COUNT) {x_fourier, x_left} <= {word[31], word[16:0]};
-                if (part == Y_COUNT) {y_fourier, y_left} <= {word[31], word[16:0]};
+                if (part == Y_COUNT) {y_fourier, pixels, y_left} <= word;
                 if (last) write_region <= part == PROGRAM ? (x_fourier ? 3'd3 : 3'd1) :
-                                          part == X ? (y_fourier ? 3'd4 : 3'd2) : 3'd0;
+                                          part == X ? (y_fourier ? 3'd4 : 3'd2) : part == Y ? 3'd7 : 3'd0;
                 if (part == CHECK) begin
                     commit <= word == ~crc;
                     withdraw <= word != ~crc;

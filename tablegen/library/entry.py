@@ -36,8 +36,11 @@ class AxisEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     shaping_order: int = 0
 
 
-class Entry(Struct, frozen=True, kw_only=True):
-    """A program of a library. ``inputs`` is the digest of all that it was made from, ``files`` those of its folder."""
+class Entry(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A program of a library. ``inputs`` is the digest of all that it was made from, ``files`` those of its folder.
+
+    ``table_pixels`` are the pixels of a sweep whose ticks are in a table; 0: all are equally long.
+    """
 
     library: str
     name: str
@@ -53,6 +56,7 @@ class Entry(Struct, frozen=True, kw_only=True):
     warnings: list[str]
     inputs: Digest
     files: dict[BuildFileName, Digest]
+    table_pixels: int = 0
 
     @property
     def axes(self) -> tuple[AxisEntry, AxisEntry]:
@@ -113,6 +117,7 @@ def make_entry(
         warnings=list(warnings),
         inputs=inputs,
         files={name: hashlib.sha256(text).hexdigest() for name, text in sorted(files.items())},
+        table_pixels=0 if schedule.pixel_table is None else schedule.pixels,
     )
 
 

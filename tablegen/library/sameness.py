@@ -6,6 +6,8 @@ from typing import Any
 from tablegen.emit.constants import storage_bits
 from tablegen.library.entry import AxisEntry, Entry
 
+MOST_PIXELS = (1 << 14) - 1  # of a sweep, whose ticks a record of dac_library has
+
 _OUTPUT: dict[str, Callable[[AxisEntry], Any]] = {
     "dac.bits": lambda axis: axis.dac_bits,
     "dac.word_bits": lambda axis: axis.word_bits,
@@ -40,6 +42,9 @@ def why_not_one_c(entries: Sequence[Entry]) -> str | None:
 
 def why_not_one_sequencer(entries: Sequence[Entry]) -> str | None:
     """Why one Verilog sequencer cannot play all of these, or None."""
+    for entry in entries:
+        if entry.table_pixels > MOST_PIXELS:
+            return f"{entry.name} has a table of {entry.table_pixels} pixels, dac_library writes at most {MOST_PIXELS}"
     return _first_difference(entries, _VERILOG)
 
 

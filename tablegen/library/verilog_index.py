@@ -2,7 +2,8 @@
 
 The memory has words of 32 bits: first the address of each record, by number, then the records. A record is the number
 of words of x and of y, with bit 31 set where they are Fourier words; 48 words of the program; the words of x and y,
-sign-extended; and the CRC-32 of all of these, of their bytes from the lowest.
+sign-extended; and the CRC-32 of all of these, of their bytes from the lowest. Where the program has a table of pixels,
+the number of words of y has the pixels of a sweep from bit 17 on, and the ticks of each stand behind the words of y.
 """
 
 import zlib
@@ -13,13 +14,16 @@ import numpy as np
 
 from tablegen.base.reading import BUILD_FILE, read_bytes, read_text
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.emit.constants import DEGREES
+from tablegen.emit.constants import DEGREES, pixel_index_bits
 from tablegen.emit.templates import template_text
 from tablegen.emit.verilog_text import literal, value_range
 from tablegen.library.entry import AxisEntry, Entry
+from tablegen.library.sameness import MOST_PIXELS
 
 MODULE = "dac_library.v"
 FOURIER = 1 << 31
+PIXELS_SHIFT = 17  # in the number of words of y
+_COUNT = (1 << PIXELS_SHIFT) - 1
 _FOLDER = Path(__file__).parent
 _HARMONICS = AXIS_WORDS.index("harmonics")
 
@@ -66,6 +70,7 @@ def _constants(entries: Sequence[Entry]) -> dict[str, int]:
     constants |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
     constants["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
     constants["SHAPING"] = max(axis.shaping_order for entry in entries for axis in entry.axes)
+    constants["PIXEL_INDEX_BITS"] = pixel_index_bits(max(entry.table_pixels for entry in entries))
     return constants
 
 
@@ -93,8 +98,16 @@ def _record(entry: Entry, content: Contents, fourier: bool) -> "np.ndarray[tuple
         for page, axis in ((1, entry.x), (2, entry.y)):
             program[page * PAGE_WORDS + _HARMONICS] = axis.harmonics
     counts = np.array([len(words) | (FOURIER if fourier else 0) for words in axes], dtype=np.uint32)
-    record = np.concatenate([counts, program, *axes])
+    counts[1] |= entry.table_pixels << PIXELS_SHIFT
+    pixels = _words(content(entry.name, f"{entry.name}_pixels.mem"), 32) if entry.table_pixels else axes[0][:0]
+    record = np.concatenate([counts, program, *axes, pixels])
     return np.append(record, np.uint32(zlib.crc32(record.astype("<u4").tobytes())))
+
+
+def words_before_crc(x_count: int, y_count: int) -> int:
+    """Return the number of words of a record before its CRC, from the first two of them."""
+    pixels = y_count >> PIXELS_SHIFT & MOST_PIXELS
+    return 2 + 3 * PAGE_WORDS + (x_count & _COUNT) + (y_count & _COUNT) + 2 * pixels
 
 
 def _words(memory: bytes, bits: int) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":

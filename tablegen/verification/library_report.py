@@ -72,13 +72,19 @@ def read_index(folder: Path) -> IndexRecord:
     return record
 
 
-def verify_library(folder: Path, verify_program: Callable[[Path], Report]) -> Report:
+PlayIndex = Callable[[IndexRecord, list[StoredBuild]], list[Check]]
+"""What plays the programs of a library by its index: their builds, by number."""
+
+
+def verify_library(folder: Path, verify_program: Callable[[Path], Report], play_index: PlayIndex) -> Report:
     """Verify every program of the library in ``folder`` as a build, and the index against the programs.
 
     Parameters
     ----------
     verify_program
         Verifies the build in a directory.
+    play_index
+        Plays the programs by the index; not called where one of them is damaged.
 
     Raises
     ------
@@ -104,18 +110,24 @@ def verify_library(folder: Path, verify_program: Callable[[Path], Report]) -> Re
         differences += [] if report.difference is None else [f"{program.name}: {report.difference}"]
     watch.timed([])
     checks += watch.timed(_index_checks(folder, record, stored))
+    played: list[Check] = []
+    if len(stored) == len(record.programs):
+        played = play_index(record, [stored[program.name] for program in record.programs])
+        checks += watch.timed(played) if played else []
     notes += [f"{path.name}: not in the index, and not verified" for path in _unindexed(folder, record)]
     difference = next(iter(differences), None)
-    return Report(record.library, checks, difference, notes, watch.seconds, _unplayed_by_all(record, unplayed))
+    return Report(record.library, checks, difference, notes, watch.seconds, _unplayed(record, unplayed, played))
 
 
-def _unplayed_by_all(record: IndexRecord, unplayed: list[list[str]]) -> list[str]:
-    """List what no program has played, of the runtime once, and the files of the programs themselves."""
+def _unplayed(record: IndexRecord, unplayed: list[list[str]], played: list[Check]) -> list[str]:
+    """List what no program has played, of the runtime once, and the files of the programs and of the index."""
     own = tuple(f"{program.name}_" for program in record.programs)
     parts = dict.fromkeys(part for parts in unplayed for part in parts)
     listed = [part for part in parts if part.startswith(own) or all(part in each for each in unplayed)]
-    simulated = any(".v" in part for part in listed)  # dac_library.v is compared, and not simulated
-    return [MODULE, *listed] if simulated and MODULE in record.files else listed
+    subjects = {check.subject for check in played}
+    source = MODULE if any(".v" in part for part in listed) else f"{record.library}_library.c"
+    index = [source] if listed and source in record.files and f"library {source}" not in subjects else []
+    return [*index, *listed]
 
 
 def _of_program(name: str, check: Check) -> Check:

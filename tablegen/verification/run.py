@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Literal
 
 from tablegen.library.whole import whole_build
-from tablegen.manifest.read import read_build
+from tablegen.manifest.read import StoredBuild, read_build
 from tablegen.manifest.turned import is_turned
 from tablegen.verification.build_report import Report, Target, verify_build
+from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.files_target import FilesTarget
-from tablegen.verification.library_report import is_library, read_index, verify_library
+from tablegen.verification.library_checks import library_checks
+from tablegen.verification.library_report import IndexRecord, is_library, read_index, verify_library
 from tablegen.verification.turned_report import verify_turned
 
 TargetName = Literal["verilog", "c", "cortex-m", "files"]
@@ -88,7 +90,23 @@ def verify(
                 progress=progress,
             )
 
-        return verify_library(folder, verify_program)
+        def play_index(record: IndexRecord, programs: list[StoredBuild]) -> list[Check]:
+            """Play the programs by the index, on the target of the first."""
+            with _work_folder(None if keep is None else Path(keep) / "library") as work:
+                return library_checks(
+                    folder,
+                    work,
+                    record,
+                    programs,
+                    target or default_target(folder / record.programs[0].name),
+                    simulator=simulator,
+                    axis=axis,
+                    fourier=fourier,
+                    ticks=ticks,
+                    progress=progress,
+                )
+
+        return verify_library(folder, verify_program, play_index)
     if is_turned(folder):
         with _work_folder(None if keep is None else Path(keep)) as work:
             return verify_turned(

@@ -4,6 +4,7 @@ import tomllib
 from pathlib import Path
 
 from editing import SCAN, SCANNER, edited, write_pair
+from sine_scans import short_sine
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.manifest.read import read_build
@@ -40,11 +41,29 @@ y.size_nm = 300.0
 band_limit.harmonics = 20
 """
 NAMES = ("narrow", "broad", "even")
+SINES = """
+[[scans]]
+name = "left"
+x.offset_v = 45.0
+
+[[scans]]
+name = "right"
+x.offset_v = 55.0
+"""
+SINE_NAMES = ("left", "right")
 
 
 def write_library(folder: Path, scans: str = SCANS, base: str = BASE) -> Path:
     """The scan file with its ``[[scans]]``, beside its scanner file."""
     return write_pair(folder, base + scans, DAMPED)
+
+
+def write_sines(folder: Path) -> Path:
+    """Write the scan file of two scans whose x is a sine and whose pixels have a table, and its scanner."""
+    short_sine(folder, "name = 'lines'", "x.table.length = 128", "y.table.length = 128")
+    path = folder / "scan.toml"
+    path.write_text(path.read_text("utf-8") + SINES, "utf-8")
+    return path
 
 
 def programs(library: Path, names: tuple[str, ...] = NAMES) -> list[DualProgram]:

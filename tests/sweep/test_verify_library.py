@@ -1,6 +1,7 @@
 """``tablegen verify`` of a library: its programs as builds, and its index against them."""
 
 import json
+import re
 import shutil
 import zlib
 from collections.abc import Callable
@@ -9,9 +10,10 @@ from pathlib import Path
 
 import pytest
 from editing import run
-from libraries import NAMES, write_library
+from libraries import NAMES, write_library, write_sines
 
 from tablegen.verification.build_report import Report
+from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.library_report import verify_library
 
 pytestmark = pytest.mark.common
@@ -192,4 +194,48 @@ def test_what_no_program_has_played_is_listed_once(stored: Path) -> None:
         unplayed = {"narrow": ["dac_spline.v", "narrow_top.v"], "broad": ["dac_spline.v", "dac_axis.v"]}
         return Report(program.name, [], None, [], unplayed=unplayed.get(program.name, ["dac_spline.v"]))
 
-    assert verify_library(stored, verify_program).unplayed == ["dac_library.v", "dac_spline.v", "narrow_top.v"]
+    def unplayed(*played: str) -> list[str]:
+        checks = [Check(f"library {source}", "integer model", "3 programs") for source in played]
+        return verify_library(stored, verify_program, lambda _record, _programs: checks).unplayed
+
+    assert unplayed() == ["dac_library.v", "dac_spline.v", "narrow_top.v"]
+    assert unplayed("dac_library.v") == ["dac_spline.v", "narrow_top.v"]
+
+
+def verify_c(library: Path) -> tuple[int, str, str]:
+    done = run("verify", library, "--target", "c", "--ticks", "1000")
+    return done.status, done.out, done.err
+
+
+def test_programs_of_the_index_in_c_are_played(library: Path) -> None:
+    """Two programs have changed places: the compiler and the digests find nothing wrong in that."""
+    status, out, err = verify_c(library)
+    assert (status, err) == (0, "")
+    row = "library lines_library.c  integer model  3 programs, 1400 ticks"
+    assert [" ".join(line.split()) for line in out.splitlines() if "library lines_library.c" in line] == [
+        " ".join(f"{row} ok".split())
+    ]
+    assert "lines_library.c" not in out[out.index("not played:") :]
+    path = library / "lines_library.c"
+    text = path.read_text("ascii")
+    changed = text.replace("DAC_PROGRAM(BROAD, broad)", "DAC_PROGRAM(EVEN, even)")
+    assert changed != text
+    write_listed(library, "lines_library.c", changed)
+    status, _, err = verify_c(library)
+    assert status == 5
+    assert re.search(r"^lines_library.c: tick \d+ after the pick of broad is ", err, re.MULTILINE)
+
+
+def test_a_library_of_sines_in_c_has_their_pixels(tmp_path: Path) -> None:
+    """Pixels of a program without its table would have equal lengths."""
+    done = run("sweep", write_sines(tmp_path), "-o", tmp_path / "out", "-j", "1", "-q")
+    assert done.status == 0, done.err
+    library = tmp_path / "out"
+    assert verify_c(library)[0] == 0
+    text = (library / "lines_library.c").read_text("ascii")
+    assert text.count("DAC_PIXEL_PROGRAM(") == 2
+    write_listed(library, "lines_library.c", text.replace("DAC_PIXEL_PROGRAM(", "DAC_PROGRAM("))
+    status, _, err = verify_c(library)
+    assert status == 5
+    assert "lines_library.c: tick " in err
+    assert " after the pick of left is " in err

@@ -1,5 +1,6 @@
 """The C program that plays a build: its own files, its runtime, and the file that gives them to the bench."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,6 +75,14 @@ def _files_of_z(stored: StoredBuild) -> list[str]:
     """Return the names of the C files of the sequencer that plays the output z; empty without z."""
     name = f"{stored.manifest.name}_z"
     return [] if stored.z is None else [f"{name}{end}" for end in (".h", ".c", "_program.h", "_program.c")]
+
+
+def library_choices(programs: Sequence[StoredBuild]) -> dict[str, int]:
+    """Return the macros with which a firmware for all these builds is compiled."""
+    every = [_choices(stored) for stored in programs]
+    return {
+        key: max(each.get(key, 0) for each in every) for key in dict.fromkeys(key for each in every for key in each)
+    }
 
 
 def _choices(stored: StoredBuild) -> dict[str, int]:

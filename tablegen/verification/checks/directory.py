@@ -29,8 +29,8 @@ def wrong_digests(folder: Path, files: Mapping[str, str]) -> list[str]:
     return wrong
 
 
-def memory_words(path: Path, count: int) -> list[int]:
-    """Read the words of a memory file as a device does.
+def memory_words(path: Path, count: int | None) -> list[int]:
+    """Read the words of a memory file as a device does; ``count`` of them, or as many as it has.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def memory_words(path: Path, count: int) -> list[int]:
         raise ValueError(f"{path.name} cannot be read: {error.strerror or error}") from None
     except ValueError:
         raise ValueError(f"{path.name} does not hold one hexadecimal word a line") from None
-    if len(words) != count:
+    if count is not None and len(words) != count:
         raise ValueError(f"{path.name} has {len(words)} words in place of {count}")
     return words
 
