@@ -193,9 +193,9 @@ def files_of_the_core(folder: Path) -> list[str]:
     return [each if isinstance(each, str) else next(iter(each)) for each in entries]
 
 
-def manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of the build."""
-    content: dict[str, Any] = json.loads((folder / "made" / NAME / "manifest.json").read_text("ascii"))
+def manifest(folder: Path, name: str = NAME) -> dict[str, Any]:
+    """Read the manifest of the build in a folder of a name."""
+    content: dict[str, Any] = json.loads((folder / "made" / name / "manifest.json").read_text("ascii"))
     return content
 
 
@@ -267,12 +267,14 @@ def test_further_formats_have_the_types_of_their_files(tmp_path: Path) -> None:
 @pytest.mark.common
 def test_a_scan_at_an_angle_has_all_of_its_files(tmp_path: Path) -> None:
     """With the output z: the modules of the slow part, and a second top with its memories."""
-    write_tilted(tmp_path, 30.0)
-    done = generate(tmp_path, {"scan": SCAN})
+    path = write_tilted(tmp_path, 30.0)
+    done = generate(tmp_path, {"scan": path.name})
     assert done.returncode == 0, done.stderr
     named = files_of_the_core(tmp_path)
-    assert sorted(named) == sorted(f"{NAME}/{name}" for name in manifest(tmp_path)["files"])
-    assert {f"{NAME}/{NAME}_z_top.v", f"{NAME}/dac_slow_part.v", f"{NAME}/{NAME}_z_slow.mem"} < set(named)
+    assert sorted(named) == sorted(f"{path.stem}/{name}" for name in manifest(tmp_path, path.stem)["files"])
+    assert {f"{path.stem}/{NAME}_z_top.v", f"{path.stem}/dac_slow_part.v", f"{path.stem}/{NAME}_z_slow.mem"} < set(
+        named
+    )
 
 
 @pytest.mark.common
