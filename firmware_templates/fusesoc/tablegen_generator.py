@@ -1,7 +1,7 @@
 """Build scans for FuseSoC, and write the core of their files: the generator ``tablegen``.
 
 FuseSoC runs it as ``python3 tablegen_generator.py INPUT.yml`` in the folder of the generated core. The ``python3`` is
-the first on PATH, of any version from 3.7 on, and need not be that of tablegen: nothing is imported from there.
+the first on PATH, of any version from 3.8 on, and need not be that of tablegen: nothing is imported from there.
 """
 
 from __future__ import annotations
