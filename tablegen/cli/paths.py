@@ -7,9 +7,10 @@ import click
 from tablegen.cli.shared.exit_status import ExitStatus
 
 
-@click.command(short_help="Print the paths of the make, CMake, C and Verilog files.")
+@click.command(short_help="Print the paths of the make, CMake, FuseSoC, C and Verilog files.")
 @click.option("--make", is_flag=True, help="Print the path of the make include file, tablegen.mk.")
 @click.option("--cmake", is_flag=True, help="Print the directory of TablegenConfig.cmake.")
+@click.option("--fusesoc", is_flag=True, help="Print the directory of the generator for FuseSoC.")
 @click.option("--runtime-c", is_flag=True, help="Print the directory of dac_*.h and dac_*.c.")
 @click.option("--runtime-verilog", is_flag=True, help="Print the directory of dac_*.v.")
 def paths(**options: bool) -> int:
@@ -26,6 +27,11 @@ def paths(**options: bool) -> int:
       tablegen_build(scan.toml TARGET scan)                  # makes the library "scan"
 
     \b
+    For FuseSoC, whose cores then name a scan.toml and depend on tablegen:utils:generator:
+      fusesoc library add tablegen "$(tablegen paths --fusesoc)"
+      fusesoc gen show tablegen                              # prints the parameters
+
+    \b
     To read or lint the sequencers, which every build also contains:
       less "$(tablegen paths --runtime-c)/dac_sequencer.h"
       cppcheck "$(tablegen paths --runtime-c)"
@@ -40,6 +46,7 @@ def paths(**options: bool) -> int:
     places = {
         "make": folder / "make" / "tablegen.mk",
         "cmake": folder / "cmake",
+        "fusesoc": folder / "fusesoc",
         "runtime-c": folder / "c",
         "runtime-verilog": folder / "verilog",
     }

@@ -211,6 +211,7 @@ def test_what_builds_do_not_read_is_not_named() -> None:
         "examples",
         "make",
         "cmake",
+        "fusesoc",
         "__pycache__",
     }
     assert not others & folders

@@ -124,6 +124,8 @@ def test_what_answers_at_once_loads_no_metadata() -> None:
 def test_the_version_is_the_same_everywhere() -> None:
     cmake = (REPOSITORY / "firmware_templates" / "cmake" / "TablegenConfigVersion.cmake").read_text("utf-8")
     assert f'set(PACKAGE_VERSION "{__version__}")' in cmake
+    generator = (REPOSITORY / "firmware_templates" / "fusesoc" / "tablegen_generator.core").read_text("utf-8")
+    assert f"\nname: tablegen:utils:generator:{__version__}\n" in generator
     assert f"\nversion: {__version__}\n" in (REPOSITORY / "CITATION.cff").read_text("utf-8")
     notes = (REPOSITORY / "docs" / "releases" / f"{__version__}.md").read_text("utf-8")
     assert notes.startswith(f"# {__version__}\n")

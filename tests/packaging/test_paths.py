@@ -11,8 +11,9 @@ from installing import python
 from tablegen import __version__
 from tablegen.base.resources import c_runtime, verilog_runtime
 
-OPTIONS = ("make", "cmake", "runtime-c", "runtime-verilog")
+OPTIONS = ("make", "cmake", "fusesoc", "runtime-c", "runtime-verilog")
 HOLDS = {
+    "fusesoc": {"tablegen_generator.core", "tablegen_generator.py"},
     "cmake": {"TablegenConfig.cmake", "TablegenConfigVersion.cmake"},
     "runtime-c": {path.name for path in c_runtime()},
     "runtime-verilog": {path.name for path in verilog_runtime()},
