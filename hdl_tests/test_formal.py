@@ -357,7 +357,8 @@ MUTANTS = {
     "response_replaced": ("axi_lite", "dac_axi_lite", "w_kept && !s_axi_bvalid", "w_kept"),
     "response_of_a_reset_access": ("axi_lite", "dac_axi_lite", "s_axi_rvalid <= 1'b0;\n        end", "end"),
     "write_without_its_data": ("axi_lite", "dac_axi_lite", "may_write = aw_kept && w_kept", "may_write = aw_kept"),
-    "word_while_not_writable": ("axi_lite", "dac_bus", "exists && !waits", "exists"),
+    "word_while_not_writable": ("axi_lite", "dac_bus", "has_mode && !waits", "has_mode"),
+    "mode_that_there_is_not": ("axi_lite", "dac_bus", "&& has_mode", ""),
     "answer_of_another_cycle": ("wishbone", "dac_wishbone", "ack_o = done && waits && cycle", "ack_o = done && cycle"),
     "answer_without_a_cycle": ("wishbone", "dac_wishbone", "err_o = done && waits && cycle", "err_o = done && waits"),
     # l. one pulse for each edge of another clock domain

@@ -197,6 +197,12 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
         ({"HARMONICS": 513}, "HARMONICS_is_not_1_to_512"),
         ({"SHAPING": 4}, "SHAPING_is_not_0_to_3"),
+        ({"COMMIT_MODES": 2}, "COMMIT_MODES_is_not_0_to_1"),
+        ({"PIXEL_INDEX_BITS": 1}, "PIXEL_INDEX_BITS_is_not_0_or_2_to_14"),
+        ({"PIXEL_INDEX_BITS": 15}, "PIXEL_INDEX_BITS_is_not_0_or_2_to_14"),
+        ({"SLOW_PART": 2}, "SLOW_PART_is_not_0_to_1"),
+        ({"SLOW_PART": 1, "SLOW_INDEX_BITS": 14}, "SLOW_INDEX_BITS_is_not_3_to_13"),
+        ({"SLOW_PART": 1, "Y_INDEX_BITS": 14}, "X_or_Y_INDEX_BITS_with_SLOW_PART_are_more_than_13"),
     ],
     "dac_synchronise": [
         ({"STAGES": 1}, "STAGES_is_not_2_to_8"),

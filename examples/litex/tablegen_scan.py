@@ -25,10 +25,12 @@ from migen import ClockSignal, If, Instance, ResetSignal, Signal
 
 import tablegen
 from tablegen.base.resources import resource_folder
+from tablegen.emit.constants import pixel_constants
 
 _DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}
 _MOST_HARMONICS = 127  # of the Fourier words that a host may send
 _COUNT_BITS = 16
+_STATES = ("writable", "refused", "committed", "can_keep", "booting", "missing", "armed", "running", "busy")
 _MARKERS = ("line", "frame", "pixel", "backward", "valid", "swapped")
 
 
@@ -80,6 +82,7 @@ class TablegenScan(LiteXModule):
         fourier = int(f"{name}_sine.mem" in build.manifest.files)
         longest = max(len(axis.words) for axis in (program.x, program.y))
         harmonics = {"p_HARMONICS": min(_MOST_HARMONICS, longest // 2 - 1)} if fourier else {}
+        pixels = pixel_constants(program.schedule)["PIXEL_INDEX_BITS"]
         widths = {}
         for letter, axis in (("X", program.x), ("Y", program.y)):
             degree = _DEGREES[axis.mode]
@@ -93,6 +96,8 @@ class TablegenScan(LiteXModule):
             p_DAC_BITS=program.x.output.dac_bits,
             p_COUNT_BITS=_COUNT_BITS,
             p_FOURIER=fourier,
+            p_COMMIT_MODES=1,
+            p_PIXEL_INDEX_BITS=pixels,
             **widths,
             **harmonics,
             i_clock=ClockSignal(),
@@ -113,12 +118,12 @@ class TablegenScan(LiteXModule):
             f"{name}_top",
             p_CLOCKS_PER_TICK=int(clocks),
             p_COUNT_BITS=_COUNT_BITS,
+            p_COMMIT_MODES=1,
             **harmonics,
             i_clock=ClockSignal(),
             i_reset=ResetSignal(),
             i_tick=self._tick(int(clocks)),
             i_underrun=0,
-            i_commit_mode=0,
             o_strobe=self.strobe,
             o_x_word=self.x_word,
             o_y_word=self.y_word,
@@ -129,8 +134,9 @@ class TablegenScan(LiteXModule):
     def _host_port(self) -> dict[str, tuple[bool, Signal]]:
         """Return the signals of the host port; True are those that the bus drives."""
         driven = {"write": 1, "write_region": 3, "write_address": 16, "write_data": 32, "commit": 1, "withdraw": 1}
+        driven["commit_mode"] = 2
         driven |= {"arm": 1, "arm_frames": 16, "trigger": 1, "park": 1, "clear_faults": 1}
-        read = dict.fromkeys(("writable", "refused", "committed", "booting", "missing", "armed", "running", "busy"), 1)
+        read = dict.fromkeys(_STATES, 1)
         read |= {"faults": 4, "fault_counts": 4 * _COUNT_BITS}
         host = {
             port: (out, Signal(bits)) for out, ports in ((True, driven), (False, read)) for port, bits in ports.items()

@@ -4,7 +4,7 @@
 // dac_axi_lite, or dac_wishbone with WISHBONE = 1, in front of a dac_sequencer; the master is in Python.
 //
 // host.txt gets a line for each clock on which the host port is used: "w REGION ADDRESS DATA", "a FRAMES" for arm, or
-// "r" and the bits clear_faults, park, trigger, withdraw, commit. ticks.txt gets a line for each strobe: codes and
+// "r", the bits clear_faults, park, trigger, withdraw, commit, and the mode of a commit. ticks.txt gets a line for each strobe: codes and
 // markers. rules.txt gets a line for each broken rule of the bus or the host port.
 module bus_bench #(
     parameter WISHBONE = 0,
@@ -22,7 +22,11 @@ module bus_bench #(
     parameter FOURIER = 1,
     parameter HARMONICS = 5,
     parameter SINE_FILE = "",
-    parameter SHAPING = 0
+    parameter SHAPING = 0,
+    parameter COMMIT_MODES = 1,
+    parameter PIXEL_INDEX_BITS = 4,
+    parameter SLOW_PART = 0,
+    parameter SLOW_INDEX_BITS = 5
 );
     `include "dac_registers.vh"
 
@@ -47,6 +51,8 @@ module bus_bench #(
 
     wire irq, write, writable, refused, commit, withdraw, committed, arm, trigger, park, clear_faults;
     wire armed, running, busy, strobe, line, frame, pixel, backward, valid, swapped, playing, parked;
+    wire can_keep;
+    wire [1:0] mode;
     wire [2:0] region;
     wire [15:0] address, frames;
     wire [31:0] data;
@@ -60,13 +66,15 @@ module bus_bench #(
                 .ADDRESS_BITS(ADDRESS_BITS), .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED),
                 .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS), .Y_INTERPOLATED(Y_INTERPOLATED),
                 .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .COUNT_BITS(COUNT_BITS), .FOURIER(FOURIER),
-                .HARMONICS(HARMONICS), .SHAPING(SHAPING)
+                .HARMONICS(HARMONICS), .SHAPING(SHAPING), .COMMIT_MODES(COMMIT_MODES),
+                .PIXEL_INDEX_BITS(PIXEL_INDEX_BITS), .SLOW_PART(SLOW_PART), .SLOW_INDEX_BITS(SLOW_INDEX_BITS)
             ) bus (
                 .clock(clock), .reset(reset), .wb_cyc_i(wb_cyc_i), .wb_stb_i(wb_stb_i), .wb_we_i(wb_we_i),
                 .wb_adr_i(wb_adr_i), .wb_sel_i(wb_sel_i), .wb_dat_i(wb_dat_i), .wb_dat_o(wb_dat_o),
                 .wb_ack_o(wb_ack_o), .wb_err_o(wb_err_o), .irq(irq), .write(write), .write_region(region),
                 .write_address(address), .write_data(data), .writable(writable), .refused(refused), .commit(commit),
-                .withdraw(withdraw), .committed(committed), .booting(1'b0), .missing(1'b0), .arm(arm),
+                .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .commit_mode(mode),
+                .booting(1'b0), .missing(1'b0), .arm(arm),
                 .arm_frames(frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
                 .running(running), .busy(busy), .playing(playing), .parked(parked), .faults(faults),
                 .fault_counts(fault_counts)
@@ -76,7 +84,8 @@ module bus_bench #(
                 .ADDRESS_BITS(ADDRESS_BITS), .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED),
                 .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS), .Y_INTERPOLATED(Y_INTERPOLATED),
                 .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .COUNT_BITS(COUNT_BITS), .FOURIER(FOURIER),
-                .HARMONICS(HARMONICS), .SHAPING(SHAPING)
+                .HARMONICS(HARMONICS), .SHAPING(SHAPING), .COMMIT_MODES(COMMIT_MODES),
+                .PIXEL_INDEX_BITS(PIXEL_INDEX_BITS), .SLOW_PART(SLOW_PART), .SLOW_INDEX_BITS(SLOW_INDEX_BITS)
             ) bus (
                 .clock(clock), .reset(reset), .s_axi_awaddr(s_axi_awaddr), .s_axi_awprot(s_axi_awprot),
                 .s_axi_awvalid(s_axi_awvalid), .s_axi_awready(s_axi_awready), .s_axi_wdata(s_axi_wdata),
@@ -86,7 +95,8 @@ module bus_bench #(
                 .s_axi_arready(s_axi_arready), .s_axi_rdata(s_axi_rdata), .s_axi_rresp(s_axi_rresp),
                 .s_axi_rvalid(s_axi_rvalid), .s_axi_rready(s_axi_rready), .irq(irq), .write(write),
                 .write_region(region), .write_address(address), .write_data(data), .writable(writable),
-                .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .booting(1'b0),
+                .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .commit_mode(mode),
+                .booting(1'b0),
                 .missing(1'b0), .arm(arm), .arm_frames(frames), .trigger(trigger), .park(park),
                 .clear_faults(clear_faults), .armed(armed), .running(running), .busy(busy), .playing(playing),
                 .parked(parked), .faults(faults), .fault_counts(fault_counts)
@@ -97,12 +107,14 @@ module bus_bench #(
     dac_sequencer #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
-        .LINE_BITS(LINE_BITS), .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(1), .FOURIER(FOURIER), .HARMONICS(HARMONICS),
-        .SINE_FILE(SINE_FILE), .SHAPING(SHAPING)
+        .LINE_BITS(LINE_BITS), .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(SLOW_PART == 0),
+        .LOW_AREA(SLOW_PART), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE), .SHAPING(SHAPING),
+        .COMMIT_MODES(COMMIT_MODES), .PIXEL_INDEX_BITS(PIXEL_INDEX_BITS), .SLOW_PART(SLOW_PART),
+        .SLOW_INDEX_BITS(SLOW_INDEX_BITS)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0), .withdraw(withdraw),
-        .committed(committed), .arm(arm),
+        .writable(writable), .refused(refused), .commit(commit), .commit_mode(mode), .withdraw(withdraw),
+        .committed(committed), .can_keep(can_keep), .arm(arm),
         .arm_frames(frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
         .running(running), .tick(tick), .underrun(underrun), .busy(busy), .strobe(strobe), .x_code(x_code),
         .y_code(y_code), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
@@ -120,7 +132,7 @@ module bus_bench #(
         if (write) $fwrite(host, "w %0d %0d %0d\n", region, address, data);
         if (arm) $fwrite(host, "a %0d\n", frames);
         if (clear_faults || park || trigger || withdraw || commit)
-            $fwrite(host, "r %b\n", {clear_faults, park, trigger, withdraw, commit});
+            $fwrite(host, "r %b %0d\n", {clear_faults, park, trigger, withdraw, commit}, commit ? mode : 2'd0);
         if (strobe)
             $fwrite(ticks, "%0d %0d %b\n", x_code, y_code, {line, frame, pixel, backward, valid, swapped, playing,
                 parked});

@@ -26,7 +26,8 @@ module port_timing_bench;
         .s_axi_araddr(read_address), .s_axi_arprot(3'd0), .s_axi_arvalid(axi_read), .s_axi_arready(ar_ready),
         .s_axi_rdata(), .s_axi_rresp(r_response), .s_axi_rvalid(r_valid), .s_axi_rready(now[56]), .irq(),
         .write(axi_host_write), .write_region(), .write_address(), .write_data(), .writable(1'b1), .refused(1'b0),
-        .commit(axi_commit), .withdraw(), .committed(1'b0), .booting(1'b0), .missing(1'b0), .arm(), .arm_frames(),
+        .commit(axi_commit), .commit_mode(), .withdraw(), .committed(1'b0), .can_keep(1'b0), .booting(1'b0),
+        .missing(1'b0), .arm(), .arm_frames(),
         .trigger(axi_trigger), .park(), .clear_faults(), .armed(1'b0), .running(1'b0), .busy(1'b0), .playing(1'b0),
         .parked(1'b1), .faults(4'd0), .fault_counts(64'd0)
     );
@@ -34,7 +35,8 @@ module port_timing_bench;
         .clock(clock), .reset(1'b0), .wb_cyc_i(cycle), .wb_stb_i(cycle), .wb_we_i(writes),
         .wb_adr_i(cycle_address[19:2]), .wb_sel_i(4'd15), .wb_dat_i(cycle_data), .wb_dat_o(), .wb_ack_o(ack),
         .wb_err_o(err), .irq(), .write(host_write), .write_region(), .write_address(), .write_data(),
-        .writable(1'b1), .refused(1'b0), .commit(commit), .withdraw(), .committed(1'b0), .booting(1'b0),
+        .writable(1'b1), .refused(1'b0), .commit(commit), .commit_mode(), .withdraw(), .committed(1'b0),
+        .can_keep(1'b0), .booting(1'b0),
         .missing(1'b0), .arm(), .arm_frames(), .trigger(), .park(), .clear_faults(), .armed(1'b0), .running(1'b0),
         .busy(1'b0), .playing(1'b0), .parked(1'b1), .faults(4'd0), .fault_counts(64'd0)
     );

@@ -19,6 +19,7 @@ module axi_properties (
     input wire        writable,
     input wire        refused,
     input wire        committed,
+    input wire        can_keep,
     input wire        booting,
     input wire        missing,
     input wire        armed,
@@ -32,14 +33,16 @@ module axi_properties (
     wire awready, wready, bvalid, arready, rvalid, write, commit, withdraw, arm, trigger, park, clear_faults;
     wire [1:0] bresp, rresp;
     wire [31:0] rdata;
-    dac_axi_lite #(.COUNT_BITS(4), .FOURIER(1)) bus (
+    wire [1:0] commit_mode;
+    dac_axi_lite #(.COUNT_BITS(4), .FOURIER(1), .COMMIT_MODES(1), .PIXEL_INDEX_BITS(4)) bus (
         .clock(clock), .reset(reset), .s_axi_awaddr(awaddr), .s_axi_awprot(3'd0), .s_axi_awvalid(awvalid),
         .s_axi_awready(awready), .s_axi_wdata(wdata), .s_axi_wstrb(wstrb), .s_axi_wvalid(wvalid),
         .s_axi_wready(wready), .s_axi_bresp(bresp), .s_axi_bvalid(bvalid), .s_axi_bready(bready),
         .s_axi_araddr(araddr), .s_axi_arprot(3'd0), .s_axi_arvalid(arvalid), .s_axi_arready(arready),
         .s_axi_rdata(rdata), .s_axi_rresp(rresp), .s_axi_rvalid(rvalid), .s_axi_rready(rready),
         .irq(), .write(write), .write_region(), .write_address(), .write_data(), .writable(writable),
-        .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .booting(booting),
+        .refused(refused), .commit(commit), .commit_mode(commit_mode),
+        .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .booting(booting),
         .missing(missing), .arm(arm), .arm_frames(), .trigger(trigger), .park(park), .clear_faults(clear_faults),
         .armed(armed), .running(running), .busy(busy), .playing(playing), .parked(parked), .faults(faults),
         .fault_counts(fault_counts)
@@ -80,6 +83,7 @@ module axi_properties (
         if (rvalid && rresp != 0) assert (rdata == 0);
         assert (!bresp[0] && !rresp[0]);
         if (write || commit) assert (writable);
+        if (commit) assert (commit_mode != 2'd3);
         if (acts) assert (addresses != 0 && words != 0 && !bvalid);
     end
 

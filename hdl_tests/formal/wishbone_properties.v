@@ -18,6 +18,7 @@ module wishbone_properties (
     input wire        writable,
     input wire        refused,
     input wire        committed,
+    input wire        can_keep,
     input wire        booting,
     input wire        missing,
     input wire        armed,
@@ -30,11 +31,13 @@ module wishbone_properties (
 );
     wire ack, err, write, commit, withdraw, arm, trigger, park, clear_faults;
     wire [31:0] read;
-    dac_wishbone #(.COUNT_BITS(4), .FOURIER(1)) bus (
+    wire [1:0] commit_mode;
+    dac_wishbone #(.COUNT_BITS(4), .FOURIER(1), .COMMIT_MODES(1), .PIXEL_INDEX_BITS(4)) bus (
         .clock(clock), .reset(reset), .wb_cyc_i(cyc), .wb_stb_i(stb), .wb_we_i(we), .wb_adr_i(adr), .wb_sel_i(sel),
         .wb_dat_i(dat), .wb_dat_o(read), .wb_ack_o(ack), .wb_err_o(err),
         .irq(), .write(write), .write_region(), .write_address(), .write_data(), .writable(writable),
-        .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .booting(booting),
+        .refused(refused), .commit(commit), .commit_mode(commit_mode),
+        .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .booting(booting),
         .missing(missing), .arm(arm), .arm_frames(), .trigger(trigger), .park(park), .clear_faults(clear_faults),
         .armed(armed), .running(running), .busy(busy), .playing(playing), .parked(parked), .faults(faults),
         .fault_counts(fault_counts)
@@ -72,6 +75,7 @@ module wishbone_properties (
         assert (!(ack && err));
         if (ended) assert (bus__registers__is_write == we && bus__registers__address[19:2] == adr);
         if (write || commit) assert (writable);
+        if (commit) assert (commit_mode != 2'd3);
         if (acts) assert (!bus__registers__done);
     end
 

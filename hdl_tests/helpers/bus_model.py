@@ -9,17 +9,22 @@ from dataclasses import dataclass, field
 
 from building import REPOSITORY
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import program_words
-from tablegen.device.sequencer import Sequencer
+from tablegen.device.sequencer import Sequencer, can_keep
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
 BUS = REPOSITORY / "firmware_templates" / "verilog" / "bus"
 sys.path.insert(0, str(BUS))
 import make_registers  # noqa: E402
 
-REGIONS = {"program": 0, "x_table": 1, "y_table": 2, "x_fourier": 3, "y_fourier": 4}
+REGIONS = {
+    "program": 0, "x_table": 1, "y_table": 2, "x_fourier": 3, "y_fourier": 4, "x_slow": 5, "y_slow": 6, "pixel_ticks": 7
+}  # fmt: skip
 PROGRAM_WORDS = 38
+PART_BITS = 13  # of the number of a word within a part of a slow part
+CAN_KEEP = 1 << 10
 COMMANDS = ("commit", "withdraw", "trigger", "park", "clear_faults")
 EVENTS = ("writable", "committed", "stopped", "fault", "refused")
 UNDERRUN = 3
@@ -38,12 +43,24 @@ class Shape:
     harmonics: int = 5
     fourier: int = 1
     count_bits: int = 5
+    commit_modes: int = 1
+    pixel_index_bits: int = 4
+    slow_index_bits: int = 0  # 0: no slow part
 
     @property
     def lengths(self) -> dict[str, int]:
         """The words that each memory has."""
         table, fourier = 1 << self.index_bits, self.fourier * (2 * self.harmonics + 1)
-        return {"program": 48, "x_table": table, "y_table": table, "x_fourier": fourier, "y_fourier": fourier}
+        pixels = 1 << self.pixel_index_bits if self.pixel_index_bits else 0
+        tables = {"x_table": table, "y_table": table, "x_fourier": fourier, "y_fourier": fourier}
+        return {"program": 48, **tables, "pixel_ticks": pixels, "x_slow": 0, "y_slow": 0}
+
+    def has(self, name: str, word: int) -> bool:
+        """Whether a memory has a word; the parts of a slow part have gaps between them."""
+        if name not in ("x_slow", "y_slow") or not self.slow_index_bits:
+            return word < self.lengths[name]
+        part, place = divmod(word, 1 << PART_BITS)
+        return part < 4 and place < (1 << self.index_bits, 1 << self.slow_index_bits, 65, 65)[part]
 
 
 SHAPE = Shape()
@@ -89,6 +106,11 @@ class BusModel:
     def faults(self) -> int:
         return int(self.sequencer.faults) | (self.underruns > 0) << UNDERRUN
 
+    def known(self, address: int) -> int:
+        """The bits of a read that the model knows: whether the idle program can keep the frame only if it is whole."""
+        keeps = self.sequencer.playing is not None and (self.ready is not None or not self.writable)
+        return -1 if keeps or address != ADDRESSES["status"] else ~CAN_KEEP
+
     def read(self, address: int) -> int | None:
         """What a read gives; None if it fails."""
         register = _REGISTERS.get(address)
@@ -104,10 +126,15 @@ class BusModel:
         values = {
             "identity": int.from_bytes(b"TBLG", "big"),
             "version": 1,
-            "features": shape.dac_bits | shape.fourier << 12 | shape.fourier * shape.harmonics << 16,
+            "features": shape.dac_bits
+            | shape.fourier << 12
+            | shape.commit_modes << 13
+            | (shape.slow_index_bits > 0) << 14
+            | shape.fourier * shape.harmonics << 16,
+            "memory_shape": shape.pixel_index_bits | shape.slow_index_bits << 8,
             "x_shape": table,
             "y_shape": table,
-            "status": sum(bool(bit) << at for at, bit in enumerate(status)),
+            "status": sum(bool(bit) << at for at, bit in enumerate(status)) | self._can_keep(),
             "faults": self.faults(),
             "interrupt_pending": self.pending,
             "interrupt_enable": self.enabled,
@@ -116,20 +143,26 @@ class BusModel:
             values[f"{fault}_count"] = min(counts[at], most)
         return values[name]
 
+    def _can_keep(self) -> int:
+        playing, idle = self.sequencer.playing, self.ready or self.sequencer.idle
+        known = self.shape.commit_modes and playing is not None and idle is not None
+        return CAN_KEEP if known and can_keep(playing, idle) else 0
+
     def write(self, address: int, data: int, strobes: int = 15) -> bool:
         """Do what a write does; False if it fails."""
         if strobes != 15:
             return False
         for memory in MAP.memories:
             offset = address - memory.address
-            if 0 <= offset < 4 * self.shape.lengths[memory.name] and offset % 4 == 0:
+            if 0 <= offset < 4 * memory.words and offset % 4 == 0 and self.shape.has(memory.name, offset // 4):
                 return self._write_word(memory.name, offset // 4, data)
         register = _REGISTERS.get(address)
         if register is None or not register.writable or data & ~register.mask:
             return False
         before = self._levels()
         if register.name == "command":
-            if data & 1 and not self.writable:
+            mode = data >> 8
+            if (data & 1 and not self.writable) or mode == 3 or (mode and not self.shape.commit_modes):
                 return False
             self._request(data)
         elif register.name == "arm":
@@ -145,14 +178,19 @@ class BusModel:
     def _write_word(self, name: str, word: int, data: int) -> bool:
         if not self.writable:
             return False
-        self.host.append(f"w {REGIONS[name]} {word} {data}")
+        if name in ("x_slow", "y_slow"):
+            part, place = divmod(word, 1 << PART_BITS)
+            self.host.append(f"w {REGIONS[name]} {part << 14 | place} {data}")
+        else:
+            self.host.append(f"w {REGIONS[name]} {word} {data}")
         self.ready = None
         self.written += name == "program" and word % 16 < (14 if word < 16 else 12)
         return True
 
     def _request(self, data: int) -> None:
-        if data:
-            self.host.append(f"r {data >> 4 & 1}{data >> 3 & 1}{data >> 2 & 1}{data >> 1 & 1}{data & 1}")
+        mode = CommitMode(data >> 8)
+        if data & 31:
+            self.host.append(f"r {data & 31:05b} {mode * (data & 1)}")
         asked = {name for at, name in enumerate(COMMANDS) if data >> at & 1}
         if "withdraw" in asked:
             self.sequencer.withdraw()
@@ -165,11 +203,11 @@ class BusModel:
         if "withdraw" in asked:
             self.ready = None
         elif "commit" in asked:
-            self._commit()
+            self._commit(mode)
 
-    def _commit(self) -> None:
+    def _commit(self, mode: CommitMode) -> None:
         if self.ready is not None:
-            self.sequencer.commit(self.ready)
+            self.sequencer.commit(self.ready, mode)
         else:
             assert self.written < PROGRAM_WORDS
             self.pending |= bits({"refused": not self.refused, "writable": True}, EVENTS)
@@ -220,7 +258,8 @@ def upload(program: DualProgram) -> list[tuple[int, int]]:
     for axis in ("x", "y"):
         table = getattr(program, axis).words
         words += [(ADDRESSES[f"{axis}_table"] + 4 * at, int(word) & 0xFFFFFFFF) for at, word in enumerate(table)]
-    return words
+    pixels = [ticks for window in program.schedule.pixel_table or () for ticks in window]
+    return words + [(ADDRESSES["pixel_ticks"] + 4 * at, ticks) for at, ticks in enumerate(pixels)]
 
 
 def flat_words(program: DualProgram, harmonics: tuple[int, int] = (0, 0)) -> list[int]:

@@ -22,7 +22,11 @@ module dac_axi_lite #(
     parameter COUNT_BITS = 16,
     parameter FOURIER = 0,
     parameter HARMONICS = 64,
-    parameter SHAPING = 0
+    parameter SHAPING = 0,
+    parameter COMMIT_MODES = 0,
+    parameter PIXEL_INDEX_BITS = 0,  // 14 or less
+    parameter SLOW_PART = 0,         // then X_INDEX_BITS, Y_INDEX_BITS and SLOW_INDEX_BITS are 13 or less
+    parameter SLOW_INDEX_BITS = 7
 ) (
     input  wire                    clock,
     input  wire                    reset,
@@ -54,8 +58,10 @@ module dac_axi_lite #(
     input  wire                    writable,
     input  wire                    refused,
     output wire                    commit,
+    output wire [1:0]              commit_mode,
     output wire                    withdraw,
     input  wire                    committed,
+    input  wire                    can_keep,         // 0 without COMMIT_MODES
     input  wire                    booting,          // 0 without dac_boot
     input  wire                    missing,          // 0 without dac_boot
     output wire                    arm,
@@ -151,14 +157,17 @@ module dac_axi_lite #(
     dac_bus #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS),
-        .COUNT_BITS(COUNT_BITS), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SHAPING(SHAPING)
+        .COUNT_BITS(COUNT_BITS), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SHAPING(SHAPING),
+        .COMMIT_MODES(COMMIT_MODES), .PIXEL_INDEX_BITS(PIXEL_INDEX_BITS), .SLOW_PART(SLOW_PART),
+        .SLOW_INDEX_BITS(SLOW_INDEX_BITS)
     ) registers (
         .clock(clock), .reset(reset), .request(start), .request_write(start_write),
         .request_address(address[19:0] | {18'd0, {2{outside}}}), .request_data(w_data), .request_bytes(w_bytes),
         .done(done), .failed(failed), .read_data(read_data), .irq(irq),
         .write(write), .write_region(write_region), .write_address(write_address),
-        .write_data(write_data), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
-        .committed(committed), .booting(booting), .missing(missing), .arm(arm), .arm_frames(arm_frames),
+        .write_data(write_data), .writable(writable), .refused(refused), .commit(commit), .commit_mode(commit_mode),
+        .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .booting(booting),
+        .missing(missing), .arm(arm), .arm_frames(arm_frames),
         .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed), .running(running), .busy(busy),
         .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
