@@ -41,8 +41,7 @@ def pixel_section(subject: Subject) -> Section | None:
         Chart("pixels-position", "x: predicted position, edges of pixels", "tick", "share of the line", tuple(curves),
               bands=bands),
         Chart("pixels-ticks", "x: lengths of pixels", "pixel along the position", "ticks", tuple(lengths)),
-        Chart("pixels-error", "x: error of each pixel", "pixel along the position", "error [% of the line]",
-              tuple(errors), marks=(Mark(0.0, "", "y"),)),
+        pixel_error_chart("pixels-error", tuple(errors)),
     )  # fmt: skip
     lead = (
         "Pixels are at equal steps of the position that the operator predicts, and their edges on whole ticks. These "
@@ -50,3 +49,9 @@ def pixel_section(subject: Subject) -> Section | None:
     )
     grid = Grid("Pixels of x, by the certificate", head, tuple(rows))
     return Section("pixels", "Pixels of the sine", (grid, Charts(charts)), lead)
+
+
+def pixel_error_chart(key: str, curves: tuple[DrawnCurve, ...]) -> Chart:
+    """Draw the error of each pixel of a sine."""
+    labels = "x: error of each pixel", "pixel along the position", "error [% of the line]"
+    return Chart(key, *labels, curves, marks=(Mark(0.0, "", "y"),))

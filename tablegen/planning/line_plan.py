@@ -243,7 +243,7 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         x, y = _within_cost(setup, x, y, schedule, problems)
     if isinstance(x.drive.shape, SineLine) and x.imaged is not None:
         with problems.at(setup.scan_file, "timing.pixels"):
-            schedule = with_pixel_table(schedule, x.drive.shape, x.imaged)
+            schedule = with_pixel_table(schedule, x.drive.shape.place, x.imaged)
         problems.stop_if_any()
     schedule = replace(schedule, settle_lines=settle_lines(setup, {"x": x.drive, "y": y.drive}, schedule, problems))
     clocks = clocks_per_tick(setup, schedule, (x.program, y.program), problems)
