@@ -94,7 +94,7 @@ def plan(
     >>> round(tablegen.plan("scan.toml").x.drive.v_amplitude, 2)  # V peak to peak at the piezo
     20.37
     """
-    return make_plan(setup_of(source, scan, scanner))
+    return make_plan(setup_of(source, scan, scanner), sines=True)
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:

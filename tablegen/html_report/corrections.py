@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark
+from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark, Role
 from tablegen.compensation import models
 from tablegen.compensation.line import SineLine
 from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
 from tablegen.html_report.number_text import hertz
 from tablegen.html_report.subject import Subject
 from tablegen.manifest.fields import ManifestAxis, ManifestFourier
+from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.series import FourierSeries
 
@@ -39,7 +40,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         row("line rate, g", "(23)", f"{drive.g:.5f}", f"{drive.v_amplitude:.6g} V peak to peak"),
     ]
     kind = models.get(drive.model) if drive.model in models.names() else None  # of another package, it may be missing
-    for side in ("forward", "backward"):
+    for side in () if fourier.imaged is not None else ("forward", "backward"):  # a sine is not bent
         branch = getattr(drive, side)
         text = f"peak residual of the {drive.model} model at u = {branch.u_peak:.3f}"
         applied = kind is None or kind.compensates
@@ -52,7 +53,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         text = (
             f"a sine at {hertz(rate)}; pixels at equal steps of the predicted position, {low:g}..{high:g} of the line"
         )
-        rows.append(row("motion", "", f"{fourier.harmonics}", text))
+        rows.append(row("motion", "", "", text))
     else:
         rows.append(_band_limit(fourier, rate))
     if fourier.refinement is not None:
@@ -114,7 +115,8 @@ def _loop_chart(wave: FourierSeries, place: FourierSeries) -> Chart:
     half = np.linspace(0.0, 0.5, 301)
     low, span = wave.a0 - np.hypot(wave.a[0], wave.b[0]), 2.0 * np.hypot(wave.a[0], wave.b[0])
     curves: list[DrawnCurve] = []
-    for side, t in (("forward", half), ("backward", half + 0.5)):
+    sides: tuple[tuple[Role, Floats], ...] = (("forward", half), ("backward", half + 0.5))
+    for side, t in sides:
         along = (wave.value(t) - low) / span
         curves.append(DrawnCurve(side, side, along, 100.0 * (place.value(t) - along)))
     return Chart(

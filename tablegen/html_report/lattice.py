@@ -58,6 +58,8 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
 
 def _remark(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> str:
     both = " All simulated pictures have the corrections of offset, size and rate."
+    if planned.plan.schedule.pixel_table is not None:
+        both += " x is a sine in all: without correction its pixels are where a piezo without hysteresis would be."
     refined = [line.axis for line in planned.plan.moving if line.layer is not None]
     if refined:
         both += (

@@ -5,6 +5,7 @@ import numpy as np
 from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark, Role
 from tablegen.html_report.blocks import Charts, Grid, Section, row
 from tablegen.html_report.number_text import figure
+from tablegen.html_report.promises import bounded
 from tablegen.html_report.subject import Subject
 from tablegen.waveform.series import FourierSeries
 
@@ -19,6 +20,7 @@ def pixel_section(subject: Subject) -> Section | None:
     if pixels is None or place is None or table is None:
         return None
     ticks = sequence.line_ticks
+    limit = None if subject.planned is None else subject.planned.plan.limits.max_scaling_error_percent
     series = FourierSeries(place.a0, np.array(place.a), np.array(place.b))
     windows = sequence.forward_ticks, sequence.backward_ticks
     times = np.arange(_POINTS) / _POINTS
@@ -32,10 +34,11 @@ def pixel_section(subject: Subject) -> Section | None:
         along = counts if side == "forward" else counts[::-1]
         lengths.append(DrawnCurve(side, side, number, np.array(along, dtype=np.float64)))
         errors.append(DrawnCurve(side, side, number, np.array(pixels.errors_percent[side])))
-        stated = (pixels.rms_percent[side], pixels.worst_percent[side], pixels.scaling_percent[side])
-        rows.append(row(side, f"{min(counts)}..{max(counts)}", *(figure(value, 3) for value in stated)))
-    rows.append(row("trace to retrace", "", "", figure(pixels.mismatch_percent, 3), ""))
-    head = ("", "ticks a pixel", "rms [% of the line]", "worst [% of the line]", "scaling error [%]")
+        stated = (pixels.rms_percent[side], pixels.worst_percent[side])
+        scaling = bounded("", pixels.scaling_percent[side], limit, "%")[1:]
+        rows.append(row(side, f"{min(counts)}..{max(counts)}", *(figure(value, 3) for value in stated), *scaling))
+    rows.append(row("trace to retrace", "", "", figure(pixels.mismatch_percent, 3), "", "", ""))
+    head = ("", "ticks a pixel", "rms [% of the line]", "worst [% of the line]", "scaling error", "limit", "")
     bands = tuple(Band(float(first), float(first + count), "imaged") for first, count in windows)
     charts = (
         Chart("pixels-position", "x: predicted position, edges of pixels", "tick", "share of the line", tuple(curves),

@@ -46,8 +46,8 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
     )
     if planned.plan.schedule.pixel_table is not None:
         lead += (
-            " x is a sine: its errors are those of its pixels, each the mean position over its ticks. Without correction "
-            "the drive is the same, and the pixels are where a piezo without hysteresis would be."
+            " x is a sine: its errors are those of its pixels, each the mean position over its ticks. Without "
+            "correction the drive is the same, and the pixels are where a piezo without hysteresis would be."
         )
     refined = [line.axis for line in planned.plan.moving if line.layer is not None]
     if refined:

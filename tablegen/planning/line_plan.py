@@ -269,6 +269,25 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
     return plan
 
 
+def make_straight_plan(setup: Setup, why: str) -> Plan:
+    """Plan a scan whose fast axis has to be straight in time, also where "auto" makes it so; a sine is refused.
+
+    Parameters
+    ----------
+    why
+        Why a sine will not do, and what to use in its place.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction on both axes, or at ``x.motion`` if the plan is a sine.
+    """
+    plan = make_plan(setup, sines=True)
+    if plan.schedule.pixel_table is not None:
+        raise Rejected([setup.scan_file.problem("x.motion", why)])
+    return plan
+
+
 def _within_cost(
     setup: Setup, x: LinePlan, y: LinePlan, schedule: Schedule, problems: Problems
 ) -> tuple[LinePlan, LinePlan]:

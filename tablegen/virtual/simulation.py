@@ -14,7 +14,7 @@ from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.device.schedule import Schedule
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.virtual.line_error import LineError, about_window_line, line_error
 from tablegen.virtual.pixel_line_error import pixel_line_error
 from tablegen.virtual.played import MAX_TICKS, PlayedDrive, intended, played
@@ -65,6 +65,17 @@ def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
         If the line leaves the range of the axis.
     """
     return run_on_each(line, [axis])[0]
+
+
+def run_of_axis(plan: Plan, line: LinePlan, axis: SettledAxis) -> AxisRun:
+    """Play one axis of a plan until it has settled; the errors of a sine are those of its pixels.
+
+    Raises
+    ------
+    ValueError
+        If the line leaves the range of the axis.
+    """
+    return run_on_each(line, [axis], pixels=plan.schedule)[0]
 
 
 def run_on_each(
