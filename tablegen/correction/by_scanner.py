@@ -21,8 +21,8 @@ from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_straight_plan
 
 _SINE = (
-    "the pixels of a sine are at equal steps of the predicted position already, and no line in time is left to "
-    "correct; correct the image by its own lattice, with --fit"
+    "the pixels of a sine are at equal steps of the position that its operator predicted, and are not evenly in time, "
+    "as this correction takes them; correct the image by its own lattice, with --fit"
 )
 
 

@@ -178,7 +178,8 @@ def running_frame(
     """Simulate a settled frame of the emitted integers of a build.
 
     Columns are ``pixels`` (those of the scan file, if not given), evenly in time within x's imaging window of each
-    sweep; of a sine they are its own. Lines are those of the frame that lie in y's imaging window on its way up, or on its way ``down``.
+    sweep; of a sine they are its own. Lines are those of the frame that lie in y's imaging window on its way up, or on
+    its way ``down``.
 
     Raises
     ------
