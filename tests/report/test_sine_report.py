@@ -10,6 +10,7 @@ from foreign_plants import ForeignPlant, ManyPlays
 from operator_files import operator_file
 from replacing import replace
 from sine_scans import response_csv, sine_scan, text_of
+from tilted_scans import write_sine
 
 import tablegen
 from tablegen.comparison.charts import comparison_charts
@@ -247,3 +248,11 @@ def test_a_sine_beside_a_line_has_the_pixels_of_its_own(folders: dict[str, Path]
     assert shown["trace to retrace"] == pixels.mismatch_percent
     assert not [one for one in line if one.section == "x pixels"]
     assert run("compare", folders["sine"], folders["line"]).status == 1
+
+
+def test_a_sine_with_z_has_both_sections_and_the_figures_of_its_build(tmp_path: Path) -> None:
+    path = write_sine(tmp_path)
+    assert run("build", path, "-o", tmp_path / "build", "-q").status == 0
+    keys = [part.key for part in sections(planned_scan(path, remedies=False))]
+    assert keys[:4] == ["lattice", "certificate", "pixels", "z"]
+    assert run("compare", path, tmp_path / "build").status == 0
