@@ -94,7 +94,7 @@ def plan(
     >>> round(tablegen.plan("scan.toml").x.drive.v_amplitude, 2)  # V peak to peak at the piezo
     20.37
     """
-    return make_plan(setup_of(source, scan, scanner))
+    return make_plan(setup_of(source, scan, scanner), sines=True)
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:
@@ -263,7 +263,7 @@ class Build(Result):
         from tablegen.charts.picture_file import PlottedCharts
         from tablegen.html_report.scan_charts import charts_of_z, drive_of, modelled_error
 
-        pairs = [(drive_of(line), modelled_error(line)) for line in self.plan.moving]
+        pairs = [(drive_of(line, self.plan.schedule), modelled_error(self.plan, line)) for line in self.plan.moving]
         return PlottedCharts(self.name, (*(chart for pair in pairs for chart in pair), *charts_of_z(self.plan)))
 
     @property

@@ -19,7 +19,7 @@ def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
     ]
     parts += [f"<p><b>warning</b>: {escape(text)}</p>" for text in brief_warnings(plan, certificates)]
     for line in plan.moving:
-        parts.append(f"<div>{embedded([drive_of(line), modelled_error(line)])}</div>")
+        parts.append(f"<div>{embedded([drive_of(line, plan.schedule), modelled_error(plan, line)])}</div>")
         rows = [*drive_lines(line), *certificate_lines(certificates[line.axis])]
         cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)
         parts.append(f"<details><summary>{line.axis}: drive and certificate</summary><table>{cells}</table></details>")

@@ -31,7 +31,7 @@ from tablegen.virtual.running import running_trace
 from tablegen.virtual.scaling import scaled_to
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.sensor import Sensor
-from tablegen.virtual.simulation import AxisRun, run_line
+from tablegen.virtual.simulation import AxisRun, run_of_axis
 
 Axis = Literal["x", "y"]
 
@@ -169,8 +169,12 @@ class Laboratory:
         return running_trace(line, self._axis(axis), periods, samples, sensor)
 
     def play(self, scan: "str | Path | Setup | Plan", axis: Axis) -> AxisRun:
-        """Play a build without noise, and return ``displacement_nm``, ``imaged`` and ``error`` of an axis."""
-        return run_line(getattr(_plan(scan), axis), self._axis(axis))
+        """Play a build without noise, and return ``displacement_nm``, ``imaged`` and ``error`` of an axis.
+
+        Of a sine on x the errors are those of its pixels.
+        """
+        plan = _plan(scan)
+        return run_of_axis(plan, getattr(plan, axis), self._axis(axis))
 
     def lattice(self, constant_nm: float, angle_deg: float = 7.0) -> Surface:
         """Return a hexagonal lattice: heights over x and y in nm."""
@@ -210,7 +214,7 @@ class Laboratory:
         """Take trace and retrace of a settled frame of a build, also of one at an angle."""
         if not isinstance(scan, Plan | TurnedPlan):
             setup = scan if isinstance(scan, Setup) else load(scan)
-            scan = make_turned_plan(setup) if setup.mixes_motions else make_plan(setup)
+            scan = make_turned_plan(setup) if setup.mixes_motions else make_plan(setup, sines=True)
         axes, coupling = (self.scanner.x, self.scanner.y), self.scanner.coupling
         if isinstance(scan, TurnedPlan):
             return turned_frame(scan, *axes, sample, conditions, pixels, coupling=coupling)
@@ -232,4 +236,4 @@ class Laboratory:
 def _plan(scan: "str | Path | Setup | Plan") -> Plan:
     if isinstance(scan, Plan):
         return scan
-    return make_plan(scan if isinstance(scan, Setup) else load(scan))
+    return make_plan(scan if isinstance(scan, Setup) else load(scan), sines=True)

@@ -7,6 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from msgspec import structs
+
 from tablegen.api.build import Build, build_planned
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
 from tablegen.api.turned import TurnedBuild, build_turned
@@ -294,7 +296,9 @@ class Live:
             If the scan exceeds a limit.
         """
         if setup.mixes_motions:
-            turned = build_turned(setup, progress=self._on_stage)
+            emit = structs.replace(setup.scan.emit, header_only=False)  # it is of files, and none is written here
+            unwritten = structs.replace(setup, scan=structs.replace(setup.scan, emit=emit))
+            turned = build_turned(unwritten, progress=self._on_stage)
             return _Scan(settings, variant, setup, turned.plan, turned)
         periods = EmittedPeriods(make_plan(setup, sines=True))
         if breaks_limit(setup, periods):

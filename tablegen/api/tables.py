@@ -56,7 +56,7 @@ def tables(
     setup = scan if isinstance(scan, Setup) else load(scan)
     if setup.mixes_motions:
         return _turned(setup, axis, progress)
-    plan = make_plan(setup)
+    plan = make_plan(setup, sines=True)
     lines = [line for line in plan.moving if axis in (None, line.axis)]
     if not lines:
         raise ValueError(f"{axis} is static in this scan: it has no table to choose.")

@@ -29,7 +29,7 @@ class CertifiedScan(Struct, frozen=True, eq=False):
 
 
 def certify_scan(
-    setup: Setup, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True, sines: bool = True
+    setup: Setup, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True
 ) -> CertifiedScan:
     """Plan and certify a scan.
 
@@ -41,8 +41,6 @@ def certify_scan(
         Called with each stage, in words.
     remedies
         Plan and measure remedies for a limit that is exceeded, and name them in its problem.
-    sines
-        False where the fast axis has to be straight in time.
 
     Raises
     ------
@@ -50,7 +48,7 @@ def certify_scan(
         With every contradiction between the scan, the scanner and the hardware.
     """
     progress("shaping the waveforms")
-    return certify_planned(setup, make_plan(setup, sines), progress, remedies=remedies)
+    return certify_planned(setup, make_plan(setup, sines=True), progress, remedies=remedies)
 
 
 def certify_planned(

@@ -21,8 +21,10 @@ def scan_findings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[F
         shaped = certificates[line.axis].shaped
         if shaped is not None and line.drive.hysteresis.compensates:
             findings += shaped_travel(line.axis, shaped.changes, shaped.rounded.changes)
-        expected = certificates[line.axis].expected
-        if expected is not None and expected.mismatch is not None:
+        expected, pixels = certificates[line.axis].expected, certificates[line.axis].pixels
+        if pixels is not None:
+            findings.append(whole_ticks(line.axis, pixels.worst, pixels.scaling, pixels.mismatch))
+        elif expected is not None and expected.mismatch is not None:
             figure = expected.mismatch
             findings.append(expected_mismatch(line.axis, expected.basis, figure.value, figure.uncertainty))
     return worst_first(findings)
@@ -48,6 +50,16 @@ def expected_mismatch(axis: str, basis: str, percent: float, uncertainty: float 
         f"the model leaves {percent:.3g}{by} % of the line: trace and retrace of {axis} are so far apart, {what}{why}"
     )
     return Finding("expect", percent, text, code="model-mismatch", axis=axis_name(axis))
+
+
+def whole_ticks(axis: str, worst: Mapping[str, float], scaling: Mapping[str, float], mismatch: float) -> Finding:
+    """Return the finding of what the rounding of a sine's pixels to whole ticks leaves, all in percent."""
+    by_side = " and ".join(f"{value:.3g} % {side}" for side, value in scaling.items())
+    text = (
+        f"pixels of {axis} begin on whole ticks, which moves them by up to {max(worst.values()):.3g} % of the line: a "
+        f"scaling error of {by_side}, and trace and retrace {mismatch:.3g} % of the line apart"
+    )
+    return Finding("expect", mismatch, text, code="rounded-pixels", axis=axis_name(axis))
 
 
 def note_findings(plan: Plan) -> list[Finding]:

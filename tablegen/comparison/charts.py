@@ -63,6 +63,7 @@ def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
         yield _drive(axis, one, other)
         yield _difference(axis, one, other)
         yield _spectrum(axis, one, other)
+        yield from _pixels(axis, one, other)
     yield from tilt_charts(a, b)
     if a.planned is not None and b.planned is not None:
         played = {one.axis: one for one in played_axes(b.planned)}
@@ -106,6 +107,26 @@ def _spectrum(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
         curves.append((rate * np.arange(1.0, series.harmonics + 1.0), 20.0 * np.log10(np.maximum(volts, 1e-9))))
     title = f"{axis} harmonics of the drive"
     return overlay(f"spectrum-{axis}", title, "frequency [Hz]", "amplitude [dB of 1 V]", *curves, log_x=True)
+
+
+def _pixels(axis: str, a: ManifestAxis, b: ManifestAxis) -> Iterator[Chart]:
+    """Draw the errors of pixels that are taken where the piezo is, if both sides have them."""
+    stated, places = [entry.certificate.pixels for entry in (a, b)], []
+    for entry, pixels in zip((a, b), stated, strict=True):
+        if pixels is None or entry.fourier.imaged is None:
+            return
+        (low, high), count = entry.fourier.imaged, len(pixels.errors_percent["forward"])
+        places.append(low + (high - low) * (np.arange(count) + 0.5) / count)
+    for side in SIDES:
+        errors = [np.array(pixels.errors_percent[side]) for pixels in stated if pixels is not None]
+        yield overlay(
+            f"pixels-{axis}-{side}",
+            f"{axis} error of each pixel {side}, as certified",
+            POSITION,
+            "error [% of the line]",
+            *zip(places, errors, strict=True),
+            marks=(Mark(0.0, "", "y"),),
+        )
 
 
 def _errors(a: PlayedAxis, b: PlayedAxis) -> Iterator[Chart]:

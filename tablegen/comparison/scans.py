@@ -27,7 +27,7 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
     quantities += rates(subject.manifest.sequence)
     axes = (("x", subject.manifest.axes.x), ("y", subject.manifest.axes.y))
     for axis, entry in axes:
-        quantities.append(ComparedQuantity(f"{axis} drive", "motion", "rests" if entry.resting else "moves"))
+        quantities.append(ComparedQuantity(f"{axis} drive", "motion", _motion(entry)))
         if entry.resting:
             quantities.append(ComparedQuantity(f"{axis} drive", "offset", entry.drive.v_offset, "V"))
             continue
@@ -83,6 +83,12 @@ def rates(sequence: ManifestSequence) -> Iterator[ComparedQuantity]:
         yield ComparedQuantity("rates", name, value, unit)
 
 
+def _motion(entry: ManifestAxis) -> str:
+    if entry.resting:
+        return "rests"
+    return "moves" if entry.fourier.place is None else "moves as a sine"
+
+
 def _corrections(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     """Yield the factors from the size to the volts at the piezo."""
     section, drive = f"{axis} drive", entry.drive
@@ -114,8 +120,9 @@ def _waveform(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     yield ComparedQuantity(section, "band limit", f"{fourier.band_limit}, {fourier.directions}")
     yield ComparedQuantity(section, "harmonics", fourier.harmonics)
     yield ComparedQuantity(section, "highest frequency", fourier.harmonics * rate, "Hz")
-    yield ComparedQuantity(section, "window from", fourier.window[0])
-    yield ComparedQuantity(section, "window to", fourier.window[1])
+    low, high = fourier.imaged or fourier.window  # of a sine as the scan file has it
+    yield ComparedQuantity(section, "window from", low)
+    yield ComparedQuantity(section, "window to", high)
     yield ComparedQuantity(section, "harmonics held back", len(fourier.held_harmonics))
     refinement = fourier.refinement
     yield ComparedQuantity(section, "harmonics of the refinement", 0 if refinement is None else len(refinement.a))

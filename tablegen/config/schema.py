@@ -494,7 +494,9 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
-    header_only: Annotated[bool, Meta(description="C: put the tables into the header instead of a .c file")] = False
+    header_only: Annotated[
+        bool, Meta(description="C: put the tables into the header instead of a .c file; not at an angle")
+    ] = False
     clock_hz: (
         Annotated[
             float,

@@ -18,7 +18,12 @@ from tablegen.correction.straight import StraightScan
 from tablegen.correction.turned_scan import by_turned_scan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import size_law_of
-from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, make_straight_plan
+
+_SINE = (
+    "the pixels of a sine are at equal steps of the position that its operator predicted, and are not evenly in time, "
+    "as this correction takes them; correct the image by its own lattice, with --fit"
+)
 
 
 def by_scanner(images: Images, scanner: Path, conditions: OldScan) -> StraightScan:
@@ -65,7 +70,7 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, conditions: O
     )
     if setup.mixes_motions:
         return by_turned_scan(images, setup, scan, model, conditions)
-    plan = make_plan(setup)
+    plan = make_straight_plan(setup, _SINE)
     if plan.y.drive.resting:
         raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, whose rows are one line of x")])
     part = plan.schedule.down if conditions.back else plan.schedule.up

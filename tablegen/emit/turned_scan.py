@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tablegen.base.input_errors import Problems, Unphysical
+from tablegen.base.input_errors import Problems, Rejected, Unphysical
 from tablegen.certificate.turned_errors import TurnedCertificate
 from tablegen.certificate.turned_summary import turned_summary
 from tablegen.config.load import Setup
@@ -26,7 +26,7 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
     Raises
     ------
     Rejected
-        For a format that a scan at an angle does not have.
+        For a format that a scan at an angle does not have, or an option of the C that it does not have.
     """
     names = formats or setup.scan.emit.formats or ("c",)
     try:
@@ -39,6 +39,12 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
                 SEQUENCER_FORMATS
             )
             raise format_rejected(setup, why, explicit=formats is not None)
+    if setup.scan.emit.header_only and "c" in needed:
+        why = (
+            "true: the tables of a scan at an angle, on coupled axes or with drift are in NAME.c and NAME_program.c, "
+            "not in the header; leave this out"
+        )
+        raise Rejected([setup.scan_file.problem("emit.header_only", why)])
     return needed
 
 

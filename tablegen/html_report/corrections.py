@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark
+from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark, Role
 from tablegen.compensation import models
+from tablegen.compensation.line import SineLine
 from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
 from tablegen.html_report.number_text import hertz
 from tablegen.html_report.subject import Subject
-from tablegen.manifest.fields import ManifestAxis
+from tablegen.manifest.fields import ManifestAxis, ManifestFourier
+from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
+from tablegen.waveform.series import FourierSeries
 
 _HEAD = ("", "equation", "factor", "after it")
 
@@ -37,7 +40,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         row("line rate, g", "(23)", f"{drive.g:.5f}", f"{drive.v_amplitude:.6g} V peak to peak"),
     ]
     kind = models.get(drive.model) if drive.model in models.names() else None  # of another package, it may be missing
-    for side in ("forward", "backward"):
+    for side in () if fourier.imaged is not None else ("forward", "backward"):  # a sine is not bent
         branch = getattr(drive, side)
         text = f"peak residual of the {drive.model} model at u = {branch.u_peak:.3f}"
         applied = kind is None or kind.compensates
@@ -45,16 +48,14 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         text = text if applied else "not compensated"
         rows.append(row(f"hysteresis {side}", equation, f"{branch.beta:+.5f}", text))
     rate = entry.line.rate_exact[0] / entry.line.rate_exact[1]
-    (low, high), error = fourier.window, fourier.max_scaling_error_percent
-    rows.append(
-        row(
-            "band limit",
-            fourier.band_limit,
-            f"{fourier.harmonics}",
-            f"harmonics, up to {hertz(fourier.harmonics * rate)}; straight over {low:g}..{high:g} {fourier.directions}"
-            + (f"; least acceleration at {error:g} % of scaling error" if error is not None else ""),
+    if fourier.imaged is not None:
+        low, high = fourier.imaged
+        text = (
+            f"a sine at {hertz(rate)}; pixels at equal steps of the predicted position, {low:g}..{high:g} of the line"
         )
-    )
+        rows.append(row("motion", "", "", text))
+    else:
+        rows.append(_band_limit(fourier, rate))
     if fourier.refinement is not None:
         rows.append(
             row(
@@ -79,8 +80,21 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
     return rows
 
 
+def _band_limit(fourier: ManifestFourier, rate_hz: float) -> tuple[TableCell, ...]:
+    """Return the row of the harmonics of a straight line."""
+    (low, high), error = fourier.window, fourier.max_scaling_error_percent
+    text = (
+        f"harmonics, up to {hertz(fourier.harmonics * rate_hz)}; straight over {low:g}..{high:g} {fourier.directions}"
+    )
+    if error is not None:
+        text += f"; least acceleration at {error:g} % of scaling error"
+    return row("band limit", fourier.band_limit, f"{fourier.harmonics}", text)
+
+
 def shape_chart(line: LinePlan) -> Chart:
-    """Draw the deviation of the drive from a straight line."""
+    """Draw the deviation of the drive from a straight line; of a sine that of the position from the drive."""
+    if isinstance(line.drive.shape, SineLine):
+        return _loop_chart(line.target, line.drive.shape.place)
     x = np.linspace(0.0, 1.0, 301)
     low, high = line.band_limit.window
     shape = line.drive.shape
@@ -93,4 +107,23 @@ def shape_chart(line: LinePlan) -> Chart:
         (DrawnCurve("forward", "forward", x, 100.0 * forward), DrawnCurve("backward", "backward", x, 100.0 * backward)),
         (Band(low, high, "imaged"),),
         (Mark(0.0, "", "y"),),
+    )
+
+
+def _loop_chart(wave: FourierSeries, place: FourierSeries) -> Chart:
+    """Draw the predicted position less the sine that a piezo without hysteresis would follow, over that sine."""
+    half = np.linspace(0.0, 0.5, 301)
+    low, span = wave.a0 - np.hypot(wave.a[0], wave.b[0]), 2.0 * np.hypot(wave.a[0], wave.b[0])
+    curves: list[DrawnCurve] = []
+    sides: tuple[tuple[Role, Floats], ...] = (("forward", half), ("backward", half + 0.5))
+    for side, t in sides:
+        along = (wave.value(t) - low) / span
+        curves.append(DrawnCurve(side, side, along, 100.0 * (place.value(t) - along)))
+    return Chart(
+        "shape-x",
+        "x: predicted position less the sine",
+        "the sine [share of the line]",
+        "position less sine [% of the line]",
+        tuple(curves),
+        marks=(Mark(0.0, "", "y"),),
     )

@@ -3,8 +3,10 @@
 import numpy as np
 
 from tablegen.charts.png import data_address, grey_png
+from tablegen.device.schedule import Schedule
 from tablegen.html_report.blocks import PagePicture, Paragraph, Pictures, ScaleBar, Section
 from tablegen.html_report.playing import PlayedAxis
+from tablegen.html_report.scan_errors import pixel_times
 from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
@@ -56,6 +58,8 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | Non
 
 def _remark(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> str:
     both = " All simulated pictures have the corrections of offset, size and rate."
+    if planned.plan.schedule.pixel_table is not None:
+        both += " x is a sine in all: without correction its pixels are where a piezo without hysteresis would be."
     refined = [line.axis for line in planned.plan.moving if line.layer is not None]
     if refined:
         both += (
@@ -80,19 +84,13 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple
     nominal = _size(planned.plan.x), _size(planned.plan.y)
     rows = np.unique(np.linspace(0, schedule.up.count - 1, min(schedule.up.count, _MOST_PIXELS)).astype(np.int64))
     columns = np.unique(np.linspace(0, schedule.pixels - 1, min(schedule.pixels, _MOST_PIXELS)).astype(np.int64))
-    places = pixel_places(schedule, line.drive.turn)
-    sides = [("trace", places[0])] + ([("retrace", places[1])] if len(places[1]) else [])
-    turn, images, error_percent = line.drive.turn, [], 0.0
-    shifted = [_about_window(run, one) for run, one in ((x, planned.plan.x), (y, planned.plan.y))]
-    for name, place in sides:
-        if not len(place):
-            continue
-        tau = place[columns]
-        time = turn * tau if name == "trace" else turn + (1.0 - turn) * (1.0 - tau)
-        at_x = np.interp(time, x.drive.turns, shifted[0], period=1.0)
+    images, error_percent = [], 0.0
+    at_ys = _about_window(y, planned.plan.y)
+    sides = _line_pixels(schedule, x, line) if x.pixels is None else _sine_pixels(x.pixels, x, line)
+    for name, *of_pixels in sides:
+        time, at_x, ideal_x = (each[columns] for each in of_pixels)
         frame = (schedule.up.first + rows[:, None] + time) / schedule.lines
-        at_y = np.interp(frame, y.drive.turns, shifted[1], period=1.0)
-        ideal_x = (tau - float(np.mean(line.band_limit.window))) * planned.plan.x.drive.size_nm
+        at_y = np.interp(frame, y.drive.turns, at_ys, period=1.0)
         slow = planned.plan.y
         ideal_y = (frame / slow.drive.turn - float(np.mean(slow.band_limit.window))) * slow.drive.size_nm
         error_percent = max(
@@ -105,6 +103,28 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple
         sites = _sites((1.0, ratio), 1.0 / _ROWS)
         images.append((name, (grey_png(heights[::-1], -_CONTRAST, 3.0), sites)))
     return images, error_percent
+
+
+def _line_pixels(schedule: Schedule, x: AxisRun, line: LinePlan) -> list[tuple[str, Floats, Floats, Floats]]:
+    """Return trace and retrace of a straight line: times of pixels in lines, where they are and should be in nm."""
+    turn, about, sides = line.drive.turn, _about_window(x, line), []
+    for name, tau in zip(("trace", "retrace"), pixel_places(schedule, turn), strict=True):
+        if len(tau):
+            time = turn * tau if name == "trace" else turn + (1.0 - turn) * (1.0 - tau)
+            ideal_nm = (tau - float(np.mean(line.band_limit.window))) * line.drive.size_nm
+            sides.append((name, time, np.interp(time, x.drive.turns, about, period=1.0), ideal_nm))
+    return sides
+
+
+def _sine_pixels(pixels: Schedule, x: AxisRun, line: LinePlan) -> list[tuple[str, Floats, Floats, Floats]]:
+    """Return the same of a sine, whose pixels are the means over their ticks."""
+    assert line.imaged is not None
+    middle, times, sides = float(np.mean(line.imaged)), pixel_times(pixels), []
+    for name, side in (("trace", "forward"), ("retrace", "backward")):
+        branch = getattr(x.imaged, side)
+        at_nm = x.imaged.size_nm * (branch.position + 0.01 * branch.residual - middle)
+        sides.append((name, times[side], at_nm, (branch.position - middle) * line.drive.size_nm))
+    return sides
 
 
 def _size(line: LinePlan) -> float:

@@ -5,9 +5,10 @@ from typing import Protocol
 import numpy as np
 
 from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark
+from tablegen.device.schedule import Schedule
 from tablegen.html_report.blocks import Charts, Section
 from tablegen.html_report.playing import PlayedAxis
-from tablegen.html_report.scan_errors import over_time, windows
+from tablegen.html_report.scan_errors import over_time, pixel_windows, run_windows
 from tablegen.html_report.subject import PlannedScan, Subject, series_of
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
@@ -22,7 +23,8 @@ def lines(subject: Subject, axes: tuple[PlayedAxis, ...] | None) -> Section:
     for at, (axis, entry) in enumerate(subject.axes):
         period_s = entry.line.rate_exact[1] / entry.line.rate_exact[0]
         window, both = entry.fourier.window, entry.fourier.directions == "both"
-        charts.append(drive_chart(axis, entry.drive, series_of(entry), window, both, period_s))
+        pixels = None if entry.fourier.place is None else subject.manifest.sequence.schedule
+        charts.append(drive_chart(axis, entry.drive, series_of(entry), window, both, period_s, pixels))
         times, unit = time_unit(period_s)
         if subject.planned is not None and axes is not None:
             charts += _moved(subject.planned, axes[at], at, times * period_s, f"time [{unit}]")
@@ -57,28 +59,43 @@ def time_unit(period_s: float) -> tuple[float, str]:
 
 
 def drive_chart(
-    axis: str, drive: DriveFigures, series: FourierSeries, window: tuple[float, float], both: bool, period_s: float
+    axis: str,
+    drive: DriveFigures,
+    series: FourierSeries,
+    window: tuple[float, float],
+    both: bool,
+    period_s: float,
+    pixels: Schedule | None = None,
 ) -> Chart:
-    """Draw the drive over a period, forward and backward, beside a plain triangle; the imaged windows are shaded."""
+    """Draw the drive over a period, forward and backward, beside a plain triangle; the imaged windows are shaded.
+
+    ``pixels`` is the schedule of a sine, beside which there is no triangle.
+    """
     times, unit = time_unit(period_s)
     period, turn, (low, high) = times * period_s, drive.turn, window
     t = np.linspace(0.0, 1.0, _POINTS)
     volts = drive.v_offset + drive.v_amplitude * (series.value(t) - 0.5)
-    bands = [(turn * low, turn * high)]
-    if both:
-        bands.append((turn + (1.0 - turn) * (1.0 - high), turn + (1.0 - turn) * (1.0 - low)))
-    triangle = drive.v_offset + drive.v_amplitude * (np.where(t <= turn, t / turn, (1 - t) / (1 - turn)) - 0.5)
+    curves = _sides(t, period, volts, turn)
+    if pixels is not None:
+        bands = pixel_windows(pixels, period)
+    else:
+        shares = [(turn * low, turn * high)]
+        if both:
+            shares.append((turn + (1.0 - turn) * (1.0 - high), turn + (1.0 - turn) * (1.0 - low)))
+        bands = tuple(Band(a * period, b * period, "imaged") for a, b in shares)
+        triangle = drive.v_offset + drive.v_amplitude * (np.where(t <= turn, t / turn, (1 - t) / (1 - turn)) - 0.5)
+        curves = (*curves, DrawnCurve("plain triangle", "before", t * period, triangle))
     return Chart(
         f"drive-{axis}",
         f"{axis} drive, one {'line' if axis == 'x' else 'frame'}",
         f"time [{unit}]",
         "drive at the piezo [V]",
-        (*_sides(t, period, volts, turn), DrawnCurve("plain triangle", "before", t * period, triangle)),
-        tuple(Band(a * period, b * period, "imaged") for a, b in bands),
+        curves,
+        bands,
     )
 
 
-def _sides(t: Floats, period: float, values: Floats, turn: float) -> tuple[DrawnCurve, DrawnCurve]:
+def _sides(t: Floats, period: float, values: Floats, turn: float) -> tuple[DrawnCurve, ...]:
     """Split values over a period by direction; both have the point at which they meet."""
     forward, backward = t <= turn + 1e-12, t >= turn - 1e-12
     return (
@@ -101,7 +118,7 @@ def _moved(planned: PlannedScan, played: PlayedAxis, at: int, period: float, lab
             label,
             "from the centre [nm]",
             _sides(turns, period, displacement_nm, line.drive.turn),
-            windows(line, period),
+            run_windows(run, line, period),
             x_range=(0.0, period),
         )
     ]
@@ -114,7 +131,7 @@ def _moved(planned: PlannedScan, played: PlayedAxis, at: int, period: float, lab
                     label,
                     "error [nm]",
                     tuple(over_time(one, line, period)),
-                    windows(line, period),
+                    run_windows(one, line, period),
                     (Mark(0.0, "", "y"),),
                     x_range=(0.0, period),
                 )

@@ -34,7 +34,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
             *([] if own is None else [own]),
             request_section(subject),
             certificate(subject),
-            *([] if (pixels := pixel_section(subject)) is None else [pixels]),
+            *_of_pixels(subject),
             *_of_z(subject),
             lines(subject, None),
             spectrum(subject),
@@ -48,6 +48,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
     return [
         *([] if picture is None else [picture]),
         certificate(subject),
+        *_of_pixels(subject),
         *_of_z(subject),
         request_section(subject),
         lines(subject, axes),
@@ -60,6 +61,12 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
         verification(subject),
         files(subject),
     ]
+
+
+def _of_pixels(subject: Subject) -> list[Section]:
+    """Return the section of the pixels of a sine; empty without a sine."""
+    section = pixel_section(subject)
+    return [] if section is None else [section]
 
 
 def _of_z(subject: Subject) -> list[Section]:

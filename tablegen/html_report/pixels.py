@@ -5,6 +5,7 @@ import numpy as np
 from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark, Role
 from tablegen.html_report.blocks import Charts, Grid, Section, row
 from tablegen.html_report.number_text import figure
+from tablegen.html_report.promises import bounded
 from tablegen.html_report.subject import Subject
 from tablegen.waveform.series import FourierSeries
 
@@ -19,6 +20,7 @@ def pixel_section(subject: Subject) -> Section | None:
     if pixels is None or place is None or table is None:
         return None
     ticks = sequence.line_ticks
+    limit = None if subject.planned is None else subject.planned.plan.limits.max_scaling_error_percent
     series = FourierSeries(place.a0, np.array(place.a), np.array(place.b))
     windows = sequence.forward_ticks, sequence.backward_ticks
     times = np.arange(_POINTS) / _POINTS
@@ -32,17 +34,17 @@ def pixel_section(subject: Subject) -> Section | None:
         along = counts if side == "forward" else counts[::-1]
         lengths.append(DrawnCurve(side, side, number, np.array(along, dtype=np.float64)))
         errors.append(DrawnCurve(side, side, number, np.array(pixels.errors_percent[side])))
-        stated = (pixels.rms_percent[side], pixels.worst_percent[side], pixels.scaling_percent[side])
-        rows.append(row(side, f"{min(counts)}..{max(counts)}", *(figure(value, 3) for value in stated)))
-    rows.append(row("trace to retrace", "", "", figure(pixels.mismatch_percent, 3), ""))
-    head = ("", "ticks a pixel", "rms [% of the line]", "worst [% of the line]", "scaling error [%]")
+        stated = (pixels.rms_percent[side], pixels.worst_percent[side])
+        scaling = bounded("", pixels.scaling_percent[side], limit, "%")[1:]
+        rows.append(row(side, f"{min(counts)}..{max(counts)}", *(figure(value, 3) for value in stated), *scaling))
+    rows.append(row("trace to retrace", "", "", figure(pixels.mismatch_percent, 3), "", "", ""))
+    head = ("", "ticks a pixel", "rms [% of the line]", "worst [% of the line]", "scaling error", "limit", "")
     bands = tuple(Band(float(first), float(first + count), "imaged") for first, count in windows)
     charts = (
         Chart("pixels-position", "x: predicted position, edges of pixels", "tick", "share of the line", tuple(curves),
               bands=bands),
         Chart("pixels-ticks", "x: lengths of pixels", "pixel along the position", "ticks", tuple(lengths)),
-        Chart("pixels-error", "x: error of each pixel", "pixel along the position", "error [% of the line]",
-              tuple(errors), marks=(Mark(0.0, "", "y"),)),
+        pixel_error_chart("pixels-error", tuple(errors)),
     )  # fmt: skip
     lead = (
         "Pixels are at equal steps of the position that the operator predicts, and their edges on whole ticks. These "
@@ -50,3 +52,9 @@ def pixel_section(subject: Subject) -> Section | None:
     )
     grid = Grid("Pixels of x, by the certificate", head, tuple(rows))
     return Section("pixels", "Pixels of the sine", (grid, Charts(charts)), lead)
+
+
+def pixel_error_chart(key: str, curves: tuple[DrawnCurve, ...]) -> Chart:
+    """Draw the error of each pixel of a sine."""
+    labels = "x: error of each pixel", "pixel along the position", "error [% of the line]"
+    return Chart(key, *labels, curves, marks=(Mark(0.0, "", "y"),))

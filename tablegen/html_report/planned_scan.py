@@ -39,7 +39,7 @@ def planned_scan(
         For wrong input.
     """
     setup = scan if isinstance(scan, Setup) else load(scan)
-    certified = certify_scan(setup, progress, remedies=remedies, sines=False)
+    certified = certify_scan(setup, progress, remedies=remedies)
     plan, certificates = certified.plan, certified.certificates
     warnings = []
     if remedies:

@@ -3,6 +3,9 @@
 The scanner is the operator of an axis that has one. Otherwise it is the law: (17) at the stroke that is really played,
 which is smaller than the corrected line, since turnarounds are rounded. Trace and retrace therefore do not meet
 although each branch was inverted; their distance is the one that the certificate expects.
+
+A sine is not bent by a correction: its drive is the same without one, and its pixels are where a piezo without
+hysteresis would be.
 """
 
 from dataclasses import dataclass
@@ -17,11 +20,15 @@ from tablegen.compensation import models
 from tablegen.compensation.identification import SettledAxis
 from tablegen.compensation.line import LineShape
 from tablegen.config.load import Setup
+from tablegen.device.schedule import Schedule
 from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.pixel_table import with_pixel_table
+from tablegen.planning.sine_setup import with_motion
 from tablegen.virtual.own_run import own_piezo
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
+from tablegen.waveform.series import FourierSeries
 
 MOST_TICKS = 1 << 13  # of a period that are played
 
@@ -111,11 +118,16 @@ class PlayedAxis:
 
 def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
     """Play the axes that move."""
-    setup = without_refinement(planned.setup)
-    plain = planned.plan if setup is planned.setup else make_plan(setup)
-    others = {model: _planned(setup, model) for model in _models(planned)}
-    both = zip(planned.plan.moving, plain.moving, strict=True)
-    return tuple(_played(line, bare, others) for line, bare in both)
+    bare = without_refinement(planned.setup)
+    sine = planned.plan.schedule.pixel_table is not None
+    motion: Literal["line", "sine"] = "sine" if sine else "line"
+    setup = bare if bare.scan.x.motion == motion else with_motion(bare, motion)
+    plain = planned.plan if bare is planned.setup else make_plan(setup, sines=sine)
+    others = {model: _planned(setup, model, sine) for model in _models(planned)}
+    return tuple(
+        _played_sine(line, plain.schedule) if line.axis == "x" and sine else _played(line, unrefined, others)
+        for line, unrefined in zip(planned.plan.moving, plain.moving, strict=True)
+    )
 
 
 def without_refinement(setup: Setup) -> Setup:
@@ -138,10 +150,10 @@ def _models(planned: PlannedScan) -> list[str]:
     return names
 
 
-def _planned(setup: Setup, model: str) -> tuple[LinePlan, LinePlan] | str:
-    """Plan the lines of another model, or return why there are none."""
+def _planned(setup: Setup, model: str, sine: bool) -> tuple[LinePlan, LinePlan] | str:
+    """Plan the lines of another model, or return why there are none; a sine keeps its own model."""
     try:
-        return make_plan(with_model(setup, model)).lines
+        return make_plan(with_model(setup, model, ("y",) if sine else ("x", "y")), sines=sine).lines
     except Rejected as rejected:
         return f"{model}: {rejected.problems[0].why}"
 
@@ -166,3 +178,27 @@ def _played(line: LinePlan, plain: LinePlan, others: dict[str, tuple[LinePlan, L
         except (Unphysical, ValueError) as reason:
             rejected.append(f"{name}: {reason}")
     return PlayedAxis(line.axis, own, tuple(played), tuple(rejected))
+
+
+def _played_sine(line: LinePlan, schedule: Schedule) -> PlayedAxis:
+    """Play a sine on its operator, once with its pixels where a piezo without hysteresis would be."""
+    piezo = own_piezo(line)
+    assert piezo is not None
+    played, rejected = [], []
+    for name in (models.UNCOMPENSATED, line.drive.model):
+        try:
+            pixels = schedule if name == line.drive.model else _pixels_without_hysteresis(line, schedule)
+            (run,) = run_on_each(line, [piezo], MOST_TICKS, pixels)
+        except (Unphysical, ValueError) as reason:
+            rejected.append(f"{name}: {reason}")
+            continue
+        played.append(PlayedCorrection("uncompensated" if name == models.UNCOMPENSATED else name, run))
+    return PlayedAxis(line.axis, True, tuple(played), tuple(rejected))
+
+
+def _pixels_without_hysteresis(line: LinePlan, schedule: Schedule) -> Schedule:
+    """Return the schedule of a sine with pixels at equal steps of what the piezo is to follow, which is a sine too."""
+    assert line.imaged is not None
+    wave = line.target
+    height = 2.0 * float(np.hypot(wave.a[0], wave.b[0]))
+    return with_pixel_table(schedule, FourierSeries(0.5, wave.a / height, wave.b / height), line.imaged)

@@ -34,6 +34,8 @@ def certificate(subject: Subject) -> Section:
     lead = "Limits in the third column are those of the scan file, of the converter and of the amplifier."
     if planned is None:
         lead = "The limits of the scan file are not in a build; give the scan file to see them."
+    if subject.manifest.axes.x.fourier.place is not None:
+        lead += " The waveform of x is a sine: its scaling error is that of its codes; pixels have their own, below."
     return Section(
         "certificate",
         "Certificate",
@@ -111,7 +113,10 @@ def _parts(subject: Subject) -> Grid:
     rows = []
     for axis, entry in subject.axes:
         for side, error in (entry.certificate.scaling_error_percent or {}).items():
-            rows.append(row(f"{axis} {side}", *(figure(error.get(name, 0.0), 3) for name in _PARTS)))
+            cells = [figure(error.get(name, 0.0), 3) for name in _PARTS]
+            if entry.fourier.place is not None:
+                cells[0] = "-"  # a sine is not a bent line
+            rows.append(row(f"{axis} {side}", *cells))
     head = ("", *(name.replace("_", " ") for name in _PARTS))
     return Grid("Scaling errors and their parts taken alone [%, peak to peak]", head, tuple(rows))
 

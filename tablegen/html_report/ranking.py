@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tablegen.base.input_errors import Problem
 from tablegen.base.warnings import Axis, Finding, Weight, worst_first
-from tablegen.certificate.scan_notes import expected_mismatch, note_findings
+from tablegen.certificate.scan_notes import expected_mismatch, note_findings, whole_ticks
 from tablegen.html_report.subject import FileState, Subject
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import ManifestAxis
@@ -47,7 +47,10 @@ def _of_problem(weight: Weight, percent: float, problem: Problem) -> Finding:
 def _expected(axis: Axis, entry: ManifestAxis) -> Iterator[Finding]:
     """Yield the expected errors of an axis."""
     certificate = entry.certificate
-    expected = certificate.expected
+    expected, pixels = certificate.expected, certificate.pixels
+    if pixels is not None:
+        yield whole_ticks(axis, pixels.worst_percent, pixels.scaling_percent, pixels.mismatch_percent)
+        return
     if expected is not None and expected.mismatch_percent is not None:
         figure = expected.mismatch_percent
         yield expected_mismatch(axis, expected.basis, figure.value, figure.uncertainty)

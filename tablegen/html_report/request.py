@@ -24,7 +24,6 @@ def request_section(subject: Subject) -> Section:
     ]
     for axis, entry in subject.axes:
         drive = entry.drive
-        low, high = entry.fourier.window
         request, offset = "", ""
         if planned is not None:
             scan = getattr(planned.setup.scan, axis)
@@ -34,7 +33,7 @@ def request_section(subject: Subject) -> Section:
             row(f"{axis} size", request, f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm imaged"),
             row(f"{axis} offset", offset, f"{drive.v_offset:.6g} V"),
             row(f"{axis} drive", "", f"{drive.v_amplitude:.6g} V peak to peak, turns at {drive.turn:g} of the period"),
-            row(f"{axis} imaged", "", f"{low:g}..{high:g} of the line, {entry.fourier.directions}"),
+            row(f"{axis} imaged", "", f"{_imaged(entry)} of the line, {entry.fourier.directions}"),
             row(f"{axis} codes", "", _codes(subject, axis)),
             *_table(axis, entry),
         ]
@@ -46,6 +45,12 @@ def request_section(subject: Subject) -> Section:
     if y.resting:
         rows.append(row("y", "off", f"rests at {y.drive.v_offset:.6g} V, code {y.output.offset_code}"))
     return Section("request", "Requested and played", (Grid("", ("", "requested", "played"), tuple(rows)),))
+
+
+def _imaged(entry: ManifestAxis) -> str:
+    """Return the imaged part of the line: of a sine as the scan file has it, in shares of the way."""
+    low, high = entry.fourier.imaged or entry.fourier.window
+    return f"{low:g}..{high:g}"
 
 
 def schedule_hz(subject: Subject) -> float:

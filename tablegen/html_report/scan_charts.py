@@ -8,8 +8,10 @@ from tablegen.certificate.certificate import Certificate
 from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup
+from tablegen.device.schedule import Schedule
 from tablegen.html_report.corrections import shape_chart
 from tablegen.html_report.lines import drive_chart
+from tablegen.html_report.pixels import pixel_error_chart
 from tablegen.html_report.playing import played_axes
 from tablegen.html_report.scan_errors import SIDES, residual_chart
 from tablegen.html_report.subject import PlannedScan
@@ -21,7 +23,7 @@ _POINTS = 321
 
 def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], brief: bool) -> PlottedCharts:
     """Draw a row for each axis; ``brief`` leaves out its last chart, which takes a simulation."""
-    rows = [[drive_of(line), *([shape_chart(line)] if _bent(line) else [])] for line in plan.moving]
+    rows = [[drive_of(line, plan.schedule), *([shape_chart(line)] if _bent(line) else [])] for line in plan.moving]
     if not brief:
         for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
             row += [residual_chart(line.axis, one) for one in axis.corrections[-1:]]
@@ -40,17 +42,23 @@ def _bent(line: LinePlan) -> bool:
     return line.drive.hysteresis.compensates
 
 
-def drive_of(line: LinePlan) -> Chart:
+def drive_of(line: LinePlan, schedule: Schedule) -> Chart:
     """Draw the drive over a period."""
+    pixels = None if line.imaged is None else schedule
     both = line.band_limit.directions == "both"
-    return drive_chart(line.axis, line.drive, line.series, line.band_limit.window, both, float(1 / line.rate))
+    return drive_chart(line.axis, line.drive, line.series, line.band_limit.window, both, float(1 / line.rate), pixels)
 
 
-def modelled_error(line: LinePlan) -> Chart:
+def modelled_error(plan: Plan, line: LinePlan) -> Chart:
     """Draw the modelled position less the requested one, inside the imaging windows; faint without compensation.
 
-    To first order in the deviation between drive and branch: x - tau = (w - u) / u'.
+    To first order in the deviation between drive and branch: x - tau = (w - u) / u'. Of a sine they are the errors of
+    its pixels.
     """
+    if line.imaged is not None and (pixels := plan.pixel_errors) is not None:
+        number = np.arange(1.0, plan.schedule.pixels + 1.0)
+        curves = tuple(DrawnCurve(side, side, number, pixels.errors[side]) for side in SIDES)
+        return pixel_error_chart(f"modelled-{line.axis}", curves)
     low, high = line.band_limit.window
     x = np.linspace(low, high, _POINTS)
     shape, plain, errors = line.drive.shape, [], []

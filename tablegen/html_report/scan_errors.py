@@ -3,6 +3,7 @@
 import numpy as np
 
 from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark, Role
+from tablegen.device.schedule import Schedule
 from tablegen.html_report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
 from tablegen.html_report.playing import PlayedAxis, PlayedCorrection
 from tablegen.html_report.subject import PlannedScan
@@ -43,6 +44,11 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
         "A simulation: the emitted integers on the scanner that the scanner file describes. It shows the residual of a "
         "correction if the scanner file is right; it cannot show whether it is. Each chart has a scale of its own."
     )
+    if planned.plan.schedule.pixel_table is not None:
+        lead += (
+            " x is a sine: its errors are those of its pixels, each the mean position over its ticks. Without "
+            "correction the drive is the same, and the pixels are where a piezo without hysteresis would be."
+        )
     refined = [line.axis for line in planned.plan.moving if line.layer is not None]
     if refined:
         lead += (
@@ -131,12 +137,34 @@ def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
     return tuple(bands)
 
 
+def run_windows(run: AxisRun, line: LinePlan, period: float) -> tuple[Band, ...]:
+    """Return the imaged stretches of a period of a run: of a sine those of its pixels."""
+    return windows(line, period) if run.pixels is None else pixel_windows(run.pixels, period)
+
+
+def pixel_windows(schedule: Schedule, period: float) -> tuple[Band, ...]:
+    """Return the imaged stretches of a line by its schedule, in the unit of ``period``."""
+    tick = period / schedule.ticks
+    both = schedule.forward, schedule.backward
+    return tuple(Band(tick * each.first, tick * each.stop, "imaged") for each in both if each.count)
+
+
+def pixel_times(schedule: Schedule) -> dict[str, Floats]:
+    """Return the middle of each pixel, trace and retrace in the order of the position, in lines; (pixels,) each."""
+    middles = []
+    for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
+        edges = np.append(starts, window.stop)
+        middles.append(0.5 * (edges[:-1] + edges[1:]) / schedule.ticks)
+    return {"forward": middles[0], "backward": middles[1][::-1]}
+
+
 def over_time(run: AxisRun, line: LinePlan, period: float) -> list[DrawnCurve]:
     """Return the curves of the residual in nm over time."""
     curves = []
     for side in (side for side in SIDES if side in run.directions):
         x, residual = inside(getattr(run.imaged, side))
-        times = np.asarray(line.drive.shape.times(side, x)) * period
+        of_pixels = None if run.pixels is None else pixel_times(run.pixels)[side]
+        times = (np.asarray(line.drive.shape.times(side, x)) if of_pixels is None else of_pixels) * period
         order = np.argsort(times)
         curves.append(DrawnCurve(side, side, times[order], 0.01 * residual[order] * run.nominal_nm))
     return curves

@@ -39,9 +39,10 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
     turn = entry.drive.turn
     triangle = (np.sin(np.pi * n * turn) / (np.pi * n) ** 2 / (turn * (1.0 - turn))) ** 2
     visible = triangle > triangle[0] * 10.0 ** (0.1 * _FLOOR_DB)
-    curves.append(
-        DrawnCurve("plain triangle", "before", n[visible] * rate, _db(triangle[visible] / triangle[0]), "points")
-    )
+    if entry.fourier.place is None:  # beside a sine it says nothing
+        curves.append(
+            DrawnCurve("plain triangle", "before", n[visible] * rate, _db(triangle[visible] / triangle[0]), "points")
+        )
     last = series.harmonics * rate
     ticks = entry.line.ticks
     if ticks <= _MOST_SPECTRUM_TICKS:

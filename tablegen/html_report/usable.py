@@ -12,6 +12,7 @@ from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import offset_surface
 from tablegen.planning.line_plan import LinePlan
+from tablegen.planning.table_maker import StoredWave
 
 _OFFSETS = 101
 _SIZES = 241
@@ -73,8 +74,7 @@ def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats,
     offset, in words.
     """
     drive, driver = line.drive, line.drive.driver
-    w = line.series.on_grid(32 * line.series.harmonics)
-    low, high = float(np.min(w)), float(np.max(w))
+    low, high = StoredWave(line.series).reach
     ends = sorted(
         line.converter.v_zero + line.converter.v_per_code * code for code in (0, (1 << line.converter.bits) - 1)
     )

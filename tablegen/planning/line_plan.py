@@ -243,7 +243,7 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         x, y = _within_cost(setup, x, y, schedule, problems)
     if isinstance(x.drive.shape, SineLine) and x.imaged is not None:
         with problems.at(setup.scan_file, "timing.pixels"):
-            schedule = with_pixel_table(schedule, x.drive.shape, x.imaged)
+            schedule = with_pixel_table(schedule, x.drive.shape.place, x.imaged)
         problems.stop_if_any()
     schedule = replace(schedule, settle_lines=settle_lines(setup, {"x": x.drive, "y": y.drive}, schedule, problems))
     clocks = clocks_per_tick(setup, schedule, (x.program, y.program), problems)
@@ -266,6 +266,25 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         sizes_nm = x.drive.size_nm, y.drive.size_nm
         place = x.drive.shape.place if isinstance(x.drive.shape, SineLine) else None
         plan = replace(plan, z=plan_straight_z(setup, schedule, sizes_nm, x.series.harmonics, place))
+    return plan
+
+
+def make_straight_plan(setup: Setup, why: str) -> Plan:
+    """Plan a scan whose fast axis has to be straight in time, also where "auto" makes it so; a sine is refused.
+
+    Parameters
+    ----------
+    why
+        Why a sine will not do, and what to use in its place.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction on both axes, or at ``x.motion`` if the plan is a sine.
+    """
+    plan = make_plan(setup, sines=True)
+    if plan.schedule.pixel_table is not None:
+        raise Rejected([setup.scan_file.problem("x.motion", why)])
     return plan
 
 

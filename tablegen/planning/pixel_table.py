@@ -4,7 +4,6 @@ import numpy as np
 from msgspec.structs import replace
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.compensation.line import SineLine
 from tablegen.device.schedule import Schedule, Window
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.waveform.series import FourierSeries
@@ -13,15 +12,15 @@ _GRID = 1 << 14  # times of a period between which the position is interpolated:
 _MOST_TICKS = 65535  # of a pixel
 
 
-def with_pixel_table(schedule: Schedule, line: SineLine, window: tuple[float, float]) -> Schedule:
+def with_pixel_table(schedule: Schedule, place: FourierSeries, window: tuple[float, float]) -> Schedule:
     """Return the schedule with pixels of equal steps in position, on one grid in trace and retrace.
 
     Parameters
     ----------
     schedule
         The schedule of the scan, whose windows in a line are replaced.
-    line
-        The fast axis.
+    place
+        Position of the fast axis over a line, 0..1.
     window
         The imaged part of the line, 0..1.
 
@@ -32,7 +31,7 @@ def with_pixel_table(schedule: Schedule, line: SineLine, window: tuple[float, fl
     """
     ticks, pixels = schedule.ticks, schedule.pixels
     edges = np.linspace(*window, pixels + 1)
-    rising, falling = passages(line.place, edges)
+    rising, falling = passages(place, edges)
     trace, retrace = (whole_ticks(times * ticks) for times in (rising, falling[::-1]))
     for times in (np.diff(rising), np.diff(falling[::-1])):
         if float(np.min(times)) * ticks < 1.0:

@@ -8,10 +8,7 @@ from tablegen.base.input_errors import Problems
 from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, SEQUENCER_FORMATS, Scan
 
-SINE = (
-    "a sine is for `check`, `show`, `build` with formats that have a sequencer, `verify`, `upload`, `readback`, `live` "
-    "and `simulate`, and its build for `report` and `compare`; leave this out, or take 'line', for anything else"
-)
+SINE = "a straight line is needed here, and this may be a sine; leave it out, or take 'line'"
 _DEFAULT_PIXEL_FORMATS = ("c",)  # a build of today keeps its files
 _HARMONICS = "a sine has one harmonic of the drive; leave this out, or take motion = 'line'"
 

@@ -15,13 +15,14 @@ from tablegen.images.cell_vectors import area
 from tablegen.images.line_length import Cell, size_of_line
 from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_straight_plan
 from tablegen.refinement.free_rows import FreeRowsFit
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.lattice_start import SampleCell
 from tablegen.refinement.learning import LayerUpdate, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
 from tablegen.refinement.round import (
+    NO_LAYER,
     Options,
     Round,
     divergence_reason,
@@ -92,7 +93,7 @@ def refine_images(
         If the images are not of this scan, nothing shows which periods of trace and retrace belong together, or a bound
         forbids learning.
     """
-    plan = make_plan(setup)
+    plan = make_straight_plan(setup, NO_LAYER)
     line: LinePlan = getattr(plan, axis)
     limits = learning_bound(line, options)
     images = images or ImageOptions()
@@ -320,7 +321,7 @@ def refine_mismatch(
     Unphysical
         If the axis is y, the images are not of this scan, or a bound forbids learning.
     """
-    plan = make_plan(setup)
+    plan = make_straight_plan(setup, NO_LAYER)
     if axis == "y":
         raise Unphysical("trace and retrace do not show the error of y; it needs a sample with a period")
     limits = learning_bound(plan.x, options)

@@ -16,7 +16,7 @@ from tablegen.certificate.line_errors import CHORD
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, make_plan, make_straight_plan
 from tablegen.planning.refinement_layer import model_digest
 from tablegen.refinement.bound import Bound, bound
 from tablegen.refinement.displacement import Displacement, fit_displacement
@@ -28,6 +28,10 @@ _FINISHED_RATIO = 0.9  # predicted over measured residual; above it the rest is 
 _CHORD_NOISES = 4.0  # of the largest and the least chord together: the rms noise of one, of some twenty in a window
 _MOST_SCALING = 1e4  # percent that a scan file can hold
 _SIZE_NOTE_LIMIT = 0.01  # share of the line; a larger size error gets a remark
+NO_LAYER = (
+    "a layer belongs to a straight line, and the pixels of a sine are where the operator says that the piezo is; "
+    "calibrate the operator again, with traces near this scan, or take 'line'"
+)
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,8 @@ def refine(
         If the trace is not of this scan, or a bound forbids learning.
     """
     check_spans(time_s, displacement_nm, drive_v)
-    line: LinePlan = getattr(make_plan(setup), axis)
+    plan = make_straight_plan(setup, NO_LAYER) if axis == "x" else make_plan(setup, sines=True)
+    line: LinePlan = getattr(plan, axis)
     limits = learning_bound(line, options)
     trace = Trace("", time_s, np.zeros(0) if drive_v is None else drive_v, displacement_nm)
     refuse_wrong_trace(line, trace, states_gain)
@@ -161,7 +166,7 @@ def with_layer_update(
         return None, setup
     refinement = msgspec.structs.replace(_refinement(setup, line, update), before_of=before_of)
     changed = with_refinement(setup, line.axis, refinement)
-    make_plan(changed)  # what is written can be built
+    make_plan(changed, sines=True)  # what is written can be built
     return refinement, changed
 
 

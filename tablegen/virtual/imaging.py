@@ -12,6 +12,7 @@ import numpy as np
 
 from tablegen.compensation.identification import SettledAxis
 from tablegen.config.scanner import Coupling
+from tablegen.device.schedule import Schedule
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.turned_plan import TurnedPlan
@@ -177,14 +178,21 @@ def running_frame(
     """Simulate a settled frame of the emitted integers of a build.
 
     Columns are ``pixels`` (those of the scan file, if not given), evenly in time within x's imaging window of each
-    sweep. Lines are those of the frame that lie in y's imaging window on its way up, or on its way ``down``.
+    sweep; of a sine they are its own. Lines are those of the frame that lie in y's imaging window on its way up, or on
+    its way ``down``.
 
     Raises
     ------
     ValueError
-        If y images no line on that way, or the scan leaves the range of the virtual scanner.
+        If y images no line on that way, the scan leaves the range of the virtual scanner, or a sine has other pixels.
     """
     schedule = plan.schedule
+    if schedule.pixel_table is None:
+        columns = _columns(plan.x.drive.turn, plan.x.band_limit.window, pixels or schedule.pixels)
+    elif pixels in (None, schedule.pixels):
+        columns = _pixel_columns(schedule)
+    else:
+        raise ValueError(f"the table of a sine has {schedule.pixels} pixels, not {pixels}")
     part = schedule.down if down else schedule.up
     if part.count == 0:
         raise ValueError(f"y images nothing on its way {'down' if down else 'up'}")
@@ -193,7 +201,7 @@ def running_frame(
         coupling,
         surface,
         conditions or Conditions(),
-        columns=_columns(plan.x.drive.turn, plan.x.band_limit.window, pixels or schedule.pixels),
+        columns=columns,
         numbers=part.first + np.arange(part.count),
         lines=schedule.lines,
     )
@@ -291,7 +299,7 @@ class _Columns:
     """Times of the columns of a direction in periods of x, the left end first, and the duration of a column."""
 
     times: Floats
-    lasts: float
+    lasts: Floats | float
 
 
 def _columns(turn: float, window: tuple[float, float], pixels: int) -> tuple[_Columns, _Columns]:
@@ -300,6 +308,15 @@ def _columns(turn: float, window: tuple[float, float], pixels: int) -> tuple[_Co
     place = window[0] + width * (np.arange(pixels) + 0.5) / pixels
     back = 1.0 - turn
     return _Columns(turn * place, turn * width / pixels), _Columns(turn + back * (1.0 - place), back * width / pixels)
+
+
+def _pixel_columns(schedule: Schedule) -> tuple[_Columns, _Columns]:
+    """Return the pixels of a schedule as columns of the trace and of the retrace."""
+    sides = []
+    for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
+        edges = np.append(starts, window.stop) / schedule.ticks
+        sides.append(_Columns(0.5 * (edges[:-1] + edges[1:]), np.diff(edges)))
+    return sides[0], _Columns(sides[1].times[::-1], np.asarray(sides[1].lasts)[::-1])
 
 
 def _playing(line: LinePlan, axis: SettledAxis) -> Position:

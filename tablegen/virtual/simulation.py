@@ -14,7 +14,7 @@ from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.device.schedule import Schedule
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.virtual.line_error import LineError, about_window_line, line_error
 from tablegen.virtual.pixel_line_error import pixel_line_error
 from tablegen.virtual.played import MAX_TICKS, PlayedDrive, intended, played
@@ -26,7 +26,7 @@ class AxisRun:
     """One axis of a scan: the drive, and ``displacement_nm`` of the virtual scanner, (ticks,), above rest at 0 V.
 
     ``error`` takes the line's ends for exact, as the paper does; ``imaged`` is about the best line through the windows
-    that are imaged.
+    that are imaged. ``pixels`` is the schedule of a sine, whose errors are those of its pixels; else None.
     """
 
     axis: Literal["x", "y"]
@@ -38,6 +38,7 @@ class AxisRun:
     nominal_nm: float
     directions: tuple[str, ...]
     refined: bool
+    pixels: Schedule | None = None
 
     @property
     def size_error_percent(self) -> float:
@@ -66,6 +67,17 @@ def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
     return run_on_each(line, [axis])[0]
 
 
+def run_of_axis(plan: Plan, line: LinePlan, axis: SettledAxis) -> AxisRun:
+    """Play one axis of a plan until it has settled; the errors of a sine are those of its pixels.
+
+    Raises
+    ------
+    ValueError
+        If the line leaves the range of the axis.
+    """
+    return run_on_each(line, [axis], pixels=plan.schedule)[0]
+
+
 def run_on_each(
     line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS, pixels: Schedule | None = None
 ) -> list[AxisRun]:
@@ -83,12 +95,15 @@ def run_on_each(
     if pixels is not None and line.imaged is not None:
         errors = [pixel_line_error(each, pixels, line.imaged) for each in settled]
     else:
+        pixels = None
         requested, turn, window = intended(line, drive), line.drive.turn, line.band_limit.window
         errors = [line_error(each, turn, window, requested, 0.5) for each in settled]
-    return [_axis_run(line, drive, *each) for each in zip(settled, errors, strict=True)]
+    return [_axis_run(line, drive, *each, pixels) for each in zip(settled, errors, strict=True)]
 
 
-def _axis_run(line: LinePlan, drive: PlayedDrive, displacement: Floats, error: LineError) -> AxisRun:
+def _axis_run(
+    line: LinePlan, drive: PlayedDrive, displacement: Floats, error: LineError, pixels: Schedule | None
+) -> AxisRun:
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
     return AxisRun(
         axis=line.axis,
@@ -100,16 +115,17 @@ def _axis_run(line: LinePlan, drive: PlayedDrive, displacement: Floats, error: L
         nominal_nm=line.drive.size_nm,
         directions=directions,
         refined=line.layer is not None,
+        pixels=pixels,
     )
 
 
-def with_model(setup: Setup, model: str) -> Setup:
-    """Return the scan with another hysteresis model on both axes, unless an axis has no parameters for it.
+def with_model(setup: Setup, model: str, axes: Sequence[str] = ("x", "y")) -> Setup:
+    """Return the scan with another hysteresis model on ``axes``, unless an axis has no parameters for it.
 
     A refinement was learnt over the scanner file's own model, and stays on axes that keep it.
     """
     scan, scanner = setup.scan, setup.scanner
-    for name in ("x", "y"):
+    for name in axes:
         axis: ScannerAxis = getattr(scanner, name)
         h = axis.hysteresis
         other = None if h is None or h.model() == model else models.get(model).like(h)

@@ -301,6 +301,16 @@ def test_a_scan_is_turned(turned: tuple[Path, DeviceInfo], tmp_path: Path) -> No
 
 
 @pytest.mark.common
+def test_a_scan_whose_files_have_tables_in_the_header_is_turned(
+    turned: tuple[Path, DeviceInfo], tmp_path: Path
+) -> None:
+    """A build at an angle refuses the key, which is of files; no file is written here."""
+    file = write_turned(tmp_path, 0.0, *TURNED, "+ [emit]\nheader_only = true")
+    _, at_30 = said(Bench(model(turned[1], boot=BOOT)), file, {"do": "rotate", "by_deg": 30})
+    assert at_30["scan"]["angle_deg"] == 30.0
+
+
+@pytest.mark.common
 def test_keys_turn_and_move_along_the_lines(turned: tuple[Path, DeviceInfo]) -> None:
     file, info = turned
     _, start, *rest = pressed(Bench(model(info, boot=BOOT)), file, "[", "\x1b[C", "q")

@@ -127,6 +127,29 @@ def test_simulate_plays_it_on_a_virtual_scanner(scan: Path, tmp_path: Path) -> N
     assert "coupled.toml: " in refused.err
 
 
+@pytest.mark.parametrize("command", ["check", "build", "report"])
+def test_tables_in_the_header_are_refused_at_their_key(tmp_path: Path, command: str) -> None:
+    """The key was ignored: the build had NAME.c all the same."""
+    path = write_turned(tmp_path, 30.0, *SHORT, "+ [emit]\nheader_only = true")
+    line = path.read_text("utf-8").splitlines().index("header_only = true") + 1
+    outcome = run(command, path, *([] if command == "check" else ["-o", tmp_path / "out"]))
+    assert outcome.status == 2
+    assert outcome.err.splitlines() == [
+        f"{path}:{line}: emit.header_only: true: the tables of a scan at an angle, on coupled axes or with drift are "
+        "in NAME.c and NAME_program.c, not in the header; leave this out"
+    ]
+    assert not (tmp_path / "out").exists()
+
+
+def test_tables_in_the_header_are_of_c_alone(tmp_path: Path) -> None:
+    path = write_turned(tmp_path, 30.0, *SHORT, "+ [emit]\nheader_only = true\nformats = ['verilog']")
+    assert run("check", path).status == 0
+    assert run("build", path, "-o", tmp_path / "out", "-f", "cargo").status == 2
+    straight = write_turned(tmp_path, 0.0, *SHORT, "+ [emit]\nheader_only = true\nformats = ['c']")
+    assert run("build", straight, "-o", tmp_path / "straight", "-q").status == 0
+    assert not (tmp_path / "straight" / "annexin_200nm.c").exists()
+
+
 def test_another_format_is_refused(scan: Path, tmp_path: Path) -> None:
     outcome = run("build", scan, "-o", tmp_path / "out", "-f", "csv")
     assert outcome.status == 2

@@ -92,7 +92,7 @@ def test_what_a_sine_cannot_have_is_refused_at_its_key(key: str, tmp_path: Path)
 
 def test_a_sine_needs_an_operator_and_a_caller_that_knows_it(tmp_path: Path) -> None:
     given = setup(tmp_path, *SINE)
-    with pytest.raises(Rejected, match=r"x\.motion: a sine is for"):
+    with pytest.raises(Rejected, match=r"x\.motion: a straight line is needed here"):
         make_plan(given)
     scanner = (tmp_path / "scanner.toml").read_text("utf-8").replace('"operator"', '"triangle"')
     text = "\n".join(line for line in scanner.splitlines() if "operator" not in line)

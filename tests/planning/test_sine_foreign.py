@@ -53,7 +53,7 @@ def test_without_the_harmonics_of_the_loop_the_image_is_bent(tmp_path: Path) -> 
     shape = plan.x.drive.shape
     assert isinstance(shape, SineLine)
     first = FourierSeries(shape.place.a0, shape.place.a[:1].copy(), shape.place.b[:1].copy())
-    bent = replace(plan, schedule=with_pixel_table(plan.schedule, replace(shape, place=first), WINDOW))
+    bent = replace(plan, schedule=with_pixel_table(plan.schedule, first, WINDOW))
     plant = PLANTS["plays"]
     right, wrong = (image_errors(*pixels_on_the_piezo(one, plant), WINDOW)["rms"] for one in (plan, bent))
     assert wrong > 5.0 * right

@@ -180,5 +180,5 @@ def test_the_page_states_the_steps(folders: dict[str, Path]) -> None:
 
 def test_a_limit_of_the_scan_file_holds_beside_a_sine(tmp_path: Path) -> None:
     path = write_sine(tmp_path, "+ [limits]\nmax_error_lsb = 0.9", "x.table.max_error_lsb = 0.8")
-    (problem,) = certify_scan(load(path), sines=True, remedies=False).broken
+    (problem,) = certify_scan(load(path), remedies=False).broken
     assert problem.why.endswith("above 0.9; a smaller slope brings it closer to the plane"), problem

@@ -1,21 +1,35 @@
-"""A sine on its own operator, stepped tick by tick, against the certificate of its pixels, which steps nothing."""
+"""A sine on its own operator, stepped tick by tick, against the certificate of its pixels, which steps nothing.
+
+And what else takes a sine: frames and traces of the laboratory, tables, a layer of y; and what refuses it, and why.
+"""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 from foreign_plants import ForeignPlant, ManyPlays
 from operator_files import operator_file
 from replacing import replace
-from sine_scans import response_csv, sine_scan, text_of
+from sine_scans import response_csv, short_sine, sine_scan, text_of
 
+import tablegen
 from tablegen.api.simulate import simulate
 from tablegen.base.input_errors import Rejected
 from tablegen.config.load import Setup
+from tablegen.device.schedule import Schedule
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.playing import played_axes
+from tablegen.html_report.table_rows import AxisTables
+from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
+from tablegen.virtual.imaging import running_frame
 from tablegen.virtual.own_run import own_piezo
 from tablegen.virtual.pixel_line_error import pixel_line_error
 from tablegen.virtual.simulation import run_on_each
 
 pytestmark = pytest.mark.common
+
+SAMPLE = {"lattice_nm": 20.0}
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +76,78 @@ def test_simulate_plays_the_sine_beside_straight_lines(setup: Setup) -> None:
     assert [chart.title for chart in simulated.charts().brief] == ["x, operator: residual"]
     with pytest.raises(Rejected, match="a sine is simulated on the scanner file's own operator alone"):
         simulate(setup, "default")
+
+
+def test_a_frame_has_the_pixels_of_the_sine(setup: Setup) -> None:
+    """Columns evenly in time, as those of a line are, would be off by percents of the line."""
+    plan = make_plan(setup, sines=True)
+    piezo, certified = own_piezo(plan.x), plan.pixel_errors
+    assert piezo is not None
+    assert certified is not None
+    low, high = plan.x.imaged or (0.0, 1.0)
+    grid = low + (high - low) * (np.arange(48) + 0.5) / 48
+
+    def off(schedule: Schedule) -> list[Floats]:
+        frame = running_frame(replace(plan, schedule=schedule), piezo, piezo, lambda x, y: x + y)
+        sides = [sweep.x_nm[0] for sweep in (frame.trace, frame.retrace)]
+        slope, start = np.polyfit(np.concatenate([grid, grid]), np.concatenate(sides), 1)
+        return [100.0 * ((nm - start) / slope - grid) for nm in sides]
+
+    for found, side in zip(off(plan.schedule), ("forward", "backward"), strict=True):
+        # The position in the middle of a pixel is not quite its mean.
+        assert np.max(np.abs(found - certified.errors[side])) < 0.1
+    assert np.max(np.abs(off(replace(plan.schedule, pixel_table=None))[0])) > 1.0
+    with pytest.raises(ValueError, match="the table of a sine has 48 pixels, not 32"):
+        running_frame(plan, piezo, piezo, lambda x, y: x + y, pixels=32)
+
+
+def test_the_laboratory_plays_a_sine_by_its_pixels(setup: Setup) -> None:
+    laboratory = tablegen.Laboratory(like=setup.scanner)
+    run = laboratory.play(setup, "x")
+    assert run.pixels is not None
+    assert len(run.imaged.forward.residual) == run.pixels.pixels == 48
+    assert laboratory.play(setup, "y").pixels is None
+    assert laboratory.frame(setup, laboratory.lattice(20.0)).trace.x_nm.shape[1] == 48
+
+
+def test_tables_of_a_sine_have_one_harmonic(setup: Setup) -> None:
+    x, y = tablegen.tables(setup).axes
+    assert isinstance(x, AxisTables)
+    assert (x.harmonics, x.ticks, y.axis) == (1, 400, "y")
+    planned = next(row for row in x.rows if row.planned)
+    (certificate, _) = tablegen.certify(tablegen.plan(setup.scan_file.name)).values()
+    assert planned.max_error_lsb == pytest.approx(certificate.max_error_lsb)
+
+
+def test_what_needs_a_straight_line_says_what_to_use(setup: Setup, tmp_path: Path) -> None:
+    trace = tablegen.Laboratory(like=setup.scanner).running_trace(setup, "x")
+    with pytest.raises(Rejected, match=r"scan\.toml:\d+: x\.motion: a layer .*; calibrate the operator again"):
+        tablegen.refine(setup, trace, axis="x")
+    heights = np.random.default_rng(1).random((13, 48))
+    for mismatch in (True, False):
+        with pytest.raises(Rejected, match=r"x\.motion: a layer .* or take 'line'"):
+            tablegen.refine(
+                setup, images=[(heights, heights)], axis="x", mismatch=mismatch, **{} if mismatch else SAMPLE
+            )
+    with pytest.raises(Rejected, match=r"x\.motion: the pixels of a sine .* with --fit"):
+        tablegen.correct(heights, scan=setup.scan_file.name)
+
+
+def test_y_beside_a_sine_learns_a_layer(setup: Setup) -> None:
+    trace = tablegen.Laboratory(like=setup.scanner).running_trace(setup, "y")
+    refined = tablegen.refine(setup, trace, axis="y")
+    plan = make_plan(refined.setup, sines=True)
+    assert plan.schedule.pixel_table is not None
+    assert plan.y.layer is not None
+
+
+def test_auto_that_ends_in_a_line_is_refined_and_stays_one(tmp_path: Path) -> None:
+    setup = short_sine(tmp_path, "x.motion = 'auto'", "x.band_limit.harmonics = 3", "timing.pixels = 150")
+    trace = tablegen.Laboratory(like=setup.scanner).running_trace(setup, "x")
+    refined = tablegen.refine(setup, trace, axis="x")
+    plan = make_plan(refined.setup, sines=True)
+    assert plan.schedule.pixel_table is None
+    assert plan.x.layer is not None
+    subject = planned_scan(refined.setup, remedies=False)
+    assert subject.planned is not None
+    assert played_axes(subject.planned)[0].emitted is not None
