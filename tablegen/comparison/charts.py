@@ -143,6 +143,8 @@ def _errors(a: PlayedAxis, b: PlayedAxis) -> Iterator[Chart]:
         curves = [inside(branch) for branch in branches]
         title = f"{a.axis} residual {side}, simulated"
         yield overlay(residual, title, place, "residual [% of the line]", *curves, marks=zero)
+        if any(np.isnan(branch.scaling).any() for branch in branches):  # an axis that rests between steps
+            continue
         curves = [(branch.scaling_position, branch.scaling) for branch in branches]
         title = f"{a.axis} scaling error {side}, simulated"
         yield overlay(scaling, title, place, "scaling error [%]", *curves, marks=zero)

@@ -60,8 +60,8 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
 
 def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
     rms, scaling, mismatch, size = image_errors(correction.run)
-    mismatch_text = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
-    return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", mismatch_text, f"{size:+.3g}")
+    scaling_text, mismatch_text = ("-" if np.isnan(value) else f"{value:.3g}" for value in (scaling, mismatch))
+    return row(f"{axis} {correction.title}", f"{rms:.3g}", scaling_text, mismatch_text, f"{size:+.3g}")
 
 
 def inside(branch: BranchError) -> tuple[Floats, Floats]:
@@ -92,6 +92,9 @@ def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
 def _charts(line: LinePlan, correction: PlayedCorrection) -> list[Chart]:
     run = correction.run
     errors = [(side, getattr(run.imaged, side)) for side in SIDES if side in run.directions]
+    errors = [(side, one) for side, one in errors if not np.isnan(one.scaling).any()]
+    if not errors:
+        return [residual_chart(line.axis, correction)]
     scaling = Chart(
         f"scaling-{line.axis}-{correction.name}",
         f"{line.axis} scaling error, {correction.title}",

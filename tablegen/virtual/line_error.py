@@ -21,6 +21,7 @@ class BranchError:
     """The errors of one direction; arrays run with the position x, 0 at the left end for both directions.
 
     ``residual`` stands at ``position``, shape (1001,) each; ``scaling`` at ``scaling_position``; both in percent.
+    ``scaling`` is NaN where the axis rests at x = 0.5, as in the middle of a long step.
     """
 
     position: Floats
@@ -146,7 +147,9 @@ def line_error(
         baseline = min(round(CHORD * (POINTS - 1)), last - first - 1)
         slope = (y[first + baseline : last] - y[first : last - baseline]) / (baseline / (POINTS - 1))
         middle = 0.5 * (x[first + baseline : last] + x[first : last - baseline])
-        scaling = 100.0 * (1.0 - slope / float(np.interp(0.5, middle, slope)))
+        reference = float(np.interp(0.5, middle, slope))
+        # A y of few steps rests between two of them: there is no slope that others could be relative to.
+        scaling = np.full(len(slope), np.nan) if reference == 0.0 else 100.0 * (1.0 - slope / reference)
         return BranchError(x, 100.0 * (y - x), middle, scaling, window)
 
     return LineError(size, branch(turn * x), branch(turn + (1.0 - turn) * (1.0 - x)))

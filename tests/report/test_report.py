@@ -23,6 +23,7 @@ from tablegen.html_report.blocks import ScaleBar
 from tablegen.html_report.own_image import image_remarks, own_picture
 from tablegen.html_report.page import charts_of, page, sections
 from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.playing import played_axes
 from tablegen.html_report.ranking import ranked
 from tablegen.html_report.subject import OwnImage, Subject
 
@@ -331,7 +332,6 @@ def test_a_curve_in_the_page_is_the_drive(found: tuple[bytes, Page], example: Pa
 
 def test_the_simulated_mismatch_is_what_the_certificate_expects(subject: Subject) -> None:
     """Two ways to it: emitted codes on the loop of their stroke here, the float waveform on it there."""
-    from tablegen.html_report.playing import played_axes
     from tablegen.virtual.own_run import image_errors
 
     x, _ = played_axes(subject.planned)  # type: ignore[arg-type]
@@ -483,3 +483,24 @@ def test_pictures_have_scale_bars(found: tuple[bytes, Page]) -> None:
     page = found[0].decode("utf-8")
     bars = re.findall(r'<path class="bar" d="M40 \d+h(\d+)"/>\s*<text[^>]*>([^<]*)</text>', page)
     assert bars == [("125", "20 nm")] * 4
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("lines", [16, 100])
+def test_an_axis_that_rests_in_the_middle_has_no_scaling_error(tmp_path: Path, lines: int) -> None:
+    """A chord is shorter than a step of 16 lines; the way back of 100 has few. Both were divided by a slope of 0."""
+    edits = ("y.motion = 'step'", f"timing.lines = {lines}", f"y.band_limit.harmonics = {7 if lines == 16 else 40}")
+    slow = ("timing.line_rate_hz = 50", "amplifier.max_slew_v_per_s = 1e9", "- [limits]")
+    path = write_pair(tmp_path, edited(SCAN, *edits, *slow))
+    subject = planned_scan(path, remedies=False)
+    assert subject.planned is not None
+    run = played_axes(subject.planned)[1].emitted
+    assert run is not None
+    assert np.all(np.isnan(run.error.forward.scaling)) == (lines == 16)
+    assert np.all(np.isnan(run.error.backward.scaling))
+    assert np.max(np.abs(run.error.forward.residual)) > 0.3, "the residual has the steps"
+    charts = charts_of(sections(subject))
+    assert ("scaling-y-laws" in charts) == (lines == 100)
+    assert "residual-y-laws" in charts
+    for chart in charts.values():
+        assert all(np.all(np.isfinite(curve.y)) for curve in chart.curves), chart.key
