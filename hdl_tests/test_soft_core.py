@@ -1,4 +1,4 @@
-"""``examples/firmware/soft_core`` whole: firmware on VexRiscv, its bus and the sequencer, from bytes on the serial line.
+"""``examples/firmware/soft_core`` whole: firmware on VexRiscv, its bus, the sequencer; from bytes on its line.
 
 Every line that is played is the model's, before and after an upload.
 """
@@ -23,7 +23,16 @@ from replacing import replace
 
 from tablegen.base.resources import resource_folder, verilog_runtime
 from tablegen.link.frames import Frame
-from tablegen.link.messages import ANSWER, REFUSAL, DeviceInfo, DeviceState, DeviceStatus, Reason, Refusal, Request
+from tablegen.link.messages import (
+    REFUSAL,
+    DeviceInfo,
+    DeviceState,
+    DeviceStatus,
+    Reason,
+    Refusal,
+    Request,
+    Upload,
+)
 from tablegen.link.program_image import ProgramImage, make_image
 from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
 
@@ -33,36 +42,42 @@ EXAMPLE = REPOSITORY / "examples" / "firmware" / "soft_core"
 CORE = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_Lite.v"
 UPDATE_RATE_HZ = 50_000
 CLOCKS_PER_TICK = 50
-CLOCKS_PER_BIT = 16
+CLOCKS_PER_BIT = 8
 LINE = 331  # ticks
 BAUD = 2400  # by which a client reckons its time-outs; a simulation has no rate of its own
-STEP = 20_000  # clocks between two looks at what has come
-MOST_STEPS = 400
+STEP = 5_000  # clocks between two looks at what has come
+MOST_STEPS = 2_000
 SCAN: dict[str, object] = {
     "limits": REMOVED,
     "timing": {"pixels": 40, "lines": 8, "line_rate_hz": 100.0, "ticks_per_line": LINE, "settle_lines": 1},
     "dac.update_rate_hz": float(UPDATE_RATE_HZ),
     "x.band_limit.harmonics": 16,
     "y.band_limit.harmonics": 8,
-    "x.table.length": 256,
-    "y.table.length": 128,
+    "x.table.length": 64,
+    "y.table.length": 32,
 }
+BAD_TABLE = 4  # DAC_BAD_TABLE of dac_sequencer.h
+MOST_FRAMES = 65_535  # of the register
+SLOW_LINE = 20_000  # ticks: a program waits long for the next one
+SLOW = {"timing.ticks_per_line": SLOW_LINE, "timing.line_rate_hz": UPDATE_RATE_HZ / SLOW_LINE}
+SHORT_TABLE = {"x.table.length": 32, "x.band_limit.harmonics": 8}
 
 
 @dataclass(frozen=True, eq=False)
 class Scans:
-    """What the device begins with, two others, and one with longer tables."""
+    """What the device begins with, and others: with slow lines, and with a shorter table."""
 
     boot: Build
     first: Build
     second: Build
-    longer: Build
+    slow: Build
+    shorter: Build
 
     def check(self, simulation: Simulation) -> LineCheck:
         """Hold the log against the model. Raises ``WrongLine``."""
         check = LineCheck(self.boot.plan.program)
-        check.offer("first", self.first.plan.program)
-        check.offer("second", self.second.plan.program)
+        for name in ("first", "second", "slow"):
+            check.offer(name, getattr(self, name).plan.program)
         check.follow(PlayedLine.parse(line) for line in simulation.lines())
         return check
 
@@ -74,7 +89,7 @@ def scan_of(size_nm: float, **more: object) -> Variant:
 @pytest.fixture(scope="module")
 def scans(tmp_path_factory: pytest.TempPathFactory) -> Scans:
     folder = tmp_path_factory.mktemp("scans")
-    variants = scan_of(200.0), scan_of(150.0), scan_of(90.0), scan_of(90.0, **{"x.table.length": 128})
+    variants = scan_of(200.0), scan_of(150.0), scan_of(90.0), scan_of(150.0, **SLOW), scan_of(90.0, **SHORT_TABLE)
     return Scans(*(build(folder / str(at), variant) for at, variant in enumerate(variants)))
 
 
@@ -186,8 +201,7 @@ def test_it_says_what_it_is(host: Host, scans: Scans) -> None:
 
 def test_uploads_while_a_scan_plays(host: Host, scans: Scans) -> None:
     host.start()
-    uploads = [(scans.first, False), (scans.second, True), (scans.first, True)]
-    for generation, (built, fourier) in enumerate(uploads, 2):
+    for generation, (built, fourier) in enumerate([(scans.first, False), (scans.second, True)], 2):
         image = image_of(built, fourier)
         assert is_answer(host.send(image), Request.DATA)
         answer = host.ask(host.talk.commit(image))
@@ -203,7 +217,7 @@ def test_uploads_while_a_scan_plays(host: Host, scans: Scans) -> None:
     host.play(10)
     assert host.status().state is DeviceState.PARKED
     check = scans.check(host.simulation)
-    assert check.taken == {1: "boot", 2: "first", 3: "second", 4: "first"}
+    assert check.taken == {1: "boot", 2: "first", 3: "second"}
     assert check.lines > 12
 
     # Negative control: one line, as if a tick of it had been another.
@@ -211,3 +225,114 @@ def test_uploads_while_a_scan_plays(host: Host, scans: Scans) -> None:
     log[5] = replace(log[5], crc=log[5].crc ^ 1)
     with pytest.raises(WrongLine):
         LineCheck(scans.boot.plan.program).follow(log)
+
+
+def damaged(image: ProgramImage) -> ProgramImage:
+    """The image with a bit of its last word changed, and the CRC of what it was."""
+    data = bytearray(image.data)
+    data[-1] ^= 1
+    return replace(image, data=bytes(data))
+
+
+def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans) -> None:
+    """A damaged image; one for other tables, which the hardware does not have; an open interlock."""
+    host.start()
+    whole = image_of(scans.first)
+    image = damaged(whole)
+    assert is_answer(host.send(image), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(image))) == (Reason.IMAGE, 0)
+    shorter = image_of(scans.shorter)
+    assert is_answer(host.send(shorter), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(shorter))) == (Reason.REFUSED, BAD_TABLE)
+    host.simulation.set(permit=0)
+    assert is_answer(host.send(whole), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(whole))) == (Reason.INTERLOCK, 0)
+    assert refusal(host.ask(host.talk.acting(Request.ARM, struct.pack("<I", MOST_FRAMES + 1)))) == (Reason.TICKS, 0)
+    host.play(2)
+    now = host.status()
+    assert (now.state, now.generation, now.faults, now.permits) == (DeviceState.PLAYING, 1, 0, False)
+    assert scans.check(host.simulation).taken == {1: "boot"}
+
+    host.simulation.set(permit=1)
+    host.play(1)
+    assert is_answer(host.ask(host.talk.commit(whole)), Request.COMMIT)  # the upload has stayed
+    host.play(2)
+    assert scans.check(host.simulation).taken == {1: "boot", 2: "first"}
+
+
+def test_a_program_that_waits_is_withdrawn(host: Host, scans: Scans) -> None:
+    host.start()
+    slow, second = image_of(scans.slow), image_of(scans.second)
+    host.send(slow)
+    assert is_answer(host.ask(host.talk.commit(slow)), Request.COMMIT)
+    host.send(second)
+    wire = host.talk.commit(second)
+    host.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + STEP, wire)
+    while host.status().upload is Upload.CHECKING:
+        pass
+    assert host.status().upload is Upload.WAITING
+    wire = host.talk.acting(Request.ABORT)
+    received = host.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + 50 * STEP, wire)
+    first, then = host.talk.answers(received)
+    assert refusal(first) == (Reason.WITHDRAWN, 0)
+    assert is_answer(then, Request.ABORT)
+    assert struct.unpack("<I", then.payload) == (2,)
+    now = host.status()
+    assert (now.upload, now.generation, now.faults) == (Upload.NONE, 2, 0)
+    assert is_answer(host.ask(host.talk.acting(Request.PARK)), Request.PARK)
+    host.play(10)
+
+    # The bank is free again.
+    host.send(second)
+    assert is_answer(host.ask(host.talk.commit(second)), Request.COMMIT)
+    assert is_answer(host.ask(host.talk.acting(Request.ARM, struct.pack("<I", 1))), Request.ARM)
+    assert is_answer(host.ask(host.talk.acting(Request.TRIGGER)), Request.TRIGGER)
+    host.play(20)
+    now = host.status()
+    assert (now.state, now.generation, now.faults) == (DeviceState.PARKED, 3, 0)
+    assert scans.check(host.simulation).taken == {1: "boot", 2: "slow", 3: "second"}
+
+
+def command(*arguments: str | Path | int) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "tablegen", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=PATIENCE_S,
+    )
+
+
+def test_the_command_line(simulation: Simulation, scans: Scans) -> None:
+    simulation.run(CLOCKS_PER_TICK * LINE * 12)
+    with simulation.bridged() as port:
+        where = ("--port", port, "--baud", BAUD)
+        steps: list[tuple[str | Path | int, ...]] = [
+            ("trigger", *where),
+            ("upload", scans.first.folder, *where),
+            ("readback", scans.first.folder, *where),
+            ("status", *where, "--json"),
+            ("park", *where),
+        ]
+        done = [command(*step) for step in steps]
+        for step, each in zip(steps, done, strict=True):
+            assert each.returncode == 0, (step, each.stdout, each.stderr)
+        assert json.loads(done[3].stdout)
+    assert scans.check(simulation).taken == {1: "boot", 2: "first"}
+
+
+def test_words_in_another_order_are_heard(scans: Scans, tmp_path: Path) -> None:
+    """A control: firmware that writes each second word of a table in front of the first."""
+    copy = tmp_path / "firmware"
+    shutil.copytree(EXAMPLE.parent, copy, ignore=shutil.ignore_patterns("build"))
+    source = copy / "soft_core" / "sequencer_registers.c"
+    text = source.read_text("utf-8")
+    right = "SEQUENCER(offset + 4 * i) = (uint32_t)p->table[i];"
+    assert text.count(right) == 1
+    source.write_text(text.replace(right, right.replace("[i]", "[i ^ 1]")), "utf-8")
+    device = compiled_device(tmp_path / "device", copy / "soft_core", scans.boot.folder.parent / "annexin_200nm.toml")
+    with Simulation(device) as simulation:
+        simulation.run(CLOCKS_PER_TICK * LINE * 12)
+        Host(simulation, Talk()).start()
+        with pytest.raises(WrongLine):
+            scans.check(simulation)
