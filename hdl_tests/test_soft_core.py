@@ -58,7 +58,7 @@ SCAN: dict[str, object] = {
 }
 BAD_TABLE = 4  # DAC_BAD_TABLE of dac_sequencer.h
 MOST_FRAMES = 65_535  # of the register
-SLOW_LINE = 20_000  # ticks: a program waits long for the next one
+SLOW_LINE = 40_000  # ticks: a program waits long for the next one
 SLOW = {"timing.ticks_per_line": SLOW_LINE, "timing.line_rate_hz": UPDATE_RATE_HZ / SLOW_LINE}
 SHORT_TABLE = {"x.table.length": 32, "x.band_limit.harmonics": 8}
 
@@ -268,9 +268,9 @@ def test_a_program_that_waits_is_withdrawn(host: Host, scans: Scans) -> None:
     host.send(second)
     wire = host.talk.commit(second)
     host.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + STEP, wire)
-    while host.status().upload is Upload.CHECKING:
+    while (upload := host.status().upload) is Upload.CHECKING:
         pass
-    assert host.status().upload is Upload.WAITING
+    assert upload is Upload.WAITING
     wire = host.talk.acting(Request.ABORT)
     received = host.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + 50 * STEP, wire)
     first, then = host.talk.answers(received)
