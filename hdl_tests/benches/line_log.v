@@ -1,5 +1,5 @@
-// The log of the lines that a sequencer plays: LINES gets six hexadecimal numbers for each, as tests/helpers/line_log.py
-// has them.
+// The log of the lines that a sequencer plays: LINES gets six hexadecimal numbers for each, as
+// tests/helpers/line_log.py has them.
 
 `timescale 1ns / 1ps
 `default_nettype none

@@ -1,7 +1,7 @@
 // Bench of examples/firmware/soft_core: the whole device, with an asynchronous line to cocotb_loader.py.
 //
-// A command: `host_count` bytes of `host_data` go onto the line, and `run_clocks` go by. Then `done` is `go`. line_log.v
-// writes LINES.
+// A command: `host_count` bytes of `host_data` go onto the line, and `run_clocks` go by. Then `done` is `go`.
+// line_log.v writes LINES.
 
 `timescale 1ns / 1ps
 `default_nettype none

@@ -1,7 +1,7 @@
 /* The producer's functions of dac_sequencer.h, for the sequencer in the FPGA: this file takes the place of
- * dac_sequencer.c, and the link does not see the difference. dac_program.c still checks a program, and keeps its bank in
- * `sequencer`, from which the link takes the program that plays; the linker's --wrap then has it written to the
- * registers. */
+ * dac_sequencer.c, and the link does not see the difference. dac_program.c still checks a program and keeps it in
+ * `sequencer`, where the link finds what plays. The linker's --wrap puts __wrap_dac_sequencer_load around its
+ * dac_sequencer_load, so that a program that is loaded is also written to the registers. */
 #include "dac_registers.h"
 #include "scan.h"
 #include "soft_core.h"
@@ -41,8 +41,8 @@ static bool power_up(dac_axis *axis, const dac_converter *converter)
 bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
 {
     (void)swaps();
-    return SEQUENCER(DAC_IDENTITY_ADDRESS) == DAC_IDENTITY_VALUE && SEQUENCER(DAC_VERSION_ADDRESS) == DAC_VERSION_VALUE
-        && power_up(&s->x, x) && power_up(&s->y, y);
+    return SEQUENCER(DAC_IDENTITY_ADDRESS) == DAC_IDENTITY_VALUE
+        && SEQUENCER(DAC_VERSION_ADDRESS) == DAC_VERSION_VALUE && power_up(&s->x, x) && power_up(&s->y, y);
 }
 
 /* A program that was committed waits until it is counted, which is later than the registers free its bank. */
