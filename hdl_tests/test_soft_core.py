@@ -9,12 +9,13 @@ import struct
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import pythondata_cpu_vexriscv
-from building import BENCHES, REMOVED, REPOSITORY, Build, Variant, build, run_warned
+from building import BENCHES, NAME, REMOVED, REPOSITORY, Build, Variant, build, run_warned
 from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_talk import Talk, is_answer
@@ -41,6 +42,7 @@ pytestmark = pytest.mark.rest
 EXAMPLE = REPOSITORY / "examples" / "firmware" / "soft_core"
 CORE = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_Lite.v"
 UPDATE_RATE_HZ = 50_000
+FIRMWARE = "firmware.mem"
 CLOCKS_PER_TICK = 50
 CLOCKS_PER_BIT = 8
 LINE = 331  # ticks
@@ -73,6 +75,11 @@ class Scans:
     slow: Build
     shorter: Build
 
+    @property
+    def scan(self) -> Path:
+        """The file that the firmware is built from."""
+        return self.boot.folder.parent / f"{NAME}.toml"
+
     def check(self, simulation: Simulation) -> LineCheck:
         """Hold the log against the model. Raises ``WrongLine``."""
         check = LineCheck(self.boot.plan.program)
@@ -91,36 +98,6 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Scans:
     folder = tmp_path_factory.mktemp("scans")
     variants = scan_of(200.0), scan_of(150.0), scan_of(90.0), scan_of(150.0, **SLOW), scan_of(90.0, **SHORT_TABLE)
     return Scans(*(build(folder / str(at), variant) for at, variant in enumerate(variants)))
-
-
-def compiled_firmware(folder: Path, example: Path, scan: Path) -> Path:
-    command = ["make", "-C", example, f"SCAN={scan}", f"BUILD={folder}", f"TABLEGEN={sys.executable} -m tablegen"]
-    clock = f"CLOCK_HZ={UPDATE_RATE_HZ * CLOCKS_PER_TICK}", f"CLOCKS_PER_TICK={CLOCKS_PER_TICK}"
-    run_warned([*command, *clock])
-    return folder / "firmware.mem"
-
-
-def compiled_device(folder: Path, example: Path, scan: Path) -> CompiledDesign:
-    """The device with its firmware in a bench."""
-    firmware = compiled_firmware(folder / "firmware", example, scan)
-    bus = sorted((resource_folder("firmware_templates") / "verilog" / "bus").glob("dac_*.v"))
-    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, example / "soft_core.v", CORE, *bus]
-    runtime = [path for path in verilog_runtime() if path.name != "program_loader.v"]
-    values: dict[str, int | str] = {"FIRMWARE": str(firmware), "LINES": LINES}
-    values |= {"CLOCKS_PER_TICK": CLOCKS_PER_TICK, "CLOCKS_PER_BIT": CLOCKS_PER_BIT}
-    design = Design([*sources, *runtime], "soft_core_bench", values, includes=[firmware.parent / "scan"])
-    return compile_design("verilator", design, folder / "model")
-
-
-@pytest.fixture(scope="module")
-def device(scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> CompiledDesign:
-    return compiled_device(tmp_path_factory.mktemp("device"), EXAMPLE, scans.boot.folder.parent / "annexin_200nm.toml")
-
-
-@pytest.fixture
-def simulation(device: CompiledDesign) -> Iterator[Simulation]:
-    with Simulation(device) as running:
-        yield running
 
 
 @dataclass
@@ -163,6 +140,55 @@ class Host:
 
     def play(self, lines: int) -> None:
         self.simulation.run(CLOCKS_PER_TICK * LINE * lines)
+
+
+def compiled_firmware(folder: Path, example: Path, scan: Path) -> Path:
+    command = ["make", "-C", example, f"SCAN={scan}", f"BUILD={folder}", f"TABLEGEN={sys.executable} -m tablegen"]
+    clock = f"CLOCK_HZ={UPDATE_RATE_HZ * CLOCKS_PER_TICK}", f"CLOCKS_PER_TICK={CLOCKS_PER_TICK}"
+    run_warned([*command, *clock])
+    return folder / FIRMWARE
+
+
+@pytest.fixture(scope="module")
+def device(scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> CompiledDesign:
+    """The device with its firmware in a bench."""
+    folder = tmp_path_factory.mktemp("device")
+    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scans.scan)
+    bus = sorted((resource_folder("firmware_templates") / "verilog" / "bus").glob("dac_*.v"))
+    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *bus]
+    runtime = [path for path in verilog_runtime() if path.name != "program_loader.v"]
+    values: dict[str, int | str] = {"FIRMWARE": FIRMWARE, "LINES": LINES}
+    values |= {"CLOCKS_PER_TICK": CLOCKS_PER_TICK, "CLOCKS_PER_BIT": CLOCKS_PER_BIT}
+    design = Design([*sources, *runtime], "soft_core_bench", values, includes=[firmware.parent / "scan"])
+    compiled = compile_design("verilator", design, folder / "model")
+    shutil.copy(firmware, compiled.folder)
+    return compiled
+
+
+@contextmanager
+def edited(device: CompiledDesign, scans: Scans, folder: Path, name: str, right: str, wrong: str) -> Iterator[Host]:
+    """Run the device with an edited file of its firmware."""
+    copy = folder / "firmware"
+    shutil.copytree(EXAMPLE.parent, copy, ignore=shutil.ignore_patterns("build"))
+    source = copy / "soft_core" / name
+    text = source.read_text("utf-8")
+    assert text.count(right) == 1
+    source.write_text(text.replace(right, wrong), "utf-8")
+    firmware = compiled_firmware(folder / "build", copy / "soft_core", scans.scan)
+    usual = (device.folder / FIRMWARE).read_bytes()
+    shutil.copy(firmware, device.folder)
+    try:
+        with Simulation(device) as simulation:
+            simulation.run(CLOCKS_PER_TICK * LINE * 12)
+            yield Host(simulation, Talk())
+    finally:
+        (device.folder / FIRMWARE).write_bytes(usual)
+
+
+@pytest.fixture
+def simulation(device: CompiledDesign) -> Iterator[Simulation]:
+    with Simulation(device) as running:
+        yield running
 
 
 @pytest.fixture
@@ -321,18 +347,31 @@ def test_the_command_line(simulation: Simulation, scans: Scans) -> None:
     assert scans.check(simulation).taken == {1: "boot", 2: "first"}
 
 
-def test_words_in_another_order_are_heard(scans: Scans, tmp_path: Path) -> None:
+def test_the_interlock_stops_what_the_firmware_would_commit(
+    device: CompiledDesign, scans: Scans, tmp_path: Path
+) -> None:
+    right = "(SYSTEM_STATE & STATE_PERMIT) != 0"
+    with edited(device, scans, tmp_path, "main.c", right, "true") as host:
+        host.start()
+        host.simulation.set(permit=0)
+        image = image_of(scans.first)
+        host.send(image)
+        assert refusal(host.ask(host.talk.commit(image))) == (Reason.TICKS, 0)
+        host.play(2)
+        now = host.status()
+        assert (now.state, now.generation, now.faults) == (DeviceState.PLAYING, 1, 0)
+        host.simulation.set(permit=1)
+        host.play(2)
+        assert is_answer(host.ask(host.talk.commit(image)), Request.COMMIT)
+        host.play(2)
+        assert scans.check(host.simulation).taken == {1: "boot", 2: "first"}
+
+
+def test_words_in_another_order_are_heard(device: CompiledDesign, scans: Scans, tmp_path: Path) -> None:
     """A control: firmware that writes each second word of a table in front of the first."""
-    copy = tmp_path / "firmware"
-    shutil.copytree(EXAMPLE.parent, copy, ignore=shutil.ignore_patterns("build"))
-    source = copy / "soft_core" / "sequencer_registers.c"
-    text = source.read_text("utf-8")
     right = "SEQUENCER(offset + 4 * i) = (uint32_t)p->table[i];"
-    assert text.count(right) == 1
-    source.write_text(text.replace(right, right.replace("[i]", "[i ^ 1]")), "utf-8")
-    device = compiled_device(tmp_path / "device", copy / "soft_core", scans.boot.folder.parent / "annexin_200nm.toml")
-    with Simulation(device) as simulation:
-        simulation.run(CLOCKS_PER_TICK * LINE * 12)
-        Host(simulation, Talk()).start()
+    wrong = right.replace("[i]", "[i ^ 1]")
+    with edited(device, scans, tmp_path, "sequencer_registers.c", right, wrong) as host:
+        host.start()
         with pytest.raises(WrongLine):
-            scans.check(simulation)
+            scans.check(host.simulation)
