@@ -58,6 +58,7 @@ SCAN: dict[str, object] = {
     "x.table.length": 64,
     "y.table.length": 32,
 }
+UNDERRUN = 8  # a bit of the faults
 BAD_TABLE = 4  # DAC_BAD_TABLE of dac_sequencer.h
 MOST_FRAMES = 65_535  # of the register
 SLOW_LINE = 40_000  # ticks: a program waits long for the next one
@@ -223,6 +224,21 @@ def test_it_says_what_it_is(host: Host, scans: Scans) -> None:
     assert (now.state, now.generation, now.faults) == (DeviceState.PLAYING, 1, 0)
     assert now.hash.hex() == scans.boot.manifest["hash"]
     assert 0 < now.line < 8
+
+
+def test_faults_are_those_of_the_sequencer(host: Host) -> None:
+    host.start()
+    host.simulation.set(underrun=1)
+    host.play(1)
+    host.simulation.set(underrun=0)
+    now = host.status()
+    assert now.faults == UNDERRUN
+    assert now.fault_counts[:3] == (0, 0, 0)
+    assert now.fault_counts[3] >= LINE
+    assert is_answer(host.ask(host.talk.acting(Request.CLEAR)), Request.CLEAR)
+    host.play(1)
+    now = host.status()
+    assert (now.faults, now.fault_counts) == (0, (0, 0, 0, 0))
 
 
 def test_uploads_while_a_scan_plays(host: Host, scans: Scans) -> None:

@@ -1,7 +1,7 @@
 // Bench of examples/firmware/soft_core: the whole device, with an asynchronous line to cocotb_loader.py.
 //
 // A command: `host_count` bytes of `host_data` go onto the line, and `run_clocks` go by. Then `done` is `go`.
-// line_log.v writes LINES.
+// line_log.v writes LINES. While `underrun` is set, the converters miss samples.
 
 `timescale 1ns / 1ps
 `default_nettype none
@@ -13,7 +13,7 @@ module soft_core_bench #(
     parameter LINES = ""
 );
     localparam MOST = 1024;
-    reg clock = 0, go = 0, done = 0, until_idle = 0, permit = 1, finished = 0;
+    reg clock = 0, go = 0, done = 0, until_idle = 0, permit = 1, underrun = 0, finished = 0;
     reg [31:0] run_clocks = 0, clocks_left = 0;
     reg [16*MOST-1:0] host_data = 0;
     reg [15:0] host_count = 0, device_count = 0;
@@ -77,6 +77,10 @@ module soft_core_bench #(
             end
         end
     end
+
+    always @(posedge clock)
+        if (underrun) force dut.missed = 1'b1;
+        else release dut.missed;
 
     line_log #(.LINES(LINES)) lines (
         .clock(clock), .strobe(dut.strobe), .x_code(dut.x_code), .y_code(dut.y_code), .markers({
