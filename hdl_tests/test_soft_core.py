@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pytest
 import pythondata_cpu_vexriscv
-from building import BENCHES, NAME, REMOVED, REPOSITORY, Build, Variant, build, run_warned
+from boards import TICKS, Board, ecp5_library, expected_words, make
+from building import BENCHES, NAME, REMOVED, REPOSITORY, Build, Variant, build, run_warned, write_variant
 from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_talk import Talk, is_answer
@@ -23,6 +24,7 @@ from loader_bridge import LINE_LOG, LINES, Simulation
 from replacing import replace
 
 from tablegen.base.resources import resource_folder, verilog_runtime
+from tablegen.config.load import load
 from tablegen.link.frames import Frame
 from tablegen.link.messages import (
     REFUSAL,
@@ -35,6 +37,7 @@ from tablegen.link.messages import (
     Upload,
 )
 from tablegen.link.program_image import ProgramImage, make_image
+from tablegen.planning.line_plan import make_plan
 from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
 
 pytestmark = pytest.mark.rest
@@ -61,6 +64,14 @@ SCAN: dict[str, object] = {
 UNDERRUN = 8  # a bit of the faults
 BAD_TABLE = 4  # DAC_BAD_TABLE of dac_sequencer.h
 MOST_FRAMES = 65_535  # of the register
+ULX3S = Board("ulx3s", clocks_per_tick=50, clocks_per_bit=217, limit=3_000_000)
+ON_A_BOARD: dict[str, object] = {
+    "limits": REMOVED,
+    "x.band_limit.harmonics": 5,
+    "y.band_limit.harmonics": 5,
+    "x.table.length": 64,
+    "y.table.length": 32,
+}
 SLOW_LINE = 40_000  # ticks: a program waits long for the next one
 SLOW = {"timing.ticks_per_line": SLOW_LINE, "timing.line_rate_hz": UPDATE_RATE_HZ / SLOW_LINE}
 SHORT_TABLE = {"x.table.length": 32, "x.band_limit.harmonics": 8}
@@ -381,6 +392,32 @@ def test_the_interlock_stops_what_the_firmware_would_commit(
         assert is_answer(host.ask(host.talk.commit(image)), Request.COMMIT)
         host.play(2)
         assert scans.check(host.simulation).taken == {1: "boot", 2: "first"}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_the_cells_play_the_model_once_they_are_triggered(tmp_path: Path) -> None:
+    """The cells that yosys makes of the device on a ULX3S, from bytes on the line to the pins of the converters."""
+    scan = write_variant(tmp_path / "scan", Variant(ON_A_BOARD))
+    target, folder = tmp_path / "build", tmp_path / "cells"
+    folder.mkdir()
+    make(EXAMPLE, f"{target}/ulx3s.json", f"BUILD={target}", f"PYTHON={sys.executable}", f"SCAN={scan}")
+    cells = ULX3S.simulator(target / "ulx3s.json", folder, *ecp5_library(folder))
+    fault, answers, words = ULX3S.played(cells)
+    assert all(is_answer(*pair) for pair in zip(answers, (Request.HELLO, Request.ARM, Request.TRIGGER), strict=False))
+    assert not fault
+    assert len(answers) >= 2
+    assert all(len(each) >= TICKS - 2 for each in words)
+    whole = expected_words(make_plan(load(scan)).program)
+    assert words == [each[: len(words[0])] for each in whole]
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_the_bitstream_is_made(tmp_path: Path) -> None:
+    """It is placed in time for the clock of the board, or nextpnr ends with an error."""
+    make(EXAMPLE, "bitstream", f"BUILD={tmp_path}", f"PYTHON={sys.executable}")
+    assert (tmp_path / "ulx3s.bit").stat().st_size > 100_000
 
 
 def test_words_in_another_order_are_heard(device: CompiledDesign, scans: Scans, tmp_path: Path) -> None:
