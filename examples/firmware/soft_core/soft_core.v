@@ -108,7 +108,7 @@ module soft_core #(
         endcase
 
     // System: 0 a received byte, or one to send; 4 state; 8 line of the frame; 12 programs taken. What was received
-    // waits in 2048 bytes, as many as the frames that the link lets a host send without an answer.
+    // waits in 2048 bytes, more than the link lets a host send without an answer.
     localparam FIFO_BITS = 11;
     wire system = at_once && target == SYSTEM && of_data;
     wire send = system && write && address[1:0] == 2'd0;
