@@ -35,7 +35,7 @@ README_PACKAGES := ca-certificates git gpgv make python3 python3-venv
 # What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
 CHECK_TOOLS := gcc libc6-dev iverilog libpython
 COMMON_TOOLS := $(CHECK_TOOLS) make g++ ccache clang libclang-rt-dev cmake ninja-build ghdl srecord tcl chromium groff man-db
-HDL_TOOLS := make g++ ccache iverilog libpython yosys nextpnr-ice40 fpga-icestorm z3
+HDL_TOOLS := make g++ ccache iverilog libpython yosys nextpnr-ice40 fpga-icestorm z3 gcc-riscv64-unknown-elf
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
     arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm cargo

@@ -6,8 +6,8 @@ What is simulated are the cells that ``make`` places.
 from pathlib import Path
 
 import pytest
-from boards import TICKS, Board, expected_words, make
-from building import BENCHES, NAME, tool
+from boards import TICKS, Board, ecp5_library, expected_words, make
+from building import NAME
 from link_talk import is_answer
 
 from tablegen.api.build import build
@@ -25,13 +25,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def cells(board: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("cells")
-    library = folder / "cells.v"
-    share = Path(tool("yosys")).resolve().parents[1] / "share" / "yosys" / "ecp5"
-    text = (share / "cells_sim.v").read_text("utf-8")
-    assert text.count("module DP16KD(") == 1
-    library.write_text(text.replace("module DP16KD(", "module DP16KD_of_yosys("), "utf-8")
-    libraries = [library, BENCHES / "dp16kd.v"]
-    return ULX3S.simulator(board / "build" / "ulx3s.json", folder, libraries, [share])
+    return ULX3S.simulator(board / "build" / "ulx3s.json", folder, *ecp5_library(folder))
 
 
 @pytest.mark.long

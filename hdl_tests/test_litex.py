@@ -24,7 +24,7 @@ ORIGIN = 0x9000_0000
 CLOCK_HZ = 8_000_000  # 16 clocks a tick
 TICKS = 700
 CATCHING_UP = 30  # ticks in which the guard has certainly reached the line
-SCAN = {
+SCAN: dict[str, Any] = {
     "limits": REMOVED,
     "timing": {"pixels": 50, "lines": 8, "line_rate_hz": 1500.0, "ticks_per_line": 331},
     "x.table.length": 128,
@@ -37,6 +37,8 @@ BENCH = """
 module bench;
     `include "dac_registers.vh"
     localparam [31:0] ORIGIN = 32'hORIGIN;
+    localparam CLOCKS_PER_TICK = 16;
+    `include "counters.vh"
     reg clock = 0, cyc = 0, we = 0;
     reg [31:0] address = 0, data = 0;
     wire [31:0] read;
@@ -70,6 +72,9 @@ module bench;
         while (!(read & DAC_STATUS_WRITABLE_MASK)) access(0, DAC_STATUS_ADDRESS, 0);
         access(1, DAC_ARM_ADDRESS, 0);
         access(1, DAC_COMMAND_ADDRESS, DAC_COMMAND_TRIGGER_MASK);
+        repeat (500 * CLOCKS_PER_TICK) @(posedge clock);
+        access(0, LINE_NUMBER - ORIGIN, 0);
+        access(0, SWAPS - ORIGIN, 0);
     end
     always @(posedge clock) if (strobe) begin
         if (line) playing = 1;
@@ -124,7 +129,19 @@ def generated(example: Any, folder: Path) -> list[str]:
         soc.comb += pad.eq(getattr(soc.scan, signal))
     soc.finalize()
     platform.get_verilog(soc, name="soc").write(str(folder / "soc.v"))
+    (folder / "counters.vh").write_text(
+        "".join(f"localparam [31:0] {name.upper()} = {csr_address(soc, name)};\n" for name in ("line_number", "swaps")),
+        "ascii",
+    )
     return [str(folder / "soc.v"), *(source[0] for source in platform.sources)]
+
+
+def csr_address(soc: SoCMini, name: str) -> int:
+    """The address of a CSR of the scan."""
+    region = soc.csr.regions["scan"]
+    place = [csr.name for csr in region.obj].index(name)
+    assert all(csr.size <= region.busword for csr in region.obj)
+    return int(region.origin) + 4 * place
 
 
 def played(example: Any, folder: Path, bench: str = BENCH) -> list[str]:
@@ -145,6 +162,7 @@ def test_the_soc_plays_the_scan_of_the_build(example: Any, made: Build) -> None:
     kinds = [(kind, int(at)) for kind, at, _ in accesses[:4]]
     assert kinds == [("read", 0), ("read", 12), ("error", 0xFFFFC), ("error", 0)]
     assert int(accesses[0][2]) == 0x54424C47
+    assert [int(value) for _, _, value in accesses[-2:]] == [500 // SCAN["timing"]["ticks_per_line"], 1]
     words = [tuple(map(int, line.split()[1:])) for line in said if line.startswith("tick")]
     axes = made.plan.x, made.plan.y
     expected = list(zip(*(line.program.output.word(line.codes(0, TICKS)).tolist() for line in axes), strict=True))

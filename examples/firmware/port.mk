@@ -5,11 +5,14 @@
 # CONVERTER is a file of converters/, for ports that send its frames: SPI_CONVERTER in C.
 #
 # A port sets OWN, CPU, LINK (where everything goes) and BOARD_FLAGS before it includes this, and PRIVATELY, which stands
-# in front of commands whose output others must not read.
+# in front of commands whose output others must not read. One for another processor than a Cortex-M sets CROSS and
+# ARCHITECTURE in place of CPU; WITHOUT names files of the runtime that files of its own replace.
 CROSS ?= arm-none-eabi-gcc
 CFLAGS ?= -O2
 BAUD ?= 115200
 CONTROL ?= link
+ARCHITECTURE ?= -mcpu=$(CPU) -mthumb
+COMMIT_MODES ?= 1
 OWN_link := control_link scan_link
 
 TABLEGEN ?= tablegen
@@ -21,15 +24,15 @@ SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
 
 vpath memory.c ..
 vpath %.c ../common
-OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
-COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
+OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(patsubst %.c,%.o,$(filter-out $(WITHOUT:%=$(BUILD)/scan/%),$($(BUILD)/scan_SOURCES)))
+COMPILE := $(CROSS) -std=c99 $(ARCHITECTURE) -ffreestanding -ffunction-sections -fdata-sections \
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
     -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
     $(if $(CONVERTER),-I../converters -DSPI_CONVERTER=$(CONVERTER) -DCONVERTER_HEADER='"$(CONVERTER).h"') \
-    $($(BUILD)/scan_CPPFLAGS) -DDAC_COMMIT_MODES=1 -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
+    $($(BUILD)/scan_CPPFLAGS) -DDAC_COMMIT_MODES=$(COMMIT_MODES) -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
 
 $(BUILD)/firmware.elf: $(OBJECTS) $(LINK_FILES)
-	$(PRIVATELY) $(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
+	$(PRIVATELY) $(CROSS) $(ARCHITECTURE) -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
 
 $(BUILD)/%.o: %.c
 	$(PRIVATELY) $(COMPILE) -c $< -o $@

@@ -12,6 +12,8 @@ In the target of a board::
 
 The registers are those of docs/registers.md, with the constants of dac_registers.h. The scan of the build is there
 after power-up, if the memory files of the build (``*.mem``) are where synthesis runs; ``arm`` and ``trigger`` start it.
+``line_number`` and ``swaps`` are CSRs of the SoC beside them, for firmware that takes uploads as
+examples/firmware/soft_core does.
 """
 
 from fractions import Fraction
@@ -20,6 +22,7 @@ from typing import Any
 
 from litex.gen import LiteXModule
 from litex.soc.interconnect import wishbone
+from litex.soc.interconnect.csr import CSRStatus
 from litex.soc.interconnect.csr_eventmanager import EventManager, EventSourceLevel
 from migen import ClockSignal, If, Instance, ResetSignal, Signal
 
@@ -89,6 +92,7 @@ class TablegenScan(LiteXModule):
             widths[f"p_{letter}_INTERPOLATED"] = degree
             widths[f"p_{letter}_INDEX_BITS"] = axis.index_bits if degree else (len(axis.words) - 1).bit_length()
             widths[f"p_{letter}_WORD_BITS"] = axis.bits
+        self._count()
         host = self._host_port()
         self.specials += Instance(
             "dac_wishbone",
@@ -142,6 +146,18 @@ class TablegenScan(LiteXModule):
             port: (out, Signal(bits)) for out, ports in ((True, driven), (False, read)) for port, bits in ports.items()
         }
         return host | {"playing": (False, self.playing), "parked": (False, self.parked)}
+
+    def _count(self) -> None:
+        """Count lines of the frame and programs, which the registers of the sequencer do not have."""
+        self.line_number = CSRStatus(16, description="Line of the frame; 0 while no scan plays.")
+        self.swaps = CSRStatus(32, description="Programs taken since power-up.")
+        line, swaps = self.line_number.status, self.swaps.status
+        stopped = ~self.playing
+        self.sync += If(
+            self.strobe,
+            If(self.frame | stopped, line.eq(0)).Elif(self.line, line.eq(line + 1)),
+            If(self.swapped, swaps.eq(swaps + 1)),
+        )
 
     def _tick(self, clocks: int) -> Signal:
         """Return a signal that is high for one clock of so many."""

@@ -1,8 +1,8 @@
 // A DP16KD of the ECP5, a block RAM of 1024 words of 18 bits, for simulations of netlists: yosys has its pins alone.
 //
-// By Lattice's TN1264, ECP5 and ECP5-5G Memory Usage Guide, as far as yosys uses it: both ports on rising edges, of one
-// width, without output registers, resets and chip selects; 36 bits are written on port A and read on port B. Of 9 bits
-// a port of 1, 2 or 4 bits has 8. +asleep is the number of clocks after power-up for which every word reads as 0.
+// By Lattice's TN1264, ECP5 and ECP5-5G Memory Usage Guide, as far as yosys uses it: both ports on rising edges, without
+// output registers, resets and chip selects; 36 bits are written on port A and read on port B. Of 9 bits a port of 1, 2
+// or 4 bits has 8. +asleep is the number of clocks after power-up for which every word reads as 0.
 
 `timescale 1ns / 1ps
 `default_nettype none
@@ -54,10 +54,10 @@ module DP16KD #(
         INITVAL_0F, INITVAL_0E, INITVAL_0D, INITVAL_0C, INITVAL_0B, INITVAL_0A, INITVAL_09, INITVAL_08,
         INITVAL_07, INITVAL_06, INITVAL_05, INITVAL_04, INITVAL_03, INITVAL_02, INITVAL_01, INITVAL_00
     };
-    localparam WIDTH = DATA_WIDTH_A, WIDE = WIDTH == 36;
+    localparam WIDE = DATA_WIDTH_A == 36;
 
     generate
-        if (DATA_WIDTH_B != WIDTH || CLKAMUX != "CLKA" || CLKBMUX != "CLKB" || REGMODE_A != "NOREG" ||
+        if ((DATA_WIDTH_B == 36) != WIDE || CLKAMUX != "CLKA" || CLKBMUX != "CLKB" || REGMODE_A != "NOREG" ||
                 REGMODE_B != "NOREG" || (!WIDE && (WRITEMODE_A == "NORMAL" || WRITEMODE_B == "NORMAL")) ||
                 WRITEMODE_A == "WRITETHROUGH" || WRITEMODE_B == "WRITETHROUGH") begin : guard
             this_model_has_no_such_DP16KD stop ();
@@ -100,30 +100,40 @@ module DP16KD #(
             end
             always @(posedge CLKB) if (selected_b)
                 {out_b, out_a} <= {bytes[from+11'd3], bytes[from+11'd2], bytes[from+11'd1], bytes[from]};
-        end else if (WIDTH == 18) begin : word
-            wire [10:0] a = {at_a[13:4], 1'b0}, b = {at_b[13:4], 1'b0};
-            always @(posedge CLKA) if (selected_a) begin
-                out_a <= {bytes[a+11'd1], bytes[a]};
-                if (WEA && at_a[0]) bytes[a] <= data_a[8:0];
-                if (WEA && at_a[1]) bytes[a+11'd1] <= data_a[17:9];
+        end else begin : own
+            if (DATA_WIDTH_A == 18) begin : word_a
+                wire [10:0] a = {at_a[13:4], 1'b0};
+                always @(posedge CLKA) if (selected_a) begin
+                    out_a <= {bytes[a+11'd1], bytes[a]};
+                    if (WEA && at_a[0]) bytes[a] <= data_a[8:0];
+                    if (WEA && at_a[1]) bytes[a+11'd1] <= data_a[17:9];
+                end
+            end else begin : narrow_a
+                localparam [3:0] LOW = DATA_WIDTH_A == 9 ? 4'd0 : 4'd8 - DATA_WIDTH_A[3:0];  // address bits that choose
+                localparam [8:0] ONES = (9'd1 << DATA_WIDTH_A) - 9'd1;
+                wire [10:0] a = at_a[13:3];
+                wire [3:0] shift = {1'b0, at_a[2:0]} & LOW;
+                always @(posedge CLKA) if (selected_a) begin
+                    out_a <= {9'd0, bytes[a] >> shift & ONES};
+                    if (WEA) bytes[a] <= (bytes[a] & ~(ONES << shift)) | (data_a[8:0] & ONES) << shift;
+                end
             end
-            always @(posedge CLKB) if (selected_b) begin
-                out_b <= {bytes[b+11'd1], bytes[b]};
-                if (WEB && at_b[0]) bytes[b] <= data_b[8:0];
-                if (WEB && at_b[1]) bytes[b+11'd1] <= data_b[17:9];
-            end
-        end else begin : narrow
-            localparam [3:0] LOW = WIDTH == 9 ? 4'd0 : 4'd8 - WIDTH[3:0];  // bits of an address that choose
-            localparam [8:0] ONES = (9'd1 << WIDTH) - 9'd1;
-            wire [10:0] a = at_a[13:3], b = at_b[13:3];
-            wire [3:0] shift_a = {1'b0, at_a[2:0]} & LOW, shift_b = {1'b0, at_b[2:0]} & LOW;
-            always @(posedge CLKA) if (selected_a) begin
-                out_a <= {9'd0, bytes[a] >> shift_a & ONES};
-                if (WEA) bytes[a] <= (bytes[a] & ~(ONES << shift_a)) | (data_a[8:0] & ONES) << shift_a;
-            end
-            always @(posedge CLKB) if (selected_b) begin
-                out_b <= {9'd0, bytes[b] >> shift_b & ONES};
-                if (WEB) bytes[b] <= (bytes[b] & ~(ONES << shift_b)) | (data_b[8:0] & ONES) << shift_b;
+            if (DATA_WIDTH_B == 18) begin : word_b
+                wire [10:0] b = {at_b[13:4], 1'b0};
+                always @(posedge CLKB) if (selected_b) begin
+                    out_b <= {bytes[b+11'd1], bytes[b]};
+                    if (WEB && at_b[0]) bytes[b] <= data_b[8:0];
+                    if (WEB && at_b[1]) bytes[b+11'd1] <= data_b[17:9];
+                end
+            end else begin : narrow_b
+                localparam [3:0] LOW = DATA_WIDTH_B == 9 ? 4'd0 : 4'd8 - DATA_WIDTH_B[3:0];
+                localparam [8:0] ONES = (9'd1 << DATA_WIDTH_B) - 9'd1;
+                wire [10:0] b = at_b[13:3];
+                wire [3:0] shift = {1'b0, at_b[2:0]} & LOW;
+                always @(posedge CLKB) if (selected_b) begin
+                    out_b <= {9'd0, bytes[b] >> shift & ONES};
+                    if (WEB) bytes[b] <= (bytes[b] & ~(ONES << shift)) | (data_b[8:0] & ONES) << shift;
+                end
             end
         end
     endgenerate

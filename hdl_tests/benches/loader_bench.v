@@ -6,7 +6,7 @@
 // sixteenths of a clock.
 // Every `tick_every` clocks there is a tick, `ticks_left` of them, or without end if all its bits are ones.
 //
-// For each line that was played LINES gets six hexadecimal numbers, as tests/line_log.py has them.
+// line_log.v writes LINES.
 
 `timescale 1ns / 1ps
 `default_nettype none
@@ -218,49 +218,11 @@ module loader_bench #(
         .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
-    // The log of lines.
-    integer log, i;
-    reg [31:0] generation = 0, log_generation = 0, line = 0, ticks = 0, crc = 0;
-    reg [7:0] all = 0;
-    reg [3:0] last_faults = 0;
-    wire [7:0] markers = {
-        parked, playing, swapped_marker, valid_marker, backward_marker, pixel_marker, frame_marker, line_marker
-    };
-    wire [31:0] x_wide = x_code, y_wide = y_code;
-    reg [71:0] record;
-
-    task end_line;
-        begin
-            if (ticks != 0) begin
-                $fwrite(log, "%h %h %h %h %h %h\n", log_generation, line, ticks, ~crc, all, {4'd0, last_faults});
-                $fflush(log);
-            end
-            ticks = 0;
-            crc = 32'hffffffff;
-            all = 0;
-        end
-    endtask
-
-    initial log = $fopen(LINES, "w");
-    always @(posedge clock)
-        if (strobe) begin
-            if (line_marker || !playing) end_line;
-            if (swapped_marker) generation = generation + 1;
-            if (line_marker) line = frame_marker ? 0 : line + 1;
-            log_generation = generation;
-            if (playing) begin
-                record = {markers, y_wide, x_wide};
-                crc = crc ^ record[31:0];
-                for (i = 0; i < 72; i = i + 1) begin
-                    if (i == 32) crc = crc ^ record[63:32];
-                    if (i == 64) crc = crc ^ record[71:64];
-                    crc = crc[0] ? (crc >> 1) ^ 32'hedb88320 : crc >> 1;
-                end
-                all = all | markers;
-                ticks = ticks + 1;
-                last_faults = faults;
-            end
-        end
+    line_log #(.DAC_BITS(DAC_BITS), .LINES(LINES)) lines (
+        .clock(clock), .strobe(strobe), .x_code(x_code), .y_code(y_code), .markers({
+            parked, playing, swapped_marker, valid_marker, backward_marker, pixel_marker, frame_marker, line_marker
+        }), .faults(faults)
+    );
 endmodule
 
 `default_nettype wire

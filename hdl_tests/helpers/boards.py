@@ -95,6 +95,16 @@ class Board:
         return fault, talk.answers(read["answers"]), words_of(read["pins"])
 
 
+def ecp5_library(folder: Path) -> tuple[list[Path], list[Path]]:
+    """Return the models of the cells of an ECP5, with block RAMs of ours, and the folders that they include from."""
+    library = folder / "cells.v"
+    share = Path(tool("yosys")).resolve().parents[1] / "share" / "yosys" / "ecp5"
+    text = (share / "cells_sim.v").read_text("utf-8")
+    assert text.count("module DP16KD(") == 1
+    library.write_text(text.replace("module DP16KD(", "module DP16KD_of_yosys("), "utf-8")
+    return [library, BENCHES / "dp16kd.v"], [share]
+
+
 def make(folder: Path, target: str, *variables: str) -> None:
     tools = Path(sys.executable).parent  # nextpnr of the environment that runs the tests
     tool("make")

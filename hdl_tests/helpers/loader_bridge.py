@@ -28,6 +28,7 @@ import assembler  # noqa: E402
 sys.dont_write_bytecode = _before
 
 BENCH = BENCHES / "loader_bench.v"
+LINE_LOG = BENCHES / "line_log.v"
 LINES = "lines.log"
 NO_STOP_BIT, BREAK, PULSE = 1 << 8, 1 << 9, 1 << 10  # of an entry of ``talk``
 BOOT_HASH = bytes(range(0xE0, 0x100))
@@ -46,7 +47,8 @@ def compile_loader(
     names = assembler.program().names
     idle = {"IDLE_FROM": names["main"], "IDLE_TO": names["receive"] + 3}
     values = {"LINES": LINES, **idle, **(parameters or {})}
-    return compile_design(simulator, Design([BENCH, *(sources or verilog_runtime())], "loader_bench", values), folder)
+    files = [BENCH, LINE_LOG, *(sources or verilog_runtime())]
+    return compile_design(simulator, Design(files, "loader_bench", values), folder)
 
 
 class Simulation:

@@ -1,9 +1,10 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
  * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only),
- * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and
- * LINK_DEVICE, a name as a string; with a key the port has random.h. With DAC_STORE=1 the port has scan_flash, and
- * LINK_STORE_WHILE_PLAYING where writing to it does not stop the processor. With DAC_LIBRARY LIBRARY and
- * LIBRARY_UPPER are the names of a library of tablegen sweep, and LIBRARY_HEADER its header.
+ * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_PERMITS, a function of the port, for an interlock; LINK_KEY_HEADER, a
+ * file that defines LINK_KEY as the bytes of an array, and LINK_DEVICE, a name as a string; with a key the port has
+ * random.h. With DAC_STORE=1 the port has scan_flash, and LINK_STORE_WHILE_PLAYING where writing to it does not stop
+ * the processor. With DAC_LIBRARY LIBRARY and LIBRARY_UPPER are the names of a library of tablegen sweep, and
+ * LIBRARY_HEADER its header.
  */
 #include "scan_link.h"
 
@@ -60,6 +61,9 @@ typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof
         {tables[0], tables[1]}, words                                                                                 \
     }
 
+#ifdef LINK_PERMITS
+bool LINK_PERMITS(void);
+#endif
 #if DAC_STORE
 dac_store scan_store;
 #endif
@@ -72,6 +76,9 @@ static const dac_link_config config = {
     .sine = SINE,
     .update_rate_hz = UPDATE_RATE_HZ,
     .hash = hash,
+#ifdef LINK_PERMITS
+    .permits = LINK_PERMITS,
+#endif
 #if DAC_STORE
     .store = &scan_store,
 #ifdef LINK_STORE_WHILE_PLAYING

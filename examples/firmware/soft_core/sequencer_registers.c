@@ -1,0 +1,228 @@
+/* The producer's functions of dac_sequencer.h, for the sequencer in the FPGA: this file takes the place of
+ * dac_sequencer.c, and the link does not see the difference. dac_program.c still checks a program and keeps it in
+ * `sequencer`, where the link finds what plays. The linker's --wrap puts __wrap_dac_sequencer_load around its
+ * dac_sequencer_load, so that a program that is loaded is also written to the registers. */
+#include "dac_registers.h"
+#include "scan.h"
+#include "soft_core.h"
+
+enum { NO_PROGRAM = 2 };        /* `playing` before the first program */
+enum { UNDER_WAY = 64 };        /* reads of a register, longer than a sample is on its way through the sequencer */
+enum { PAGE = 16, WORDS = 48 }; /* of a program: the page of the scan, of x and of y */
+
+dac_sequencer sequencer;
+
+/* Programs that were taken; banks take turns. */
+static uint32_t swaps(void)
+{
+    const uint32_t taken = SYSTEM_SWAPS;
+
+    sequencer.swaps = taken;
+    sequencer.playing = (uint8_t)(taken == 0 ? NO_PROGRAM : (taken - 1) & 1);
+    return taken;
+}
+
+/* Waits until a sample that was the first of a program has been counted. */
+static void let_samples_pass(void)
+{
+    for (unsigned i = 0; i < UNDER_WAY; i++)
+        (void)SEQUENCER(DAC_STATUS_ADDRESS);
+}
+
+static bool power_up(dac_axis *axis, const dac_converter *converter)
+{
+    axis->bits = converter->bits;
+    axis->word_bits = converter->word_bits;
+    axis->flip = converter->twos_complement ? UINT32_C(1) << (converter->bits - 1) : 0;
+    axis->shift = (uint8_t)(converter->left_aligned ? converter->word_bits - converter->bits : 0);
+    return (SEQUENCER(DAC_FEATURES_ADDRESS) & DAC_FEATURES_DAC_BITS_MASK) == converter->bits;
+}
+
+bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
+{
+    (void)swaps();
+    return SEQUENCER(DAC_IDENTITY_ADDRESS) == DAC_IDENTITY_VALUE
+        && SEQUENCER(DAC_VERSION_ADDRESS) == DAC_VERSION_VALUE && power_up(&s->x, x) && power_up(&s->y, y);
+}
+
+/* A program that was committed waits until it is counted, which is later than the registers free its bank. */
+static bool waits(const dac_sequencer *s)
+{
+    return s->waiting != 0 && swaps() == s->loaded_after;
+}
+
+bool dac_sequencer_writable(const dac_sequencer *s)
+{
+    return !waits(s) && (SEQUENCER(DAC_STATUS_ADDRESS) & DAC_STATUS_WRITABLE_MASK) != 0;
+}
+
+unsigned dac_sequencer_idle(const dac_sequencer *s)
+{
+    (void)s;
+    return swaps() & 1;
+}
+
+dac_status dac_sequencer_status(const dac_sequencer *s)
+{
+    dac_status now;
+    (void)s;
+
+    now.line = SYSTEM_LINE; /* before the swaps: a line of the old program, if these have not grown */
+    now.swaps = swaps();
+    const uint32_t state = SEQUENCER(DAC_STATUS_ADDRESS);
+    now.markers = (uint8_t)((state & DAC_STATUS_PLAYING_MASK ? DAC_PLAYING : 0)
+                            | (state & DAC_STATUS_PARKED_MASK ? DAC_PARKED : 0));
+    now.faults = (uint8_t)SEQUENCER(DAC_FAULTS_ADDRESS);
+    for (unsigned i = 0; i < DAC_FAULTS; i++)
+        now.fault_counts[i] = SEQUENCER(DAC_SLEW_COUNT_ADDRESS + 4 * i);
+    return now;
+}
+
+/* Whether the tables of the hardware are of this mode and width: interpolated ones have exactly its length. */
+static bool fits(const dac_axis_program *p, uint32_t shape)
+{
+    const uint32_t degree = (shape & DAC_X_SHAPE_DEGREE_MASK) >> DAC_X_SHAPE_DEGREE_SHIFT;
+    const uint32_t index_bits = (shape & DAC_X_SHAPE_INDEX_BITS_MASK) >> DAC_X_SHAPE_INDEX_BITS_SHIFT;
+    const uint32_t word_bits = (shape & DAC_X_SHAPE_WORD_BITS_MASK) >> DAC_X_SHAPE_WORD_BITS_SHIFT;
+
+    if (p->bits != word_bits)
+        return false;
+    if (degree == 0)
+        return p->index_bits == 0 && p->length <= UINT32_C(1) << index_bits;
+    return p->index_bits == index_bits + (degree == 3 ? (uint32_t)DAC_CUBIC : 0);
+}
+
+static void put_schedule(uint32_t *page, const dac_program *p)
+{
+    const dac_schedule *const s = &p->schedule;
+    const uint32_t words[] = {
+        s->line_ticks, s->frame_lines, s->settle_lines, s->turn_tick, s->forward.first, s->forward.count,
+        s->backward.first, s->backward.count, s->up.first, s->up.count, s->down.first, s->down.count, s->pixels,
+        p->y.hold_ticks != 1,
+    };
+
+    for (unsigned i = 0; i < sizeof words / sizeof words[0]; i++)
+        page[i] = words[i];
+}
+
+static void put_axis(uint32_t *page, const dac_axis_program *p)
+{
+    const uint32_t advances = p->phase_period;
+    const uint32_t step = UINT32_MAX / advances, remainder = UINT32_MAX % advances + 1;
+    const uint32_t words[] = {
+        remainder == advances ? step + 1 : step, /* of 2^32 */
+        remainder == advances ? 0 : remainder,
+        advances,
+        (uint32_t)p->gain_word,
+        (uint32_t)(p->offset_word & 0x3FFFF),
+        (uint32_t)(p->offset_word >> 18),
+        (uint32_t)p->code_min,
+        (uint32_t)p->code_max,
+        (uint32_t)p->max_step,
+        (uint32_t)p->park_code,
+        0,
+#if DAC_SHAPING
+        p->shaping_order | (uint32_t)p->shaping_zero << 8,
+#endif
+    };
+
+    for (unsigned i = 0; i < sizeof words / sizeof words[0]; i++)
+        page[i] = words[i];
+}
+
+static void write_table(uint32_t offset, const dac_axis_program *p)
+{
+    for (uint32_t i = 0; i < p->length; i++)
+        SEQUENCER(offset + 4 * i) = (uint32_t)p->table[i];
+}
+
+dac_loaded __real_dac_sequencer_load(dac_sequencer *s, const dac_program *program);
+dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *program);
+
+/* Checks a program, and writes it into the idle bank of the hardware. */
+dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *program)
+{
+    uint32_t words[WORDS] = {0};
+    const dac_loaded loaded = __real_dac_sequencer_load(s, program);
+
+    if (loaded != DAC_LOADED)
+        return loaded;
+    s->waiting = 0;
+    s->loaded = 0;
+    if (program->schedule.line_ticks < 8 || program->schedule.frame_lines > UINT32_C(1) << 16
+        || program->schedule.settle_lines > 255)
+        return DAC_BAD_SCHEDULE;
+    if (!fits(&program->x, SEQUENCER(DAC_X_SHAPE_ADDRESS)) || !fits(&program->y, SEQUENCER(DAC_Y_SHAPE_ADDRESS)))
+        return DAC_BAD_TABLE;
+    put_schedule(words, program);
+    put_axis(words + PAGE, &program->x);
+    put_axis(words + 2 * PAGE, &program->y);
+    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK; /* what may have been there, and did not fit */
+    for (unsigned i = 0; i < WORDS; i++)
+        SEQUENCER(DAC_PROGRAM_ADDRESS + 4 * i) = words[i];
+    write_table(DAC_X_TABLE_ADDRESS, &program->x);
+    write_table(DAC_Y_TABLE_ADDRESS, &program->y);
+    s->loaded = 1;
+    return DAC_LOADED;
+}
+
+bool dac_sequencer_commit(dac_sequencer *s)
+{
+    if (!s->loaded)
+        return false;
+    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_COMMIT_MASK;
+    s->waiting = 1;
+    const uint32_t state = SEQUENCER(DAC_STATUS_ADDRESS);
+    if ((state & DAC_STATUS_COMMITTED_MASK) != 0)
+        return true;
+    /* A tick has taken it already; or the interlock has opened, or a word did not fit. */
+    let_samples_pass();
+    if (!waits(s))
+        return true;
+    s->waiting = 0;
+    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK
+                                   | (state & DAC_STATUS_REFUSED_MASK ? DAC_COMMAND_CLEAR_FAULTS_MASK : 0);
+    return false;
+}
+
+bool dac_sequencer_withdraw(dac_sequencer *s)
+{
+    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK;
+    let_samples_pass(); /* it may have been taken just before */
+    if (waits(s))
+        s->waiting = 0;
+    return true;
+}
+
+static bool command(uint32_t mask)
+{
+    SEQUENCER(DAC_COMMAND_ADDRESS) = mask;
+    return true;
+}
+
+bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames)
+{
+    (void)s;
+    if (frames > DAC_ARM_FRAMES_MASK)
+        return false;
+    SEQUENCER(DAC_ARM_ADDRESS) = frames;
+    return true;
+}
+
+bool dac_sequencer_trigger(dac_sequencer *s)
+{
+    (void)s;
+    return command(DAC_COMMAND_TRIGGER_MASK);
+}
+
+bool dac_sequencer_park(dac_sequencer *s)
+{
+    (void)s;
+    return command(DAC_COMMAND_PARK_MASK);
+}
+
+bool dac_sequencer_clear_faults(dac_sequencer *s)
+{
+    (void)s;
+    return command(DAC_COMMAND_CLEAR_FAULTS_MASK);
+}

@@ -1,0 +1,430 @@
+"""``examples/firmware/soft_core`` whole: firmware on VexRiscv, its bus, the sequencer; from bytes on its line.
+
+Every line that is played is the model's, before and after an upload.
+"""
+
+import json
+import shutil
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import pythondata_cpu_vexriscv
+from boards import TICKS, Board, ecp5_library, expected_words, make
+from building import BENCHES, NAME, REMOVED, REPOSITORY, Build, Variant, build, run_warned, write_variant
+from limits import PATIENCE_S
+from line_log import LineCheck, PlayedLine, WrongLine
+from link_talk import Talk, is_answer
+from loader_bridge import LINE_LOG, LINES, Simulation
+from replacing import replace
+
+from tablegen.base.resources import resource_folder, verilog_runtime
+from tablegen.config.load import load
+from tablegen.link.frames import Frame
+from tablegen.link.messages import (
+    REFUSAL,
+    DeviceInfo,
+    DeviceState,
+    DeviceStatus,
+    Reason,
+    Refusal,
+    Request,
+    Upload,
+)
+from tablegen.link.program_image import ProgramImage, make_image
+from tablegen.planning.line_plan import make_plan
+from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
+
+pytestmark = pytest.mark.rest
+
+EXAMPLE = REPOSITORY / "examples" / "firmware" / "soft_core"
+CORE = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_Lite.v"
+UPDATE_RATE_HZ = 50_000
+FIRMWARE = "firmware.mem"
+CLOCKS_PER_TICK = 50
+CLOCKS_PER_BIT = 8
+LINE = 331  # ticks
+BAUD = 2400  # by which a client reckons its time-outs; a simulation has no rate of its own
+STEP = 5_000  # clocks between two looks at what has come
+MOST_STEPS = 2_000
+SCAN: dict[str, object] = {
+    "limits": REMOVED,
+    "timing": {"pixels": 40, "lines": 8, "line_rate_hz": 100.0, "ticks_per_line": LINE, "settle_lines": 1},
+    "dac.update_rate_hz": float(UPDATE_RATE_HZ),
+    "x.band_limit.harmonics": 16,
+    "y.band_limit.harmonics": 8,
+    "x.table.length": 64,
+    "y.table.length": 32,
+}
+UNDERRUN = 8  # a bit of the faults
+BAD_TABLE = 4  # DAC_BAD_TABLE of dac_sequencer.h
+MOST_FRAMES = 65_535  # of the register
+ULX3S = Board("ulx3s", clocks_per_tick=50, clocks_per_bit=217, limit=3_000_000)
+ON_A_BOARD: dict[str, object] = {
+    "limits": REMOVED,
+    "x.band_limit.harmonics": 5,
+    "y.band_limit.harmonics": 5,
+    "x.table.length": 64,
+    "y.table.length": 32,
+}
+SLOW_LINE = 40_000  # ticks: a program waits long for the next one
+SLOW = {"timing.ticks_per_line": SLOW_LINE, "timing.line_rate_hz": UPDATE_RATE_HZ / SLOW_LINE}
+SHORT_TABLE = {"x.table.length": 32, "x.band_limit.harmonics": 8}
+
+
+@dataclass(frozen=True, eq=False)
+class Scans:
+    """What the device begins with, and others: with slow lines, and with a shorter table."""
+
+    boot: Build
+    first: Build
+    second: Build
+    slow: Build
+    shorter: Build
+
+    @property
+    def scan(self) -> Path:
+        """The file that the firmware is built from."""
+        return self.boot.folder.parent / f"{NAME}.toml"
+
+    def check(self, simulation: Simulation) -> LineCheck:
+        """Hold the log against the model. Raises ``WrongLine``."""
+        check = LineCheck(self.boot.plan.program)
+        for name in ("first", "second", "slow"):
+            check.offer(name, getattr(self, name).plan.program)
+        check.follow(PlayedLine.parse(line) for line in simulation.lines())
+        return check
+
+
+def scan_of(size_nm: float, **more: object) -> Variant:
+    return Variant({**SCAN, "x.size_nm": size_nm, "y.size_nm": size_nm, **more})
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory: pytest.TempPathFactory) -> Scans:
+    folder = tmp_path_factory.mktemp("scans")
+    variants = scan_of(200.0), scan_of(150.0), scan_of(90.0), scan_of(150.0, **SLOW), scan_of(90.0, **SHORT_TABLE)
+    return Scans(*(build(folder / str(at), variant) for at, variant in enumerate(variants)))
+
+
+@dataclass
+class Host:
+    """Requests, one after the other, each until it is answered."""
+
+    simulation: Simulation
+    talk: Talk
+
+    def ask(self, wire: bytes) -> Frame:
+        """Send a request and wait for its answer."""
+        received = self.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + STEP, wire)
+        for _ in range(MOST_STEPS):
+            answers = self.talk.answers(received)
+            if answers:
+                (answer,) = answers
+                return answer
+            received = self.simulation.run(STEP)
+        raise AssertionError("no answer")
+
+    def status(self) -> DeviceStatus:
+        return DeviceStatus.unpack(self.ask(self.talk.request(Request.STATUS)).payload)
+
+    def send(self, image: ProgramImage) -> Frame:
+        """Send BEGIN and all DATA; the last answer, or the first refusal."""
+        for wire in self.talk.upload(image):
+            answer = self.ask(wire)
+            if answer.type == REFUSAL:
+                break
+        return answer
+
+    def start(self) -> DeviceInfo:
+        """HELLO, ARM and TRIGGER, and the lines in which the guard leaves the power-up codes."""
+        hello = self.ask(self.talk.hello())
+        assert is_answer(hello, Request.HELLO)
+        assert is_answer(self.ask(self.talk.acting(Request.ARM, bytes(4))), Request.ARM)
+        assert is_answer(self.ask(self.talk.acting(Request.TRIGGER)), Request.TRIGGER)
+        self.play(3)
+        return DeviceInfo.unpack(hello.payload)
+
+    def play(self, lines: int) -> None:
+        self.simulation.run(CLOCKS_PER_TICK * LINE * lines)
+
+
+def compiled_firmware(folder: Path, example: Path, scan: Path) -> Path:
+    command = ["make", "-C", example, f"SCAN={scan}", f"BUILD={folder}", f"TABLEGEN={sys.executable} -m tablegen"]
+    clock = f"CLOCK_HZ={UPDATE_RATE_HZ * CLOCKS_PER_TICK}", f"CLOCKS_PER_TICK={CLOCKS_PER_TICK}"
+    run_warned([*command, *clock])
+    return folder / FIRMWARE
+
+
+@pytest.fixture(scope="module")
+def device(scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> CompiledDesign:
+    """The device with its firmware in a bench."""
+    folder = tmp_path_factory.mktemp("device")
+    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scans.scan)
+    bus = sorted((resource_folder("firmware_templates") / "verilog" / "bus").glob("dac_*.v"))
+    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *bus]
+    runtime = [path for path in verilog_runtime() if path.name != "program_loader.v"]
+    values: dict[str, int | str] = {"FIRMWARE": FIRMWARE, "LINES": LINES}
+    values |= {"CLOCKS_PER_TICK": CLOCKS_PER_TICK, "CLOCKS_PER_BIT": CLOCKS_PER_BIT}
+    design = Design([*sources, *runtime], "soft_core_bench", values, includes=[firmware.parent / "scan"])
+    compiled = compile_design("verilator", design, folder / "model")
+    shutil.copy(firmware, compiled.folder)
+    return compiled
+
+
+@contextmanager
+def edited(device: CompiledDesign, scans: Scans, folder: Path, name: str, right: str, wrong: str) -> Iterator[Host]:
+    """Run the device with an edited file of its firmware."""
+    copy = folder / "firmware"
+    shutil.copytree(EXAMPLE.parent, copy, ignore=shutil.ignore_patterns("build"))
+    source = copy / "soft_core" / name
+    text = source.read_text("utf-8")
+    assert text.count(right) == 1
+    source.write_text(text.replace(right, wrong), "utf-8")
+    firmware = compiled_firmware(folder / "build", copy / "soft_core", scans.scan)
+    usual = (device.folder / FIRMWARE).read_bytes()
+    shutil.copy(firmware, device.folder)
+    try:
+        with Simulation(device) as simulation:
+            simulation.run(CLOCKS_PER_TICK * LINE * 12)
+            yield Host(simulation, Talk())
+    finally:
+        (device.folder / FIRMWARE).write_bytes(usual)
+
+
+@pytest.fixture
+def simulation(device: CompiledDesign) -> Iterator[Simulation]:
+    with Simulation(device) as running:
+        yield running
+
+
+@pytest.fixture
+def host(simulation: Simulation) -> Host:
+    simulation.run(CLOCKS_PER_TICK * LINE * 12)  # the firmware starts, and the guard reaches the park codes
+    return Host(simulation, Talk())
+
+
+def image_of(built: Build, fourier: bool = False) -> ProgramImage:
+    digest = str(built.manifest["hash"])
+    words = [line.fourier.in_order for line in built.plan.lines] if fourier else []
+    return make_image(built.plan.program, digest, *words)
+
+
+def refusal(answer: Frame) -> tuple[int, int]:
+    assert answer.type == REFUSAL
+    unpacked = Refusal.unpack(answer.payload)
+    return unpacked.reason, unpacked.detail
+
+
+def test_it_says_what_it_is(host: Host, scans: Scans) -> None:
+    info, boot = host.start(), scans.boot.plan
+    assert info.update_rate_hz == UPDATE_RATE_HZ
+    for told, limits, line in ((info.x, info.x_limits, boot.x), (info.y, info.y_limits, boot.y)):
+        output = line.program.output
+        assert (told.index_bits, told.word_bits) == (line.program.index_bits, line.program.bits)
+        assert (told.dac_bits, told.converter) == (output.dac_bits, output.word_bits)
+        assert (limits.code_min, limits.code_max, limits.max_step) == (
+            output.code_min, output.code_max, output.max_step,
+        )  # fmt: skip
+    now = host.status()
+    assert (now.state, now.generation, now.faults) == (DeviceState.PLAYING, 1, 0)
+    assert now.hash.hex() == scans.boot.manifest["hash"]
+    assert 0 < now.line < 8
+
+
+def test_faults_are_those_of_the_sequencer(host: Host) -> None:
+    host.start()
+    host.simulation.set(underrun=1)
+    host.play(1)
+    host.simulation.set(underrun=0)
+    now = host.status()
+    assert now.faults == UNDERRUN
+    assert now.fault_counts[:3] == (0, 0, 0)
+    assert now.fault_counts[3] >= LINE
+    assert is_answer(host.ask(host.talk.acting(Request.CLEAR)), Request.CLEAR)
+    host.play(1)
+    now = host.status()
+    assert (now.faults, now.fault_counts) == (0, (0, 0, 0, 0))
+
+
+def test_uploads_while_a_scan_plays(host: Host, scans: Scans) -> None:
+    host.start()
+    for generation, (built, fourier) in enumerate([(scans.first, False), (scans.second, True)], 2):
+        image = image_of(built, fourier)
+        assert is_answer(host.send(image), Request.DATA)
+        answer = host.ask(host.talk.commit(image))
+        assert is_answer(answer, Request.COMMIT)
+        taken, line = struct.unpack("<II", answer.payload)
+        assert taken == generation
+        assert 0 <= line < 8
+        host.play(3)
+        now = host.status()
+        assert (now.state, now.generation, now.hash) == (DeviceState.PLAYING, generation, image.info.hash)
+        assert (now.faults, now.bad_frames) == (0, 0)
+    assert is_answer(host.ask(host.talk.acting(Request.PARK)), Request.PARK)
+    host.play(10)
+    assert host.status().state is DeviceState.PARKED
+    check = scans.check(host.simulation)
+    assert check.taken == {1: "boot", 2: "first", 3: "second"}
+    assert check.lines > 12
+
+    # Negative control: one line, as if a tick of it had been another.
+    log = [PlayedLine.parse(line) for line in host.simulation.lines()]
+    log[5] = replace(log[5], crc=log[5].crc ^ 1)
+    with pytest.raises(WrongLine):
+        LineCheck(scans.boot.plan.program).follow(log)
+
+
+def damaged(image: ProgramImage) -> ProgramImage:
+    """The image with a bit of its last word changed, and the CRC of what it was."""
+    data = bytearray(image.data)
+    data[-1] ^= 1
+    return replace(image, data=bytes(data))
+
+
+def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans) -> None:
+    """A damaged image; one for other tables, which the hardware does not have; an open interlock."""
+    host.start()
+    whole = image_of(scans.first)
+    image = damaged(whole)
+    assert is_answer(host.send(image), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(image))) == (Reason.IMAGE, 0)
+    shorter = image_of(scans.shorter)
+    assert is_answer(host.send(shorter), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(shorter))) == (Reason.REFUSED, BAD_TABLE)
+    host.simulation.set(permit=0)
+    assert is_answer(host.send(whole), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(whole))) == (Reason.INTERLOCK, 0)
+    assert refusal(host.ask(host.talk.acting(Request.ARM, struct.pack("<I", MOST_FRAMES + 1)))) == (Reason.TICKS, 0)
+    host.play(2)
+    now = host.status()
+    assert (now.state, now.generation, now.faults, now.permits) == (DeviceState.PLAYING, 1, 0, False)
+    assert scans.check(host.simulation).taken == {1: "boot"}
+
+    host.simulation.set(permit=1)
+    host.play(1)
+    assert is_answer(host.ask(host.talk.commit(whole)), Request.COMMIT)  # the upload has stayed
+    host.play(2)
+    assert scans.check(host.simulation).taken == {1: "boot", 2: "first"}
+
+
+def test_a_program_that_waits_is_withdrawn(host: Host, scans: Scans) -> None:
+    host.start()
+    slow, second = image_of(scans.slow), image_of(scans.second)
+    host.send(slow)
+    assert is_answer(host.ask(host.talk.commit(slow)), Request.COMMIT)
+    host.send(second)
+    wire = host.talk.commit(second)
+    host.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + STEP, wire)
+    while (upload := host.status().upload) is Upload.CHECKING:
+        pass
+    assert upload is Upload.WAITING
+    wire = host.talk.acting(Request.ABORT)
+    received = host.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + 50 * STEP, wire)
+    first, then = host.talk.answers(received)
+    assert refusal(first) == (Reason.WITHDRAWN, 0)
+    assert is_answer(then, Request.ABORT)
+    assert struct.unpack("<I", then.payload) == (2,)
+    now = host.status()
+    assert (now.upload, now.generation, now.faults) == (Upload.NONE, 2, 0)
+    assert is_answer(host.ask(host.talk.acting(Request.PARK)), Request.PARK)
+    host.play(10)
+
+    # The bank is free again.
+    host.send(second)
+    assert is_answer(host.ask(host.talk.commit(second)), Request.COMMIT)
+    assert is_answer(host.ask(host.talk.acting(Request.ARM, struct.pack("<I", 1))), Request.ARM)
+    assert is_answer(host.ask(host.talk.acting(Request.TRIGGER)), Request.TRIGGER)
+    host.play(20)
+    now = host.status()
+    assert (now.state, now.generation, now.faults) == (DeviceState.PARKED, 3, 0)
+    assert scans.check(host.simulation).taken == {1: "boot", 2: "slow", 3: "second"}
+
+
+def command(*arguments: str | Path | int) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "tablegen", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=PATIENCE_S,
+    )
+
+
+def test_the_command_line(simulation: Simulation, scans: Scans) -> None:
+    simulation.run(CLOCKS_PER_TICK * LINE * 12)
+    with simulation.bridged() as port:
+        where = ("--port", port, "--baud", BAUD)
+        steps: list[tuple[str | Path | int, ...]] = [
+            ("trigger", *where),
+            ("upload", scans.first.folder, *where),
+            ("readback", scans.first.folder, *where),
+            ("status", *where, "--json"),
+            ("park", *where),
+        ]
+        done = [command(*step) for step in steps]
+        for step, each in zip(steps, done, strict=True):
+            assert each.returncode == 0, (step, each.stdout, each.stderr)
+        assert json.loads(done[3].stdout)
+    assert scans.check(simulation).taken == {1: "boot", 2: "first"}
+
+
+def test_the_interlock_stops_what_the_firmware_would_commit(
+    device: CompiledDesign, scans: Scans, tmp_path: Path
+) -> None:
+    right = "(SYSTEM_STATE & STATE_PERMIT) != 0"
+    with edited(device, scans, tmp_path, "main.c", right, "true") as host:
+        host.start()
+        host.simulation.set(permit=0)
+        image = image_of(scans.first)
+        host.send(image)
+        assert refusal(host.ask(host.talk.commit(image))) == (Reason.TICKS, 0)
+        host.play(2)
+        now = host.status()
+        assert (now.state, now.generation, now.faults) == (DeviceState.PLAYING, 1, 0)
+        host.simulation.set(permit=1)
+        host.play(2)
+        assert is_answer(host.ask(host.talk.commit(image)), Request.COMMIT)
+        host.play(2)
+        assert scans.check(host.simulation).taken == {1: "boot", 2: "first"}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_the_cells_play_the_model_once_they_are_triggered(tmp_path: Path) -> None:
+    """The cells that yosys makes of the device on a ULX3S, from bytes on the line to the pins of the converters."""
+    scan = write_variant(tmp_path / "scan", Variant(ON_A_BOARD))
+    target, folder = tmp_path / "build", tmp_path / "cells"
+    folder.mkdir()
+    make(EXAMPLE, f"{target}/ulx3s.json", f"BUILD={target}", f"PYTHON={sys.executable}", f"SCAN={scan}")
+    cells = ULX3S.simulator(target / "ulx3s.json", folder, *ecp5_library(folder))
+    fault, answers, words = ULX3S.played(cells)
+    assert all(is_answer(*pair) for pair in zip(answers, (Request.HELLO, Request.ARM, Request.TRIGGER), strict=False))
+    assert not fault
+    assert len(answers) >= 2
+    assert all(len(each) >= TICKS - 2 for each in words)
+    whole = expected_words(make_plan(load(scan)).program)
+    assert words == [each[: len(words[0])] for each in whole]
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_the_bitstream_is_made(tmp_path: Path) -> None:
+    """It is placed in time for the clock of the board, or nextpnr ends with an error."""
+    make(EXAMPLE, "bitstream", f"BUILD={tmp_path}", f"PYTHON={sys.executable}")
+    assert (tmp_path / "ulx3s.bit").stat().st_size > 100_000
+
+
+def test_words_in_another_order_are_heard(device: CompiledDesign, scans: Scans, tmp_path: Path) -> None:
+    """A control: firmware that writes each second word of a table in front of the first."""
+    right = "SEQUENCER(offset + 4 * i) = (uint32_t)p->table[i];"
+    wrong = right.replace("[i]", "[i ^ 1]")
+    with edited(device, scans, tmp_path, "sequencer_registers.c", right, wrong) as host:
+        host.start()
+        with pytest.raises(WrongLine):
+            scans.check(host.simulation)
