@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -25,12 +26,17 @@ from replacing import replace
 
 from tablegen.base.resources import resource_folder, verilog_runtime
 from tablegen.config.load import load
+from tablegen.device.commit_mode import CommitMode
 from tablegen.link.frames import Frame
 from tablegen.link.messages import (
     REFUSAL,
+    AxisWords,
     DeviceInfo,
     DeviceState,
     DeviceStatus,
+    Feature,
+    More,
+    Move,
     Reason,
     Refusal,
     Request,
@@ -156,7 +162,7 @@ class Host:
 
 def compiled_firmware(folder: Path, example: Path, scan: Path) -> Path:
     command = ["make", "-C", example, f"SCAN={scan}", f"BUILD={folder}", f"TABLEGEN={sys.executable} -m tablegen"]
-    clock = f"CLOCK_HZ={UPDATE_RATE_HZ * CLOCKS_PER_TICK}", f"CLOCKS_PER_TICK={CLOCKS_PER_TICK}"
+    clock = f"CLOCK_HZ={UPDATE_RATE_HZ * CLOCKS_PER_TICK}", f"CLOCKS_PER_TICK={CLOCKS_PER_TICK}", "MOVE=1"
     run_warned([*command, *clock])
     return folder / FIRMWARE
 
@@ -278,6 +284,45 @@ def test_uploads_while_a_scan_plays(host: Host, scans: Scans) -> None:
     log[5] = replace(log[5], crc=log[5].crc ^ 1)
     with pytest.raises(WrongLine):
         LineCheck(scans.boot.plan.program).follow(log)
+
+
+def test_a_frame_goes_on(host: Host, scans: Scans) -> None:
+    """With a program of the same lines, and with a move of the one that plays; with another one it is refused."""
+    info = host.start()
+    assert info.features & Feature.COMMIT_MODES
+    assert info.more & More.MOVE
+    slow, image, plan = image_of(scans.slow), image_of(scans.first), scans.first.plan
+    host.send(slow)
+    assert refusal(host.ask(commit_at(host.talk, slow, CommitMode.KEEP))) == (Reason.KEEP, 0)
+    host.send(image)
+    taken = [struct.unpack("<II", host.ask(commit_at(host.talk, image, CommitMode.KEEP)).payload)]
+    host.play(2)
+    moved = replace(
+        plan.x.program.output, offset_word=plan.x.program.output.offset_word + (300 << plan.x.program.output.gain_q)
+    )
+    outputs = moved, plan.y.program.output
+    words = [AxisWords(output.gain_word, output.offset_word) for output in outputs]
+    answer = host.ask(host.talk.acting(Request.MOVE, Move(taken[0][0], *words).pack()))
+    assert is_answer(answer, Request.MOVE)
+    taken.append(struct.unpack("<II", answer.payload[:8]))
+    host.play(3)
+    assert [generation for generation, _ in taken] == [2, 3]
+    log = [PlayedLine.parse(line) for line in host.simulation.lines()]
+    swaps = [(before, after) for before, after in pairwise(log) if after.generation != before.generation]
+    assert [(after.generation, after.line) for _, after in swaps] == [
+        (generation, (before.line + 1) % 8) for generation, (before, _) in zip((2, 3), swaps, strict=True)
+    ]
+    assert any(after.line for _, after in swaps), "a frame that goes on, and does not begin"
+    # The last whole line is one of the moved program.
+    program = replace(plan.program, x=replace(plan.program.x, output=moved))
+    last = next(played for played in reversed(log) if played.ticks == LINE)
+    assert last.generation == 3
+    line = LineCheck(program).steady(program, last.line, settled=True)
+    assert line.sum(LINE) == (last.crc, last.markers)
+
+
+def commit_at(talk: Talk, image: ProgramImage, mode: CommitMode) -> bytes:
+    return talk.acting(Request.COMMIT, struct.pack("<IB", image.info.image_crc, mode))
 
 
 def damaged(image: ProgramImage) -> ProgramImage:

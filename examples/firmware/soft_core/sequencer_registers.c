@@ -166,11 +166,12 @@ dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *progra
     return DAC_LOADED;
 }
 
-bool dac_sequencer_commit(dac_sequencer *s)
+/* The modes of the registers have the numbers of dac_commit_mode. */
+bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode)
 {
-    if (!s->loaded)
+    if (!s->loaded || (unsigned)mode > DAC_COMMIT_FRAME)
         return false;
-    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_COMMIT_MASK;
+    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_COMMIT_MASK | (uint32_t)mode << DAC_COMMAND_COMMIT_MODE_SHIFT;
     s->waiting = 1;
     const uint32_t state = SEQUENCER(DAC_STATUS_ADDRESS);
     if ((state & DAC_STATUS_COMMITTED_MASK) != 0)
@@ -183,6 +184,17 @@ bool dac_sequencer_commit(dac_sequencer *s)
     SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK
                                    | (state & DAC_STATUS_REFUSED_MASK ? DAC_COMMAND_CLEAR_FAULTS_MASK : 0);
     return false;
+}
+
+bool dac_sequencer_commit(dac_sequencer *s)
+{
+    return dac_sequencer_commit_at(s, DAC_COMMIT_LINE);
+}
+
+bool dac_sequencer_can_keep(const dac_sequencer *s)
+{
+    (void)s;
+    return swaps() == 0 || (SEQUENCER(DAC_STATUS_ADDRESS) & DAC_STATUS_CAN_KEEP_MASK) != 0;
 }
 
 bool dac_sequencer_withdraw(dac_sequencer *s)

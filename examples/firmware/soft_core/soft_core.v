@@ -160,7 +160,8 @@ module soft_core #(
 
     // The sequencer on the bus. The interlock is in the way of the commit itself, whatever the firmware thinks of it.
     wire host_write, writable, refused, host_commit, withdraw, committed, arm, trigger, park, clear_faults;
-    wire armed, running, busy, missed;
+    wire armed, running, busy, missed, can_keep;
+    wire [1:0] commit_mode;
     wire [2:0] region;
     wire [15:0] word_address, arm_frames;
     wire [31:0] word;
@@ -170,15 +171,15 @@ module soft_core #(
         .DAC_BITS(ANNEXIN_200NM_X_DAC_BITS), .COUNT_BITS(COUNT_BITS), .SHAPING(ANNEXIN_200NM_SHAPING),
         .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
         .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS), .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED),
-        .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS)
+        .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS), .COMMIT_MODES(1)
     ) registers (
         .clock(clock), .reset(reset), .wb_cyc_i(access && target == SEQUENCER),
         .wb_stb_i(access && target == SEQUENCER), .wb_we_i(write), .wb_adr_i(address[17:0]), .wb_sel_i(d_bytes),
         .wb_dat_i(d_data), .wb_dat_o(scan_data), .wb_ack_o(scan_done), .wb_err_o(scan_failed), .irq(),
         .write(host_write), .write_region(region), .write_address(word_address), .write_data(word),
-        .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw), .committed(committed),
-        .booting(1'b0), .missing(1'b0), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park),
-        .clear_faults(clear_faults), .armed(armed), .running(running), .busy(busy), .playing(playing),
+        .writable(writable), .refused(refused), .commit(host_commit), .commit_mode(commit_mode),
+        .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .booting(1'b0), .missing(1'b0), .arm(arm),
+        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed), .running(running), .busy(busy), .playing(playing),
         .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
@@ -192,11 +193,12 @@ module soft_core #(
         .DAC_BITS(ANNEXIN_200NM_X_DAC_BITS), .COUNT_BITS(COUNT_BITS), .SHAPING(ANNEXIN_200NM_SHAPING),
         .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
         .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS), .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED),
-        .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS), .LOW_AREA(1)
+        .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS), .LOW_AREA(1),
+        .COMMIT_MODES(1)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(host_write), .write_region(region), .write_address(word_address),
         .write_data(word), .writable(writable), .refused(refused), .commit(host_commit && permit_2),
-        .commit_mode(2'd0), .withdraw(withdraw), .committed(committed), .can_keep(), .arm(arm),
+        .commit_mode(commit_mode), .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
         .running(running), .tick(tick), .underrun(missed), .busy(busy), .strobe(strobe), .x_code(x_code),
         .y_code(y_code), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
