@@ -189,6 +189,37 @@ CASES = {
         )
         for family in ("ECP5", "7-series")
     },
+    "axis_ECP5_cells": Case(
+        "one axis, a sample a clock, with ecp5/",
+        "dac_axis",
+        "ECP5",
+        {**_AXIS, "PLAIN_MULTIPLIER": 1},
+        least_mhz=140,
+        folder="ecp5",
+    ),
+    "sequencer_ECP5_cells": Case(
+        "two axes, a sample a clock, with ecp5/",
+        "dac_sequencer",
+        "ECP5",
+        {**_TOP, "PLAIN_MULTIPLIER": 1},
+        least_mhz=140,
+        most_multipliers=4,
+        folder="ecp5",
+    ),
+    "sequencer_scanner_ECP5_cells": Case(
+        "two axes, shaped: to scanner, with ecp5/",
+        "dac_sequencer",
+        "ECP5",
+        {**_TOP, "PLAIN_MULTIPLIER": 1, "SHAPING": 3},
+        folder="ecp5",
+    ),
+    "sequencer_cubic_ECP5_cells": Case(
+        "two axes, a sample in 11 clocks, with ecp5/",
+        "dac_sequencer",
+        "ECP5",
+        {**_TWO_CUBIC, "PLAIN_MULTIPLIER": 1},
+        folder="ecp5",
+    ),
     "sequencer_low_area_ECP5": Case("two axes, low area", "dac_sequencer", "ECP5", {**_TOP, "LOW_AREA": 1}),
     "sequencer_slow_part_ECP5": Case(
         "two axes at an angle, low area",
@@ -240,7 +271,7 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
             top = FLAGS.stem
             Path(folder, FLAGS.name).write_text(FLAGS.read_text("utf-8"), "utf-8")
         script = (
-            f"read_verilog -defer *.v; hierarchy -check -top {top} {parameters}; "
+            f"{_read(case)}; hierarchy -check -top {top} {parameters}; "
             f"{SYNTHESIS[case.family].format(top=top, netlist=netlist)}; tee -q -o {statistics} stat"
         )
         _run("yosys", "-q", "-p", script, folder=folder)
@@ -253,17 +284,23 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
         return Result(counts, None if in_chains else max(cells for cells, _ in placed), min(mhz for _, mhz in placed))
 
 
+def _read(case: Case) -> str:
+    """Return the script that reads a design, and the cells that it has itself."""
+    cells = "read_verilog -lib -nooverwrite +/ecp5/cells_sim.v +/ecp5/cells_bb.v; " if case.folder == "ecp5" else ""
+    return f"{cells}read_verilog -defer *.v"
+
+
 def _synthesise_in_chains(case: Case, folder: Path, netlist: Path) -> None:
     """Synthesise a module whose inputs come from one chain of flip-flops, and whose outputs go into another one."""
     ports = folder / "ports.json"
     parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())
-    script = f"read_verilog -defer *.v; hierarchy -check -top {case.top} {parameters}; proc; write_json {ports}"
+    script = f"read_verilog -defer *.v; hierarchy -top {case.top} {parameters}; proc; write_json {ports}"
     _run("yosys", "-q", "-p", script, folder=str(folder))
     modules = json.loads(ports.read_text("utf-8"))["modules"].values()
     (top,) = (module for module in modules if int(module["attributes"].get("top", "0"), 2))
     widths = {name: (port["direction"], len(port["bits"])) for name, port in top["ports"].items()}
     (folder / "chains.v").write_text(_chains(case, widths), "utf-8")
-    script = f"read_verilog -defer *.v; hierarchy -check -top chains; {SYNTHESIS[case.family]}"
+    script = f"{_read(case)}; hierarchy -check -top chains; {SYNTHESIS[case.family]}"
     _run("yosys", "-q", "-p", script.format(top="chains", netlist=netlist), folder=str(folder))
 
 
@@ -374,7 +411,9 @@ def digest(rows: str, modules: Path = MODULES) -> str:
     further = sorted({case.folder for case in CASES.values() if case.folder})
     sources = [path for folder in (".", *further) for path in sorted((modules / folder).glob("*.v"))] + [FLAGS]
     code = [re.sub(r"//.*|\s+", "", path.read_text("utf-8")) for path in sources]
-    how = [inspect.getsource(function) for function in (measure, _synthesise_in_chains, _chains, _place, _counts)]
+    how = [
+        inspect.getsource(function) for function in (measure, _read, _synthesise_in_chains, _chains, _place, _counts)
+    ]
     content = repr((rows, code, how, CASES, SYNTHESIS, PLACEMENT, IN_CHAINS, PRIMITIVES, SEEDS, OF_THE_SEQUENCER))
     return hashlib.sha256(content.encode("utf-8")).hexdigest()[:32]
 

@@ -286,21 +286,23 @@ MUTANTS = {
     "commit_lost": ("scan", "dac_bank", "withdraw || take", "withdraw || take || (committed && !bank)"),
     "commit_not_withdrawn": ("scan", "dac_bank", "reset || withdraw || take", "reset || take"),
     # g. what stops a scan
-    "park_ignored": ("requests", "dac_scan", "(still_running || go) && !park", "(still_running || go)"),
+    "park_ignored": ("requests", "dac_scan", "unloads) || go) && !park", "unloads) || go)"),
     "park_lost_to_trigger": (
-        "requests", "dac_scan", "(still_running || go) && !park", "(still_running && !park || go)"
+        "requests", "dac_scan", "((plays_on && !unloads) || go) && !park", "((plays_on && !unloads && !park) || go)"
     ),
     "park_lost_to_arm": ("requests", "dac_scan", "&& !park && !reset;", "&& !(park && !arm) && !reset;"),
     "park_waits_for_a_tick": ("requests", "dac_scan", "&& !park && !reset;", "&& !(park && tick) && !reset;"),
     "park_leaves_it_armed": ("requests", "dac_scan", "if (park || reset) armed", "if (reset) armed"),
     "reset_ignored": ("requests", "dac_scan", "&& !park && !reset;", "&& !park;"),
     "trigger_without_arm": ("requests", "dac_scan", "trigger && (armed || arm)", "trigger"),
-    "trigger_without_program": ("requests", "dac_scan", "(loaded || committed)", "1"),
-    "trigger_before_the_first_tick_lost": ("requests", "dac_scan", "(loaded || committed)", "(loaded || take)"),
-    "withdrawn_and_started": ("requests", "dac_scan", " && !unloads && !still_running", " && !still_running"),
-    "withdrawn_and_running": ("requests", "dac_scan", " && last_frame) && !unloads;", " && last_frame);"),
-    "taken_and_withdrawn": ("requests", "dac_scan", "!loaded && !take;", "!loaded;"),
-    "trigger_restarts_a_scan": ("requests", "dac_scan", " && !still_running;", ";"),
+    "trigger_without_program": ("requests", "dac_scan", "(loaded || (committed && (tick || !withdraw)))", "1"),
+    "trigger_before_the_first_tick_lost": (
+        "requests", "dac_scan", "(committed && (tick || !withdraw))", "take"
+    ),
+    "withdrawn_and_started": ("requests", "dac_scan", "(committed && (tick || !withdraw))", "committed"),
+    "withdrawn_and_running": ("requests", "dac_scan", "(plays_on && !unloads)", "plays_on"),
+    "taken_and_withdrawn": ("requests", "dac_scan", "!loaded && !(tick && committed);", "!loaded;"),
+    "trigger_restarts_a_scan": ("requests", "dac_scan", " && !plays_on;", ";"),
     "arm_alone_starts": ("requests", "dac_scan", "go = trigger && (armed || arm)", "go = (trigger && armed || arm)"),
     "armed_for_ever": ("requests", "dac_scan", "armed <= 1'b0;\n            frames_left", "frames_left"),
     "endless_count": ("requests", "dac_scan", "!(frame_ends && last_frame)", "1"),

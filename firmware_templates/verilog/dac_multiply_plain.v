@@ -1,5 +1,4 @@
-// result = floor((a b + low) / 2^DROP), exact, one a clock: a `*` between registers, for parts with multiplier
-// blocks.
+// result = floor((a b + low) / 2^DROP), exact, one a clock, for parts with multiplier blocks: dac_product is the block.
 //
 // a and b enter together, low one clock later; the result is there three clocks after a. What a has above BLOCK_BITS,
 // the width of a block's port, would take another block; its lowest bits, often two, are multiplied in look-up tables
@@ -24,21 +23,29 @@ module dac_multiply_plain #(
     localparam SPLIT = A_BITS > BLOCK_BITS ? A_BITS - BLOCK_BITS : 0;  // bits of a that a block has no port for
     localparam PRODUCT_BITS = A_BITS + B_BITS + 1;
 
-    reg signed [A_BITS-1:0] a_in;
-    reg signed [B_BITS-1:0] b_in;
-    reg signed [A_BITS-SPLIT+B_BITS-1:0] product;
+    wire signed [A_BITS-SPLIT+B_BITS-1:0] product;
     reg signed [PRODUCT_BITS-1:0] rest;
 
-    wire signed [A_BITS-SPLIT-1:0] a_high = a_in[A_BITS-1:SPLIT];
+    dac_product #(.A_BITS(A_BITS - SPLIT), .B_BITS(B_BITS)) block (
+        .clock(clock), .a(a[A_BITS-1:SPLIT]), .b(b), .product(product)
+    );
 
-    // The lowest bits of a, one row of b each.
-    wire signed [PRODUCT_BITS-1:0] rows [0:SPLIT];
-    assign rows[0] = {{PRODUCT_BITS-LOW_BITS{1'b0}}, low};
+    // The lowest bits of a: a row of b for each. Their sum has a register where the block has those of its factors.
+    wire signed [PRODUCT_BITS-1:0] lowest;
     genvar i;
     generate
-        for (i = 0; i < SPLIT; i = i + 1) begin : row
-            wire signed [PRODUCT_BITS-1:0] wide = {{PRODUCT_BITS-B_BITS{b_in[B_BITS-1]}}, b_in};
-            assign rows[i+1] = rows[i] + (a_in[i] ? wide <<< i : {PRODUCT_BITS{1'b0}});
+        if (SPLIT > 0) begin : split
+            wire signed [PRODUCT_BITS-1:0] wide = {{PRODUCT_BITS-B_BITS{b[B_BITS-1]}}, b};
+            wire signed [PRODUCT_BITS-1:0] rows [0:SPLIT];
+            assign rows[0] = {PRODUCT_BITS{1'b0}};
+            for (i = 0; i < SPLIT; i = i + 1) begin : row
+                assign rows[i+1] = rows[i] + (a[i] ? wide <<< i : {PRODUCT_BITS{1'b0}});
+            end
+            reg signed [PRODUCT_BITS-1:0] sum;
+            always @(posedge clock) sum <= rows[SPLIT];
+            assign lowest = sum;
+        end else begin : whole
+            assign lowest = {PRODUCT_BITS{1'b0}};
         end
     endgenerate
 
@@ -47,10 +54,7 @@ module dac_multiply_plain #(
     wire unused = &floored;
 
     always @(posedge clock) begin
-        a_in <= a;
-        b_in <= b;
-        product <= a_high * b_in;
-        rest <= rows[SPLIT];
+        rest <= lowest + {{PRODUCT_BITS-LOW_BITS{1'b0}}, low};
         result <= floored[RESULT_BITS-1:0];
     end
 endmodule

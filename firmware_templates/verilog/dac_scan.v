@@ -104,9 +104,11 @@ module dac_scan #(
     wire plays = tick && running;
     wire fresh = starts || (take && !(keep && can_keep));
     wire frame_ends = plays && last && bottom;  // a line that is fresh does not end with its first tick
-    wire unloads = withdraw && !loaded && !take;  // the first program is withdrawn: there is none to play
-    wire still_running = running && !(frame_ends && last_frame) && !unloads;
-    wire go = trigger && (armed || arm) && (loaded || committed) && !unloads && !still_running;
+    // The first program is withdrawn: there is none to play. A tick would have taken it, since a scan that runs before
+    // is at its first line.
+    wire unloads = withdraw && !loaded && !(tick && committed);
+    wire plays_on = running && !(frame_ends && last_frame);
+    wire go = trigger && (armed || arm) && (loaded || (committed && (tick || !withdraw))) && !plays_on;
 
     initial begin
         armed = 1'b0;
@@ -159,7 +161,7 @@ module dac_scan #(
             starts <= 1'b1;
         end
         if (park || reset) armed <= 1'b0;
-        running <= (still_running || go) && !park && !reset;
+        running <= ((plays_on && !unloads) || go) && !park && !reset;
     end
 
     always @(posedge clock)

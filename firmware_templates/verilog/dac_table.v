@@ -22,27 +22,23 @@ module dac_table #(
 );
     localparam ROW_BITS = INDEX_BITS - 1;
 
-    reg [WORD_BITS-1:0] even_words [0:(1<<INDEX_BITS)-1];
-    reg [WORD_BITS-1:0] odd_words [0:(1<<INDEX_BITS)-1];
-
-    reg [ROW_BITS:0] even_row, odd_row;
-    reg [WORD_BITS-1:0] even_word, odd_word;
+    wire [ROW_BITS-1:0] row = index[INDEX_BITS-1:1];
+    wire [ROW_BITS-1:0] next_row = row + {{ROW_BITS-1{1'b0}}, index[0]};
+    wire [INDEX_BITS-1:0] write_address = {write_bank, write_index[INDEX_BITS-1:1]};
+    wire [WORD_BITS-1:0] even_word, odd_word;
     reg odd_at_row, odd_at_word;
 
-    wire [ROW_BITS-1:0] next_row = index[INDEX_BITS-1:1] + {{ROW_BITS-1{1'b0}}, index[0]};
+    dac_memory #(.BITS(WORD_BITS), .ADDRESS_BITS(INDEX_BITS)) even (
+        .clock(clock), .write(write && !write_index[0]), .write_address(write_address), .write_data(write_data),
+        .address({read_bank, next_row}), .word(even_word)
+    );
+    dac_memory #(.BITS(WORD_BITS), .ADDRESS_BITS(INDEX_BITS)) odd (
+        .clock(clock), .write(write && write_index[0]), .write_address(write_address), .write_data(write_data),
+        .address({read_bank, row}), .word(odd_word)
+    );
 
     always @(posedge clock) begin
-        if (write && !write_index[0]) even_words[{write_bank, write_index[INDEX_BITS-1:1]}] <= write_data;
-        if (write && write_index[0]) odd_words[{write_bank, write_index[INDEX_BITS-1:1]}] <= write_data;
-    end
-
-    always @(posedge clock) begin
-        even_row <= {read_bank, next_row};
-        odd_row <= {read_bank, index[INDEX_BITS-1:1]};
         odd_at_row <= index[0];
-
-        even_word <= even_words[even_row];
-        odd_word <= odd_words[odd_row];
         odd_at_word <= odd_at_row;
 
         here <= odd_at_word ? odd_word : even_word;

@@ -1,8 +1,9 @@
 // A DP16KD of the ECP5, a block RAM of 1024 words of 18 bits, for simulations of netlists: yosys has its pins alone.
 //
-// By Lattice's TN1264, ECP5 and ECP5-5G Memory Usage Guide, as far as yosys uses it: both ports on rising edges, without
-// output registers, resets and chip selects; 36 bits are written on port A and read on port B. Of 9 bits a port of 1, 2
-// or 4 bits has 8. +asleep is the number of clocks after power-up for which every word reads as 0.
+// By Lattice's TN1264, ECP5 and ECP5-5G Memory Usage Guide, as far as yosys and ecp5/dac_memory.v use it: both ports on
+// rising edges, without resets and chip selects, an output register on port B alone; 36 bits are written on port A and
+// read on port B. Of 9 bits a port of 1, 2 or 4 bits has 8. +asleep is the number of clocks after power-up for which every
+// word reads as 0.
 
 `timescale 1ns / 1ps
 `default_nettype none
@@ -58,7 +59,8 @@ module DP16KD #(
 
     generate
         if ((DATA_WIDTH_B == 36) != WIDE || CLKAMUX != "CLKA" || CLKBMUX != "CLKB" || REGMODE_A != "NOREG" ||
-                REGMODE_B != "NOREG" || (!WIDE && (WRITEMODE_A == "NORMAL" || WRITEMODE_B == "NORMAL")) ||
+                (REGMODE_B != "NOREG" && (WIDE || REGMODE_B != "OUTREG")) ||
+                (!WIDE && (WRITEMODE_A == "NORMAL" || WRITEMODE_B == "NORMAL")) ||
                 WRITEMODE_A == "WRITETHROUGH" || WRITEMODE_B == "WRITETHROUGH") begin : guard
             this_model_has_no_such_DP16KD stop ();
         end
@@ -78,7 +80,8 @@ module DP16KD #(
     wire selected_b = CEB && {CSB2, CSB1, CSB0} == 3'd0;
 
     reg [8:0] bytes [0:2047];
-    reg [17:0] out_a, out_b;
+    reg [17:0] out_a, out_b, late_b;
+    always @(posedge CLKB) if (OCEB) late_b <= out_b;
     reg awake;
     integer k, asleep;
     initial begin
@@ -144,7 +147,7 @@ module DP16KD #(
     assign {
         DOB17, DOB16, DOB15, DOB14, DOB13, DOB12, DOB11, DOB10, DOB9,
         DOB8, DOB7, DOB6, DOB5, DOB4, DOB3, DOB2, DOB1, DOB0
-    } = out_b & {18{awake}};
+    } = (REGMODE_B == "OUTREG" ? late_b : out_b) & {18{awake}};
 endmodule
 
 `default_nettype wire

@@ -275,8 +275,8 @@ def _axis() -> Iterator[Mutant]:
     yield Mutant(
         "the table does not wrap to its first word",
         "dac_table",
-        "even_row <= {read_bank, next_row}",
-        "even_row <= {read_bank, next_row == 0 && index[0] ? {ROW_BITS{1'b1}} : next_row}",
+        ".address({read_bank, next_row})",
+        ".address({read_bank, next_row == 0 && index[0] ? {ROW_BITS{1'b1}} : next_row})",
     )
     yield Mutant(
         "the other bank is read",
@@ -284,7 +284,9 @@ def _axis() -> Iterator[Mutant]:
         ".read_bank(read_bank), .index(phase",
         ".read_bank(!read_bank), .index(phase",
     )
-    yield Mutant("the other bank is written", "dac_table", "odd_words[{write_bank,", "odd_words[{!write_bank,")
+    yield Mutant("the other bank is written", "dac_table", "{write_bank, write_index", "{!write_bank, write_index")
+    yield Mutant("odd words are written to both", "dac_table", "write && !write_index[0]", "write")
+    yield Mutant("a word is read a clock early", "dac_memory", "word <= words[row]", "word <= words[address]")
     yield Mutant(
         "the bank is read a clock early",
         "dac_axis",
@@ -313,8 +315,8 @@ def _axis() -> Iterator[Mutant]:
     yield Mutant(
         "a direct table is written in the other bank",
         "dac_direct_table",
-        "memory[{write_bank,",
-        "memory[{!write_bank,",
+        ".write_address({write_bank,",
+        ".write_address({!write_bank,",
         "direct",
     )
     yield Mutant(
@@ -434,10 +436,11 @@ def _output() -> Iterator[Mutant]:
     yield Mutant(
         "the multiplier drops the low bits (blocks)",
         "dac_multiply_plain",
-        "rows[i] + (a_in[i] ? wide <<< i : {PRODUCT_BITS{1'b0}})",
+        "rows[i] + (a[i] ? wide <<< i : {PRODUCT_BITS{1'b0}})",
         "rows[i]",
         "plain",
     )
+    yield Mutant("a factor is a clock early (blocks)", "dac_product", "a_in * b_in", "a * b_in", "plain")
     yield Mutant(
         "the guard lets one code less pass upwards",
         "dac_slew",
@@ -522,20 +525,23 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "a trigger is lost before the first program is taken",
         "dac_scan",
-        "(loaded || committed)",
+        "(loaded || (committed && (tick || !withdraw)))",
         "(loaded || (tick && committed))",
     )
     yield Mutant(
         "a trigger is taken though the first program is withdrawn",
         "dac_scan",
-        " && !unloads && !still_running",
-        " && !still_running",
+        "(committed && (tick || !withdraw))",
+        "committed",
     )
+    yield Mutant("the first program is withdrawn, and its scan runs", "dac_scan", "(plays_on && !unloads)", "plays_on")
     yield Mutant(
-        "the first program is withdrawn, and its scan runs", "dac_scan", "last_frame) && !unloads;", "last_frame);"
+        "a withdrawal stops the first program as it is taken",
+        "dac_scan",
+        "!loaded && !(tick && committed);",
+        "!loaded;",
     )
-    yield Mutant("a withdrawal stops the first program as it is taken", "dac_scan", "!loaded && !take;", "!loaded;")
-    yield Mutant("a trigger is taken while a scan plays", "dac_scan", " && !still_running;", ";")
+    yield Mutant("a trigger is taken while a scan plays", "dac_scan", " && !plays_on;", ";")
     yield Mutant(
         "a trigger does not disarm",
         "dac_scan",
@@ -543,12 +549,14 @@ def _scan() -> Iterator[Mutant]:
         "        if (go) begin",
     )
     yield Mutant("park does not disarm", "dac_scan", "if (park || reset) armed", "if (reset) armed")
-    yield Mutant("park is ignored", "dac_scan", "(still_running || go) && !park", "(still_running || go)")
+    yield Mutant(
+        "park is ignored", "dac_scan", "((plays_on && !unloads) || go) && !park", "((plays_on && !unloads) || go)"
+    )
     yield Mutant(
         "park does not come before a trigger",
         "dac_scan",
-        "(still_running || go) && !park && !reset",
-        "(still_running && !park && !reset) || go",
+        "((plays_on && !unloads) || go) && !park && !reset",
+        "(plays_on && !unloads && !park && !reset) || go",
     )
     yield Mutant("reset is ignored by the scan", "dac_scan", "!park && !reset", "!park")
     yield Mutant(

@@ -15,8 +15,9 @@ _BY_TURNS = {
     "dac_pair_slew", "dac_pair_table", "dac_pair_words", "dac_delay", "dac_skew", "dac_multiply_digits",
 }  # fmt: skip
 _RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}
-_SPLINE = {"dac_phase", "dac_spline", "dac_spline_step"}
-_LINES = {"dac_phase", "dac_table", "dac_interpolator"}
+_SPLINE = {"dac_phase", "dac_spline", "dac_spline_step", "dac_direct_table", "dac_memory"}
+_LINES = {"dac_phase", "dac_table", "dac_memory", "dac_interpolator"}
+_BLOCKS = {"dac_multiply_plain", "dac_product"}
 _SLOW_PART = {
     "dac_slow_axis", "dac_slow_boot", "dac_slow_divide", "dac_slow_engine", "dac_slow_fit", "dac_slow_part",
     "dac_slow_store", "dac_axis_serial", "dac_spline_terms",
@@ -35,8 +36,8 @@ def played_modules(placement: Placement, programs: Sequence[Program], has_pixel_
         return played | {"dac_axis_serial"} | ({"dac_spline_terms"} if "cubic" in modes else set())
     if placement.axis == "alternate":
         return played | _BY_TURNS
-    played |= _PIPELINED | {"dac_multiply_plain" if placement.axis == "blocks" else "dac_multiply_digits"}
-    for mode, modules in (("interpolated", _LINES), ("cubic", _SPLINE), ("direct", {"dac_direct_table"})):
+    played |= _PIPELINED | (_BLOCKS if placement.axis == "blocks" else {"dac_multiply_digits"})
+    for mode, modules in (("interpolated", _LINES), ("cubic", _SPLINE), ("direct", {"dac_direct_table", "dac_memory"})):
         if mode in modes:
             played |= modules
     if "interpolated" in modes and placement.axis != "blocks":
