@@ -11,6 +11,7 @@ from stream_configurations import (
     SMALL,
     SWAPS,
     SWAPS_SLOW,
+    random_changes,
     random_swaps,
 )
 from stream_laws import Broken, follow_their_programs, steps_are_limited
@@ -21,8 +22,9 @@ from stream_scripts import (
     swaps_at_every_tick,
 )
 
+from tablegen.device.schedule import Schedule
 from tablegen.verification.play.sequencer_shape import SequencerShape
-from tablegen.verification.play.stream import Script
+from tablegen.verification.play.stream import Script, Words
 from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 SAMPLES_ON_VERILATOR = 1_000_000
@@ -54,17 +56,50 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
+@pytest.mark.parametrize("swaps", [SWAPS // 2, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
 def test_no_line_mixes_programs_and_no_step_is_above_the_limit(swaps: int, small_on_verilator: SequencerBench) -> None:
     rng = np.random.default_rng(swaps)
     samples = 0
-    for _ in range(0, swaps, SWAPS):
-        script, programs = random_swaps(rng, SWAPS)
+    for _ in range(0, swaps, SWAPS // 2):
+        script, programs = random_swaps(rng, SWAPS // 2)
         played = equal(small_on_verilator, script)
         samples += played.samples
-        assert np.sum(flag(played.capture, "swapped")) == SWAPS == len(programs)
+        assert np.sum(flag(played.capture, "swapped")) == SWAPS // 2 == len(programs)
         follow_their_programs(played.capture, programs)
     assert samples >= SAMPLES_ON_VERILATOR * swaps // SWAPS
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("changes", [SWAPS // 2, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
+def test_no_change_begins_a_frame_again(changes: int, tmp_path: Path) -> None:
+    """Commits that keep the frame, at any tick: each line is whole, and each frame has all of its lines."""
+    bench = SequencerBench("verilator", SMALL, tmp_path, {"COMMIT_MODES": 1})
+    rng = np.random.default_rng(changes)
+    for _ in range(0, changes, SWAPS // 2):
+        script, schedule = random_changes(rng, SWAPS // 2)
+        capture = equal(bench, script).capture
+        assert np.sum(flag(capture, "swapped")) == SWAPS // 2
+        assert frames_are_whole(capture, schedule)
+
+
+def frames_are_whole(capture: Words, schedule: Schedule) -> bool:
+    """Whether lines and frames begin when those of one schedule do that nobody changes."""
+    playing = capture[flag(capture, "playing")]
+    lines, frames = (np.flatnonzero(flag(playing, name)) for name in ("line", "frame"))
+    return np.array_equal(lines, np.arange(0, len(playing), schedule.ticks)) and np.array_equal(
+        frames, np.arange(0, len(playing), schedule.frame_ticks)
+    )
+
+
+@pytest.mark.common
+def test_a_frame_that_begins_again_is_not_whole() -> None:
+    script, schedule = random_changes(np.random.default_rng(0), 40)
+    capture = np.array(script.expected, dtype=np.uint64)
+    assert frames_are_whole(capture, schedule)
+    at = int(np.flatnonzero(flag(capture, "swapped") & ~flag(capture, "frame"))[20])
+    begins_again = np.concatenate([capture[:at], capture[np.flatnonzero(flag(capture, "frame"))[0] :]])
+    assert not frames_are_whole(begins_again, schedule)
+    assert not frames_are_whole(np.delete(capture, at), schedule)
 
 
 @pytest.mark.common

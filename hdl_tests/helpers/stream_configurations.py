@@ -4,10 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from programs import random_dual
+from programs import random_dual, random_program
+from replacing import replace
 from stream_scripts import random_play
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import DualProgram
+from tablegen.device.schedule import Schedule
 from tablegen.emit.constants import DEGREES
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
@@ -165,3 +168,23 @@ def random_swaps(
         programs.append(program)
     script.wait_ticks(100)
     return script, programs
+
+
+def random_changes(rng: np.random.Generator, changes: int, shape: SequencerShape = SMALL) -> tuple[Script, Schedule]:
+    """A scan without end whose program is changed at any tick, by commits that keep the frame; and its schedule."""
+    script = Script()
+    script.tick_every(1)
+    first = random_dual(rng, shape, (12, 20), kind="smooth", lines=(3, 5))
+    y_place = first.y.hold, first.y.phase.ticks
+    for number in range(changes):
+        x, y = (random_program(rng, shape, axis, first.schedule, "smooth") for axis in "xy")
+        program = replace(first, x=x, y=y if (y.hold, y.phase.ticks) == y_place else first.y)
+        script.load(program)
+        script.wait(int(rng.integers(0, 20)))
+        script.request("commit", program=program, mode=CommitMode.KEEP)
+        if number == 0:
+            script.wait(10)
+            script.request("arm", "trigger")
+        script.wait_ticks(24)
+    script.wait_ticks(100)
+    return script, first.schedule
