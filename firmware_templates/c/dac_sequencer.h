@@ -140,13 +140,22 @@ typedef struct {
 
 /* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). The names may be macros,
  * as of -DUP=ANNEXIN_200NM -Dlow=annexin_200nm: DAC_PROGRAM(UP, low). NAME_program.c of a build has it as an object. */
-#define DAC_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name, NULL)
 #if DAC_PIXEL_TABLE
-/* The same for a header that has a table of the ticks of each pixel. */
+/* With the table of the ticks of each pixel, if the header has one: then NAME_PIXEL_TABLE is 1, and not defined without.
+ * Before a 1, DAC_PIXELS_1 puts a comma between the words, so that the table is the second argument, and not NULL. */
+#define DAC_PROGRAM(NAME, name) DAC_ANY_PROGRAM(NAME, name)
+#define DAC_ANY_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name, DAC_PIXELS(NAME##_PIXEL_TABLE, name##_pixel_table))
+#define DAC_PIXELS(has_table, table) DAC_PIXELS_OF(has_table, table)
+#define DAC_PIXELS_OF(has_table, table) DAC_SECOND(DAC_PIXELS_##has_table table, NULL, 0)
+#define DAC_PIXELS_1 0,
+#define DAC_SECOND(...) DAC_SECOND_OF(__VA_ARGS__)
+#define DAC_SECOND_OF(first, second, ...) second
+/* The same for a header that has such a table. */
 #define DAC_PIXEL_PROGRAM(NAME, name) DAC_PIXEL_PROGRAM_OF(NAME, name)
 #define DAC_PIXEL_PROGRAM_OF(NAME, name) DAC_PROGRAM_OF(NAME, name, name##_pixel_table)
 #define DAC_PIXEL_MEMBER(counts) , counts
 #else
+#define DAC_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name, NULL)
 #define DAC_PIXEL_MEMBER(counts)
 #endif
 #define DAC_PROGRAM_OF(NAME, name, counts)                                                                            \

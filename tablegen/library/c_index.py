@@ -46,13 +46,7 @@ def c_index(library: str, entries: Sequence[Entry], version: str) -> dict[str, b
             "LONGEST_NAME": max(len(entry.name) for entry in entries),
         },
         "programs": [
-            {
-                "number": number,
-                "name": entry.name,
-                "NAME": entry.name.upper(),
-                "told": _told(entry),
-                "macro": "DAC_PIXEL_PROGRAM" if entry.table_pixels else "DAC_PROGRAM",
-            }
+            {"number": number, "name": entry.name, "NAME": entry.name.upper(), "told": _told(entry)}
             for number, entry in enumerate(entries)
         ],
     }

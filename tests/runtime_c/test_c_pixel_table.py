@@ -10,8 +10,10 @@ import pytest
 from building import run_clean
 from c_library import BAD_SCHEDULE, LOADED, Library, PixelCProgram, Twin, compile_library
 from c_scripts import long_dual
+from editing import SCAN, SCANNER, edited, run, write_pair
 from programs import random_schedule, with_table
 from replacing import replace
+from sine_scans import short_sine
 
 from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import DualProgram
@@ -171,3 +173,38 @@ def test_every_mutant_is_found(mutant: str, tmp_path: Path) -> None:
     library = Library(path)
     with pytest.raises(AssertionError):
         judge(library)
+
+
+PROGRAMS = """
+#include "{name}.h"
+#include "dac_sequencer.h"
+#include <stdio.h>
+#define UP {capital}
+#define low {name}
+static const dac_program one = DAC_PROGRAM({capital}, {name}), other = DAC_PROGRAM(UP, low);
+int main(void)
+{{
+    printf("%d %d\\n", one.schedule.pixel_table != NULL, one.schedule.pixel_table == other.schedule.pixel_table);
+    return 0;
+}}
+"""
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("compiler", ["gcc -std=c99", "clang -std=c99", "g++ -x c++", "clang++ -x c++ -std=c++17"])
+def test_a_program_has_the_table_of_its_header(compiler: str, tmp_path: Path) -> None:
+    """Of a build with a sine, and of one without, by the same macro; its names may be macros."""
+    for name, has_table in (("sine", 1), ("line", 0)):
+        folder = tmp_path / name
+        if has_table:
+            short_sine(tmp_path, "name = 'sine'")
+        else:
+            write_pair(tmp_path, edited(SCAN, "name = 'line'"), SCANNER)
+        assert run("build", tmp_path / "scan.toml", "-o", folder, "-q").status == 0
+        (folder / "main.c").write_text(PROGRAMS.format(name=name, capital=name.upper()), "ascii")
+        arrays = folder / f"{name}.c"
+        options = ["-Wall", "-Wextra", "-Wpedantic", TABLE, f"-I{folder}"]
+        run_clean([*compiler.split(), *options, "-c", folder / "main.c", "-o", folder / "main.o"])
+        run_clean(["gcc", *options, "-c", arrays, "-o", folder / "arrays.o"])
+        run_clean(["g++", folder / "main.o", folder / "arrays.o", "-o", folder / "main"])
+        assert run_clean([folder / "main"]).split() == [str(has_table), "1"]
