@@ -141,8 +141,8 @@ typedef struct {
 /* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). The names may be macros,
  * as of -DUP=ANNEXIN_200NM -Dlow=annexin_200nm: DAC_PROGRAM(UP, low). NAME_program.c of a build has it as an object. */
 #if DAC_PIXEL_TABLE
-/* With the table of the ticks of each pixel, if the header has one: then NAME_PIXEL_TABLE is 1, and not defined without.
- * Before a 1, DAC_PIXELS_1 puts a comma between the words, so that the table is the second argument, and not NULL. */
+/* With the table of the ticks of each pixel, if the header has one: NAME_PIXEL_TABLE is 1 then, and else not defined.
+ * Before a 1, DAC_PIXELS_1 puts a comma between the words, so that the table is the second argument, not NULL. */
 #define DAC_PROGRAM(NAME, name) DAC_ANY_PROGRAM(NAME, name)
 #define DAC_ANY_PROGRAM(NAME, name) DAC_PROGRAM_OF(NAME, name, DAC_PIXELS(NAME##_PIXEL_TABLE, name##_pixel_table))
 #define DAC_PIXELS(has_table, table) DAC_PIXELS_OF(has_table, table)

@@ -250,7 +250,7 @@ def test_the_runtime_is_copied_byte_for_byte(scan: Path) -> None:
     assert all(name.endswith("_top.v") for name in modules)
     assert not any(name.endswith("_top.v") for name in RUNTIME)
     for name in RUNTIME:
-        (source,) = _TEMPLATES.glob(f"**/{name}")
+        (source,) = (path for path in _TEMPLATES.glob(f"**/{name}") if path.parent.name != "ecp5")  # cells of a part
         assert (out / name).read_bytes() == source.read_bytes()
 
 

@@ -1,6 +1,6 @@
-/* Plays programs of a library in turn, to standard output. The arguments are picks: NAME RESTARTS TICKS. A pick is its
- * number in four bytes, the digits of its hash, and its ticks, of ten bytes each, the lowest of each word first: x and y
- * in four, markers, faults. */
+/* Plays programs of a library in turn, to standard output. The arguments are picks: NAME RESTARTS TICKS. A pick is
+ * its number in four bytes, the digits of its hash, and its ticks, of ten bytes each, the lowest of each word first: x
+ * and y in four, markers, faults. */
 #include <stdio.h>
 #include <stdlib.h>
 
