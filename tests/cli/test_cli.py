@@ -636,7 +636,7 @@ def test_an_interruption_while_writing_waits_for_the_last_file(scan: Path, event
 WAITING = """
 import signal, sys
 import tablegen.certificate.certified_scan
-def wait(*_):
+def wait(*_, **_options):
     print("planning", flush=True)
     while True:
         signal.pause()
