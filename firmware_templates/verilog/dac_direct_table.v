@@ -14,12 +14,18 @@ module dac_direct_table #(
     input  wire [WORD_BITS-1:0]        write_data,
     input  wire                        read_bank,
     input  wire [INDEX_BITS-1:0]       index,
-    output wire signed [WORD_BITS-1:0] word
+    output reg  signed [WORD_BITS-1:0] word
 );
-    dac_memory #(.BITS(WORD_BITS), .ADDRESS_BITS(INDEX_BITS + 1)) memory (
-        .clock(clock), .write(write), .write_address({write_bank, write_index}), .write_data(write_data),
-        .address({read_bank, index}), .word(word)
-    );
+    reg [WORD_BITS-1:0] memory [0:(2<<INDEX_BITS)-1];
+    reg [INDEX_BITS:0] row;
+
+    always @(posedge clock)
+        if (write) memory[{write_bank, write_index}] <= write_data;
+
+    always @(posedge clock) begin
+        row <= {read_bank, index};
+        word <= memory[row];
+    end
 endmodule
 
 `default_nettype wire

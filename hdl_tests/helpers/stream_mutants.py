@@ -315,8 +315,8 @@ def _axis() -> Iterator[Mutant]:
     yield Mutant(
         "a direct table is written in the other bank",
         "dac_direct_table",
-        ".write_address({write_bank,",
-        ".write_address({!write_bank,",
+        "memory[{write_bank,",
+        "memory[{!write_bank,",
         "direct",
     )
     yield Mutant(

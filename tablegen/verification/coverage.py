@@ -15,7 +15,7 @@ _BY_TURNS = {
     "dac_pair_slew", "dac_pair_table", "dac_pair_words", "dac_delay", "dac_skew", "dac_multiply_digits",
 }  # fmt: skip
 _RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}
-_SPLINE = {"dac_phase", "dac_spline", "dac_spline_step", "dac_direct_table", "dac_memory"}
+_SPLINE = {"dac_phase", "dac_spline", "dac_spline_step", "dac_direct_table"}
 _LINES = {"dac_phase", "dac_table", "dac_memory", "dac_interpolator"}
 _BLOCKS = {"dac_multiply_plain", "dac_product"}
 _SLOW_PART = {
@@ -37,7 +37,7 @@ def played_modules(placement: Placement, programs: Sequence[Program], has_pixel_
     if placement.axis == "alternate":
         return played | _BY_TURNS
     played |= _PIPELINED | (_BLOCKS if placement.axis == "blocks" else {"dac_multiply_digits"})
-    for mode, modules in (("interpolated", _LINES), ("cubic", _SPLINE), ("direct", {"dac_direct_table", "dac_memory"})):
+    for mode, modules in (("interpolated", _LINES), ("cubic", _SPLINE), ("direct", {"dac_direct_table"})):
         if mode in modes:
             played |= modules
     if "interpolated" in modes and placement.axis != "blocks":

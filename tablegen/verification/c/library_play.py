@@ -71,9 +71,9 @@ class CLibraryPlay:
             except SimulationFailed:
                 require_headers(compiler)
                 raise
-            arguments = [word for pick in picks for word in (self._name(pick), str(int(pick.restarts)), str(pick.ticks))]
+            texts = [word for pick in picks for word in (self._name(pick), str(int(pick.restarts)), str(pick.ticks))]
             most = 2 * sum(map(len, expected)) + 1000
-            record([str(program), *arguments], b"", capture, most, 60.0 + ticks / _LEAST_TICKS_A_SECOND)
+            record([str(program), *texts], b"", capture, most, 60.0 + ticks / _LEAST_TICKS_A_SECOND)
             failure = self._difference(picks, expected, read_bytes(capture, BUILD_FILE))
         except SimulationFailed as error:
             return self._check("nothing", str(error))
