@@ -146,7 +146,7 @@ def test_a_process_of_its_own_ends_so(tmp_path: Path) -> None:
     scan = write_pair(tmp_path)
     code = (
         "import sys, tablegen.certificate.certified_scan as b\n"
-        "def fail(*_): raise KeyError('µ')\n"
+        "def fail(*_, **_options): raise KeyError('µ')\n"
         "b.make_plan = fail\n"
         f"sys.argv = ['tablegen', 'check', {str(scan)!r}]\n"
         "from tablegen.cli import main\nmain()"
