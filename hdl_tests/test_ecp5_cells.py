@@ -86,7 +86,7 @@ MUTANTS = [
     ("dac_memory", "ADDRESS_BITS == 12 ? 4", "ADDRESS_BITS == 12 ? 9"),
     ("dac_product", '.REG_OUTPUT_CLK("CLK0")', '.REG_OUTPUT_CLK("NONE")'),
     ("dac_product", '.REG_INPUTA_CLK("CLK0")', '.REG_INPUTA_CLK("NONE")'),
-    ("dac_product", "b_wide = b_long[17:0]", "b_wide = b"),
+    ("dac_product", "b_wide = b_long[17:0]", "b_wide = {2'd0, b_long[15:0]}"),
 ]
 
 
