@@ -521,7 +521,9 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "a trigger is not taken on the clock of its arm", "dac_scan", "trigger && (armed || arm)", "trigger && armed"
     )
-    yield Mutant("a trigger is taken with nothing to play", "dac_scan", "(loaded || committed) && ", "")
+    yield Mutant(
+        "a trigger is taken with nothing to play", "dac_scan", "(loaded || (committed && (tick || !withdraw))) && ", ""
+    )
     yield Mutant(
         "a trigger is lost before the first program is taken",
         "dac_scan",
