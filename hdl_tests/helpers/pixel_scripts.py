@@ -148,11 +148,32 @@ def refuse_tables(rng: Generator, script: PixelScript, shape: SequencerShape) ->
         script.wait(check_clocks(program.schedule) + 2)
         script.wait_ticks(100)
         before.append(program)
+    more_than_a_bank(rng, script, shape)
     for bit in range(PIXEL_INDEX_BITS, 16):  # there are no such words
         script.write(PIXEL_TICKS, [1], 1 << bit)
         script.refused = True
         script.state(f"write to {1 << bit}")
         script.request("clear_faults")
+
+
+def more_than_a_bank(rng: Generator, script: PixelScript, shape: SequencerShape) -> None:
+    """Commit more pixels than a bank has, whose low bits are those of a table that fits, and which the windows have."""
+    program = random_dual(rng, shape, (300, 300), kind="tame", lines=(1, 3))
+    windows, table = (Window(0, 150), Window(150, 150)), ((70, 50, 30), (40, 50, 60))
+    schedule = replace(program.schedule, turn_tick=150, forward=windows[0], backward=windows[1], pixels=3)
+    program = replace(program, schedule=replace(schedule, pixel_table=table))
+    take(script, program)
+    script.wait_ticks(700)
+    script.wait_writable()
+    Script.load(script, program)
+    script.write_pixels(program)
+    script.write(PROGRAM, [2 * MOST_PIXELS + 3], PIXELS)
+    script.wait(1)
+    script.commit_unfit()
+    script.wait_ticks(700)
+    script.state("commit of more pixels than a bank has, of which the windows have as many ticks")
+    script.pace(1, 41)
+    script.request("clear_faults", "withdraw")
 
 
 def _right(program: DualProgram, region: int, address: int) -> int:
