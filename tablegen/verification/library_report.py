@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from tablegen.base.input_errors import Unphysical, shortened
 from tablegen.base.reading import BUILD_FILE, read_bytes
@@ -41,7 +41,7 @@ class IndexRecord(Struct, frozen=True):
     formats: list[str]
     notes: list[str]
     files: dict[FileName, Digest]
-    programs: Annotated[list[IndexedProgram], Meta(min_length=1)]
+    programs: list[IndexedProgram]
     failed: list[dict[str, Any]]
 
 
@@ -65,6 +65,8 @@ def read_index(folder: Path) -> IndexRecord:
         raise NotABuild(f"{path}: cannot be read: {error.strerror or error}; {_REMEDY}") from None
     except (ValueError, RecursionError) as error:  # a ValidationError is a ValueError
         raise NotABuild(f"{path}: is damaged: {shortened(str(error))}; {_REMEDY}") from None
+    if not record.programs:
+        raise NotABuild(f"{path}: has no program; {_REMEDY}")
     names = [record.library, *(program.name for program in record.programs)]
     for name in names:
         if (why := why_not_a_name(name)) is not None:
@@ -176,12 +178,14 @@ def _wrong_entry(folder: Path, library: str, entry: Entry, stored: StoredBuild) 
     for axis, content in (("x", entry.x), ("y", entry.y)):
         certificate = getattr(stored.manifest.axes, axis).certificate
         errors[axis] = (certificate.max_error_lsb, content.scaling_error_percent)
+    # Of the formats by default a manifest does not keep the order.
+    same_formats = sorted(entry.formats) == sorted(stored.formats)
     expected = make_entry(
         library,
         stored_content(stored),
         errors,
         settings=entry.settings,
-        formats=stored.formats,
+        formats=entry.formats if same_formats else stored.formats,
         warnings=entry.warnings,
         inputs=entry.inputs,
         files={},

@@ -53,6 +53,24 @@ def test_every_program_and_the_index_are_verified(stored: Path) -> None:
     assert lines[-1] == f"{stored}: verified, 38 checks"
 
 
+def test_formats_by_default_are_those_of_the_manifest_in_any_order(tmp_path: Path) -> None:
+    """A manifest does not keep them; formats that it has are compared."""
+    out = tmp_path / "out"
+    assert run("sweep", write_library(tmp_path), "-o", out, "-j", "1", "-f", "verilog", "-f", "c").status == 0
+    assert verify(out)[0] == 0
+    edit_json(out / "broad" / "program.json", lambda record: record.update(formats=["verilog", "verilog"]))
+    status, _, err = verify(out)
+    assert status == 5
+    assert "library records: broad/program.json: formats is not that of manifest.json" in err
+
+
+def test_a_library_without_a_program_is_status_2(library: Path) -> None:
+    edit_json(library / "library.json", lambda record: record.update(programs=[]))
+    status, out, err = verify(library)
+    assert (status, out) == (2, "")
+    assert err == f"{library}/library.json: has no program; write the library again with `tablegen sweep`\n"
+
+
 def edit_json(path: Path, change: Callable[[dict], object]) -> None:
     record = json.loads(path.read_text("ascii"))
     change(record)
