@@ -110,6 +110,12 @@ class Schedule(Struct, frozen=True):
         forward, backward = (np.cumsum([0, *counts[:-1]]) for counts in self.pixel_table)
         return self.forward.first + forward, self.backward.first + backward
 
+    @property
+    def pixel_edges(self) -> tuple[Ints, Ints]:
+        """The ticks between which the pixels of both windows lie, ascending, shape (pixels + 1,) each."""
+        forward, backward = self.pixel_starts
+        return np.append(forward, self.forward.stop), np.append(backward, self.backward.stop)
+
 
 def has_ticks_for_pixels(pixels: int, forward_count: int, backward_count: int) -> bool:
     """Return True if each window that has ticks has at least one for each pixel.

@@ -154,11 +154,8 @@ def pixel_windows(schedule: Schedule, period: float) -> tuple[Band, ...]:
 
 def pixel_times(schedule: Schedule) -> dict[str, Floats]:
     """Return the middle of each pixel, trace and retrace in the order of the position, in lines; (pixels,) each."""
-    middles = []
-    for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
-        edges = np.append(starts, window.stop)
-        middles.append(0.5 * (edges[:-1] + edges[1:]) / schedule.ticks)
-    return {"forward": middles[0], "backward": middles[1][::-1]}
+    forward, backward = (0.5 * (edges[:-1] + edges[1:]) / schedule.ticks for edges in schedule.pixel_edges)
+    return {"forward": forward, "backward": backward[::-1]}
 
 
 def over_time(run: AxisRun, line: LinePlan, period: float) -> list[DrawnCurve]:

@@ -58,7 +58,7 @@ def pixel_means(place: FourierSeries, schedule: Schedule) -> tuple[Floats, Float
     n = 2.0 * pi * np.arange(1.0, place.harmonics + 1.0)
     integral = FourierSeries(0.0, -place.b / n, place.a / n)  # without that of a0
     means = []
-    for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
-        edges = np.append(starts, window.stop) / schedule.ticks
+    for ticks in schedule.pixel_edges:
+        edges = ticks / schedule.ticks
         means.append(place.a0 + np.diff(integral.value(edges)) / np.diff(edges))
     return means[0], means[1][::-1]

@@ -313,8 +313,8 @@ def _columns(turn: float, window: tuple[float, float], pixels: int) -> tuple[_Co
 def _pixel_columns(schedule: Schedule) -> tuple[_Columns, _Columns]:
     """Return the pixels of a schedule as columns of the trace and of the retrace."""
     sides = []
-    for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
-        edges = np.append(starts, window.stop) / schedule.ticks
+    for ticks in schedule.pixel_edges:
+        edges = ticks / schedule.ticks
         sides.append(_Columns(0.5 * (edges[:-1] + edges[1:]), np.diff(edges)))
     return sides[0], _Columns(sides[1].times[::-1], np.asarray(sides[1].lasts)[::-1])
 

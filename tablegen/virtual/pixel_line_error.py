@@ -54,7 +54,7 @@ def _means(displacement_nm: Floats, schedule: Schedule) -> tuple[Floats, Floats]
     parts = len(displacement_nm)
     sums = np.concatenate([[0.0], np.cumsum(displacement_nm)])
     means = []
-    for window, starts in zip((schedule.forward, schedule.backward), schedule.pixel_starts, strict=True):
-        edges = np.append(starts, window.stop) * (parts / schedule.ticks)
+    for ticks in schedule.pixel_edges:
+        edges = ticks * (parts / schedule.ticks)
         means.append(np.diff(np.interp(edges, np.arange(parts + 1), sums)) / np.diff(edges))
     return means[0], means[1][::-1]
