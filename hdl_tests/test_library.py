@@ -161,6 +161,7 @@ FAULTS = {
         lambda library: (library / "lines_library_tables.mem").write_text("00000003\n", "ascii"),
         "lines_library_tables.mem has no 3 records",
     ),
+    "no module": (lambda library: (library / "dac_library.v").unlink(), "dac_library.v is missing"),
     "no header": (lambda library: (library / "lines_library.vh").unlink(), "lines_library.vh is missing"),
 }
 

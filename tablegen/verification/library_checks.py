@@ -8,8 +8,7 @@ from tablegen.library.verilog_index import MODULE
 from tablegen.manifest.read import StoredBuild
 from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.library_report import IndexRecord
-
-_MOST_TICKS = 1 << 28
+from tablegen.verification.play.library_session import MOST_TICKS
 
 
 def library_checks(
@@ -38,14 +37,15 @@ def library_checks(
     simulator, axis, fourier
         How the Verilog is simulated and placed; of "pipelined" axes those with multiplier blocks play.
     ticks
-        Most ticks after a pick, by default 20,000.
+        Most ticks after a pick, at most and by default ``MOST_TICKS``.
 
     Raises
     ------
     ToolMissing
         If a compiler or simulator is not installed.
     """
-    most, name, count = _MOST_TICKS if ticks is None else ticks, record.library, len(programs)
+    most = MOST_TICKS if ticks is None else min(ticks, MOST_TICKS)
+    name, count = record.library, len(programs)
     names, played = [program.name for program in record.programs], [program.program for program in programs]
     if target == "verilog" and MODULE in record.files:
         from tablegen.verification.play.placement import Placement

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Sequencer, Tick
 
-_MOST_TICKS = 20_000  # of a pick
+MOST_TICKS = 20_000  # of a pick
 _OTHER_TICKS = 20  # beside the rest of the line that plays, and a whole line
 
 
@@ -34,17 +34,16 @@ class Pick:
 def make_picks(programs: Sequence[DualProgram], failing: Sequence[Pick], most_ticks: int) -> list[Pick]:
     """Make picks of all programs by number, with those that fail after the first, and of the first again.
 
-    After a pick play the rest of a line and a line of the new program, but at most ``most_ticks`` and 20,000 ticks.
-    Where they are too few for the line that plays, the scan starts again.
+    After a pick play the rest of a line and a line of the new program, but at most ``most_ticks``. Where they
+    are too few for the line that plays, the scan starts again.
     """
-    most = min(most_ticks, _MOST_TICKS)
     picks: list[Pick] = []
     before = None
     for number in (*range(len(programs)), 0):
         own = programs[number].schedule.ticks
         rest = 0 if before is None else programs[before].schedule.ticks
-        restarts = before is None or rest + _OTHER_TICKS > most
-        picks.append(Pick(number, min(most, own + _OTHER_TICKS + (0 if restarts else rest)), restarts))
+        restarts = before is None or rest + _OTHER_TICKS > most_ticks
+        picks.append(Pick(number, min(most_ticks, own + _OTHER_TICKS + (0 if restarts else rest)), restarts))
         if before is None:
             picks += failing
         before = number

@@ -32,6 +32,7 @@ _PICK_CLOCKS = 2000  # beside the words, the rendering and the ticks
 _UNCHANGED = (1 << 32) - 1  # an address at which no memory ends
 _PICK = 0xF << 60  # in the place of a tick: a pick is over, bit 0 is its failure
 _FAILED_TICKS = 100  # after a pick that fails
+_ANSWERS = ("a commit", "a failure")
 
 _MODULE = """\
 // The bench of tablegen verify for a library: picks programs by number, and writes down what plays.
@@ -40,7 +41,7 @@ _MODULE = """\
 
 module verify_bench #(
     parameter PICKS = "", parameter CAPTURE = "", parameter MEMORY_CLOCKS = 1, parameter PLAIN_MULTIPLIER = 0,
-    parameter LOW_AREA = 0, parameter ALTERNATE = 0, parameter FOURIER = 0, parameter PACE = 1
+    parameter LOW_AREA = 0, parameter ALTERNATE = 0, parameter PACE = 1
 );
 `include "{name}_library.vh"
     localparam ADDRESS_BITS = 24;
@@ -162,7 +163,7 @@ endmodule
 `default_nettype wire
 """
 _RENDERED = """,
-        .FOURIER(FOURIER), .HARMONICS({NAME}_LIBRARY_HARMONICS), .SINE_FILE({NAME}_LIBRARY_SINE_FILE)"""
+        .FOURIER(1), .HARMONICS({NAME}_LIBRARY_HARMONICS), .SINE_FILE({NAME}_LIBRARY_SINE_FILE)"""
 
 
 @dataclass(frozen=True)
@@ -195,10 +196,10 @@ class LibraryPlay:
             If the simulator is not installed.
         """
         work.mkdir(parents=True, exist_ok=True)
-        modules = sorted(path.name for path in folder.glob("dac_*.v"))
+        modules = sorted({MODULE, *(path.name for path in folder.glob("dac_*.v"))})
         sources, missing = copies(folder, [*modules, f"{self.library}_library.vh"], work / "rtl")
         if missing:
-            return self._check("nothing", "0 programs", some(missing))
+            return self._check("nothing", "", some(missing))
         (work / simulator).mkdir(exist_ok=True)
         for path in folder.glob(f"{self.library}_library_*.mem"):
             copies(folder, [path.name], work / simulator)
@@ -217,7 +218,7 @@ class LibraryPlay:
             worker.run(work, _TARGET, job)
             return self._compared(picks, read_capture(work / _CAPTURE))
         except (SimulationFailed, OSError, ValueError) as error:
-            return self._check("nothing", "0 differ", str(error))
+            return self._check("nothing", "", str(error))
 
     def _check(self, compared: str, worst: str, failure: str | None) -> Check:
         failure = failure and f"{self.library}, {MODULE}: {failure}"
@@ -246,7 +247,7 @@ class LibraryPlay:
 
     def _parameters(self) -> dict[str, int | str]:
         every = self.placement.parameters(0, "")
-        kinds = {key: every.get(key, 0) for key in ("PLAIN_MULTIPLIER", "LOW_AREA", "ALTERNATE", "FOURIER")}
+        kinds = {key: every.get(key, 0) for key in ("PLAIN_MULTIPLIER", "LOW_AREA", "ALTERNATE")}
         files = {"PICKS": f"../{_PICKS}", "CAPTURE": f"../{_CAPTURE}"}
         return {**files, **kinds, "MEMORY_CLOCKS": self.memory_clocks, "PACE": self._pace}
 
@@ -321,9 +322,6 @@ class LibraryPlay:
             return f"the pick: expected {ours}, got {theirs}"
         ours, theirs = (_told(words) for words in (expected, played))
         return f"tick {place - 1} after the pick:\n  expected  {ours}\n  got       {theirs}"
-
-
-_ANSWERS = ("a commit", "a failure")
 
 
 def _pick_line(pick: Pick) -> str:
