@@ -19,12 +19,12 @@ CUBIC = {"mode": "cubic", "length": 16, "bits": 16}
 DIRECT = {"mode": "direct", "bits": 16}
 
 
-def short(folder: Path, changes: dict[str, object]) -> Build:
-    """The short scan, with changes."""
+def short(folder: Path, changes: dict[str, object], scanner: dict[str, object] | None = None) -> Build:
+    """The short scan, with changes in it and in the scanner file."""
     kept = {key: value for key, value in SHORT.items() if key.rpartition(".")[0] not in changes}
     if "y" in changes:
         kept = {key: value for key, value in kept.items() if not key.startswith("y.")}
-    return build(folder, Variant({**kept, **changes}))
+    return build(folder, Variant({**kept, **changes}, scanner or {}))
 
 
 def model_ticks(program: DualProgram, count: int, parked: int = 1) -> list[Tick]:

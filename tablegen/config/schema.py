@@ -466,12 +466,14 @@ SequencerFormat = Literal[
     "c",
     "verilog",
     "arduino",
+    "axi-stream",
     "cargo",
     "cmsis-pack",
     "constraints",
     "esp-idf",
     "fusesoc",
     "platformio",
+    "spi",
     "zephyr",
 ]
 """A format that plays every scan: a sequencer, or a package around one. Others have the tables of a line and a frame.

@@ -26,7 +26,8 @@ class CPackage(Struct, frozen=True):
 class VerilogPackage(Struct, frozen=True):
     """The Verilog of a scan: the names of its own files and of the modules of the sequencer, each in order.
 
-    ``clocks_per_tick`` is 0 where the clock of the FPGA is not known.
+    ``clocks_per_tick`` is 0 where the clock of the FPGA is not known. ``parameters`` are those of ``NAME_top`` with
+    their defaults; its codes have ``code_bits``, and its words for the converters of x and y ``word_bits``.
     """
 
     name: str
@@ -36,3 +37,6 @@ class VerilogPackage(Struct, frozen=True):
     modules: list[str]
     clocks_per_tick: int
     update_rate_hz: Fraction
+    parameters: dict[str, int]
+    code_bits: int
+    word_bits: tuple[int, int]

@@ -13,7 +13,7 @@ from tablegen.emit.package import CPackage, VerilogPackage
 from tablegen.emit.package_format import PackageOfC, PackageOfVerilog
 from tablegen.emit.slow_c import slow_c_files, slow_constants, slow_storage
 from tablegen.emit.turned_content import TurnedContent
-from tablegen.emit.turned_verilog import turned_verilog_files, turned_verilog_runtime
+from tablegen.emit.turned_verilog import turned_top_parameters, turned_verilog_files, turned_verilog_runtime
 
 
 def require_format(format_name: str, program: ScanProgram) -> None:
@@ -81,6 +81,7 @@ def _c_package(content: TurnedContent) -> CPackage:
 
 
 def _verilog_package(content: TurnedContent) -> VerilogPackage:
+    x, y = (axis.output for axis in content.axes)
     return VerilogPackage(
         content.name,
         content.version,
@@ -89,6 +90,9 @@ def _verilog_package(content: TurnedContent) -> VerilogPackage:
         sorted(path.name for path in turned_verilog_runtime()),
         content.clocks_per_tick,
         content.program.schedule.update_rate_hz,
+        turned_top_parameters(content),
+        x.dac_bits,
+        (x.word_bits, y.word_bits),
     )
 
 

@@ -12,7 +12,7 @@ from tablegen.emit.memory import Memory, memory_file
 from tablegen.emit.templates import comment_safe, template
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.emit.verilog_text import literal, value_range
-from tablegen.emit.verilog_top import port_range
+from tablegen.emit.verilog_top import COUNTERS, port_range
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.output import GAIN_BITS
@@ -86,6 +86,12 @@ def _device(content: TurnedContent) -> dict[str, int]:
     }
 
 
+def turned_top_parameters(content: TurnedContent) -> dict[str, int]:
+    """Return the parameters of ``NAME_top`` with their defaults, in order."""
+    own = {"CLOCKS_PER_TICK": content.clocks_per_tick, "SLOW_INDEX_BITS": _slow_index_bits(content)}
+    return {**own, "COMMIT_MODES": 0, **COUNTERS}
+
+
 def _slow_index_bits(content: TurnedContent) -> int:
     return max(index_bits_of(len(axis.slow.words)) for axis in content.axes)
 
@@ -129,6 +135,7 @@ def _context(content: TurnedContent) -> dict[str, Any]:
         "slow_memory": files["SLOW_FILE"],
         "dac_bits": dac_bits,
         "code_range": port_range(dac_bits),
+        "pins": (),
         "axes": [_axis(content, axis) for axis in "xy"],
     }
 

@@ -8,6 +8,8 @@ from tablegen.emit.constants import DEGREES, memory_index_bits, pixel_constants,
 from tablegen.emit.content import MAX_RENDERED_HARMONICS, AxisContent, Content
 from tablegen.emit.templates import template
 
+COUNTERS = {"TICK_BITS": 24, "LINE_BITS": 16, "PERIOD_BITS": 31, "COUNT_BITS": 16, "START_CLOCKS": 4096}
+"""Parameters of every top: widths of counters that serve every program, and the clocks before a boot."""
 _PORT = len("[4*COUNT_BITS-1:0]")  # characters of the widest range of a port
 
 
@@ -24,6 +26,28 @@ def sine_memory(content: Content) -> str:
 def pixel_memory(content: Content) -> str:
     """Return the name of the file of the ticks of each pixel; empty where pixels are equal."""
     return f"{content.name}_pixels.mem" if content.schedule.pixel_table else ""
+
+
+def top_parameters(content: Content) -> dict[str, int]:
+    """Return the parameters of ``NAME_top`` with their defaults, in order."""
+    pixels = {"PIXEL_INDEX_BITS": pixel_constants(content.schedule)["PIXEL_INDEX_BITS"]}
+    return {
+        "CLOCKS_PER_TICK": content.clocks_per_tick,
+        "LOW_AREA": 0,
+        "PLAIN_MULTIPLIER": 0,
+        "ALTERNATE": 0,
+        **({"HARMONICS": _most_harmonics(content)} if content.renders_tables else {}),
+        "SHAPING": shaping_constants(content).get("SHAPING", 0),
+        **(pixels if content.schedule.pixel_table else {}),
+        "COMMIT_MODES": 0,
+        **COUNTERS,
+    }
+
+
+def _most_harmonics(content: Content) -> int:
+    """Return the number of harmonics that fills the memories of a rendering."""
+    highest = max(axis.harmonics for axis in content.axes)
+    return min((1 << highest.bit_length()) - 1, MAX_RENDERED_HARMONICS)
 
 
 def _context(content: Content) -> dict[str, Any]:
@@ -44,7 +68,7 @@ def _context(content: Content) -> dict[str, Any]:
         "clocks_by_turns": LEAST_CLOCKS,
         "fourier": int(content.renders_tables),
         "least_harmonics": highest,
-        "harmonics": min((1 << highest.bit_length()) - 1, MAX_RENDERED_HARMONICS),  # what fills the memories
+        "harmonics": _most_harmonics(content),
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": sine_memory(content),
         "pixels": content.schedule.pixels if content.schedule.pixel_table else 0,
@@ -52,6 +76,7 @@ def _context(content: Content) -> dict[str, Any]:
         "pixel_memory": pixel_memory(content),
         "dac_bits": dac_bits,
         "code_range": port_range(dac_bits),
+        "pins": (),
         "axes": [_axis(content, axis) for axis in content.axes],
     }
 

@@ -20,6 +20,7 @@ from tablegen.verification.c.host import host_compiler
 from tablegen.verification.checks.directory import copies, wrong_digests
 from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.verilog.simulate import require
+from tablegen.verification.verilog.top_play import played_outputs
 from tablegen.verification.verilog.turned_play import USUAL_TICKS, TurnedPlay
 from tablegen.version import __version__
 
@@ -87,7 +88,8 @@ def verify_turned(
         else:
             progress(f"{simulator} plays {ticks} ticks")
             content = _content_of(stored)
-            played = TurnedPlay(content, ticks).checks(folder, work / "verilog", simulator)
+            outputs = played_outputs(manifest.formats)
+            played = TurnedPlay(content, ticks, outputs=outputs).checks(folder, work / "verilog", simulator)
             if (of_z := content.content_of_z) is not None:
                 progress(f"{simulator} plays {ticks} ticks of z")
                 played += TurnedPlay(of_z, ticks, ", z").checks(folder, work / "verilog_z", simulator)

@@ -26,6 +26,7 @@ from tablegen.planning.clock import slow_clocks_per_tick
 from tablegen.verification.build_report import Report
 from tablegen.verification.run import verify
 from tablegen.verification.verilog import turned_play
+from tablegen.verification.verilog.top_play import OUTPUTS
 
 pytestmark = pytest.mark.common
 
@@ -68,6 +69,19 @@ def test_a_frame_and_the_start_of_the_next_are_those_of_the_model(build: Path) -
     assert top.compared == f"{2 * (64 + 64 + 2 * 13 + 64) + 48} words booted, {TICKS + 24} ticks"
     assert stored.manifest.formats == ["c", "verilog"]
     assert stored.manifest.clocks_per_tick == least_slow_clocks(stored.program) == CLOCKS
+
+
+def test_the_outputs_around_its_top_are_played_too(tmp_path: Path) -> None:
+    formats = ["verilog", *OUTPUTS]
+    build_turned(turned_setup(tmp_path, 30.0, *SMALL, f"+ [emit]\nformats = {formats}")).write(tmp_path / "out")
+    report = verify(tmp_path / "out", ticks=PART)
+    assert report.failures == []
+    assert subjects(report)[-3:] == ["top", *OUTPUTS]
+    swap = edit(f"{NAME}_spi.v", ".mosi_x(mosi_x), .mosi_y(mosi_y)", ".mosi_x(mosi_y), .mosi_y(mosi_x)")
+    swap(tmp_path / "out")
+    failures = [one for one in verify(tmp_path / "out", ticks=PART).failures if "tick" in one]
+    assert len(failures) == 1
+    assert failures[0].startswith(f"{NAME}_spi.v: tick 1 differs from the model")
 
 
 @pytest.mark.rest

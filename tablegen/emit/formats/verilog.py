@@ -21,7 +21,7 @@ from tablegen.emit.memory import memory_files
 from tablegen.emit.package import VerilogPackage
 from tablegen.emit.templates import comment_safe, template
 from tablegen.emit.verilog_text import literal, value_range
-from tablegen.emit.verilog_top import pixel_memory, sine_memory, top_file
+from tablegen.emit.verilog_top import pixel_memory, sine_memory, top_file, top_parameters
 
 # Patterns of checks are compiled on first use, since a build needs none.
 _LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"
@@ -80,6 +80,9 @@ def verilog_package(content: Content) -> VerilogPackage:
         sorted(path.name for path in modules),
         content.clocks_per_tick,
         content.schedule.update_rate_hz,
+        top_parameters(content),
+        content.x.program.output.dac_bits,
+        (content.x.program.output.word_bits, content.y.program.output.word_bits),
     )
 
 

@@ -4,7 +4,7 @@ The header is compiled into it as a user would include it: its constants set up 
 the serial output, and are written down, so that what the simulator reads is compared, not the text.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 from tablegen.emit.constants import verilog_constants
 from tablegen.emit.content import Content
 from tablegen.verification.play.stream import Words, read_capture
+from tablegen.verification.verilog.top_play import Output, instances
 
 TOP = "verify_bench"
 WORDS, WIRES, STATES, CONSTANTS = "words.hex", "wires.hex", "states.hex", "constants.txt"  # in the folder of a bench
@@ -23,9 +24,6 @@ SPACING_CLOCKS = 200  # a strobe so long after the one before it is sent on the 
 COUNT_BITS = 8  # of a fault counter: few enough that it ends at its largest number
 WIRE_WORDS = 2  # 64-bit words of a sample on the wires: its number, then both words
 
-_TOP_PLAYS = """\
-    top_play #(.UPLOAD(UPLOAD), .BOOTED(BOOTED), .PLAYED(PLAYED)) top (.finished(top_finished));"""
-_NO_TOP = "    assign top_finished = 1'b1;"
 _MODULE = """\
 // The bench of tablegen verify: what a build emitted sets up the sequencer and its outputs.
 `timescale 1ns / 1ps
@@ -33,8 +31,7 @@ _MODULE = """\
 
 module verify_bench #(
     parameter SCRIPT = "", parameter CAPTURE = "", parameter STATES = "", parameter WORDS = "", parameter WIRES = "",
-    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter UPLOAD = "", parameter BOOTED = "",
-    parameter PLAYED = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
+    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
     parameter BOOT_Y = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
     parameter LOW_AREA = 0, parameter ALTERNATE = 0, parameter FOURIER = 0, parameter HARMONICS = 64,
     parameter SINE_FILE = "", parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
@@ -54,13 +51,13 @@ module verify_bench #(
     ) bench ();
 
     // For the cocotb side of the bench.
-    wire top_finished;
-    wire finished = bench.finished && top_finished;
+    wire [{last_top}:0] tops_finished;
+    wire finished = bench.finished && &tops_finished;
     wire [127:0] fault_counts = bench.fault_counts;
     wire [31:0] strobes = bench.strobes, ticks = bench.ticks, jitter = bench.jitter, latency = bench.latency;
     wire refused = bench.refused;
 
-{top}
+{tops}
 
     integer constants;
     initial begin
@@ -145,10 +142,10 @@ def expected_constants(content: Content) -> dict[str, str]:
     return {"HASH": content.hash, **numbers}
 
 
-def bench_text(content: Content, index_bits: tuple[int, int], top: bool = False) -> str:
+def bench_text(content: Content, index_bits: tuple[int, int], outputs: Sequence[Output] = ()) -> str:
     """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y.
 
-    With ``top`` its ``NAME_top.v`` plays beside the session.
+    The modules of ``outputs`` play beside the session.
     """
     name = content.name.upper()
     return _MODULE.format(
@@ -159,7 +156,8 @@ def bench_text(content: Content, index_bits: tuple[int, int], top: bool = False)
         y_index_bits=index_bits[1],
         spacing=SPACING_CLOCKS,
         pixel_index_bits=f"{name}_PIXEL_INDEX_BITS",
-        top=_TOP_PLAYS if top else _NO_TOP,
+        last_top=max(len(outputs) - 1, 0),
+        tops="\n".join(instances(outputs)) or "    assign tops_finished = 1'b1;",
         constants=written_constants(content.name, expected_constants(content)),
     )
 

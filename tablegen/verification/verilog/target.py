@@ -56,7 +56,7 @@ from tablegen.verification.verilog.bench import (
 )
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
 from tablegen.verification.verilog.simulate import Design, compile_design, require
-from tablegen.verification.verilog.top_play import TopPlay
+from tablegen.verification.verilog.top_play import TopPlay, played_outputs
 from tablegen.verification.verilog.turned_play import TurnedPlay
 
 _SESSION_TICKS = 30_000  # of the program of a build, in a session that has its frame apart
@@ -130,8 +130,11 @@ class VerilogTarget:
         assert memories is not None
         job.progress("playing the integer model")
         runs = self._runs(job, memories)
-        if (job.folder / f"{name}_top.v").is_file():
-            runs[0].top = TopPlay.of(stored_content(stored), job.most_ticks, self.placement.axis)
+        runs[0].tops = [
+            TopPlay.of(stored_content(stored), job.most_ticks, self.placement.axis, output)
+            for output in played_outputs(stored.formats)
+            if (job.folder / f"{name}_{output}.v").is_file()
+        ]
         for run in runs:
             run.prepare(self.simulator, stored, sources[:-1], job.folder)
         job.progress(lambda: ", ".join(run.progress(self.simulator) for run in runs))
@@ -203,8 +206,7 @@ class VerilogTarget:
             check_states(script.states, states, most_counted),
             check_timing(capture, status),
         ]
-        if run.top is not None:
-            checks.append(run.top.check(run.folder))
+        checks += [top.check(run.folder) for top in run.tops]
         if len(runs) > 1:
             checks.append(check_whole("frame", captures[1], ", multiplier blocks"))
         differences = [first_difference(one) for one in captures]
@@ -217,7 +219,7 @@ class VerilogTarget:
             stored.program.schedule.pixel_table is not None,
             stored.z is not None,
         )
-        tops = ([] if run.top is None else [f"{content.name}_top.v"]) + [f"{content.name}_z_top.v"]
+        tops = [*(f"{content.name}_{top.output}.v" for top in run.tops), f"{content.name}_z_top.v"]
         unplayed = [name for name in unplayed if name not in tops]
         return Outcome(checks, run.session, next(filter(None, differences), None), whole, unplayed=unplayed)
 
@@ -230,7 +232,7 @@ class SimulatedRun:
     session: BuildSession
     placement: Placement
     memories: Memories
-    top: TopPlay | None = None  # plays beside the session
+    tops: list[TopPlay] = field(default_factory=list)  # play beside the session
     job: dict[str, Any] = field(default_factory=dict)
 
     def prepare(self, simulator: str, stored: StoredBuild, sources: list[Path], build: Path) -> None:
@@ -240,9 +242,9 @@ class SimulatedRun:
         shape = SequencerShape.of((stored.program.x, stored.program.y))
         bench = folder / f"{TOP}.v"
         write_boot_files(folder)
-        index_bits, top = (shape.x_index_bits, shape.y_index_bits), self.top
-        bench.write_text(bench_text(stored_content(stored), index_bits, top is not None), "ascii")
-        beside = [] if top is None else top.prepare(build, folder, folder / simulator)
+        index_bits, outputs = (shape.x_index_bits, shape.y_index_bits), [top.output for top in self.tops]
+        bench.write_text(bench_text(stored_content(stored), index_bits, outputs), "ascii")
+        beside = [path for top in self.tops for path in top.prepare(build, folder, folder / simulator)]
         harmonics = max(self.memories.x_harmonics, self.memories.y_harmonics)
         self.job = {
             "simulator": simulator,
@@ -253,9 +255,8 @@ class SimulatedRun:
                 "X_POWER_UP_CODE": script.power_up[0],
                 "Y_POWER_UP_CODE": script.power_up[1],
                 **self.placement.parameters(harmonics, f"../{_SINE}"),
-                **({} if top is None else top.parameters()),
             },
-            "clocks": script.clocks if top is None else max(script.clocks, top.clocks),
+            "clocks": max([script.clocks, *(top.clocks for top in self.tops)]),
         }
 
     def progress(self, simulator: str) -> str:

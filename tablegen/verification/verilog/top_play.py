@@ -1,5 +1,6 @@
 """A play of ``NAME_top.v``: what it boots from the memory files, then codes, words and markers of its first lines.
 
+A build in the format spi or axi-stream has a module around it, which is played too: there words are those of the wires.
 It is a second device in the bench of a session, on a clock of its own. To render the tables takes a simulator longer
 than a session: a top that boots Fourier words is told to withdraw them once all have been compared, and gets the
 tables instead. The other parameters serve both ways.
@@ -8,7 +9,7 @@ tables instead. The other parameters serve both ways.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,22 +36,67 @@ from tablegen.verification.play.stream import (
     read_capture,
 )
 
-BENCH = "top_play"
-_UPLOAD, _BOOTED, _PLAYED = "top_upload.hex", "top_booted.hex", "top_played.hex"
+Output = Literal["top", "spi", "axi_stream"]
+"""A module of a build with all that its scan needs: ``NAME_top``, or the one of an output around it."""
+OUTPUTS: dict[str, Output] = {"spi": "spi", "axi-stream": "axi_stream"}
+"""The modules around ``NAME_top`` by their formats."""
+_MOST_OUTPUT_TICKS = 1000  # of a module around the top, which was played itself
 _CLOCKS = 6000  # that ticks take, unless a line takes more
 _MAX_TICKS = 20_000
 _OTHER_CLOCKS = 2000  # to boot, to withdraw and to drain, beside the words
 _REST_CLOCKS = 100  # before the tick that takes the program, and before the trigger
+_REST_OF_A_FRAME = 7  # clocks between two frames of dac_spi with its defaults
 _WORD = (1 << 32) - 1
 
-_OTHER_SINE = 'device.sequencer.SINE_FILE != "{}_sine.mem"'  # which only a rendering would read
+_OTHER_SINE = '{}.sequencer.SINE_FILE != "{}_sine.mem"'  # which only a rendering would read
+
+# What an output has beside the ports of NAME_top: its connections, its signals, what writes them down, and when.
+_PINS: dict[Output, str] = {
+    "top": "",
+    "spi": """, .sclk(sclk), .cs_x_n(cs_n), .cs_y_n(), .mosi_x(mosi_x), .mosi_y(mosi_y), .ldac_n(ldac_n),
+        .sending()""",
+    "axi_stream": """, .m_axis_tdata(beat), .m_axis_tuser(user), .m_axis_tvalid(valid_beat), .m_axis_tready(1'b1)""",
+}
+_SIGNALS: dict[Output, str] = {
+    "top": "",
+    "spi": """
+    wire sclk, cs_n, mosi_x, mosi_y, ldac_n;
+    reg [63:0] held = 0;
+    reg [31:0] x_shift = 0, y_shift = 0;
+    always @(posedge sclk)
+        if (!cs_n) begin
+            x_shift <= {x_shift[30:0], mosi_x};
+            y_shift <= {y_shift[30:0], mosi_y};
+        end
+    always @(negedge cs_n) begin
+        x_shift <= 0;
+        y_shift <= 0;
+    end
+    always @(negedge ldac_n)
+        if (cs_n) $fwrite(played, "%016x\\n%016x\\n", held, {y_shift, x_shift});
+""",
+    "axi_stream": """
+    wire [2*LANE_BITS-1:0] beat;
+    wire [4:0] user;
+    wire valid_beat;
+    reg [63:0] held = 0;
+    wire [31:0] x_lane = beat[LANE_BITS-1:0], y_lane = beat[2*LANE_BITS-1:LANE_BITS];
+""",
+}
+_WRITTEN: dict[Output, str] = {
+    "top": """if (strobe) $fwrite(played, "%016x\\n%016x\\n", sample, {y_sent, x_sent});""",
+    "spi": "if (strobe) held = sample;",
+    "axi_stream": """if (valid_beat)
+                $fwrite(played, "%016x\\n%016x\\n", {held[63:53], user, held[47:0]}, {y_lane, x_lane});
+            if (strobe) held = sample;""",
+}
 
 _MODULE = """\
 // The bench of NAME_top.v: compares nothing, writes down what the top boots and plays.
 `timescale 1ns / 1ps
 `default_nettype none
 
-module top_play #(
+module {bench} #(
     parameter UPLOAD = "", parameter BOOTED = "", parameter PLAYED = ""
 ) (
     output reg finished
@@ -65,9 +111,12 @@ module top_play #(
     wire [{y_bits}-1:0] y_word;
     wire [23:0] x_wide = x_code, y_wide = y_code;
     wire [31:0] x_sent = x_word, y_sent = y_word;
+    wire [63:0] sample =
+        {{4'd0, faults, parked, playing, swapped, valid, backward, pixel, frame, line, y_wide, x_wide}};
+    localparam LANE_BITS = {lane_bits};
     integer upload, booted, played, clocks = 0;
-
-    {name}_top #({settings}.START_CLOCKS(50)) device (
+{signals}
+    {module} #({settings}.START_CLOCKS(50)) device (
         .clock(clock), .reset(1'b0), .write(write), .write_region(word[50:48]), .write_address(word[47:32]),
         .write_data(word[31:0]), .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0),
         .withdraw(withdraw), .can_keep(),
@@ -76,7 +125,7 @@ module top_play #(
         .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code), .x_word(x_word), .y_word(y_word),
         .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
         .valid_marker(valid), .swapped_marker(swapped), .playing(playing), .parked(parked), .faults(faults),
-        .fault_counts()
+        .fault_counts(){pins}
     );
 
     task step;
@@ -84,10 +133,7 @@ module top_play #(
             #5 clock = 1;
             #5 clock = 0;
             clocks = clocks + 1;
-            if (strobe)
-                $fwrite(played, "%016x\\n%016x\\n",
-                        {{4'd0, faults, parked, playing, swapped, valid, backward, pixel, frame, line, y_wide, x_wide}},
-                        {{y_sent, x_sent}});
+            {written}
         end
     endtask
 
@@ -98,9 +144,9 @@ module top_play #(
         played = $fopen(PLAYED, "w");
         #1;
         while (booting !== 1'b0 && clocks < {boot_clocks}) begin
-            if (device.sequencer.write)
-                $fwrite(booted, "%016x\\n", {{13'd0, device.sequencer.write_region, device.sequencer.write_address,
-                                            device.sequencer.write_data}});
+            if ({top}.sequencer.write)
+                $fwrite(booted, "%016x\\n", {{13'd0, {top}.sequencer.write_region, {top}.sequencer.write_address,
+                                            {top}.sequencer.write_data}});
             step;
         end
         $fwrite(booted, "%016x\\n", {{61'd0, {other_sine}, missing, refused}});
@@ -161,20 +207,26 @@ class TopPlay:
     """A play of the top of a build, of ``ticks`` ticks that are ``pace`` clocks apart.
 
     With ``by_turns`` it is the top with ``ALTERNATE``, which boots tables; otherwise the one with multiplier blocks.
+    With another ``output`` than "top" it is the module around it.
     """
 
     content: Content
     ticks: int
     pace: int
     by_turns: bool = False
+    output: Output = "top"
 
     @classmethod
-    def of(cls, content: Content, most_ticks: int, axis: Axis = "blocks") -> "TopPlay":
-        """Return a play of a line at least, within ``most_ticks``: by turns if the ``axis`` is, else in blocks."""
+    def of(cls, content: Content, most_ticks: int, axis: Axis = "blocks", output: Output = "top") -> "TopPlay":
+        """Return a play of a line at least, within ``most_ticks``: by turns if the ``axis`` is, else in blocks.
+
+        Of a module around the top it has 1000 ticks at most.
+        """
         by_turns = axis == "alternate"
         pace = Placement("alternate" if by_turns else "blocks").playing(content.program).tick_clocks
         ticks = max(content.schedule.ticks, _CLOCKS // pace)
-        return cls(content, min(ticks, most_ticks, _MAX_TICKS), pace, by_turns)
+        ticks = output_ticks(min(ticks, most_ticks, _MAX_TICKS), output)
+        return cls(content, ticks, output_pace(pace, content.program, output), by_turns, output)
 
     @property
     def clocks(self) -> int:
@@ -194,26 +246,23 @@ class TopPlay:
         """Copy the top of a build into ``folder``, memory files to where the ``model`` runs; return top and bench."""
         upload = self._tables() if self._renders else []
         names = [f"{self.content.name}_{memory.name}.mem" for memory in memories(self.content)]
-        return write_top(self.content.name, names, self._bench_text(), build, folder, model, upload)
-
-    def parameters(self) -> dict[str, str]:
-        """Return the files of the bench, relative to the folder in which the model runs."""
-        return top_parameters()
+        return write_top(self.content.name, self.output, names, self._bench_text(), build, folder, model, upload)
 
     def check(self, folder: Path) -> Check:
         """Compare what was booted and played in a folder with the manifest and the integer model."""
-        return check_top(self.content.name, self._boot(), self.content.program, self.ticks, folder)
+        return check_top(self.content.name, self.output, self._boot(), self.content.program, self.ticks, folder)
 
     def _bench_text(self) -> str:
         return top_bench_text(
             self.content.name,
             self.content.program,
+            output=self.output,
             boot_clocks=self._boot_clocks,
             ticks=self.ticks,
             pace=self.pace,
             settings=".ALTERNATE(1), " if self.by_turns else ".PLAIN_MULTIPLIER(1), ",
             rest=_REST_CLOCKS + check_clocks(self.content.schedule),
-            other_sine=_OTHER_SINE.format(self.content.name) if self._renders else "1'b0",
+            other_sine=_OTHER_SINE.format(_top(self.output), self.content.name) if self._renders else "1'b0",
             withdraws=self._renders,
         )
 
@@ -243,10 +292,57 @@ def writes(regions: "list[tuple[int, np.ndarray]]", address: int = 0) -> list[Wr
     ]
 
 
+def played_outputs(formats: Iterable[str]) -> list[Output]:
+    """Return the modules that are played of a build in these formats."""
+    return ["top", *(OUTPUTS[each] for each in formats if each in OUTPUTS)]
+
+
+def output_pace(pace: int, program: ScanProgram, output: Output) -> int:
+    """Return the clocks from tick to tick of a module whose sequencer takes ``pace``."""
+    return max(pace, 2 * max(_word_bits(program)) + 1 + _REST_OF_A_FRAME) if output == "spi" else pace
+
+
+def output_ticks(ticks: int, output: Output) -> int:
+    """Return how many of the ticks of a top a module of a build plays."""
+    return ticks if output == "top" else min(ticks, _MOST_OUTPUT_TICKS)
+
+
+def instances(outputs: Sequence[Output]) -> list[str]:
+    """Return the Verilog that instantiates the benches of these modules; each raises its ``tops_finished``."""
+    return [
+        f"    {_bench_name(output)} #({_bench_files(output)}) {output} (.finished(tops_finished[{number}]));"
+        for number, output in enumerate(outputs)
+    ]
+
+
+def _bench_name(output: Output) -> str:
+    return f"{output}_play"
+
+
+def _bench_files(output: Output) -> str:
+    """Return the parameters of a bench: its files, relative to the folder in which the model runs."""
+    return ", ".join(f'.{key}("../{name}")' for key, name in _files(output).items())
+
+
+def _files(output: Output) -> dict[str, str]:
+    """Return the files of a bench by its parameters."""
+    return {key: f"{output}_{key.lower()}.hex" for key in ("UPLOAD", "BOOTED", "PLAYED")}
+
+
+def _word_bits(program: ScanProgram) -> tuple[int, int]:
+    return program.x.output.word_bits, program.y.output.word_bits
+
+
+def _top(output: Output) -> str:
+    """Return the path of ``NAME_top`` in the bench of a module."""
+    return "device" if output == "top" else "device.top"
+
+
 def top_bench_text(
     name: str,
     program: ScanProgram,
     *,
+    output: Output = "top",
     boot_clocks: int,
     ticks: int,
     pace: int,
@@ -255,7 +351,7 @@ def top_bench_text(
     other_sine: str = "1'b0",
     withdraws: bool = False,
 ) -> str:
-    """Return the bench module of ``NAME_top.v``.
+    """Return the bench module of ``NAME_top.v``, or of the module of an ``output`` around it.
 
     Parameters
     ----------
@@ -270,12 +366,18 @@ def top_bench_text(
     other_sine, withdraws
         An expression that is 1 for a wrong sine, and whether what was booted is replaced by an upload.
     """
-    x, y = program.x.output, program.y.output
+    x_bits, y_bits = _word_bits(program)
     return _MODULE.format(
-        name=name,
-        dac_bits=x.dac_bits,
-        x_bits=x.word_bits,
-        y_bits=y.word_bits,
+        bench=_bench_name(output),
+        module=f"{name}_{output}",
+        top=_top(output),
+        pins=_PINS[output],
+        signals=_SIGNALS[output],
+        written=_WRITTEN[output],
+        lane_bits=8 * ((max(x_bits, y_bits) + 7) // 8),
+        dac_bits=program.x.output.dac_bits,
+        x_bits=x_bits,
+        y_bits=y_bits,
         boot_clocks=boot_clocks,
         settings=settings,
         rest=rest,
@@ -287,9 +389,16 @@ def top_bench_text(
 
 
 def write_top(
-    name: str, memories: Iterable[str], bench_text: str, build: Path, folder: Path, model: Path, upload: Sequence[Write]
+    name: str,
+    output: Output,
+    memories: Iterable[str],
+    bench_text: str,
+    build: Path,
+    folder: Path,
+    model: Path,
+    upload: Sequence[Write],
 ) -> list[Path]:
-    """Write what plays the top of a build: its copy and the bench into ``folder``, and memory files beside the model.
+    """Write what plays a module of a build: its copy and the bench into ``folder``, and memory files beside the model.
 
     Parameters
     ----------
@@ -303,34 +412,34 @@ def write_top(
     Returns
     -------
     list of Path
-        Top and bench.
+        Module and bench.
     """
     model.mkdir(exist_ok=True)
     for memory in memories:
         if (build / memory).is_file():
             (model / memory).write_bytes(read_bytes(build / memory, BUILD_FILE))
-    (folder / _UPLOAD).write_text("".join(f"{one.packed():016x}\n" for one in upload), "ascii")
-    bench = folder / f"{BENCH}.v"
+    uploaded = "".join(f"{one.packed():016x}\n" for one in upload)
+    (folder / _files(output)["UPLOAD"]).write_text(uploaded, "ascii")
+    bench = folder / f"{_bench_name(output)}.v"
     bench.write_text(bench_text, "ascii")
-    top = folder / f"{name}_top.v"
-    top.write_bytes(read_bytes(build / top.name, BUILD_FILE))
-    return [top, bench]
+    module = folder / f"{name}_{output}.v"
+    module.write_bytes(read_bytes(build / module.name, BUILD_FILE))
+    return [module, bench]
 
 
-def top_parameters() -> dict[str, str]:
-    """Return the files of the bench of a top, relative to the folder in which the model runs."""
-    names = {"UPLOAD": _UPLOAD, "BOOTED": _BOOTED, "PLAYED": _PLAYED}
-    return {key: f"../{name}" for key, name in names.items()}
-
-
-def check_top(name: str, boot: Sequence[Write], program: ScanProgram, ticks: int, folder: Path) -> Check:
-    """Compare what a top booted and played in a folder with the writes of its boot and the integer model."""
+def check_top(
+    name: str, output: Output, boot: Sequence[Write], program: ScanProgram, ticks: int, folder: Path
+) -> Check:
+    """Compare what a module booted and played in a folder with the writes of its boot and the integer model."""
+    files = _files(output)
     expected = np.array([*(one.packed() for one in boot), 0], dtype=np.uint64)
-    model, booted, played = _model(program, ticks), read_capture(folder / _BOOTED), read_capture(folder / _PLAYED)
+    model = _model(program, ticks)
+    booted, played = (read_capture(folder / files[key]) for key in ("BOOTED", "PLAYED"))
     failure = _boot_failure(expected, booted) or _play_failure(model, played)
     wrong = _different(expected, booted) + _different(model, played)
     compared = f"{len(boot)} words booted, {ticks} ticks"
-    return Check("top", "integer model", compared, f"{wrong} differ", "0", failure and f"{name}_top.v: {failure}")
+    failure = failure and f"{name}_{output}.v: {failure}"
+    return Check(output.replace("_", "-"), "integer model", compared, f"{wrong} differ", "0", failure)
 
 
 def _model(program: ScanProgram, count: int) -> Words:

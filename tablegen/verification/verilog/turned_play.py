@@ -5,6 +5,7 @@ It is the top of a scan at an angle, or that of the output z.
 The header is compiled beside it, and its constants are written down as the simulator reads them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -23,10 +24,13 @@ from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.stream import PROGRAM, X_TABLE, Y_TABLE
 from tablegen.verification.verilog.bench import CONSTANTS, TOP, different_constants, written_constants
 from tablegen.verification.verilog.top_play import (
+    Output,
     Write,
     check_top,
+    instances,
+    output_pace,
+    output_ticks,
     top_bench_text,
-    top_parameters,
     write_top,
     writes,
 )
@@ -43,16 +47,17 @@ _MODULE = """\
 `default_nettype none
 
 module verify_bench #(
-    parameter CONSTANTS = "", parameter UPLOAD = "", parameter BOOTED = "", parameter PLAYED = ""
+    parameter CONSTANTS = ""
 );
 `include "{name}.vh"
     // For the cocotb side of the bench.
-    wire finished;
+    wire [{last_top}:0] tops_finished;
+    wire finished = &tops_finished;
     wire refused = 1'b0;
     wire [127:0] fault_counts = 128'd0;
     wire [31:0] strobes = 32'd0, ticks = 32'd0, jitter = 32'd0, latency = 32'd0;
 
-    top_play #(.UPLOAD(UPLOAD), .BOOTED(BOOTED), .PLAYED(PLAYED)) top (.finished(finished));
+{tops}
 
     integer constants;
     initial begin
@@ -70,30 +75,43 @@ endmodule
 class TurnedPlay:
     """A play of ``ticks`` ticks from the start of a frame, as close to each other as the sequencer allows.
 
-    The subjects of its checks have a ``suffix``.
+    The modules of ``outputs`` play. The subjects of its checks have a ``suffix``.
     """
 
     content: TurnedContent
     ticks: int
     suffix: str = ""
+    outputs: Sequence[Output] = ("top",)
 
     def checks(self, folder: Path, work: Path, simulator: Literal["icarus", "verilator"]) -> list[Check]:
         """Play the build in ``folder`` and return what differs; ``work`` is an empty folder, which is made."""
         name = self.content.name
         work.mkdir(exist_ok=True)
         modules = sorted(path.name for path in folder.glob("dac_*.v"))
-        sources, missing = copies(folder, [*modules, f"{name}_top.v", f"{name}.vh"], work / "rtl")
+        sources, missing = copies(folder, [*modules, *self._modules(), f"{name}.vh"], work / "rtl")
         if missing:
             return [self._failed(simulator, "nothing", some(missing))]
         memories = [f"{name}_{one.name}.mem" for one in turned_memories(self.content)]
-        beside = write_top(name, memories, self._bench_text(), folder, work, work / simulator, [])
+        beside = [
+            path
+            for output in self.outputs
+            for path in write_top(name, output, memories, self._bench_text(output), folder, work, work / simulator, [])
+        ]
         bench, constants = work / f"{TOP}.v", self._constants()
-        bench.write_text(_MODULE.format(name=name, constants=written_constants(name, constants)), "ascii")
+        bench.write_text(
+            _MODULE.format(
+                name=name,
+                last_top=len(self.outputs) - 1,
+                tops="\n".join(instances(self.outputs)),
+                constants=written_constants(name, constants),
+            ),
+            "ascii",
+        )
         job = {
             "simulator": simulator,
             "sources": [str(path) for path in (*sources[: len(modules)], *beside, bench)],
             "includes": [str(sources[-1].parent)],
-            "parameters": {"CONSTANTS": f"../{CONSTANTS}", **top_parameters()},
+            "parameters": {"CONSTANTS": f"../{CONSTANTS}"},
             "clocks": self._clocks,
         }
         try:
@@ -102,8 +120,9 @@ class TurnedPlay:
             header = differing_check(
                 f"verilog header{self.suffix}", "manifest, by the simulator", f"{len(constants)} constants", different
             )
-            top = check_top(name, self._boot(), self.content.program, self.ticks, work)
-            return [header, replace(top, subject=f"{top.subject}{self.suffix}")]
+            boot, program = self._boot(), self.content.program
+            tops = [check_top(name, output, boot, program, self._ticks(output), work) for output in self.outputs]
+            return [header, *(replace(top, subject=f"{top.subject}{self.suffix}") for top in tops)]
         except (SimulationFailed, OSError, ValueError) as error:
             return [self._failed(simulator, f"{self.ticks} ticks", str(error))]
 
@@ -132,13 +151,20 @@ class TurnedPlay:
         numbers = {key: str(value) for key, value in turned_constants(self.content).items()}
         return {"HASH": self.content.hash, **numbers}
 
-    def _bench_text(self) -> str:
+    def _modules(self) -> list[str]:
+        return [f"{self.content.name}_{output}.v" for output in self.outputs]
+
+    def _ticks(self, output: Output) -> int:
+        return output_ticks(self.ticks, output)
+
+    def _bench_text(self, output: Output) -> str:
         return top_bench_text(
             self.content.name,
             self.content.program,
+            output=output,
             boot_clocks=self._boot_clocks,
-            ticks=self.ticks,
-            pace=self._pace,
+            ticks=self._ticks(output),
+            pace=output_pace(self._pace, self.content.program, output),
             rest=self._rest,
         )
 

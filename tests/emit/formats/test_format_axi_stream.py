@@ -1,0 +1,34 @@
+"""The output in AXI4-Stream: the ports and parameters of ``NAME_top``, and its own.
+
+What it plays is compared in ``tests/verification/test_top_play.py`` and ``hdl_tests/test_converter_tops.py``.
+"""
+
+import re
+from pathlib import Path
+
+from building import NAME
+from formatted import check_finds_a_flip, formatted
+
+FILE = f"{NAME}_axi_stream.v"
+PINS = ["m_axis_tdata", "m_axis_tuser", "m_axis_tvalid", "m_axis_tready"]
+
+
+def ports(text: str) -> list[str]:
+    return re.findall(r"^    (?:input|output) +wire (?:\[[^\]]*\])? *(\w+)", text, re.MULTILINE)
+
+
+def parameters(text: str) -> list[str]:
+    return re.findall(r"^    parameter (?:\[31:0\] )?(\w+) = ([\w\']+)", text, re.MULTILINE)
+
+
+def test_it_has_the_ports_and_parameters_of_the_top(tmp_path: Path) -> None:
+    built = formatted(tmp_path, "short", "axi-stream")
+    text, top = (built.files[name].decode("ascii") for name in (FILE, f"{NAME}_top.v"))
+    assert ports(text) == ports(top) + PINS
+    own = parameters(top)
+    assert len(own) > 10
+    assert parameters(text)[: len(own)] == own
+
+
+def test_a_changed_digit_is_found(tmp_path: Path) -> None:
+    check_finds_a_flip(formatted(tmp_path, "short", "axi-stream"), "axi-stream", [FILE])
