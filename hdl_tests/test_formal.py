@@ -17,7 +17,7 @@ import pytest
 from building import REPOSITORY, tool
 from limits import PATIENCE_S
 from sets import long
-from test_lint import ADC, BUS, CROSSINGS, MODULES, path_of
+from test_lint import MODULES, SOURCES, path_of
 
 pytestmark = pytest.mark.rest
 
@@ -78,6 +78,13 @@ PROOFS = {
     "marker_delay": Proof("marker_delay_properties", 2, 10, covers=10, maps_memory=True),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
+    "pair_slew": Proof("pair_slew_properties", 1, 14, {"BITS": 4}),
+    "pair_slew_of_16_bits": Proof("pair_slew_properties", 1, 0, {"BITS": 16}),
+    "pair_phase": Proof("pair_phase_properties", 1, 12, {"PERIOD_BITS": 4}),
+    "pair_phase_of_31_bits": Proof("pair_phase_properties", 1, 0, {"PERIOD_BITS": 31}),
+    "pair_table": Proof("pair_table_properties", 1, 10, maps_memory=True),
+    "pair_delay": Proof("pair_delay_properties", 2, 8, {"CLOCKS": 3}, maps_memory=True),
+    "pair_delay_of_64_clocks": Proof("pair_delay_properties", 2, 66, {"CLOCKS": 64}, maps_memory=True),
 }
 COVERS_AS_ASSERTIONS = """
 (* techmap_celltype = "$cover" *)
@@ -95,8 +102,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     """
     for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
         shutil.copy(path, folder)
-    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v"), *CROSSINGS.glob("*.v"), *ADC.glob("*.v")]
-    texts = {path.stem: path.read_text("utf-8") for path in sources} | dict(modules)
+    texts = {path.stem: path.read_text("utf-8") for path in SOURCES} | dict(modules)
     for name, text in texts.items():
         if name not in proof.stubs:
             (folder / f"{name}.v").write_text(text, "utf-8")
@@ -394,6 +400,19 @@ MUTANTS = {
     "marker_of_its_neighbour": ("marker_delay", "dac_marker_delay", "past[now] <= in[i]", "past[now] <= in[0]"),
     "marker_without_its_bypass": ("marker_delay", "dac_marker_delay", "is_1 <= delay == 1", "is_1 <= 1'b0"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
+    # n. both axes by turns
+    "pair_step_of_the_other_axis": ("pair_slew", "dac_pair_slew", "step = ~step_inverse;", "step = ~last_step;"),
+    "pair_target_of_the_other_axis": ("pair_slew", "dac_pair_slew", "? ~target : target_2", "? ~target : target_1"),
+    "pair_moves_without_a_tick": ("pair_slew", "dac_pair_slew", "if (valid_1)", "if (1)"),
+    "pair_step_by_the_other_way": ("pair_phase", "dac_pair_phase", "advances ? at_step", "advances ? other_step"),
+    "pair_phase_never_wraps": ("pair_phase", "dac_pair_phase", "advances && wraps;", "1'b0;"),
+    "pair_phase_by_the_other_rest": ("pair_phase", "dac_pair_phase", ": {1'b0, at_remainder}", ": {1'b0, other_remainder}"),
+    "pair_delay_a_clock_longer": ("pair_delay", "dac_pair_delay", "BEHIND = 65 - ", "BEHIND = 64 - "),
+    "pair_word_of_the_other_axis": ("pair_table", "dac_pair_table", "odd_row <= {read_y,", "odd_row <= {even_row[ROW_BITS+1],"),
+    "pair_word_of_the_other_bank": (
+        "pair_table", "dac_pair_table", "{write_y, write_bank, write_index", "{write_y, read_bank, write_index"
+    ),
+    "pair_word_after_the_last_of_x": ("pair_table", "dac_pair_table", "next = read_y ? y_even : x_even", "next = x_even"),
 }  # fmt: skip
 
 
