@@ -24,6 +24,7 @@ pytestmark = pytest.mark.rest
 FORMAL = REPOSITORY / "hdl_tests" / "formal"
 COVER = re.compile(r"cover \((.*)\);")
 PIPELINED = re.compile(r"`ifdef PIPELINED\n(.*?)`endif\n", re.DOTALL)  # what low area does not have
+SHORT = re.compile(r"^// `(\w+)` is `([\w.]+)`$", re.MULTILINE)  # of an instance with a long name
 ASIDE = re.compile(r"`ifndef PROPERTIES_ALONE\n.*?\n`endif\n", re.DOTALL)  # assertions that are no property
 
 
@@ -83,6 +84,9 @@ PROOFS = {
     "pair_phase": Proof("pair_phase_properties", 1, 12, {"PERIOD_BITS": 4}),
     "pair_phase_of_31_bits": Proof("pair_phase_properties", 1, 0, {"PERIOD_BITS": 31}),
     "pair_table": Proof("pair_table_properties", 1, 10, maps_memory=True),
+    "pair_play": Proof(
+        "pair_play_properties", 2, 60, {"ALTERNATE": 1}, ("dac_fit", "dac_whole", "dac_pair_delay"), 70
+    ),
     "pair_delay": Proof("pair_delay_properties", 2, 8, {"CLOCKS": 3}, maps_memory=True),
     "pair_delay_of_64_clocks": Proof("pair_delay_properties", 2, 66, {"CLOCKS": 64}, maps_memory=True),
 }
@@ -114,6 +118,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     text = COVER.sub(lambda statement: statement[0] if next(numbers) == cover else ";", text)
     harness = folder / f"{proof.top}.v"
     harness.write_text(text, "utf-8")
+    short = dict(SHORT.findall(text))
     seen = sorted(set(re.findall(r"\b\w*[a-z0-9]__\w+", text)))
     lines = [f"read_verilog -defer {folder / name}.v" for name in texts if name not in proof.stubs]
     for stub in proof.stubs:
@@ -124,15 +129,16 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
         f"read_verilog -formal -defer {harness}",
         f"hierarchy -check -top {proof.top} " + " ".join(f"-chparam {k} {v}" for k, v in proof.parameters.items()),
         "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten",
-        *(f"connect -nounset -set {name} {_inner(name)}" for name in seen),
+        *(f"connect -nounset -set {name} {_inner(name, short)}" for name in seen),
         f"check -assert; opt_clean; prep -top {proof.top}; memory_nordff; dffunmap; opt_clean",
     ]
     return "\n".join(lines) + "\n"
 
 
-def _inner(name: str) -> str:
+def _inner(name: str, short: Mapping[str, str]) -> str:
     """The signal ``b`` of the instance ``a`` for ``a__b``; a number at the end or on the way is an index."""
-    return re.sub(r"__(\d+)", r"[\1]", name).replace("__", ".")
+    instance, signal = re.sub(r"__(\d+)", r"[\1]", name).replace("__", ".").split(".", 1)
+    return f"{short.get(instance, instance)}.{signal}"
 
 
 def _proven(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None) -> bool:

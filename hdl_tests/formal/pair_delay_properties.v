@@ -53,12 +53,10 @@ module pair_delay_properties #(
         delay__words__9, delay__words__8, delay__words__7, delay__words__6, delay__words__5, delay__words__4,
         delay__words__3, delay__words__2, delay__words__1, delay__words__0
     };
+    wire [127:0] twice = {words, words};
+    wire [63:0] stored = twice >> at;  // bit 63 - k: k + 1 clocks ago
     integer k;
-    reg [5:0] place;
-    always @* for (k = 0; k < CLOCKS - 1; k = k + 1) begin
-        place = at - 1 - k;
-        assert (words[place] == past[k]);
-    end
+    always @* for (k = 0; k < CLOCKS - 1; k = k + 1) assert (stored[63-k] == past[k]);
 `endif
 endmodule
 
