@@ -43,6 +43,7 @@ class Proof:
 
 
 ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit", "dac_whole")
+SLOW_STUBS = ("dac_fit", "dac_whole", "dac_slow_fit", "dac_slow_engine", "dac_slow_store", "dac_slow_axis")
 CONTROL_STUBS = ("dac_axis", "dac_fit", "dac_whole")
 SERIAL = Proof("serial_properties", 1, 0)
 PROOFS = {
@@ -79,6 +80,7 @@ PROOFS = {
     "marker_delay": Proof("marker_delay_properties", 2, 10, covers=10, maps_memory=True),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
+    "slow_play": Proof("slow_play_properties", 3, 40, {}, SLOW_STUBS, 50),
     "pair_slew": Proof("pair_slew_properties", 1, 14, {"BITS": 4}),
     "pair_slew_of_16_bits": Proof("pair_slew_properties", 1, 0, {"BITS": 16}),
     "pair_phase": Proof("pair_phase_properties", 1, 12, {"PERIOD_BITS": 4}),
@@ -87,6 +89,8 @@ PROOFS = {
     "pair_play": Proof(
         "pair_play_properties", 2, 60, {"ALTERNATE": 1}, ("dac_fit", "dac_whole", "dac_pair_delay"), 70
     ),
+    "pair_words": Proof("pair_words_properties", 2, 50, covers=50, maps_memory=True),
+    "pair_programs": Proof("pair_program_properties", 6, 56, {}, ("dac_pair_delay", "dac_pair_words"), 50),
     "pair_delay": Proof("pair_delay_properties", 2, 8, {"CLOCKS": 3}, maps_memory=True),
     "pair_delay_of_64_clocks": Proof("pair_delay_properties", 2, 66, {"CLOCKS": 64}, maps_memory=True),
 }
@@ -419,6 +423,13 @@ MUTANTS = {
         "pair_table", "dac_pair_table", "{write_y, write_bank, write_index", "{write_y, read_bank, write_index"
     ),
     "pair_word_after_the_last_of_x": ("pair_table", "dac_pair_table", "next = read_y ? y_even : x_even", "next = x_even"),
+    "pair_digits_of_the_other_axis": ("pair_programs", "dac_pair_output", "i % 2 == 0 ? held[", "i % 2 == 1 ? held["),
+    "pair_limit_of_the_other_axis": ("pair_programs", "dac_pair", ".load_max(load_max),", ".load_max(load_park),"),
+    "pair_ring_stands_still": ("pair_programs", "dac_pair_ring", "load ? value : other;", "load ? value : now;"),
+    "pair_park_code_of_x_for_y": ("pair_words", "dac_pair_words", "{1'b1, PARK_CODE}", "{1'b0, PARK_CODE}"),
+    "pair_word_is_kept_too_short": ("pair_play", "dac_sequencer", "drained = swapped_done;", "drained = load_0;"),
+    "pair_reads_what_is_written": ("pair_play", "dac_pair", "? tick_bank : y_bank;", "? tick_bank : !y_bank;"),
+    "pair_takes_a_tick_a_clock": ("pair_play", "dac_sequencer", "works <= accepted_tick;", "works <= 1'b0;"),
 }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
-// Both axes by turns in the sequencer: no word of a program is written from the load of a new one until its last word is
-// read, and no word of a table whose bank is read; a program is loaded by a clock of x, and not before the last one has
-// all of its words. A strobe comes 48 clocks after its tick, with `playing` exactly where the scan ran at that tick, and
-// `busy` is high on the clock after a tick alone.
+// Both axes by turns in the sequencer: no word of a program is written from the load of a new one until its last word
+// is read, and no word of a table whose bank is read; a program is loaded by a clock of x, and not before the last one
+// has all of its words. A strobe comes 48 clocks after its tick, with `playing` exactly where the scan ran at that
+// tick, and `busy` is high on the clock after a tick alone.
 //
 // The host may do anything on any clock. pair_program_properties has the words.
 //
