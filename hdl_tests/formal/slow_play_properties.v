@@ -100,6 +100,8 @@ module slow_play_properties (
     wire [8:0] x_axis__works;
     wire works = uut__tick_0 || x_axis__works != 0;
 
+    wire [LINE_BITS-1:0] idle_last = idle_lines - 1, last_of_lines = lines - 1;
+
     // Lines of 8 ticks or more, and the line after the one that plays, or due.
     wire [LINE_BITS-1:0] last_line = uut__scan__last_line_number;
     wire [LINE_BITS-1:0] due = uut__scan__starts ? 0 : uut__scan__first ? uut__scan__at_line :
@@ -107,7 +109,8 @@ module slow_play_properties (
     wire [2:0] next_x = part__half ? x_axis__label_0 : x_axis__label_1;
     wire [2:0] next_y = part__half ? y_axis__label_0 : y_axis__label_1;
     wire [2:0] worked = {part__line_at, store__colours[uut__bank ^ part__is_idle ^ uut__load_0]};
-    reg [LINE_BITS-1:0] plays_line;
+    wire [2:0] at_line = {uut__scan__at_line, store__colours[uut__bank]};
+    wire [2:0] this_line = {uut__line_number, store__colours[uut__bank]};
     always @* begin
         // The banks.
         assert (!committed || !uut__banks__draining);
@@ -121,13 +124,14 @@ module slow_play_properties (
         if (uut__load_0) assert (uut__tick_0 && part__is_idle && !part__preparing && !committed && uut__loaded);
         if (part__is_idle && !part__preparing && !uut__load_0) assert (part__anew && !uut__host_write);
         if (committed || part__preparing) assert (lines_known);
-        if (lines_known) assert (uut__scan__idle_last_line == idle_lines[LINE_BITS-1:0] - 1);
+        if (lines_known) assert (uut__scan__idle_last_line == idle_last);
         if (part__preparing) assert (idle_lines >= 1 && idle_lines <= 1 << LINE_BITS);
         if (part__preparing) assert (uut__scan__idle_next_to_last >= 6);
         if (part__preparing) assert (uut__scan__idle_next_to_last <= (1 << TICK_BITS) - 2);
-        if (uut__loaded) assert (last_line == lines[LINE_BITS-1:0] - 1 && lines >= 1 && lines <= 1 << LINE_BITS);
+        if (uut__loaded) assert (last_line == last_of_lines && lines >= 1 && lines <= 1 << LINE_BITS);
         if (uut__loaded) assert (uut__scan__next_to_last_tick >= 6);
         if (uut__loaded) assert (uut__scan__next_to_last_tick <= (1 << TICK_BITS) - 2);
+        if (!uut__loaded) assert (uut__scan__next_to_last_tick == 1 && last_line == 0);
         // The scan.
         if (running) begin
             assert (!(uut__scan__first && uut__scan__last));
@@ -148,7 +152,12 @@ module slow_play_properties (
         if (uut__tick_0 && uut__runs_0 && running && !uut__scan__starts && !uut__scan__first)
             assert (uut__line_number == uut__scan__at_line);
         if (running && part__is_idle && part__preparing && uut__at_frame && !part__anew) assert (due == 0);
-        // Labels.
+        // Labels: of the half that plays, from the first tick of a line to its last, and of the other one.
+        if (running && !uut__scan__first && !(uut__tick_0 && uut__line_0))
+            assert (x_label == at_line && y_label == at_line);
+        if (uut__tick_0 && uut__runs_0 && !uut__line_0) assert (x_label == this_line && y_label == this_line);
+        if (uut__tick_0 && uut__line_0)
+            assert (engine__done && part__line_at == uut__line_number && part__is_idle == uut__load_0);
         if (engine__done) assert (next_x == worked && next_y == worked && !engine__works);
         if (engine__works && engine__reads) assert (store__colour == worked[0] || part__anew);
         if (engine__works && engine__wrote[0]) assert (next_x == worked || part__anew);
