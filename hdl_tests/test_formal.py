@@ -80,17 +80,16 @@ PROOFS = {
     "marker_delay": Proof("marker_delay_properties", 2, 10, covers=10, maps_memory=True),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
-    "slow_play": Proof("slow_play_properties", 3, 40, {}, SLOW_STUBS, 50),
+    "slow_play": Proof("slow_play_properties", 3, 26, {}, SLOW_STUBS, 26),
+    "slow_divide": Proof("slow_divide_properties", 1, 20, covers=20),
     "pair_slew": Proof("pair_slew_properties", 1, 14, {"BITS": 4}),
     "pair_slew_of_16_bits": Proof("pair_slew_properties", 1, 0, {"BITS": 16}),
     "pair_phase": Proof("pair_phase_properties", 1, 12, {"PERIOD_BITS": 4}),
     "pair_phase_of_31_bits": Proof("pair_phase_properties", 1, 0, {"PERIOD_BITS": 31}),
     "pair_table": Proof("pair_table_properties", 1, 10, maps_memory=True),
-    "pair_play": Proof(
-        "pair_play_properties", 2, 60, {"ALTERNATE": 1}, ("dac_fit", "dac_whole", "dac_pair_delay"), 70
-    ),
-    "pair_words": Proof("pair_words_properties", 2, 50, covers=50, maps_memory=True),
-    "pair_programs": Proof("pair_program_properties", 6, 56, {}, ("dac_pair_delay", "dac_pair_words"), 50),
+    "pair_play": Proof("pair_play_properties", 2, 60, {"ALTERNATE": 1}, ("dac_fit", "dac_whole", "dac_pair_delay"), 70),
+    "pair_words": Proof("pair_words_properties", 2, 14, covers=14, maps_memory=True),
+    "pair_programs": Proof("pair_program_properties", 6, 34, {}, ("dac_pair_delay", "dac_pair_words"), 34),
     "pair_delay": Proof("pair_delay_properties", 2, 8, {"CLOCKS": 3}, maps_memory=True),
     "pair_delay_of_64_clocks": Proof("pair_delay_properties", 2, 66, {"CLOCKS": 64}, maps_memory=True),
 }
@@ -182,6 +181,9 @@ SLOW_PROOFS = {
     "serial_that_shapes",
     "scanner_of_3_bits",
     "product_of_words_of_21_bits",
+    "pair_slew_of_16_bits",
+    "pair_phase_of_31_bits",
+    "pair_delay_of_64_clocks",
 }
 
 
@@ -191,6 +193,7 @@ def test_holds_for_ever(name: str, tmp_path: Path) -> None:
 
 
 SLOW = {"writes_pipelined", "play_cubic", "sequencer", "sequencer_of_look_up_tables", "sequencer_that_shapes"}
+SLOW |= {"pair_play", "pair_programs"}
 COVERED = [name for name, proof in PROOFS.items() if proof.covers]
 
 
@@ -416,20 +419,35 @@ MUTANTS = {
     "pair_moves_without_a_tick": ("pair_slew", "dac_pair_slew", "if (valid_1)", "if (1)"),
     "pair_step_by_the_other_way": ("pair_phase", "dac_pair_phase", "advances ? at_step", "advances ? other_step"),
     "pair_phase_never_wraps": ("pair_phase", "dac_pair_phase", "advances && wraps;", "1'b0;"),
-    "pair_phase_by_the_other_rest": ("pair_phase", "dac_pair_phase", ": {1'b0, at_remainder}", ": {1'b0, other_remainder}"),
+    "pair_phase_by_the_other_rest": (
+        "pair_phase", "dac_pair_phase", ": {1'b0, at_remainder}", ": {1'b0, other_remainder}"
+    ),
     "pair_delay_a_clock_longer": ("pair_delay", "dac_pair_delay", "BEHIND = 65 - ", "BEHIND = 64 - "),
-    "pair_word_of_the_other_axis": ("pair_table", "dac_pair_table", "odd_row <= {read_y,", "odd_row <= {even_row[ROW_BITS+1],"),
+    "pair_word_of_the_other_axis": (
+        "pair_table", "dac_pair_table", "odd_row <= {read_y,", "odd_row <= {even_row[ROW_BITS+1],"
+    ),
     "pair_word_of_the_other_bank": (
         "pair_table", "dac_pair_table", "{write_y, write_bank, write_index", "{write_y, read_bank, write_index"
     ),
-    "pair_word_after_the_last_of_x": ("pair_table", "dac_pair_table", "next = read_y ? y_even : x_even", "next = x_even"),
+    "pair_word_after_the_last_of_x": (
+        "pair_table", "dac_pair_table", "next = read_y ? y_even : x_even", "next = x_even"
+    ),
     "pair_digits_of_the_other_axis": ("pair_programs", "dac_pair_output", "i % 2 == 0 ? held[", "i % 2 == 1 ? held["),
     "pair_limit_of_the_other_axis": ("pair_programs", "dac_pair", ".load_max(load_max),", ".load_max(load_park),"),
     "pair_ring_stands_still": ("pair_programs", "dac_pair_ring", "load ? value : other;", "load ? value : now;"),
-    "pair_park_code_of_x_for_y": ("pair_words", "dac_pair_words", "{1'b1, PARK_CODE}", "{1'b0, PARK_CODE}"),
+    "pair_step_of_x_for_y": ("pair_words", "dac_pair_words", "{1'b1, PHASE_STEP}", "{1'b0, PHASE_STEP}"),
     "pair_word_is_kept_too_short": ("pair_play", "dac_sequencer", "drained = swapped_done;", "drained = load_0;"),
     "pair_reads_what_is_written": ("pair_play", "dac_pair", "? tick_bank : y_bank;", "? tick_bank : !y_bank;"),
     "pair_takes_a_tick_a_clock": ("pair_play", "dac_sequencer", "works <= accepted_tick;", "works <= 1'b0;"),
+    # o. lines with a slow part
+    "slow_line_before_it_is_ready": ("slow_play", "dac_slow_part", "ready = ended && !anew;", "ready = !anew;"),
+    "slow_words_of_the_old_program": ("slow_play", "dac_slow_part", ".bank(bank ^ is_idle)", ".bank(bank)"),
+    "slow_half_does_not_change": ("slow_play", "dac_slow_part", "half ^ changes", "half ^ (changes && load)"),
+    "slow_divisor_stays_in_the_rest": (
+        "slow_divide", "dac_slow_divide", "rest <= reduces ? less : from", "rest <= from"
+    ),
+    "slow_both_bits_are_one": ("slow_divide", "dac_slow_divide", "(add && here && there)", "(add && here)"),
+    "slow_half_is_lost": ("slow_divide", "dac_slow_divide", "half ? {1'b0, whole[REST_BITS-1:1]}", "half ? 0"),
 }  # fmt: skip
 
 

@@ -1,6 +1,6 @@
-// In the place of dac_pair_words for the proofs: its schedule, without its memory. pair_words_properties proves that the
-// module has this schedule, and that its words are those that were written; here they are any, and a harness assumes of
-// them what it needs.
+// In the place of dac_pair_words for the proofs: its schedule, without its memory. pair_words_properties proves that
+// the module has this schedule, and that its words are those that were written; here they are any, and a harness
+// assumes of them what it needs.
 
 `default_nettype none
 

@@ -3,7 +3,7 @@
 //
 // `watch` picks any word of a program, of x or of y. Asked of the surroundings, and proven of the sequencer by
 // pair_play_properties: nothing is written while a new program reads its words, and none begins meanwhile. The rules
-// that use the words are in pair_phase_properties, pair_output_properties and pair_slew_properties.
+// that use the words are in pair_phase_properties and pair_slew_properties; that of the product has no proof.
 
 `default_nettype none
 
@@ -168,8 +168,8 @@ module pair_program_properties (
             end
     end
 
-    // Not vacuous: a program is taken while another one plays.
-    always @* cover (load && plays_known && number == GAIN && idle_word != plays);
+    // Not vacuous: a program reaches the first digit of a gain.
+    always @* cover (plays_known && number == GAIN && of_y && stage == 24 && digits[1:0] == 2'd3);
 
 `ifndef PROPERTIES_ALONE
     // What makes it inductive: the words in their memory, and where the loads are.

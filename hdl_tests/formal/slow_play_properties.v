@@ -1,5 +1,5 @@
-// The slow part in the sequencer: no line ever plays words of another. At every tick of a scan both axes have in the half
-// that plays the words of that line, of the program that plays; a line that is not ready loses its tick.
+// The slow part in the sequencer: no line ever plays words of another. At every tick of a scan both axes have in the
+// half that plays the words of that line, of the program that plays.
 //
 // The host may do anything on any clock, in every mode of a commit; a line may take any time to be worked out. What is
 // worked out is a label: the line, and the colour of its program. Asked of what the host commits is what dac_fit and
