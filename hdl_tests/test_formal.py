@@ -17,13 +17,14 @@ import pytest
 from building import REPOSITORY, tool
 from limits import PATIENCE_S
 from sets import long
-from test_lint import ADC, BUS, CROSSINGS, MODULES, path_of
+from test_lint import MODULES, SOURCES, path_of
 
 pytestmark = pytest.mark.rest
 
 FORMAL = REPOSITORY / "hdl_tests" / "formal"
 COVER = re.compile(r"cover \((.*)\);")
 PIPELINED = re.compile(r"`ifdef PIPELINED\n(.*?)`endif\n", re.DOTALL)  # what low area does not have
+SHORT = re.compile(r"^// `(\w+)` is `([\w.]+)`$", re.MULTILINE)  # of an instance with a long name
 ASIDE = re.compile(r"`ifndef PROPERTIES_ALONE\n.*?\n`endif\n", re.DOTALL)  # assertions that are no property
 
 
@@ -42,6 +43,7 @@ class Proof:
 
 
 ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit", "dac_whole")
+SLOW_STUBS = ("dac_fit", "dac_whole", "dac_slow_fit", "dac_slow_engine", "dac_slow_store", "dac_slow_axis")
 CONTROL_STUBS = ("dac_axis", "dac_fit", "dac_whole")
 SERIAL = Proof("serial_properties", 1, 0)
 PROOFS = {
@@ -78,6 +80,18 @@ PROOFS = {
     "marker_delay": Proof("marker_delay_properties", 2, 10, covers=10, maps_memory=True),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
+    "slow_play": Proof("slow_play_properties", 3, 26, {}, SLOW_STUBS, 26),
+    "slow_divide": Proof("slow_divide_properties", 1, 20, covers=20),
+    "pair_slew": Proof("pair_slew_properties", 1, 14, {"BITS": 4}),
+    "pair_slew_of_16_bits": Proof("pair_slew_properties", 1, 0, {"BITS": 16}),
+    "pair_phase": Proof("pair_phase_properties", 1, 12, {"PERIOD_BITS": 4}),
+    "pair_phase_of_31_bits": Proof("pair_phase_properties", 1, 0, {"PERIOD_BITS": 31}),
+    "pair_table": Proof("pair_table_properties", 1, 10, maps_memory=True),
+    "pair_play": Proof("pair_play_properties", 2, 60, {"ALTERNATE": 1}, ("dac_fit", "dac_whole", "dac_pair_delay"), 70),
+    "pair_words": Proof("pair_words_properties", 2, 14, covers=14, maps_memory=True),
+    "pair_programs": Proof("pair_program_properties", 6, 34, {}, ("dac_pair_delay", "dac_pair_words"), 34),
+    "pair_delay": Proof("pair_delay_properties", 2, 8, {"CLOCKS": 3}, maps_memory=True),
+    "pair_delay_of_64_clocks": Proof("pair_delay_properties", 2, 66, {"CLOCKS": 64}, maps_memory=True),
 }
 COVERS_AS_ASSERTIONS = """
 (* techmap_celltype = "$cover" *)
@@ -95,8 +109,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     """
     for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
         shutil.copy(path, folder)
-    sources = [*MODULES.glob("dac_*.v"), *BUS.glob("*.v"), *CROSSINGS.glob("*.v"), *ADC.glob("*.v")]
-    texts = {path.stem: path.read_text("utf-8") for path in sources} | dict(modules)
+    texts = {path.stem: path.read_text("utf-8") for path in SOURCES} | dict(modules)
     for name, text in texts.items():
         if name not in proof.stubs:
             (folder / f"{name}.v").write_text(text, "utf-8")
@@ -108,6 +121,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
     text = COVER.sub(lambda statement: statement[0] if next(numbers) == cover else ";", text)
     harness = folder / f"{proof.top}.v"
     harness.write_text(text, "utf-8")
+    short = dict(SHORT.findall(text))
     seen = sorted(set(re.findall(r"\b\w*[a-z0-9]__\w+", text)))
     lines = [f"read_verilog -defer {folder / name}.v" for name in texts if name not in proof.stubs]
     for stub in proof.stubs:
@@ -118,15 +132,16 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
         f"read_verilog -formal -defer {harness}",
         f"hierarchy -check -top {proof.top} " + " ".join(f"-chparam {k} {v}" for k, v in proof.parameters.items()),
         "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten",
-        *(f"connect -nounset -set {name} {_inner(name)}" for name in seen),
+        *(f"connect -nounset -set {name} {_inner(name, short)}" for name in seen),
         f"check -assert; opt_clean; prep -top {proof.top}; memory_nordff; dffunmap; opt_clean",
     ]
     return "\n".join(lines) + "\n"
 
 
-def _inner(name: str) -> str:
+def _inner(name: str, short: Mapping[str, str]) -> str:
     """The signal ``b`` of the instance ``a`` for ``a__b``; a number at the end or on the way is an index."""
-    return re.sub(r"__(\d+)", r"[\1]", name).replace("__", ".")
+    instance, signal = re.sub(r"__(\d+)", r"[\1]", name).replace("__", ".").split(".", 1)
+    return f"{short.get(instance, instance)}.{signal}"
 
 
 def _proven(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None) -> bool:
@@ -166,6 +181,9 @@ SLOW_PROOFS = {
     "serial_that_shapes",
     "scanner_of_3_bits",
     "product_of_words_of_21_bits",
+    "pair_slew_of_16_bits",
+    "pair_phase_of_31_bits",
+    "pair_delay_of_64_clocks",
 }
 
 
@@ -175,6 +193,7 @@ def test_holds_for_ever(name: str, tmp_path: Path) -> None:
 
 
 SLOW = {"writes_pipelined", "play_cubic", "sequencer", "sequencer_of_look_up_tables", "sequencer_that_shapes"}
+SLOW |= {"pair_play", "pair_programs"}
 COVERED = [name for name, proof in PROOFS.items() if proof.covers]
 
 
@@ -394,12 +413,49 @@ MUTANTS = {
     "marker_of_its_neighbour": ("marker_delay", "dac_marker_delay", "past[now] <= in[i]", "past[now] <= in[0]"),
     "marker_without_its_bypass": ("marker_delay", "dac_marker_delay", "is_1 <= delay == 1", "is_1 <= 1'b0"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
+    # n. both axes by turns
+    "pair_step_of_the_other_axis": ("pair_slew", "dac_pair_slew", "step = ~step_inverse;", "step = ~last_step;"),
+    "pair_target_of_the_other_axis": ("pair_slew", "dac_pair_slew", "? ~target : target_2", "? ~target : target_1"),
+    "pair_moves_without_a_tick": ("pair_slew", "dac_pair_slew", "if (valid_1)", "if (1)"),
+    "pair_step_by_the_other_way": ("pair_phase", "dac_pair_phase", "advances ? at_step", "advances ? other_step"),
+    "pair_phase_never_wraps": ("pair_phase", "dac_pair_phase", "advances && wraps;", "1'b0;"),
+    "pair_phase_by_the_other_rest": (
+        "pair_phase", "dac_pair_phase", ": {1'b0, at_remainder}", ": {1'b0, other_remainder}"
+    ),
+    "pair_delay_a_clock_longer": ("pair_delay", "dac_pair_delay", "BEHIND = 65 - ", "BEHIND = 64 - "),
+    "pair_word_of_the_other_axis": (
+        "pair_table", "dac_pair_table", "odd_row <= {read_y,", "odd_row <= {even_row[ROW_BITS+1],"
+    ),
+    "pair_word_of_the_other_bank": (
+        "pair_table", "dac_pair_table", "{write_y, write_bank, write_index", "{write_y, read_bank, write_index"
+    ),
+    "pair_word_after_the_last_of_x": (
+        "pair_table", "dac_pair_table", "next = read_y ? y_even : x_even", "next = x_even"
+    ),
+    "pair_digits_of_the_other_axis": ("pair_programs", "dac_pair_output", "i % 2 == 0 ? held[", "i % 2 == 1 ? held["),
+    "pair_remainder_too_early": ("pair_programs", "dac_pair", "load_phase <= ends;", "load_phase <= is_remainder;"),
+    "pair_ring_stands_still": ("pair_programs", "dac_pair_ring", "load ? value : other;", "load ? value : now;"),
+    "pair_step_at_the_period": ("pair_words", "dac_pair_words", "was == PHASE_STEP", "was == PHASE_PERIOD"),
+    "pair_step_of_x_for_y": ("pair_words", "dac_pair_words", "{1'b1, PHASE_STEP}", "{1'b0, PHASE_STEP}"),
+    "pair_word_is_kept_too_short": ("pair_play", "dac_sequencer", "drained = swapped_done;", "drained = load_0;"),
+    "pair_reads_what_is_written": ("pair_play", "dac_pair", "? tick_bank : y_bank;", "? tick_bank : !y_bank;"),
+    "pair_takes_a_tick_a_clock": ("pair_play", "dac_sequencer", "works <= accepted_tick;", "works <= 1'b0;"),
+    # o. lines with a slow part
+    "slow_line_before_it_is_ready": ("slow_play", "dac_slow_part", "ready = ended && !anew;", "ready = !anew;"),
+    "slow_words_of_the_old_program": ("slow_play", "dac_slow_part", ".bank(bank ^ is_idle)", ".bank(bank)"),
+    "slow_half_does_not_change": ("slow_play", "dac_slow_part", "half <= half ^ changes;", "half <= half;"),
+    "slow_divisor_stays_in_the_rest": (
+        "slow_divide", "dac_slow_divide", "rest <= reduces ? less : from", "rest <= from"
+    ),
+    "slow_both_bits_are_one": ("slow_divide", "dac_slow_divide", "(add && here && there)", "(add && here)"),
+    "slow_half_is_lost": ("slow_divide", "dac_slow_divide", "half ? {1'b0, whole[REST_BITS-1:1]}", "half ? 0"),
 }  # fmt: skip
 
 
 # With the first one of each module in each harness.
 FIRSTS = {(harness, module): name for name, (harness, module, _, _) in reversed(MUTANTS.items())}
-SOME = [*list(MUTANTS)[::6], *FIRSTS.values()]
+LATE = {"pair_digits_of_the_other_axis", "pair_step_of_x_for_y"}  # many clocks deep
+SOME = {*list(MUTANTS)[::6], *FIRSTS.values()} - LATE
 
 
 @pytest.mark.parametrize("name", long(SOME, MUTANTS))

@@ -1,12 +1,13 @@
-// What sequencer_properties, play_properties and writes_properties look at: the parameters and ports of a harness, and a
-// small dac_sequencer. The host may do anything on any clock.
+// What sequencer_properties, play_properties, writes_properties and pair_program_properties look at: the parameters and
+// ports of a harness, and a small dac_sequencer. The host may do anything on any clock.
 
 #(
     parameter PLAIN_MULTIPLIER = 1,
     parameter LOW_AREA = 0,
     parameter FOURIER = 0,
     parameter SHAPING = 0,
-    parameter CUBIC = 0  // 1: both tables
+    parameter CUBIC = 0,  // 1: both tables
+    parameter ALTERNATE = 0
 ) (
     input wire        clock,
     input wire        reset,
@@ -33,8 +34,8 @@
     dac_sequencer #(
         .DAC_BITS(8), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(4),
         .LINE_BITS(2), .PERIOD_BITS(8), .COUNT_BITS(2), .LOW_AREA(LOW_AREA),
-        .PLAIN_MULTIPLIER(LOW_AREA && !FOURIER ? 0 : PLAIN_MULTIPLIER), .HARMONICS(3),
-        .FOURIER(FOURIER), .SHAPING(SHAPING), .X_INTERPOLATED(CUBIC ? 3 : 1), .Y_INTERPOLATED(CUBIC ? 3 : 1)
+        .PLAIN_MULTIPLIER((LOW_AREA && !FOURIER) || ALTERNATE ? 0 : PLAIN_MULTIPLIER), .HARMONICS(3),
+        .FOURIER(FOURIER), .SHAPING(SHAPING), .ALTERNATE(ALTERNATE), .X_INTERPOLATED(CUBIC ? 3 : 1), .Y_INTERPOLATED(CUBIC ? 3 : 1)
     ) uut (
         .clock(clock), .reset(reset), .write(write), .write_region(write_region), .write_address(write_address),
         .write_data(write_data), .writable(writable), .refused(refused), .commit(commit), .commit_mode(2'd0),
