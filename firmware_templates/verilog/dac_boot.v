@@ -91,6 +91,15 @@ module dac_boot #(
         if (START_CLOCKS < 0 || START_CLOCKS > 16777216) begin : guard_11
             dac_boot_START_CLOCKS_is_not_0_to_16777216 stop ();
         end
+        if (PROGRAM_FILE == "") begin : guard_12
+            dac_boot_PROGRAM_FILE_is_not_set stop ();
+        end
+        if (X_FILE == "") begin : guard_13
+            dac_boot_X_FILE_is_not_set stop ();
+        end
+        if (Y_FILE == "") begin : guard_14
+            dac_boot_Y_FILE_is_not_set stop ();
+        end
     endgenerate
 
     // The bit above a word is 1 in the last word of a memory that no file has filled. Where one has, it is 0
