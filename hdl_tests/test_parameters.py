@@ -161,10 +161,6 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"Y_WORD_BITS": 25}, "Y_WORD_BITS_is_not_8_to_24"),
         ({"HARMONICS": 0}, "HARMONICS_is_not_1_to_512"),
         ({"MULTIPLIER": 2}, "MULTIPLIER_is_not_0_to_1"),
-        (
-            {"X_INDEX_BITS": 5, "Y_INDEX_BITS": 4, "HARMONICS": 16},
-            "HARMONICS_is_not_less_than_half_of_the_longer_table",
-        ),
         ({"SINE_FILE": EMPTY}, "SINE_FILE_is_not_set"),
     ],
     "dac_coding": [

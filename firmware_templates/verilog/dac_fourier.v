@@ -106,10 +106,7 @@ module dac_fourier #(
         if (MULTIPLIER < 0 || MULTIPLIER > 1) begin : guard_5
             dac_fourier_MULTIPLIER_is_not_0_to_1 stop ();
         end
-        if (HARMONICS >= 1 << (INDEX_BITS - 1)) begin : guard_6
-            dac_fourier_HARMONICS_is_not_less_than_half_of_the_longer_table stop ();
-        end
-        if (SINE_FILE == "") begin : guard_7
+        if (SINE_FILE == "") begin : guard_6
             dac_fourier_SINE_FILE_is_not_set stop ();
         end
     endgenerate
