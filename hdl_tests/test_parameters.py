@@ -1,25 +1,22 @@
 """Illegal parameters stop the elaboration with their reason, in Icarus, Verilator and yosys; legal ones do not.
 
-An illegal value is one beyond the range that a guard gives; the values at both ends of it elaborate. No parameter of a
-module that a design instantiates is without its guard.
+An illegal value is one beyond the range that a guard gives; the values at both ends of it elaborate. No parameter of
+any module is without its guard; those of the modules inside the core are in ``inner_parameters``.
 """
 
 import re
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 from building import REPOSITORY, tool
+from inner_parameters import ANY, HANDED_ON, illegal, legal
 from sets import one_of
-from test_lint import MODULES, NEEDED, SOURCES, lint, path_of
+from test_lint import MODULES, SOURCES, complete, lint, path_of
 
 MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
 GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
-PUBLIC = (
-    "dac_sequencer", "program_loader", "dac_boot", "dac_slow_boot", "dac_pixel_boot", "dac_fourier", "dac_coding",
-    "dac_spi", "dac_axi_stream", "dac_bus", "dac_synchronise", "adc_pixels", "dac_marker_delay",
-)  # fmt: skip
 Values = Mapping[str, int | str]
 SLOW_PART = {"SLOW_PART": 1, "LOW_AREA": 1}
 ALTERNATE = {"ALTERNATE": 1}
@@ -28,6 +25,7 @@ ALTERNATE_HAS_NO = "ALTERNATE_has_no_LOW_AREA_PLAIN_MULTIPLIER_FOURIER_or_SHAPIN
 FOURIER = {"FOURIER": 1, "X_WORD_BITS": 32, "Y_WORD_BITS": 32, "X_WORDS": 3, "Y_WORDS": 3, "X_HARMONICS": 1}
 CUBIC = {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3}
 BOOT = FOURIER | {"Y_HARMONICS": 1}
+EMPTY = '""'  # the name of a file
 # What is illegal, and the reason that a tool gives.
 ILLEGAL: dict[str, list[tuple[Values, str]]] = {
     "dac_sequencer": [
@@ -67,6 +65,7 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
             {"FOURIER": 1, "HARMONICS": 16, "X_INDEX_BITS": 5, "Y_INDEX_BITS": 4},
             "HARMONICS_is_not_less_than_half_of_the_longer_table",
         ),
+        ({"FOURIER": 1, "SINE_FILE": EMPTY}, "SINE_FILE_is_not_set"),
         ({"SLOW_PART": 2}, "SLOW_PART_is_not_0_to_1"),
         ({"SLOW_PART": 1}, "SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_or_SHAPING"),
         ({**SLOW_PART, "FOURIER": 1}, "SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_or_SHAPING"),
@@ -134,6 +133,9 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({**BOOT, "X_WORDS": 4}, "X_WORDS_is_not_two_X_HARMONICS_and_one"),
         ({**BOOT, "Y_HARMONICS": 2}, "Y_WORDS_is_not_two_Y_HARMONICS_and_one"),
         ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
+        ({"PROGRAM_FILE": EMPTY}, "PROGRAM_FILE_is_not_set"),
+        ({"X_FILE": EMPTY}, "X_FILE_is_not_set"),
+        ({"Y_FILE": EMPTY}, "Y_FILE_is_not_set"),
     ],
     "dac_slow_boot": [
         ({"X_TABLE_WORDS": 7}, "X_TABLE_WORDS_is_not_8_to_16384"),
@@ -144,11 +146,13 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"Y_KNOTS": 66}, "Y_KNOTS_is_not_2_to_65"),
         ({"WORD_BITS": 17}, "WORD_BITS_is_not_18_to_21"),
         ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
+        ({"SLOW_FILE": EMPTY}, "SLOW_FILE_is_not_set"),
     ],
     "dac_pixel_boot": [
         ({"PIXELS": 0}, "PIXELS_is_not_1_to_32768"),
         ({"PIXELS": 32769}, "PIXELS_is_not_1_to_32768"),
         ({"START_CLOCKS": 16777217}, "START_CLOCKS_is_not_0_to_16777216"),
+        ({"PIXEL_FILE": EMPTY}, "PIXEL_FILE_is_not_set"),
     ],
     "dac_fourier": [
         ({"X_INDEX_BITS": 2}, "X_INDEX_BITS_is_not_3_to_16"),
@@ -157,6 +161,7 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"Y_WORD_BITS": 25}, "Y_WORD_BITS_is_not_8_to_24"),
         ({"HARMONICS": 0}, "HARMONICS_is_not_1_to_512"),
         ({"MULTIPLIER": 2}, "MULTIPLIER_is_not_0_to_1"),
+        ({"SINE_FILE": EMPTY}, "SINE_FILE_is_not_set"),
     ],
     "dac_coding": [
         ({"BITS": 1}, "BITS_is_not_2_to_32"),
@@ -312,7 +317,7 @@ LEGAL: dict[str, list[Values]] = {
 
 def icarus(top: str, values: Values, folder: Path) -> str:
     """What it says; nothing where it compiles."""
-    given = [f"-P{top}.{name}={value}" for name, value in (NEEDED.get(top, {}) | dict(values)).items()]
+    given = [f"-P{top}.{name}={value}" for name, value in complete(top, values).items()]
     command = ["iverilog", "-g2005", "-Wall", "-o", folder / "out", "-s", top, *given, *SOURCES]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode == 0) == (done.stderr == ""), done.stderr
@@ -338,16 +343,36 @@ def unfilled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def written(value: int | str) -> int | str:
+    """Return a value as the command line of yosys takes it: a string as the bits of its characters."""
+    if not isinstance(value, str) or '"' not in value:
+        return value
+    text = value.strip('"').encode("ascii") or b"\0"
+    return f"{8 * len(text)}'h{text.hex()}"
+
+
 def yosys(top: str, values: Values, modules: Path) -> str:
-    given = " ".join(f"-chparam {name} {value}" for name, value in (NEEDED.get(top, {}) | dict(values)).items())
+    given = " ".join(f"-chparam {name} {written(value)}" for name, value in complete(top, values).items())
     script = f"read_verilog -defer {modules}/*.v; hierarchy -check -top {top} {given}"
-    done = subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
+    (modules / "words.mem").write_text("0\n", "ascii")
+    done = subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True, cwd=modules)
     assert (done.returncode == 0) == ("ERROR" not in done.stderr), done.stderr
     return done.stderr
 
 
-CASES = [(top, values, reason) for top, cases in ILLEGAL.items() for values, reason in cases]
-NAMES = [f"{top}-{reason}-{index}" for index, (top, _, reason) in enumerate(CASES)]
+CASES = [(top, values, reason) for top, cases in ILLEGAL.items() for values, reason in cases] + list(illegal())
+
+
+def names_of(cases: Sequence[tuple[str, Values, str]]) -> list[str]:
+    """Return the names of tests of illegal parameters."""
+    return [f"{top}-{reason}-{index}" for index, (top, _, reason) in enumerate(cases)]
+
+
+NAMES = names_of(CASES)
+# The command line of yosys has no number below 0.
+WRITTEN = [case for case in CASES if not any(isinstance(value, int) and value < 0 for value in case[1].values())]
+# Yosys 0.23 ends by an assertion of its own where these are the top and have parameters, whatever their values.
+NO_TOP_OF_YOSYS = ("dac_multiply_plain", "dac_output")
 
 
 @pytest.mark.common
@@ -363,12 +388,12 @@ def test_an_illegal_parameter_is_refused_by_verilator(top: str, values: Values, 
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(("top", "values", "reason"), one_of(4, CASES, 3), ids=NAMES)
+@pytest.mark.parametrize(("top", "values", "reason"), one_of(4, WRITTEN, 3), ids=names_of(WRITTEN))
 def test_an_illegal_parameter_is_refused_by_yosys(top: str, values: Values, reason: str, unfilled: Path) -> None:
     assert re.search(rf"ERROR: Module `\\\w*{reason}\w*' referenced in module", yosys(top, values, unfilled))
 
 
-LEGAL_CASES = [(top, values) for top, cases in LEGAL.items() for values in cases]
+LEGAL_CASES = [(top, values) for top, cases in LEGAL.items() for values in cases] + list(legal())
 
 
 @pytest.mark.common
@@ -379,29 +404,83 @@ def test_legal_ones_at_both_ends_are_taken(top: str, values: Values, tmp_path: P
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(("top", "values"), one_of(2, LEGAL_CASES, 2))
+@pytest.mark.parametrize(
+    ("top", "values"), one_of(2, [case for case in LEGAL_CASES if case[0] not in NO_TOP_OF_YOSYS], 2)
+)
 def test_legal_ones_at_both_ends_are_taken_by_yosys(top: str, values: Values, unfilled: Path) -> None:
     assert "ERROR" not in yosys(top, values, unfilled)
 
 
-@pytest.mark.parametrize("top", PUBLIC)
-def test_every_parameter_has_its_guard_and_every_guard_its_case(top: str) -> None:
-    """But names of files and hashes, of which any will do."""
-    text = path_of(top).read_text("utf-8")
+def parameters_of(text: str) -> set[str]:
+    """Return the parameters that a module declares."""
     found = MODULE.search(text)
-    assert found is not None
-    parameters = set(re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2])) - {"BOOT_HASH"}
-    guards = GUARD.findall(text)
-    assert guards
-    for name in parameters:
-        assert name.endswith("_FILE") or any(name in guard for guard in guards) or name in _conditions(text), name
-    cases = [reason for _, reason in ILLEGAL[top]]
-    for guard in guards:
-        assert any(reason in guard for reason in cases), guard
+    return set(re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2])) if found else set()
 
 
-def _conditions(text: str) -> str:
-    return "".join(re.findall(r"if \(([^\n]*(?:\n[^\n]*)?)\) begin : guard_", text))
+def guarded(text: str, name: str) -> bool:
+    """Return True if a guard of the module has the parameter in its name or in its condition."""
+    conditions = "".join(re.findall(r"if \(([^\n]*(?:\n[^\n]*)?)\) begin : guard_", text))
+    return any(name in guard for guard in GUARD.findall(text)) or re.search(rf"\b{name}\b", conditions) is not None
+
+
+def unguarded(text: str, handed_on: Mapping[str, str]) -> set[str]:
+    """Return the parameters of a module that neither it nor the module to which it hands them on has a guard for."""
+    left = set()
+    for name in parameters_of(text):
+        if name in handed_on:
+            target = handed_on[name]
+            formal = re.search(rf"\b{target} #\([^;]*?\.(\w+)\({name}\)", text)
+            further = unguarded(path_of(target).read_text("utf-8"), HANDED_ON.get(target, {}))
+            if formal is None or formal[1] in further:
+                left.add(name)
+        elif not guarded(text, name):
+            left.add(name)
+    return left
+
+
+ALL = sorted({*SOURCES, *(MODULES / "ecp5").glob("*.v")})
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_every_parameter_has_its_guard_and_every_guard_its_case(path: Path) -> None:
+    """But contents, of which any will do."""
+    text = path.read_text("utf-8")
+    assert unguarded(text, HANDED_ON.get(path.stem, {})) == ANY.get(path.stem, set())
+    if path.parent.name == "ecp5":  # which has the guards of the module of the same name, or narrower ones
+        return
+    reasons = [reason for top, _, reason in CASES if top == path.stem]
+    for guard in GUARD.findall(text):
+        assert any(guard.startswith(f"{path.stem}_{reason}") for reason in reasons), guard
+
+
+def test_a_parameter_without_a_guard_would_be_seen() -> None:
+    """Be it the parameter of the module, or one that it hands on."""
+    text = path_of("dac_table").read_text("utf-8")
+    assert unguarded(text.replace("INDEX_BITS < 2", "WORD_BITS < 2").replace("table_INDEX_BITS", "table"), {}) == {
+        "INDEX_BITS"
+    }
+    axis = path_of("dac_axis").read_text("utf-8")
+    assert unguarded(axis, {}) == set(HANDED_ON["dac_axis"])
+    assert unguarded(axis.replace(".DAC_BITS(DAC_BITS)", ".DAC_BITS(16)"), HANDED_ON["dac_axis"]) == {"DAC_BITS"}
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [
+        ("dac_memory", {"BITS": 0}, "BITS_is_less_than_1"),
+        ("dac_direct_table", {"INDEX_BITS": 0}, "INDEX_BITS_is_less_than_1"),
+        ("dac_product", {"A_BITS": 19}, "A_BITS_is_not_2_to_18"),
+        ("dac_product", {"B_BITS": 1}, "B_BITS_is_not_2_to_18"),
+    ],
+)
+def test_the_modules_of_an_ecp5_have_guards_of_their_own(
+    name: str, values: Values, reason: str, tmp_path: Path
+) -> None:
+    given = [f"-P{name}.{key}={value}" for key, value in values.items()]
+    sources = sorted((MODULES / "ecp5").glob("*.v"))
+    command = ["iverilog", "-g2005", "-o", tmp_path / "out", "-s", name, *given, *sources]
+    said = subprocess.run(command, capture_output=True, text=True).stderr
+    assert f"Unknown module type: {name}_{reason}" in said
 
 
 def test_the_page_lists_every_parameter_and_its_range() -> None:

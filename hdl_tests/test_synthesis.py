@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from building import REPOSITORY, tool
 from sets import LONG_TEST, long, one_of
+from test_lint import complete
+from test_parameters import written
 
 sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
@@ -65,20 +67,24 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
 }
 
 
-def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> subprocess.CompletedProcess[str]:
-    values = " ".join(f"-chparam {name} {value}" for name, value in parameters.items())
+def check(
+    top: str, parameters: Mapping[str, int], run_in: Path, folder: Path = MODULES
+) -> subprocess.CompletedProcess[str]:
+    (run_in / "words.mem").write_text("0\n", "ascii")
+    given = {name: written(value) for name, value in complete(top, parameters).items()}
+    values = " ".join(f"-chparam {name} {value}" for name, value in given.items())
     script = (
         f"read_verilog -defer {folder}/*.v {BUS}/*.v {ADC}/*.v {SLOW}/*.v {PAIR}/*.v; "
         f"hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )
-    return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
+    return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True, cwd=run_in)
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("name", one_of(2, CHECKED))
-def test_has_no_latch_and_no_conflict(name: str) -> None:
-    done = check(*CHECKED[name])
+def test_has_no_latch_and_no_conflict(name: str, tmp_path: Path) -> None:
+    done = check(*CHECKED[name], tmp_path)
     assert done.returncode == 0, done.stderr
 
 
@@ -101,7 +107,7 @@ def test_a_fault_would_be_seen(text: str, instead: str, tmp_path: Path) -> None:
     bank = tmp_path / "dac_bank.v"
     assert bank.read_text("utf-8").count(text) == 1
     bank.write_text(bank.read_text("utf-8").replace(text, instead), "utf-8")
-    assert check("dac_sequencer", {}, tmp_path).returncode != 0
+    assert check("dac_sequencer", {}, tmp_path, tmp_path).returncode != 0
 
 
 # The page.

@@ -4,8 +4,8 @@
 // words, <name>_x_fourier.mem and <name>_y_fourier.mem, from which a sequencer with FOURIER = 1 computes its tables;
 // they take less memory. PROGRAM_FILE is <name>_program.mem either way. The boot ends with a commit; arm and trigger
 // are left to the host. In simulation a file that is missing or has too few words is not committed: the boot ends
-// without, and `missing` is high. In synthesis, where the macro SYNTHESIS has to be defined, only a name that is empty
-// is seen: some tools would let the mark of an unfilled memory win over the file.
+// without, and `missing` is high. In synthesis, where the macro SYNTHESIS has to be defined, this is not seen: some
+// tools would let the mark of an unfilled memory win over the file. A name that is empty stops the elaboration of both.
 //
 // It reads nothing for START_CLOCKS after power-up: block RAMs of iCE40 parts read as 0 for some microseconds after the
 // configuration. 4096 clocks are 41 us at 100 MHz.
@@ -90,6 +90,15 @@ module dac_boot #(
         end
         if (START_CLOCKS < 0 || START_CLOCKS > 16777216) begin : guard_11
             dac_boot_START_CLOCKS_is_not_0_to_16777216 stop ();
+        end
+        if (PROGRAM_FILE == "") begin : guard_12
+            dac_boot_PROGRAM_FILE_is_not_set stop ();
+        end
+        if (X_FILE == "") begin : guard_13
+            dac_boot_X_FILE_is_not_set stop ();
+        end
+        if (Y_FILE == "") begin : guard_14
+            dac_boot_Y_FILE_is_not_set stop ();
         end
     endgenerate
 

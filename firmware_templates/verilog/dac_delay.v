@@ -10,6 +10,16 @@ module dac_delay #(
     input  wire [BITS-1:0] in,
     output wire [BITS-1:0] out
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_delay_BITS_is_less_than_1 stop ();
+        end
+        if (CLOCKS < 0) begin : guard_1
+            dac_delay_CLOCKS_is_less_than_0 stop ();
+        end
+    endgenerate
+
     generate
         if (CLOCKS == 0) begin : none
             wire unused = clock;

@@ -106,6 +106,9 @@ module dac_fourier #(
         if (MULTIPLIER < 0 || MULTIPLIER > 1) begin : guard_5
             dac_fourier_MULTIPLIER_is_not_0_to_1 stop ();
         end
+        if (SINE_FILE == "") begin : guard_6
+            dac_fourier_SINE_FILE_is_not_set stop ();
+        end
     endgenerate
 
     // Coefficients and the quarter of the sine: block RAMs, one clocked read port each. One is written while not busy

@@ -45,6 +45,9 @@ module dac_pixel_boot #(
         if (START_CLOCKS < 0 || START_CLOCKS > 16777216) begin : guard_1
             dac_pixel_boot_START_CLOCKS_is_not_0_to_16777216 stop ();
         end
+        if (PIXEL_FILE == "") begin : guard_2
+            dac_pixel_boot_PIXEL_FILE_is_not_set stop ();
+        end
     endgenerate
 
     // The bit above a word marks a memory that no file has filled, as in dac_boot.

@@ -15,6 +15,13 @@ module dac_pixels #(
     input  wire signed [BITS+1:0] pixels_less_count_less_1,  // negative: the window has a tick for each pixel
     output reg                    pixel
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_pixels_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
+
     // i pixels - count (strobes), less another count, so that its sign decides; below `pixels`, and not below -count.
     reg signed [BITS+1:0] behind;
     initial behind = 0;

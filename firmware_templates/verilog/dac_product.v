@@ -14,6 +14,16 @@ module dac_product #(
     input  wire signed [B_BITS-1:0]        b,
     output reg  signed [A_BITS+B_BITS-1:0] product
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (A_BITS < 1) begin : guard_0
+            dac_product_A_BITS_is_less_than_1 stop ();
+        end
+        if (B_BITS < 1) begin : guard_1
+            dac_product_B_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
+
     reg signed [A_BITS-1:0] a_in;
     reg signed [B_BITS-1:0] b_in;
 

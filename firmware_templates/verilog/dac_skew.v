@@ -11,6 +11,13 @@ module dac_skew #(
     input  wire [2*DIGITS-1:0] value,
     output wire [2*DIGITS-1:0] digits
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (DIGITS < 1) begin : guard_0
+            dac_skew_DIGITS_is_less_than_1 stop ();
+        end
+    endgenerate
+
     reg [2*DIGITS-1:0] recoded;
     initial recoded = 0;
 

@@ -20,6 +20,16 @@ module dac_table #(
     output reg  signed [WORD_BITS-1:0]  here,
     output reg  signed [WORD_BITS-1:0]  there
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (WORD_BITS < 1) begin : guard_0
+            dac_table_WORD_BITS_is_less_than_1 stop ();
+        end
+        if (INDEX_BITS < 2) begin : guard_1
+            dac_table_INDEX_BITS_is_less_than_2 stop ();
+        end
+    endgenerate
+
     localparam ROW_BITS = INDEX_BITS - 1;
 
     wire [ROW_BITS-1:0] row = index[INDEX_BITS-1:1];

@@ -31,6 +31,7 @@ from c_scripts import (
     renderings,
 )
 from replacing import replace
+from resting import check_rest, rest_script
 from sets import LONG_TEST, common_of, long
 from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
@@ -100,6 +101,15 @@ def test_lines_are_stopped_and_started_anywhere(benches: Benches) -> None:
     for seed in range(3):
         catching_up(script, long_dual(np.random.default_rng(seed), shape, (200, 300)))
     everywhere(benches, script, shape)
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", ["bits_16", "cubic", "direct"])
+def test_x_rests_as_y_does(name: str, benches: Benches) -> None:
+    """An image, a line along y, a point and a line along x in one scan, each held against its program too."""
+    shape, script = LONG[name][0], Script()
+    programs = rest_script(np.random.default_rng(7), script, shape, 1, (200, 300))
+    check_rest(everywhere(benches, script, shape), programs)
 
 
 @pytest.mark.common

@@ -16,6 +16,16 @@ module dac_memory #(
     input  wire [ADDRESS_BITS-1:0] address,
     output wire [BITS-1:0]         word
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_memory_BITS_is_less_than_1 stop ();
+        end
+        if (ADDRESS_BITS < 1) begin : guard_1
+            dac_memory_ADDRESS_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
+
     localparam WIDTH = // of a block
         ADDRESS_BITS < 11 ? 18 : ADDRESS_BITS == 11 ? 9 : ADDRESS_BITS == 12 ? 4 : ADDRESS_BITS == 13 ? 2 : 1;
     localparam BLOCKS = (BITS + WIDTH - 1) / WIDTH;

@@ -13,12 +13,19 @@ module dac_pair_phase #(
     input  wire                   load,       // for the sample of the next clock
     input  wire [PERIOD_BITS-1:0] remainder,  // 2^32 mod N
     input  wire [PERIOD_BITS:0]   less,       // remainder - N
-    input  wire                   load_step,  // for the sample of the last clock
+    input  wire                   load_step,  // for the sample of this clock
     input  wire [31:0]            step,       // floor(2^32 / N)
     input  wire                   restart,    // advance 0 of a period
     input  wire                   advance,    // the sample advances the phase
     output reg  [31:0]            phase
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_0
+            dac_pair_phase_PERIOD_BITS_is_not_1_to_31 stop ();
+        end
+    endgenerate
+
     wire [PERIOD_BITS-1:0] at_remainder, other_remainder;
     wire [PERIOD_BITS:0] at_less, other_less;
     wire [31:0] at_step, other_step;

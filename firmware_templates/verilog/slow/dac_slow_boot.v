@@ -72,6 +72,9 @@ module dac_slow_boot #(
         if (START_CLOCKS < 0 || START_CLOCKS > 16777216) begin : guard_7
             dac_slow_boot_START_CLOCKS_is_not_0_to_16777216 stop ();
         end
+        if (SLOW_FILE == "") begin : guard_8
+            dac_slow_boot_SLOW_FILE_is_not_set stop ();
+        end
     endgenerate
 
     // The bit above a word marks a memory that no file has filled, as in dac_boot.

@@ -28,6 +28,16 @@ module dac_slow_divide #(
     output wire                     reduces,    // the rest is not below the divisor
     output reg  [QUOTIENT_BITS-1:0] quotient
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (REST_BITS < 2) begin : guard_0
+            dac_slow_divide_REST_BITS_is_less_than_2 stop ();
+        end
+        if (QUOTIENT_BITS < 20) begin : guard_1
+            dac_slow_divide_QUOTIENT_BITS_is_less_than_20 stop ();
+        end
+    endgenerate
+
     reg [REST_BITS-1:0] rest, whole, part;
     wire [REST_BITS-1:0] whole_less_part = whole - part;
     wire [REST_BITS-1:0] from = twice ? {rest[REST_BITS-2:0], 1'b0} : rest;

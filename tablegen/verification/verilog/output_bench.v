@@ -83,7 +83,7 @@ module output_bench #(
     check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(1)) boot_fourier (
         .clock(clock), .random(~random), .words(written[1]), .missing(incomplete[1]), .errors(boot_errors[1])
     );
-    check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .LACKS_PROGRAM(1)) no_program (
+    check_boot #(.PROGRAM_FILE(X_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .LACKS_PROGRAM(1)) no_program (
         .clock(clock), .random(random), .words(written[2]), .missing(incomplete[2]), .errors(boot_errors[2])
     );
     check_boot #(.PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .X_WORDS(10)) short_x (
@@ -294,7 +294,8 @@ module check_axi_stream #(
 endmodule
 
 // dac_boot with a device that makes it wait, and a reset in between: every word in its place, then a commit, then the
-// host. A file may be missing, or have fewer words than there should be; then there is no commit.
+// host. A file may have fewer words than there should be, as a table in the place of the program; then there is no
+// commit.
 module check_boot #(
     parameter PROGRAM_FILE = "", parameter X_FILE = "", parameter Y_FILE = "", parameter FOURIER = 0, parameter X_WORDS = 9,
     parameter Y_WORDS = 9, parameter LACKS_PROGRAM = 0
@@ -332,7 +333,7 @@ module check_boot #(
     wire [15:0] address;
     wire [31:0] data;
     dac_boot #(
-        .PROGRAM_FILE(LACKS_PROGRAM ? "" : PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(FOURIER), .X_WORDS(X_WORDS),
+        .PROGRAM_FILE(PROGRAM_FILE), .X_FILE(X_FILE), .Y_FILE(Y_FILE), .FOURIER(FOURIER), .X_WORDS(X_WORDS),
         .Y_WORDS(Y_WORDS), .X_WORD_BITS(WORD_BITS), .Y_WORD_BITS(WORD_BITS), .X_HARMONICS(HARMONICS),
         .Y_HARMONICS(HARMONICS), .START_CLOCKS(START_CLOCKS)
     ) boot (
