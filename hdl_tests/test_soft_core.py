@@ -21,11 +21,22 @@ from link_talk import is_answer
 from loader_bridge import Simulation
 from replacing import replace
 from soft_core_device import (
-    BAUD, CLOCKS_PER_BIT, EXAMPLE, START_LINES, STEP, UPDATE_RATE_HZ, Device, Host, compiled_device, refusal,
+    BAUD,
+    CLOCKS_PER_BIT,
+    EXAMPLE,
+    START_LINES,
+    STEP,
+    UPDATE_RATE_HZ,
+    Device,
+    Host,
+    compiled_device,
+    refusal,
 )  # fmt: skip
+from turned_scans import write_turned
 
 from tablegen.config.load import load
 from tablegen.device.commit_mode import CommitMode
+from tablegen.link.errors import Unsuitable
 from tablegen.link.messages import (
     AxisWords,
     DeviceState,
@@ -36,8 +47,10 @@ from tablegen.link.messages import (
     Request,
     Upload,
 )
+from tablegen.link.prepare import PreparedScan, check
 from tablegen.link.program_image import ProgramImage, make_image
 from tablegen.planning.line_plan import make_plan
+from tablegen.planning.turned_plan import make_turned_plan
 
 pytestmark = pytest.mark.rest
 
@@ -227,9 +240,13 @@ def damaged(image: ProgramImage) -> ProgramImage:
     return replace(image, data=bytes(data))
 
 
-def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans) -> None:
-    """A damaged image; one for other tables, which the hardware does not have; an open interlock."""
-    host.start()
+def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans, tmp_path: Path) -> None:
+    """Scans at an angle; a damaged image; one for other tables, which the hardware does not have; an open interlock."""
+    info = host.start()
+    turned = PreparedScan.of_turned(make_turned_plan(load(write_turned(tmp_path, 30.0, "timing.lines = 16"))))
+    with pytest.raises(Unsuitable, match="one table for each axis alone"):
+        check(turned, turned.image("table"), info, (info.x_limits, info.y_limits), any_rate=True)
+    assert refusal(host.send(turned.image("table"))) == (Reason.SHAPE, 0)
     whole = image_of(scans.first)
     image = damaged(whole)
     assert is_answer(host.send(image), Request.DATA)

@@ -83,6 +83,14 @@ class Host:
         payload = struct.pack("<IB", image.info.image_crc, mode)
         return self.ask(self.talk.acting(Request.COMMIT, payload))
 
+    def read_back(self, length: int) -> bytes:
+        """Return the first bytes of the image that plays."""
+        data = b""
+        while len(data) < length:
+            wire = self.talk.request(Request.READBACK, struct.pack("<IB", len(data), min(length - len(data), 240)))
+            data += self.ask(wire).payload[4:]
+        return data
+
     def play(self, lines: int) -> None:
         """Let so many lines go by."""
         self.simulation.run(self.line_clocks * lines)

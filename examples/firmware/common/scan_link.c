@@ -1,5 +1,5 @@
-/* The link of a build. It accepts tables as long as those of the build, slow parts with as many knots and as long a
- * slow table as a build of a scan at an angle has, and has the limits of that scan.
+/* The link of a build. It accepts tables as long as those of the build, slow parts with as many knots and as long
+ * slow tables as those of a scan at an angle that it is built from, and has the limits of that scan.
  * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_SLOW_KNOTS and LINK_SLOW_INDEX_BITS
  * for more knots and longer slow tables of a device that is built from such a scan, LINK_HARMONICS (0: tables only),
  * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_PERMITS, a function of the port, for an interlock; LINK_KEY_HEADER, a
@@ -51,8 +51,8 @@ static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 #if CONSTANT(_SLOW_PART)
 #define WORDS_OF(words) (sizeof(words) / sizeof(words)[0])
 #define LARGER(a, b) ((a) > (b) ? (a) : (b))
-#ifndef LINK_SLOW_KNOTS
-#define LINK_SLOW_KNOTS LARGER(WORDS_OF(NAMED(_x_gains)), WORDS_OF(NAMED(_y_gains)))
+#ifndef LINK_SLOW_KNOTS /* frames of fewer than 17 lines have fewer, and others are to be taken */
+#define LINK_SLOW_KNOTS LARGER(LARGER(WORDS_OF(NAMED(_x_gains)), WORDS_OF(NAMED(_y_gains))), 17u)
 #endif
 #ifndef LINK_SLOW_INDEX_BITS /* behind the last word of a slow table stand its first three */
 #define LINK_SLOW_INDEX_BITS BITS_FOR(LARGER(WORDS_OF(NAMED(_x_slow)), WORDS_OF(NAMED(_y_slow))) - 3)
