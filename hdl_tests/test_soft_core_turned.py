@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from boards import make
 from building import REMOVED, Variant, build
 from editing import run
 from limits import PATIENCE_S
@@ -19,7 +20,7 @@ from line_log import LineCheck, PlayedLine, WrongLine
 from link_talk import is_answer
 from loader_bridge import Simulation
 from replacing import replace
-from soft_core_device import BAUD, UPDATE_RATE_HZ, Device, Host, compiled_device, refusal
+from soft_core_device import BAUD, EXAMPLE, UPDATE_RATE_HZ, Device, Host, compiled_device, refusal
 from turned_scans import write_turned
 
 from tablegen.device.commit_mode import CommitMode
@@ -42,6 +43,7 @@ EDITS = (
     f"timing.line_rate_hz = {UPDATE_RATE_HZ / LINE}", "timing.settle_lines = 1", "x.band_limit.harmonics = 12",
     "y.band_limit.harmonics = 8",
 )  # fmt: skip
+FORMATS = "+ [emit]\nformats = ['c', 'verilog']"
 STRAIGHT: dict[str, object] = {
     "limits": REMOVED,
     "timing": {"pixels": 40, "lines": LINES, "line_rate_hz": 100.0, "ticks_per_line": LINE, "settle_lines": 1},
@@ -74,8 +76,7 @@ class Scans:
 def turned_build(folder: Path, angle_deg: float, size_nm: float, lines: int = LINES) -> PreparedScan:
     """Build a scan at an angle for C and Verilog; its file is beside the build."""
     folder.mkdir()
-    formats = "+ [emit]\nformats = ['c', 'verilog']"
-    scan = write_turned(folder, angle_deg, *EDITS, f"timing.lines = {lines}", formats, size_nm=size_nm)
+    scan = write_turned(folder, angle_deg, *EDITS, f"timing.lines = {lines}", FORMATS, size_nm=size_nm)
     assert run("build", scan, "-o", folder / "build", "-q").status == 0
     return PreparedScan.of_build(folder / "build")
 
@@ -186,21 +187,30 @@ def with_slow_word(scan: PreparedScan, axis: str, number: int) -> ProgramImage:
     return make_image(replace(scan.program, **{axis: changed}), scan.digest)
 
 
-def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans) -> None:
-    """A slow table that was damaged on its way, one that leads too far, and a scan without a slow part."""
+def test_a_slow_table_that_leads_too_far_is_refused(host: Host, scans: Scans) -> None:
+    """A damaged word of it, and the CRC of that: the scan that plays is left alone."""
     info = host.start()
-    whole = scans.first.image("table")
-    place = slow_word_at(scans.first, "y", FAR_WORD)
-    data = bytearray(whole.data)
-    data[place] ^= 1
-    damaged = replace(whole, data=bytes(data))
-    assert is_answer(host.send(damaged), Request.DATA)
-    assert refusal(host.ask(host.talk.commit(damaged))) == (Reason.IMAGE, 0)
-
     far = with_slow_word(scans.first, "y", FAR_WORD)
     assert is_answer(host.send(far), Request.DATA)
     objection = first_objection(take_apart(far.data, far.info.x, far.info.y), info.x_limits, info.y_limits, None)
     assert refusal(host.ask(host.talk.commit(far))) == objection == (Reason.RANGE, 1 + 2 * FAR_LINE)
+    host.play(2)
+    now = host.status()
+    assert (now.state, now.generation, now.faults) == (DeviceState.PLAYING, 1, 0)
+    assert scans.check(host.simulation).taken == {1: "boot"}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans) -> None:
+    """A slow table that was damaged on its way, and a scan without a slow part."""
+    host.start()
+    whole = scans.first.image("table")
+    data = bytearray(whole.data)
+    data[slow_word_at(scans.first, "y", FAR_WORD)] ^= 1
+    damaged = replace(whole, data=bytes(data))
+    assert is_answer(host.send(damaged), Request.DATA)
+    assert refusal(host.ask(host.talk.commit(damaged))) == (Reason.IMAGE, 0)
 
     straight = scans.straight.image("table")
     assert is_answer(host.send(straight), Request.DATA)
@@ -252,6 +262,17 @@ def test_faults_of_the_firmware_are_found(device: Device, scans: Scans, tmp_path
         host.play(LINES)
         with pytest.raises(WrongLine):
             scans.check(host.simulation)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(86_400)
+def test_the_bitstream_is_made(tmp_path: Path) -> None:
+    """Of a scan of another name and update rate: it is placed in time for the clock of the board."""
+    scan = write_turned(tmp_path, 30.0, "dac.update_rate_hz = 250e3", FORMATS, size_nm=200.0)
+    scan.write_text(scan.read_text("utf-8").replace('name = "annexin_200nm"', 'name = "lattice"', 1), "utf-8")
+    make(EXAMPLE, "bitstream", f"BUILD={tmp_path / 'bits'}", f"PYTHON={sys.executable}", f"SCAN={scan}")
+    assert (tmp_path / "bits" / "ulx3s.bit").stat().st_size > 100_000
+    assert "CLOCKS_PER_TICK(100)" in (tmp_path / "bits" / "ulx3s.v").read_text("utf-8")
 
 
 def command(*arguments: str | Path | int) -> subprocess.CompletedProcess[str]:
