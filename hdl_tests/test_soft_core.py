@@ -4,60 +4,58 @@ Every line that is played is the model's, before and after an upload.
 """
 
 import json
-import shutil
 import struct
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-import pythondata_cpu_vexriscv
 from boards import TICKS, Board, ecp5_library, expected_words, make
-from building import BENCHES, NAME, REMOVED, REPOSITORY, Build, Variant, build, run_warned, write_variant
+from building import NAME, REMOVED, Build, Variant, build, write_variant
 from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine, WrongLine
-from link_talk import Talk, is_answer
-from loader_bridge import LINE_LOG, LINES, Simulation
+from link_talk import is_answer
+from loader_bridge import Simulation
 from replacing import replace
+from soft_core_device import (
+    BAUD,
+    CLOCKS_PER_BIT,
+    EXAMPLE,
+    START_LINES,
+    STEP,
+    UPDATE_RATE_HZ,
+    Device,
+    Host,
+    compiled_device,
+    refusal,
+)  # fmt: skip
+from turned_scans import write_turned
 
-from tablegen.base.resources import resource_folder, verilog_runtime
 from tablegen.config.load import load
 from tablegen.device.commit_mode import CommitMode
-from tablegen.link.frames import Frame
+from tablegen.link.errors import Unsuitable
 from tablegen.link.messages import (
-    REFUSAL,
     AxisWords,
-    DeviceInfo,
     DeviceState,
-    DeviceStatus,
     Feature,
     More,
     Move,
     Reason,
-    Refusal,
     Request,
     Upload,
 )
+from tablegen.link.prepare import PreparedScan, check
 from tablegen.link.program_image import ProgramImage, make_image
 from tablegen.planning.line_plan import make_plan
-from tablegen.verification.verilog.simulate import CompiledDesign, Design, compile_design
+from tablegen.planning.turned_plan import make_turned_plan
 
 pytestmark = pytest.mark.rest
 
-EXAMPLE = REPOSITORY / "examples" / "firmware" / "soft_core"
-CORE = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_Lite.v"
-UPDATE_RATE_HZ = 50_000
-FIRMWARE = "firmware.mem"
 CLOCKS_PER_TICK = 50
-CLOCKS_PER_BIT = 8
 LINE = 331  # ticks
-BAUD = 2400  # by which a client reckons its time-outs; a simulation has no rate of its own
-STEP = 5_000  # clocks between two looks at what has come
-MOST_STEPS = 2_000
 SCAN: dict[str, object] = {
     "limits": REMOVED,
     "timing": {"pixels": 40, "lines": 8, "line_rate_hz": 100.0, "ticks_per_line": LINE, "settle_lines": 1},
@@ -118,113 +116,27 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Scans:
     return Scans(*(build(folder / str(at), variant) for at, variant in enumerate(variants)))
 
 
-@dataclass
-class Host:
-    """Requests, one after the other, each until it is answered."""
-
-    simulation: Simulation
-    talk: Talk
-
-    def ask(self, wire: bytes) -> Frame:
-        """Send a request and wait for its answer."""
-        received = self.simulation.run(len(wire) * 10 * CLOCKS_PER_BIT + STEP, wire)
-        for _ in range(MOST_STEPS):
-            answers = self.talk.answers(received)
-            if answers:
-                (answer,) = answers
-                return answer
-            received = self.simulation.run(STEP)
-        raise AssertionError("no answer")
-
-    def status(self) -> DeviceStatus:
-        return DeviceStatus.unpack(self.ask(self.talk.request(Request.STATUS)).payload)
-
-    def send(self, image: ProgramImage) -> Frame:
-        """Send BEGIN and all DATA; the last answer, or the first refusal."""
-        for wire in self.talk.upload(image):
-            answer = self.ask(wire)
-            if answer.type == REFUSAL:
-                break
-        return answer
-
-    def start(self) -> DeviceInfo:
-        """HELLO, ARM and TRIGGER, and the lines in which the guard leaves the power-up codes."""
-        hello = self.ask(self.talk.hello())
-        assert is_answer(hello, Request.HELLO)
-        assert is_answer(self.ask(self.talk.acting(Request.ARM, bytes(4))), Request.ARM)
-        assert is_answer(self.ask(self.talk.acting(Request.TRIGGER)), Request.TRIGGER)
-        self.play(3)
-        return DeviceInfo.unpack(hello.payload)
-
-    def play(self, lines: int) -> None:
-        self.simulation.run(CLOCKS_PER_TICK * LINE * lines)
-
-
-def compiled_firmware(folder: Path, example: Path, scan: Path) -> Path:
-    command = ["make", "-C", example, f"SCAN={scan}", f"BUILD={folder}", f"TABLEGEN={sys.executable} -m tablegen"]
-    clock = f"CLOCK_HZ={UPDATE_RATE_HZ * CLOCKS_PER_TICK}", f"CLOCKS_PER_TICK={CLOCKS_PER_TICK}", "MOVE=1"
-    run_warned([*command, *clock])
-    return folder / FIRMWARE
-
-
 @pytest.fixture(scope="module")
-def device(scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> CompiledDesign:
+def device(scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> Device:
     """The device with its firmware in a bench."""
-    folder = tmp_path_factory.mktemp("device")
-    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scans.scan)
-    bus = sorted((resource_folder("firmware_templates") / "verilog" / "bus").glob("dac_*.v"))
-    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *bus]
-    runtime = [path for path in verilog_runtime() if path.name != "program_loader.v"]
-    values: dict[str, int | str] = {"FIRMWARE": FIRMWARE, "LINES": LINES}
-    values |= {"CLOCKS_PER_TICK": CLOCKS_PER_TICK, "CLOCKS_PER_BIT": CLOCKS_PER_BIT}
-    design = Design([*sources, *runtime], "soft_core_bench", values, includes=[firmware.parent / "scan"])
-    compiled = compile_design("verilator", design, folder / "model")
-    shutil.copy(firmware, compiled.folder)
-    return compiled
-
-
-@contextmanager
-def edited(device: CompiledDesign, scans: Scans, folder: Path, name: str, right: str, wrong: str) -> Iterator[Host]:
-    """Run the device with an edited file of its firmware."""
-    copy = folder / "firmware"
-    shutil.copytree(EXAMPLE.parent, copy, ignore=shutil.ignore_patterns("build"))
-    source = copy / "soft_core" / name
-    text = source.read_text("utf-8")
-    assert text.count(right) == 1
-    source.write_text(text.replace(right, wrong), "utf-8")
-    firmware = compiled_firmware(folder / "build", copy / "soft_core", scans.scan)
-    usual = (device.folder / FIRMWARE).read_bytes()
-    shutil.copy(firmware, device.folder)
-    try:
-        with Simulation(device) as simulation:
-            simulation.run(CLOCKS_PER_TICK * LINE * 12)
-            yield Host(simulation, Talk())
-    finally:
-        (device.folder / FIRMWARE).write_bytes(usual)
+    return compiled_device(tmp_path_factory.mktemp("device"), scans.scan, CLOCKS_PER_TICK, LINE)
 
 
 @pytest.fixture
-def simulation(device: CompiledDesign) -> Iterator[Simulation]:
-    with Simulation(device) as running:
+def simulation(device: Device) -> Iterator[Simulation]:
+    with Simulation(device.compiled) as running:
         yield running
 
 
 @pytest.fixture
-def host(simulation: Simulation) -> Host:
-    simulation.run(CLOCKS_PER_TICK * LINE * 12)  # the firmware starts, and the guard reaches the park codes
-    return Host(simulation, Talk())
+def host(device: Device, simulation: Simulation) -> Host:
+    return device.host(simulation)
 
 
 def image_of(built: Build, fourier: bool = False) -> ProgramImage:
     digest = str(built.manifest["hash"])
     words = [line.fourier.in_order for line in built.plan.lines] if fourier else []
     return make_image(built.plan.program, digest, *words)
-
-
-def refusal(answer: Frame) -> tuple[int, int]:
-    assert answer.type == REFUSAL
-    unpacked = Refusal.unpack(answer.payload)
-    return unpacked.reason, unpacked.detail
 
 
 def test_it_says_what_it_is(host: Host, scans: Scans) -> None:
@@ -293,9 +205,9 @@ def test_a_frame_goes_on(host: Host, scans: Scans) -> None:
     assert info.more & More.MOVE
     slow, image, plan = image_of(scans.slow), image_of(scans.first), scans.first.plan
     host.send(slow)
-    assert refusal(host.ask(commit_at(host.talk, slow, CommitMode.KEEP))) == (Reason.KEEP, 0)
+    assert refusal(host.commit_at(slow, CommitMode.KEEP)) == (Reason.KEEP, 0)
     host.send(image)
-    taken = [struct.unpack("<II", host.ask(commit_at(host.talk, image, CommitMode.KEEP)).payload)]
+    taken = [struct.unpack("<II", host.commit_at(image, CommitMode.KEEP).payload)]
     host.play(2)
     moved = replace(
         plan.x.program.output, offset_word=plan.x.program.output.offset_word + (300 << plan.x.program.output.gain_q)
@@ -321,10 +233,6 @@ def test_a_frame_goes_on(host: Host, scans: Scans) -> None:
     assert line.sum(LINE) == (last.crc, last.markers)
 
 
-def commit_at(talk: Talk, image: ProgramImage, mode: CommitMode) -> bytes:
-    return talk.acting(Request.COMMIT, struct.pack("<IB", image.info.image_crc, mode))
-
-
 def damaged(image: ProgramImage) -> ProgramImage:
     """The image with a bit of its last word changed, and the CRC of what it was."""
     data = bytearray(image.data)
@@ -332,9 +240,13 @@ def damaged(image: ProgramImage) -> ProgramImage:
     return replace(image, data=bytes(data))
 
 
-def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans) -> None:
-    """A damaged image; one for other tables, which the hardware does not have; an open interlock."""
-    host.start()
+def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans, tmp_path: Path) -> None:
+    """Scans at an angle; a damaged image; one for other tables, which the hardware does not have; an open interlock."""
+    info = host.start()
+    turned = PreparedScan.of_turned(make_turned_plan(load(write_turned(tmp_path, 30.0, "timing.lines = 16"))))
+    with pytest.raises(Unsuitable, match="one table for each axis alone"):
+        check(turned, turned.image("table"), info, (info.x_limits, info.y_limits), any_rate=True)
+    assert refusal(host.send(turned.image("table"))) == (Reason.SHAPE, 0)
     whole = image_of(scans.first)
     image = damaged(whole)
     assert is_answer(host.send(image), Request.DATA)
@@ -402,7 +314,7 @@ def command(*arguments: str | Path | int) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_command_line(simulation: Simulation, scans: Scans) -> None:
-    simulation.run(CLOCKS_PER_TICK * LINE * 12)
+    simulation.run(START_LINES * CLOCKS_PER_TICK * LINE)
     with simulation.bridged() as port:
         where = ("--port", port, "--baud", BAUD)
         steps: list[tuple[str | Path | int, ...]] = [
@@ -419,11 +331,9 @@ def test_the_command_line(simulation: Simulation, scans: Scans) -> None:
     assert scans.check(simulation).taken == {1: "boot", 2: "first"}
 
 
-def test_the_interlock_stops_what_the_firmware_would_commit(
-    device: CompiledDesign, scans: Scans, tmp_path: Path
-) -> None:
+def test_the_interlock_stops_what_the_firmware_would_commit(device: Device, scans: Scans, tmp_path: Path) -> None:
     right = "(SYSTEM_STATE & STATE_PERMIT) != 0"
-    with edited(device, scans, tmp_path, "main.c", right, "true") as host:
+    with device.edited(tmp_path, "main.c", right, "true") as host:
         host.start()
         host.simulation.set(permit=0)
         image = image_of(scans.first)
@@ -465,11 +375,11 @@ def test_the_bitstream_is_made(tmp_path: Path) -> None:
     assert (tmp_path / "ulx3s.bit").stat().st_size > 100_000
 
 
-def test_words_in_another_order_are_heard(device: CompiledDesign, scans: Scans, tmp_path: Path) -> None:
+def test_words_in_another_order_are_heard(device: Device, scans: Scans, tmp_path: Path) -> None:
     """A control: firmware that writes each second word of a table in front of the first."""
     right = "SEQUENCER(offset + 4 * i) = (uint32_t)p->table[i];"
     wrong = right.replace("[i]", "[i ^ 1]")
-    with edited(device, scans, tmp_path, "sequencer_registers.c", right, wrong) as host:
+    with device.edited(tmp_path, "sequencer_registers.c", right, wrong) as host:
         host.start()
         with pytest.raises(WrongLine):
             scans.check(host.simulation)

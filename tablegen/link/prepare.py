@@ -237,7 +237,8 @@ def _slow_parts(scan: PreparedScan, info: DeviceInfo) -> list[str]:
     if More.SLOW_PARTS not in info.more:
         return [
             "the scan is at an angle, on coupled axes or drifts, and the device plays one table for each axis alone: "
-            "build its firmware with DAC_SLOW_PART=1 and memory for slow parts, or set angle_deg = 0 (FPGAs have none)"
+            "build its firmware with DAC_SLOW_PART=1 and memory for slow parts (of FPGAs a soft core has them), or set "
+            "angle_deg = 0"
         ]
     reasons = []
     for name, axis in axes:

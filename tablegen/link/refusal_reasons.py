@@ -70,7 +70,7 @@ def lacks_mode(info: DeviceInfo, swap: CommitMode) -> str | None:
         return None
     return (
         f"--swap {swap.name.lower()}: the device starts a new scan at the next line, from line 0; build its firmware "
-        "with DAC_COMMIT_MODES=1 (FPGAs have no other mode), or use --swap line"
+        "with DAC_COMMIT_MODES=1, its FPGA with COMMIT_MODES=1, or use --swap line"
     )
 
 
@@ -172,8 +172,17 @@ def _shaping(detail: int, info: DeviceInfo | None) -> str:
     )
 
 
+# Of dac_loaded in dac_sequencer.h; those that only the sequencer knows.
+_SEQUENCER_REASONS = {
+    3: "a line, a frame or the settling is shorter or longer than it plays (3)",
+    4: "its table has another length than that of the device (4)",
+    9: "the sequencer plays either scans at an angle alone, or none of them, as that which it was built for (9)",
+}
+
+
 def _other(detail: int, info: DeviceInfo | None) -> str:
-    return f"its sequencer refused the program for an internal reason ({detail}); build for this device"
+    why = _SEQUENCER_REASONS.get(detail, f"for an internal reason ({detail})")
+    return f"its sequencer refused the program: {why}; build for this device"
 
 
 _SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.played_lines import LineTicks, play_line
 from tablegen.device.sequencer import Sequencer, Tick
@@ -122,13 +123,14 @@ class _Play:
 class LineCheck:
     """Follows the log of a device that starts with ``boot`` at ``codes``; what may be uploaded is offered before.
 
-    ``taken`` is the program of each generation that played a line, by its name as it was offered, since the start.
+    ``taken`` is the program of each generation that played a line, by its name as it was offered, since the start;
+    ``kept`` has those that went on with the frame of the one before, which only a check with ``keeps`` allows.
     """
 
     BOOT = "boot"
 
-    def __init__(self, boot: ScanProgram, codes: tuple[int, int] = (0, 0)) -> None:
-        self._boot, self._power_up = boot, codes
+    def __init__(self, boot: ScanProgram, codes: tuple[int, int] = (0, 0), keeps: bool = False) -> None:
+        self._boot, self._power_up, self._keeps = boot, codes, keeps
         self._offered: dict[str, ScanProgram] = {self.BOOT: boot}
         self._steady: dict[tuple[ScanProgram, int, bool], _Ticks] = {}
         self.lines = 0
@@ -137,6 +139,7 @@ class LineCheck:
     def reboot(self) -> None:
         """The device has started again; what was logged before has been followed."""
         self.taken: dict[int, str] = {1: self.BOOT}
+        self.kept: set[int] = set()
         self._play: _Play | None = None
         self._generation = 1
         self._whole = False  # the last line
@@ -160,6 +163,8 @@ class LineCheck:
             if found is None:
                 raise WrongLine(f"{played} after generation {self._generation}, {self._last()}")
             name, play = found
+            if played.generation != self._generation and played.line != 0:
+                self.kept.add(played.generation)
             self.taken[played.generation] = name
             self._play, self._generation = play, played.generation
             self._codes = play.go_on(played.ticks)
@@ -180,6 +185,8 @@ class LineCheck:
             elif played.generation == self._generation + 1:
                 for name, program in self._offered.items():
                     yield name, self._swapped(self._play.program, program, self._codes)
+                    if self._keeps:
+                        yield name, self._swapped(self._play.program, program, self._codes, self._play.line)
         if played.line != 0 or played.generation < self._generation:
             return
         if same:
@@ -213,11 +220,14 @@ class LineCheck:
             return self._play.program
         return self._offered[name]
 
-    def _swapped(self, old: ScanProgram, new: ScanProgram, codes: tuple[int, int]) -> _Play:
-        """Taken at the start of a line."""
+    def _swapped(self, old: ScanProgram, new: ScanProgram, codes: tuple[int, int], line: int = 0) -> _Play:
+        """Taken at the start of a line: the first of a frame, or ``line`` of the frame that goes on."""
         sequencer = self._running(old, codes)
-        sequencer.commit(new)
-        return _Play(self, sequencer, new, after_park=False)
+        sequencer.line = line
+        sequencer.commit(new, CommitMode.KEEP if line else CommitMode.LINE)
+        play = _Play(self, sequencer, new, after_park=False)
+        play.line = line
+        return play
 
     def _started(self, program: ScanProgram, codes: tuple[int, int]) -> _Play:
         """Triggered, from codes on the way to its park codes."""

@@ -63,7 +63,7 @@ def _ask(player: SequencerPlayer | LinePlayer, request: str, number: int, mode: 
         player.withdraw()
 
 
-def _played(steps: list[Step]) -> list[PlayedLine]:
+def _played(steps: list[Step], mode: CommitMode = CommitMode.LINE) -> list[PlayedLine]:
     log = Log()
     player = SequencerPlayer(_BOOT, on_tick=log)
     parking = False
@@ -73,13 +73,13 @@ def _played(steps: list[Step]) -> list[PlayedLine]:
                 60
             )  # a swap on the way to the park codes begins another way there, which the check does not follow
         parking = request == "park" or (parking and request != "commit")
-        _ask(player, request, number)
+        _ask(player, request, number, mode)
         player.advance(ticks)
     return log.lines
 
 
-def _check() -> LineCheck:
-    check = LineCheck(_BOOT)
+def _check(keeps: bool = False) -> LineCheck:
+    check = LineCheck(_BOOT, keeps=keeps)
     for name, program in _PROGRAMS.items():
         check.offer(name, program)
     return check
@@ -112,6 +112,20 @@ def test_a_log_of_many_things() -> None:
     check.follow(lines)
     assert len(lines) > 12
     assert len(check.taken) == 4
+
+
+def test_a_frame_that_goes_on_with_another_program() -> None:
+    """A check that does not allow it finds it, as it finds the frame on another line."""
+    lines = _played(_SOME, CommitMode.KEEP)
+    check = _check(keeps=True)
+    check.follow(lines)
+    assert (check.lines, len(check.taken)) == (len(lines), 4)
+    assert check.kept
+    with pytest.raises(WrongLine):
+        _check().follow(lines)
+    at = next(number for number, line in enumerate(lines) if line.generation in check.kept)
+    with pytest.raises(WrongLine):
+        _check(keeps=True).follow([*lines[: at - 1], *lines[at:]])
 
 
 _CHANGES = [("crc", 1), ("ticks", -1), ("ticks", 1), ("line", 1), ("generation", 1), ("markers", 32), ("faults", 1)]

@@ -4,10 +4,20 @@
 #include "names.h"
 #include SCAN_HEADER
 
+#if !DAC_SLOW_PART
 const dac_program scan_whole = PROGRAM(SCAN_UPPER, SCAN);
+#endif
 const dac_converter scan_x_converter = CONVERTER(CONSTANT(_X));
 const dac_converter scan_y_converter = CONVERTER(CONSTANT(_Y));
 
+#if CONSTANT(_SLOW_PART)
+bool scan_half(dac_program *program, unsigned place)
+{
+    *program = scan_whole;
+    (void)place;
+    return false;
+}
+#else
 static dac_word x_tables[2][CONSTANT(_X_TABLE_LENGTH) + 1], y_tables[2][CONSTANT(_Y_TABLE_LENGTH) + 1];
 
 static bool halve(dac_axis_program *axis, dac_word *table, const int32_t *words, unsigned harmonics)
@@ -32,3 +42,4 @@ bool scan_half(dac_program *program, unsigned place)
     return halve(&program->x, x_tables[place], NAMED(_x_fourier), CONSTANT(_X_HARMONICS))
         && halve(&program->y, y_tables[place], NAMED(_y_fourier), CONSTANT(_Y_HARMONICS));
 }
+#endif

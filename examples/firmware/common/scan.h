@@ -11,9 +11,14 @@ extern "C" {
 extern dac_sequencer sequencer; /* in the port */
 
 extern const dac_converter scan_x_converter, scan_y_converter;
+#if DAC_SLOW_PART
+#include "names.h"
+#define scan_whole NAMED(_program) /* of NAME_program.c, which has the slow part of a scan at an angle */
+#endif
 extern const dac_program scan_whole;
 
-/* The half scan. Its tables are computed here from Fourier words, into one of two places: see dac_sequencer_idle(). */
+/* The half scan. Its tables are computed here from Fourier words, into one of two places: see dac_sequencer_idle().
+ * Returns false if the build has no such words, as that of a scan at an angle. */
 bool scan_half(dac_program *program, unsigned place);
 
 #ifdef __cplusplus

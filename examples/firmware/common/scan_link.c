@@ -1,5 +1,7 @@
-/* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
- * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only),
+/* The link of a build. It accepts tables as long as those of the build, slow parts with as many knots and as long
+ * slow tables as those of a scan at an angle that it is built from, and has the limits of that scan.
+ * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_SLOW_KNOTS and LINK_SLOW_INDEX_BITS
+ * for more knots and longer slow tables of a device that is built from such a scan, LINK_HARMONICS (0: tables only),
  * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_PERMITS, a function of the port, for an interlock; LINK_KEY_HEADER, a
  * file that defines LINK_KEY as the bytes of an array, and LINK_DEVICE, a name as a string; with a key the port has
  * random.h. With DAC_STORE=1 the port has scan_flash, and LINK_STORE_WHILE_PLAYING where writing to it does not stop
@@ -46,6 +48,31 @@
 
 static dac_word x_tables[2][DAC_TABLE_ROOM(LINK_X_INDEX_BITS)], y_tables[2][DAC_TABLE_ROOM(LINK_Y_INDEX_BITS)];
 static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
+#if CONSTANT(_SLOW_PART)
+#define WORDS_OF(words) (sizeof(words) / sizeof(words)[0])
+#define LARGER(a, b) ((a) > (b) ? (a) : (b))
+#ifndef LINK_SLOW_KNOTS /* frames of fewer than 17 lines have fewer, and others are to be taken */
+#define LINK_SLOW_KNOTS LARGER(LARGER(WORDS_OF(NAMED(_x_gains)), WORDS_OF(NAMED(_y_gains))), 17u)
+#endif
+#ifndef LINK_SLOW_INDEX_BITS /* behind the last word of a slow table stand its first three */
+#define LINK_SLOW_INDEX_BITS BITS_FOR(LARGER(WORDS_OF(NAMED(_x_slow)), WORDS_OF(NAMED(_y_slow))) - 3)
+#endif
+#define SLOW_MEMORY(axis, bits)                                                                                       \
+    static int8_t axis##_second[2][UINT32_C(1) << (bits)];                                                            \
+    static dac_word axis##_slow_tables[2][DAC_LINK_SLOW_ROOM(LINK_SLOW_INDEX_BITS)];                                  \
+    static dac_word axis##_mixed[DAC_TABLE_ROOM(bits)];                                                               \
+    static int32_t axis##_gains[2][LINK_SLOW_KNOTS];                                                                  \
+    static int16_t axis##_ratios[2][LINK_SLOW_KNOTS]
+SLOW_MEMORY(x, LINK_X_INDEX_BITS);
+SLOW_MEMORY(y, LINK_Y_INDEX_BITS);
+#define SLOW_OF(axis)                                                                                                 \
+    , {{axis##_second[0], axis##_slow_tables[0], axis##_gains[0], axis##_ratios[0]},                                  \
+       {axis##_second[1], axis##_slow_tables[1], axis##_gains[1], axis##_ratios[1]}}, axis##_mixed
+#elif DAC_SLOW_PART
+#define SLOW_OF(axis) , {{NULL, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}}, NULL
+#else
+#define SLOW_OF(axis)
+#endif
 static uint8_t hash[32];
 #ifdef LINK_KEY
 static const uint8_t key[] = {LINK_KEY};
@@ -54,11 +81,11 @@ static const char device[] = LINK_DEVICE;
 typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
-#define AXIS(NAME, bits, tables, words)                                                                               \
+#define AXIS(NAME, axis, bits)                                                                               \
     {                                                                                                                 \
         CONVERTER(CONSTANT(NAME)), {CONSTANT(NAME##_CODE_MIN), CONSTANT(NAME##_CODE_MAX),                             \
         CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, DAC_TABLE_ROOM(bits),           \
-        {tables[0], tables[1]}, words                                                                                 \
+        {axis##_tables[0], axis##_tables[1]}, axis##_fourier SLOW_OF(axis)                                            \
     }
 
 #ifdef LINK_PERMITS
@@ -69,12 +96,16 @@ dac_store scan_store;
 #endif
 
 static const dac_link_config config = {
-    .x = AXIS(_X, LINK_X_INDEX_BITS, x_tables, x_fourier),
-    .y = AXIS(_Y, LINK_Y_INDEX_BITS, y_tables, y_fourier),
+    .x = AXIS(_X, x, LINK_X_INDEX_BITS),
+    .y = AXIS(_Y, y, LINK_Y_INDEX_BITS),
     .harmonics = HARMONICS,
     .sine_index_bits = SINE_BITS,
     .sine = SINE,
     .update_rate_hz = UPDATE_RATE_HZ,
+#if CONSTANT(_SLOW_PART)
+    .slow_knots = LINK_SLOW_KNOTS,
+    .slow_index_bits = LINK_SLOW_INDEX_BITS,
+#endif
     .hash = hash,
 #ifdef LINK_PERMITS
     .permits = LINK_PERMITS,

@@ -9,6 +9,11 @@
 enum { NO_PROGRAM = 2 };        /* `playing` before the first program */
 enum { UNDER_WAY = 64 };        /* reads of a register, longer than a sample is on its way through the sequencer */
 enum { PAGE = 16, WORDS = 48 }; /* of a program: the page of the scan, of x and of y */
+enum { GAIN = 3, KNOTS = 12 };  /* of the page of an axis: gain and offset, and the words of a slow part */
+#if DAC_SLOW_PART
+enum { SLOW_PART = 4 * 8192 };  /* bytes from a part of a slow part to the next */
+#define MOST_SPACING UINT32_C(0x1FFFF)
+#endif
 
 dac_sequencer sequencer;
 
@@ -105,17 +110,29 @@ static void put_schedule(uint32_t *page, const dac_program *p)
         page[i] = words[i];
 }
 
+/* Step and remainder of a period: 2^32 by its length. */
+static void put_period(uint32_t *words, uint32_t length)
+{
+    const uint32_t step = UINT32_MAX / length, remainder = UINT32_MAX % length + 1;
+
+    words[0] = remainder == length ? step + 1 : step;
+    words[1] = remainder == length ? 0 : remainder;
+}
+
+static void put_scale(uint32_t *words, int32_t gain_word, int64_t offset_word)
+{
+    words[0] = (uint32_t)gain_word;
+    words[1] = (uint32_t)(offset_word & 0x3FFFF);
+    words[2] = (uint32_t)(offset_word >> 18);
+}
+
 static void put_axis(uint32_t *page, const dac_axis_program *p)
 {
-    const uint32_t advances = p->phase_period;
-    const uint32_t step = UINT32_MAX / advances, remainder = UINT32_MAX % advances + 1;
     const uint32_t words[] = {
-        remainder == advances ? step + 1 : step, /* of 2^32 */
-        remainder == advances ? 0 : remainder,
-        advances,
-        (uint32_t)p->gain_word,
-        (uint32_t)(p->offset_word & 0x3FFFF),
-        (uint32_t)(p->offset_word >> 18),
+        p->phase_period,
+        0,
+        0,
+        0,
         (uint32_t)p->code_min,
         (uint32_t)p->code_max,
         (uint32_t)p->max_step,
@@ -126,14 +143,80 @@ static void put_axis(uint32_t *page, const dac_axis_program *p)
 #endif
     };
 
+    put_period(page, p->phase_period);
     for (unsigned i = 0; i < sizeof words / sizeof words[0]; i++)
-        page[i] = words[i];
+        page[2 + i] = words[i];
+    put_scale(page + GAIN, p->gain_word, p->offset_word);
 }
 
 static void write_table(uint32_t offset, const dac_axis_program *p)
 {
     for (uint32_t i = 0; i < p->length; i++)
         SEQUENCER(offset + 4 * i) = (uint32_t)p->table[i];
+}
+
+#if DAC_SLOW_PART
+/* Whether the hardware has room for a slow part. Its gains and ratios are at the same lines. */
+static bool slow_fits(const dac_slow_part *slow)
+{
+    const uint32_t shape = SEQUENCER(DAC_MEMORY_SHAPE_ADDRESS);
+    const uint32_t index_bits =
+        (shape & DAC_MEMORY_SHAPE_SLOW_INDEX_BITS_MASK) >> DAC_MEMORY_SHAPE_SLOW_INDEX_BITS_SHIFT;
+
+    return slow->index_bits <= index_bits && slow->gain_spacing <= MOST_SPACING
+        && (slow->second == NULL
+            || (slow->ratio_knots == slow->gain_knots && slow->ratio_spacing == slow->gain_spacing));
+}
+
+/* The clocks in which the hardware works out a line of an axis: "A slow part" of docs/verilog.md. */
+static uint32_t line_clocks(const dac_axis_program *p)
+{
+    return 467 + 2 * (p->slow->gain_knots - UINT32_C(2)) + 2u * p->slow->index_bits + 11 * p->length;
+}
+
+/* The next line is worked out while a line plays, in all clocks but two of each tick. */
+static bool line_is_long_enough(const dac_program *p)
+{
+    return (uint64_t)p->schedule.line_ticks * (CLOCKS_PER_TICK - 2) >= line_clocks(&p->x) + line_clocks(&p->y);
+}
+
+/* Gain and offset of the slow table take the place of those of the axis. */
+static void put_slow(uint32_t *page, const dac_slow_part *slow, uint32_t lines)
+{
+    put_scale(page + GAIN, slow->gain_word, slow->offset_word);
+    page[KNOTS] = slow->gain_knots | (uint32_t)slow->index_bits << 8;
+    page[KNOTS + 1] = slow->gain_spacing;
+    put_period(page + KNOTS + 2, lines);
+}
+
+static void write_slow(uint32_t offset, const dac_axis_program *p)
+{
+    const dac_slow_part *const slow = p->slow;
+
+    for (uint32_t i = 0; i < p->length; i++)
+        SEQUENCER(offset + 4 * i) = slow->second != NULL ? (uint32_t)slow->second[i] : 0;
+    for (uint32_t i = 0; i < UINT32_C(1) << slow->index_bits; i++)
+        SEQUENCER(offset + SLOW_PART + 4 * i) = (uint32_t)slow->table[i];
+    for (uint32_t i = 0; i < slow->gain_knots; i++) {
+        SEQUENCER(offset + 2 * SLOW_PART + 4 * i) = (uint32_t)slow->gains[i];
+        SEQUENCER(offset + 3 * SLOW_PART + 4 * i) = slow->second != NULL ? (uint32_t)slow->ratios[i] : 0;
+    }
+}
+#endif
+
+/* Whether the hardware plays the slow parts of a program: it has them on both axes, or on none. */
+static bool slow_parts_fit(const dac_program *p)
+{
+    const bool slow = (SEQUENCER(DAC_FEATURES_ADDRESS) & DAC_FEATURES_SLOW_PART_MASK) != 0;
+
+#if DAC_SLOW_PART
+    if (slow)
+        return p->x.slow != NULL && p->y.slow != NULL && slow_fits(p->x.slow) && slow_fits(p->y.slow);
+    return p->x.slow == NULL && p->y.slow == NULL;
+#else
+    (void)p;
+    return !slow;
+#endif
 }
 
 dac_loaded __real_dac_sequencer_load(dac_sequencer *s, const dac_program *program);
@@ -154,14 +237,32 @@ dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *progra
         return DAC_BAD_SCHEDULE;
     if (!fits(&program->x, SEQUENCER(DAC_X_SHAPE_ADDRESS)) || !fits(&program->y, SEQUENCER(DAC_Y_SHAPE_ADDRESS)))
         return DAC_BAD_TABLE;
+    if (!slow_parts_fit(program))
+        return DAC_BAD_SLOW_PART;
+#if DAC_SLOW_PART
+    if (program->x.slow != NULL && !line_is_long_enough(program))
+        return DAC_BAD_SCHEDULE;
+#endif
     put_schedule(words, program);
     put_axis(words + PAGE, &program->x);
     put_axis(words + 2 * PAGE, &program->y);
+#if DAC_SLOW_PART
+    if (program->x.slow != NULL) {
+        put_slow(words + PAGE, program->x.slow, program->schedule.frame_lines);
+        put_slow(words + 2 * PAGE, program->y.slow, program->schedule.frame_lines);
+    }
+#endif
     SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK; /* what may have been there, and did not fit */
     for (unsigned i = 0; i < WORDS; i++)
         SEQUENCER(DAC_PROGRAM_ADDRESS + 4 * i) = words[i];
     write_table(DAC_X_TABLE_ADDRESS, &program->x);
     write_table(DAC_Y_TABLE_ADDRESS, &program->y);
+#if DAC_SLOW_PART
+    if (program->x.slow != NULL) {
+        write_slow(DAC_X_SLOW_ADDRESS, &program->x);
+        write_slow(DAC_Y_SLOW_ADDRESS, &program->y);
+    }
+#endif
     s->loaded = 1;
     return DAC_LOADED;
 }
@@ -176,6 +277,10 @@ bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode)
     const uint32_t state = SEQUENCER(DAC_STATUS_ADDRESS);
     if ((state & DAC_STATUS_COMMITTED_MASK) != 0)
         return true;
+#if DAC_SLOW_PART
+    if ((state & (DAC_STATUS_REFUSED_MASK | DAC_STATUS_WRITABLE_MASK)) == 0)
+        return true; /* its first line is worked out before it counts as committed */
+#endif
     /* A tick has taken it already; or the interlock has opened, or a word did not fit. */
     let_samples_pass();
     if (!waits(s))

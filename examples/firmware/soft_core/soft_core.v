@@ -7,7 +7,9 @@
 //   0xC0000000  the serial line, interlock and lines of the frame: soft_core.h
 //
 // The ports are those of examples/verilog/linked_scanner.v. While `permit` is low, no new scan becomes active. The scan
-// of the build gives widths, modes and power-up codes; its update rate has to be that of CLOCKS_PER_TICK.
+// of the build gives widths, modes and power-up codes; its update rate has to be that of CLOCKS_PER_TICK. soft_core.vh,
+// which the Makefile writes, has the constants of the build with the prefix SCAN_. A scan at an angle has a slow part on
+// both axes, and the sequencer then plays such scans alone.
 
 `default_nettype none
 
@@ -34,7 +36,7 @@ module soft_core #(
     output wire image,
     output wire fault
 );
-    `include "annexin_200nm.vh"
+    `include "soft_core.vh"
 
     localparam COUNT_BITS = 16;
 
@@ -168,10 +170,11 @@ module soft_core #(
     wire [3:0] faults;
     wire [4*COUNT_BITS-1:0] fault_counts;
     dac_wishbone #(
-        .DAC_BITS(ANNEXIN_200NM_X_DAC_BITS), .COUNT_BITS(COUNT_BITS), .SHAPING(ANNEXIN_200NM_SHAPING),
-        .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
-        .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS), .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED),
-        .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS), .COMMIT_MODES(1)
+        .DAC_BITS(SCAN_X_DAC_BITS), .COUNT_BITS(COUNT_BITS), .SHAPING(SCAN_SHAPING),
+        .X_INTERPOLATED(SCAN_X_INTERPOLATED), .X_INDEX_BITS(SCAN_X_INDEX_BITS),
+        .X_WORD_BITS(SCAN_X_TABLE_BITS), .Y_INTERPOLATED(SCAN_Y_INTERPOLATED),
+        .Y_INDEX_BITS(SCAN_Y_INDEX_BITS), .Y_WORD_BITS(SCAN_Y_TABLE_BITS), .COMMIT_MODES(1),
+        .SLOW_PART(SCAN_SLOW_PART), .SLOW_INDEX_BITS(SCAN_SLOW_INDEX_BITS)
     ) registers (
         .clock(clock), .reset(reset), .wb_cyc_i(access && target == SEQUENCER),
         .wb_stb_i(access && target == SEQUENCER), .wb_we_i(write), .wb_adr_i(address[17:0]), .wb_sel_i(d_bytes),
@@ -179,8 +182,8 @@ module soft_core #(
         .write(host_write), .write_region(region), .write_address(word_address), .write_data(word),
         .writable(writable), .refused(refused), .commit(host_commit), .commit_mode(commit_mode),
         .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .booting(1'b0), .missing(1'b0), .arm(arm),
-        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed), .running(running), .busy(busy), .playing(playing),
-        .parked(parked), .faults(faults), .fault_counts(fault_counts)
+        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
+        .running(running), .busy(busy), .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
     reg [$clog2(CLOCKS_PER_TICK)-1:0] divider;
@@ -188,13 +191,13 @@ module soft_core #(
     wire tick = divider == CLOCKS_PER_TICK - 1;
     always @(posedge clock) divider <= tick ? 0 : divider + 1'b1;
 
-    wire [ANNEXIN_200NM_X_DAC_BITS-1:0] x_code, y_code;
+    wire [SCAN_X_DAC_BITS-1:0] x_code, y_code;
     dac_sequencer #(
-        .DAC_BITS(ANNEXIN_200NM_X_DAC_BITS), .COUNT_BITS(COUNT_BITS), .SHAPING(ANNEXIN_200NM_SHAPING),
-        .X_INTERPOLATED(ANNEXIN_200NM_X_INTERPOLATED), .X_INDEX_BITS(ANNEXIN_200NM_X_INDEX_BITS),
-        .X_WORD_BITS(ANNEXIN_200NM_X_TABLE_BITS), .Y_INTERPOLATED(ANNEXIN_200NM_Y_INTERPOLATED),
-        .Y_INDEX_BITS(ANNEXIN_200NM_Y_INDEX_BITS), .Y_WORD_BITS(ANNEXIN_200NM_Y_TABLE_BITS), .LOW_AREA(1),
-        .COMMIT_MODES(1)
+        .DAC_BITS(SCAN_X_DAC_BITS), .COUNT_BITS(COUNT_BITS), .SHAPING(SCAN_SHAPING),
+        .X_INTERPOLATED(SCAN_X_INTERPOLATED), .X_INDEX_BITS(SCAN_X_INDEX_BITS),
+        .X_WORD_BITS(SCAN_X_TABLE_BITS), .Y_INTERPOLATED(SCAN_Y_INTERPOLATED),
+        .Y_INDEX_BITS(SCAN_Y_INDEX_BITS), .Y_WORD_BITS(SCAN_Y_TABLE_BITS), .LOW_AREA(1),
+        .COMMIT_MODES(1), .SLOW_PART(SCAN_SLOW_PART), .SLOW_INDEX_BITS(SCAN_SLOW_INDEX_BITS)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(host_write), .write_region(region), .write_address(word_address),
         .write_data(word), .writable(writable), .refused(refused), .commit(host_commit && permit_2),
@@ -208,12 +211,12 @@ module soft_core #(
 
     wire [15:0] x_word, y_word;
     dac_coding #(
-        .BITS(ANNEXIN_200NM_X_DAC_BITS), .WORD_BITS(ANNEXIN_200NM_X_DAC_WORD_BITS),
-        .TWOS_COMPLEMENT(ANNEXIN_200NM_X_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(ANNEXIN_200NM_X_DAC_LEFT_ALIGNED)
+        .BITS(SCAN_X_DAC_BITS), .WORD_BITS(SCAN_X_DAC_WORD_BITS),
+        .TWOS_COMPLEMENT(SCAN_X_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(SCAN_X_DAC_LEFT_ALIGNED)
     ) x_coding (.code(x_code), .word(x_word));
     dac_coding #(
-        .BITS(ANNEXIN_200NM_Y_DAC_BITS), .WORD_BITS(ANNEXIN_200NM_Y_DAC_WORD_BITS),
-        .TWOS_COMPLEMENT(ANNEXIN_200NM_Y_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(ANNEXIN_200NM_Y_DAC_LEFT_ALIGNED)
+        .BITS(SCAN_Y_DAC_BITS), .WORD_BITS(SCAN_Y_DAC_WORD_BITS),
+        .TWOS_COMPLEMENT(SCAN_Y_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(SCAN_Y_DAC_LEFT_ALIGNED)
     ) y_coding (.code(y_code), .word(y_word));
     dac_spi #(.WORD_BITS(16), .FRAME_BITS(16)) converters (
         .clock(clock), .reset(1'b0), .strobe(strobe), .x_word(x_word), .y_word(y_word), .sclk(sclk), .cs_x_n(select_n),
@@ -223,16 +226,17 @@ module soft_core #(
     assign fault = faults != 4'd0 || refused;
 
     // What this device plays. The reason of a refusal is the name of a module that does not exist.
-    localparam CUBIC = ANNEXIN_200NM_X_INTERPOLATED == 3 || ANNEXIN_200NM_Y_INTERPOLATED == 3;
-    localparam CLOCKS = (CUBIC ? 90 : 41) + (ANNEXIN_200NM_SHAPING != 0 ? 2 : 0);
+    localparam CUBIC = SCAN_X_INTERPOLATED == 3 || SCAN_Y_INTERPOLATED == 3;
+    localparam STRAIGHT_CLOCKS = (CUBIC ? 90 : 41) + (SCAN_SHAPING != 0 ? 2 : 0);
+    localparam CLOCKS = SCAN_SLOW_PART != 0 ? SCAN_CLOCKS : STRAIGHT_CLOCKS;
     generate
-        if (ANNEXIN_200NM_X_DAC_WORD_BITS != 16 || ANNEXIN_200NM_Y_DAC_WORD_BITS != 16) begin : guard_0
+        if (SCAN_X_DAC_WORD_BITS != 16 || SCAN_Y_DAC_WORD_BITS != 16) begin : guard_0
             soft_core_serves_converters_with_words_of_16_bits stop ();
         end
-        if (ANNEXIN_200NM_X_DAC_BITS != ANNEXIN_200NM_Y_DAC_BITS) begin : guard_1
+        if (SCAN_X_DAC_BITS != SCAN_Y_DAC_BITS) begin : guard_1
             soft_core_serves_converters_of_the_same_bits stop ();
         end
-        if (ANNEXIN_200NM_PIXEL_INDEX_BITS != 0) begin : guard_2
+        if (SCAN_PIXEL_INDEX_BITS != 0) begin : guard_2
             soft_core_plays_no_table_of_pixels stop ();
         end
         if (CLOCKS_PER_TICK < CLOCKS) begin : guard_3
