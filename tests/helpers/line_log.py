@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.played_lines import LineTicks, play_line
-from tablegen.device.sequencer import Sequencer, Tick
+from tablegen.device.sequencer import Sequencer, Tick, can_keep
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.play.stream import FLAGS
 
@@ -180,6 +181,9 @@ class LineCheck:
             elif played.generation == self._generation + 1:
                 for name, program in self._offered.items():
                     yield name, self._swapped(self._play.program, program, self._codes)
+                for name, program in self._offered.items():
+                    if can_keep(self._play.program, program):
+                        yield name, self._kept(self._play.program, program, self._codes, self._play.line)
         if played.line != 0 or played.generation < self._generation:
             return
         if same:
@@ -218,6 +222,15 @@ class LineCheck:
         sequencer = self._running(old, codes)
         sequencer.commit(new)
         return _Play(self, sequencer, new, after_park=False)
+
+    def _kept(self, old: ScanProgram, new: ScanProgram, codes: tuple[int, int], line: int) -> _Play:
+        """Taken at the start of a line, and the frame goes on."""
+        sequencer = self._running(old, codes)
+        sequencer.line = line
+        sequencer.commit(new, CommitMode.KEEP)
+        play = _Play(self, sequencer, new, after_park=False)
+        play.line = line
+        return play
 
     def _started(self, program: ScanProgram, codes: tuple[int, int]) -> _Play:
         """Triggered, from codes on the way to its park codes."""
