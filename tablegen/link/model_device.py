@@ -136,10 +136,7 @@ class ModelDevice:
             raise ValueError("a device that takes MOVE keeps tables and has modes of a COMMIT")
         if More.PLAY in info.more and (staged or (not compiled and flash is None)):
             raise ValueError("a device that takes PLAY keeps tables and has programs")
-        if (info.z is None) != (z_player is None) or (info.z is None) != (More.Z not in info.more):
-            raise ValueError("the output z, its feature and its player go together")
-        if info.z is not None and (staged or Feature.STORE in info.features or info.more & (More.MOVE | More.PLAY)):
-            raise ValueError("a device with z keeps tables, takes no moves, and has no programs by number or in slots")
+        _check_z(info, z_player, staged)
         self.info, self.player, self.boot = info, player, boot
         self.z_player, self._starts_z = z_player, plays_z
         self.permits = True
@@ -601,6 +598,14 @@ class ModelDevice:
         self._challenges += 1
         count = bytes([len(self._identity)]) + self._identity + struct.pack("<II", self.boot, self._challenges)
         return hashlib.blake2s(count, key=self._key, digest_size=NONCE_BYTES).digest()
+
+
+def _check_z(info: DeviceInfo, player: Player | None, staged: bool) -> None:
+    """Raise ``ValueError`` if a device cannot have the output z, or not as it says."""
+    if len({info.z is None, player is None, More.Z not in info.more}) != 1:
+        raise ValueError("the output z, its feature and its player go together")
+    if info.z is not None and (staged or Feature.STORE in info.features or info.more & (More.MOVE | More.PLAY)):
+        raise ValueError("a device with z keeps tables, takes no moves, and has no programs by number or in slots")
 
 
 def _plain_bytes(frame: Frame) -> int:

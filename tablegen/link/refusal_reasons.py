@@ -104,8 +104,8 @@ def lacks_z(info: DeviceInfo) -> str | None:
     if info.z is not None:
         return None
     return (
-        "the scan has the output z, and the device has none: build its firmware with DAC_LINK_Z=1 and a second sequencer "
-        "for z, or leave [z] out of the scan (FPGAs have none over their link)"
+        "the scan has the output z, and the device has none: build its firmware with DAC_LINK_Z=1 and a second "
+        "sequencer for z, or leave [z] out of the scan (FPGAs have none over their link)"
     )
 
 

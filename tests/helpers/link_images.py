@@ -10,8 +10,8 @@ from programs import Kind, random_dual, random_fourier, random_schedule, rendere
 from replacing import replace
 
 from tablegen.device.dual_program import AxisProgram, DualProgram, ScanProgram
-from tablegen.device.schedule import Schedule
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
+from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.link.messages import AxisLimits
 from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image, parts_of

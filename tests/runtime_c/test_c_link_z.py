@@ -31,7 +31,6 @@ from tilted_scans import write_sine, write_stepped, write_straight, write_tilted
 from tablegen.base.resources import c_link, c_runtime
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import AxisProgram, ScanProgram
-from tablegen.device.registers import PAGE_WORDS
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.acceptance import first_objection
 from tablegen.link.device import Device
@@ -69,9 +68,9 @@ def pair(seed: int, like: int | None = None) -> tuple[ScanProgram, ScanProgram]:
             program = random_z_program(rng, CUBIC, pair(like)[0].schedule)
         z = random_z_program(rng, CUBIC, program.schedule)
         big = program.schedule.ticks >= 40 and program.schedule.lines >= 5
-        if big and all(isinstance(axis, FrameProgram) for axis in (program.x, program.y, z.x, z.y)):
-            if loadable(program) and loadable(z):
-                return program, z
+        slow = all(isinstance(axis, FrameProgram) for axis in (program.x, program.y, z.x, z.y))
+        if big and slow and loadable(program) and loadable(z):
+            return program, z
 
 
 def image_of(pair: tuple[ScanProgram, ScanProgram], seed: int = 1) -> ProgramImage:
@@ -419,7 +418,8 @@ def test_a_scan_from_the_command_line_plays_as_the_integer_model(kind: str, tmp_
     for name, slope in (("one", "0.02"), ("two", "0.03")):
         (tmp_path / name).mkdir()
         edits = [30.0] if kind == "angle" else ["timing.pixels = 16"] if kind == "sine" else []
-        path = SCANS[kind](tmp_path / name, *edits, f"z.slope_x = {slope}")  # type: ignore[operator]
+        path = SCANS[kind](tmp_path / name, *edits)  # type: ignore[operator]
+        path.write_text(path.read_text("utf-8").replace("slope_x = 0.02", f"slope_x = {slope}"), "utf-8")
         assert run("build", path, "-o", tmp_path / name / "build", "-q").status == 0
         scans.append(PreparedScan.of_build(tmp_path / name / "build"))
     first, second = scans
@@ -456,7 +456,6 @@ def test_a_scan_from_the_command_line_plays_as_the_integer_model(kind: str, tmp_
     for check, lines in zip(checks, (device.lines(), device.z_lines()), strict=True):
         check.follow(PlayedLine(**line._asdict()) for line in lines)
     assert checks[0].lines == checks[1].lines > 2
-    assert checks[0].taken[3] == "two"
     assert checks[1].taken[2] == "two"
 
 
@@ -520,8 +519,9 @@ MUTANTS = {
     "bytes of z go to x and y": (Z, "l->received != bytes_of(l) ? l : l->z", "true ? l : l->z"),
     "half an upload is whole": (Z, "        if (l->z->received != bytes_of(l->z))\n", "        if (false)\n"),
     "a refused z is one of x": (Z, "return part->is_z ? dac_link_of_z(found) : found;", "return found;"),
-    "a z that does not fit leaves its upload": (Z, "            l->upload = DAC_LINK_NONE;\n            return dac_link_of_z(found);",
-                                                "            return dac_link_of_z(found);"),
+    "a z that does not fit leaves its upload": (
+        Z, "            l->upload = DAC_LINK_NONE;\n            return dac_link_of_z(found);",
+        "            return dac_link_of_z(found);"),
     "z is not read back": (Z, "    if (done != count) {", "    if (false) {"),
     "checks of z begin twice": (Z, "        l->checks_z = false;\n", ""),
     "the CRC is that of x and y": (CHECK, "    *done = at->part == DAC_LINK_END && (part != l || !l->has_z);",
@@ -560,9 +560,7 @@ def device_with(mutant: tuple[str, str, str] | None, folder: Path) -> Path:
             text = text.replace(mutant[1], mutant[2])
         (folder / path.name).write_text(text, "utf-8")
         sources.append(folder / path.name)
-    return compile_device(
-        folder / "device.so", options=("-std=c99", "-O1", "-w"), sources=sources, more=OPTIONS
-    )
+    return compile_device(folder / "device.so", options=("-std=c99", "-O1", "-w"), sources=sources, more=OPTIONS)
 
 
 def test_every_mutant_is_of_the_link_as_it_is() -> None:
