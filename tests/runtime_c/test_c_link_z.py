@@ -277,6 +277,14 @@ def test_an_upload_goes_on_in_either_image() -> None:
         host.ask(Request.HELLO, b"\x01")
         status, _ = host.status()
         assert (status.received, status.image_crc) == (until, image.info.image_crc)
+    other = replace(image.info.z, x=replace(image.info.z.x, index_bits=4))  # type: ignore[type-var]
+    for info in (replace(image.info, z=other), image.info.first):
+        host.send(image, middle + 100)
+        assert host.ask(Request.BEGIN, info.pack()) == bytes(4)
+    host.send(image, middle + 100)
+    unfit = replace(image.info, z=replace(other, y=replace(other.y, word_bits=15)))
+    assert host.ask(Request.BEGIN, unfit.pack()) == (Reason.SHAPE, OF_Z + 1)
+    assert host.status()[0].received == 0
     assert host.upload(image) == 2
     read = b""
     while len(piece := host.ask(Request.READBACK, struct.pack("<IB", len(read), 240))) > 4:
