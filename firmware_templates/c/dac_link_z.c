@@ -210,7 +210,7 @@ static bool plays(const dac_sequencer *s)
 /* Why programs are not handed over now. With stopped ticks this stays true. */
 static dac_link_finding judge_commit(const dac_link *l, bool changes)
 {
-    const unsigned requests = changes ? 2 : 1; /* a park, and the commit */
+    const unsigned requests = changes ? 2u : 1u; /* a park, and the commit */
 
     if (changes && (plays(l->sequencer) || plays(l->z->sequencer)))
         return dac_link_because(DAC_LINK_NOT_PARKED, 0);
@@ -269,7 +269,7 @@ bool dac_link_withdraw(dac_link *l)
     if (z == NULL)
         return dac_sequencer_withdraw(l->sequencer);
     stop_ticks(l, true);
-    const bool room = has_room(l->sequencer, changes ? 2 : 1) && has_room(z->sequencer, changes ? 2 : 1);
+    const bool room = has_room(l->sequencer, changes ? 2u : 1u) && has_room(z->sequencer, changes ? 2u : 1u);
     if (room) {
         (void)dac_sequencer_withdraw(l->sequencer);
         (void)dac_sequencer_withdraw(z->sequencer);

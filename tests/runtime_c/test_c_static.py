@@ -35,6 +35,8 @@ CHOICES = {
     "moves": ["-DDAC_MOVE=1", "-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1"],
     "pixel_table": ["-DDAC_PIXEL_TABLE=1"],
+    "z": ["-DDAC_LINK_Z=1", "-DDAC_COMMIT_MODES=1", "-DDAC_SLOW_PART=1"],
+    "z_alone": ["-DDAC_LINK_Z=1", "-DDAC_PIXEL_TABLE=1"],
     "slow_part_wide": [
         "-DDAC_SLOW_PART=1",
         "-DDAC_SPLINE=1",
@@ -68,7 +70,7 @@ COMPILERS = {
 }
 QUICK = ("default", "small")
 # Each alternative of each #if is in one of these; the others are combinations of them.
-ANALYSED = (*QUICK, "wide", "spline_shaped_no_long_multiplication", "commit_modes", "slow_part")
+ANALYSED = (*QUICK, "wide", "spline_shaped_no_long_multiplication", "commit_modes", "slow_part", "z")
 # An analyser reports what it finds in a file that is wrong in this way.
 FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
 ANALYSERS = {
@@ -142,6 +144,7 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
         ("DAC_STORE", "-DDAC_STORE=1"),
         ("DAC_MOVE", "-DDAC_MOVE=1"),
         ("DAC_LIBRARY", "-DDAC_LIBRARY=2"),
+        ("DAC_LINK_Z", "-DDAC_LINK_Z=1"),
     ):
         if given not in options:
             text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
@@ -155,20 +158,21 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
         ["-O0"],
         ["-O2"],
         ["-Os"],
-        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "moves", "slow_part")),
+        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "moves", "slow_part", "z")),
     ],
     ids=" ".join,
 )
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
     """Exported is what headers declare, asked for are their own functions, memcpy and memset; no variables."""
-    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *OF_THE_LINK, *options, "-c", *SOURCES], tmp_path)
+    options = [*options, *(() if "-DDAC_LINK_Z=1" in options else OF_THE_LINK)]  # z goes without these
+    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *options, "-c", *SOURCES], tmp_path)
     found: dict[str, set[str]] = {}
     for path in sorted(tmp_path.glob("*.o")):
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    own = declared(*HEADERS, options=[*options, *OF_THE_LINK])
+    own = declared(*HEADERS, options=options)
     assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
     assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     # Of absolute value, for the linker to compare: they are in no memory.
