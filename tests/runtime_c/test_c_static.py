@@ -158,26 +158,41 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
         ["-O0"],
         ["-O2"],
         ["-Os"],
-        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "moves", "slow_part", "z")),
+        *(["-O2", *CHOICES[choice]] for choice in ("wide", "shaped", "commit_modes", "moves", "slow_part")),
     ],
     ids=" ".join,
 )
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
     """Exported is what headers declare, asked for are their own functions, memcpy and memset; no variables."""
-    options = [*options, *(() if "-DDAC_LINK_Z=1" in options else OF_THE_LINK)]  # z goes without these
-    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *options, "-c", *SOURCES], tmp_path)
+    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *OF_THE_LINK, *options, "-c", *SOURCES], tmp_path)
     found: dict[str, set[str]] = {}
     for path in sorted(tmp_path.glob("*.o")):
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    own = declared(*HEADERS, options=options)
+    own = declared(*HEADERS, options=[*options, *OF_THE_LINK])
     assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
     assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     # Of absolute value, for the linker to compare: they are in no memory.
     assert found.pop("A") == {"dac_objects_need_the_same_options", "dac_objects_need_the_same_link_ring"}
     assert set(found) <= {"t", "r"}, found
+
+
+@pytest.mark.rest
+def test_a_link_with_z_exports_what_its_headers_declare_for_it(tmp_path: Path) -> None:
+    """z goes without kept programs, moves and libraries, so this is the difference that its option makes."""
+    exported = []
+    for name, options in (("without", []), ("with", ["-DDAC_LINK_Z=1"])):
+        folder = tmp_path / name
+        folder.mkdir()
+        run_clean(["gcc", "-std=c99", "-ffreestanding", "-O2", *options, "-c", *SOURCES], folder)
+        lines = [run_clean(["nm", path]).splitlines() for path in sorted(folder.glob("*.o"))]
+        exported.append({line.split()[-1] for each in lines for line in each if " T " in line})
+    own = declared(*HEADERS, options=[*ALL_FUNCTIONS, "-DDAC_LINK_Z=1"]) - declared(*HEADERS)
+    assert exported[1] - exported[0] == own | {"dac_sequencer_starts"}
+    assert own >= {"dac_link_init_z", "dac_link_arm", "dac_link_trigger", "dac_link_park"}
+    assert not exported[0] - exported[1]
 
 
 def test_public_names_have_the_prefix_of_the_sequencer() -> None:
