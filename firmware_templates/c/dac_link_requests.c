@@ -170,8 +170,8 @@ static uint8_t put_z(const dac_link *l, uint8_t *at)
     at[6] = at[7] = 0;
 #if DAC_PIXEL_TABLE
     further |= c->table_pixels != 0 ? (uint32_t)PLAYS_PIXEL_TABLES : 0u;
-    at[6] = (uint8_t)c->table_pixels;
-    at[7] = (uint8_t)(c->table_pixels >> 8);
+    at[6] = (uint8_t)(c->table_pixels & 255u);
+    at[7] = (uint8_t)(c->table_pixels >> 8 & 255u);
 #endif
     dac_link_put(at, further);
     at += Z_AT;
