@@ -210,8 +210,10 @@ static bool plays(const dac_sequencer *s)
 /* Why programs are not handed over now. With stopped ticks this stays true. */
 static dac_link_finding judge_commit(const dac_link *l, bool changes)
 {
-    const unsigned requests = changes ? 2u : 1u; /* a park, and the commit */
+    unsigned requests = 1;
 
+    if (changes) /* a park in front of the commit */
+        requests++;
     if (changes && (plays(l->sequencer) || plays(l->z->sequencer)))
         return dac_link_because(DAC_LINK_NOT_PARKED, 0);
 #if DAC_COMMIT_MODES
