@@ -246,7 +246,7 @@ class Dialogue:
             at = 4 * (PAGE_WORDS * int(rng.integers(1, 3)) + int(rng.choice([10, 12])))
             data[at + int(rng.integers(0, 3))] ^= 1 << int(rng.integers(0, 8))
             second = resealed(second, bytes(data))
-        elif rng.random() < 0.2:
+        elif rng.random() < 0.4:
             second = damaged_slow(rng, second)
         return join(first, second)
 
