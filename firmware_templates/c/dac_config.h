@@ -149,6 +149,20 @@
 #define DAC_COMMIT_MODES 1 /* a move goes on with the frame */
 #endif
 
+/* The output z. */
+
+#ifndef DAC_LINK_Z
+#define DAC_LINK_Z 0 /* 1: the link may have a second sequencer, whose x is z */
+#endif
+#if DAC_LINK_Z && (DAC_MOVE || DAC_STORE || DAC_LIBRARY)
+#error "DAC_LINK_Z has no moves, no kept programs and no programs by number"
+#endif
+#if DAC_LINK_Z
+#define DAC_CONFIG_Z "+65536" /* behind the bytes of the ring */
+#else
+#define DAC_CONFIG_Z
+#endif
+
 /* Every object defines a symbol whose value has the options on which types and calls depend. A linker accepts this
  * again and again with one value, and refuses a second value. It takes no memory and no instruction. */
 #if defined(__GNUC__) && defined(__ELF__)
@@ -164,7 +178,7 @@ DAC_CONFIG_SYMBOL("dac_objects_need_the_same_options",
                       DAC_SHAPING) ")*2+" DAC_CONFIG_VALUE(DAC_SPLINE) ")*256+" DAC_CONFIG_VALUE(
                       DAC_REQUESTS) ")*2+" DAC_CONFIG_VALUE(DAC_LONG_MULTIPLY) ")*2+" DAC_CONFIG_VALUE(
                       DAC_COMMIT_MODES) ")*2+" DAC_CONFIG_VALUE(DAC_STORE) ")*4+" DAC_CONFIG_VALUE(DAC_LIBRARY) ")")
-DAC_CONFIG_SYMBOL("dac_objects_need_the_same_link_ring", DAC_CONFIG_VALUE(DAC_LINK_RING))
+DAC_CONFIG_SYMBOL("dac_objects_need_the_same_link_ring", DAC_CONFIG_VALUE(DAC_LINK_RING) DAC_CONFIG_Z)
 #endif
 
 #endif

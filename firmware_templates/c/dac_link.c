@@ -189,6 +189,10 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
     case DAC_LINK_HELLO:
         return 1;
     case DAC_LINK_BEGIN:
+#if DAC_LINK_Z
+        if (length == DAC_LINK_INFO + DAC_LINK_Z_INFO)
+            return length;
+#endif
         return DAC_LINK_INFO;
     case DAC_LINK_READ:
         return 5;
@@ -274,16 +278,37 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
     switch (request) {
     case DAC_LINK_HELLO:
         return dac_link_hello(l, a->session, a);
+#if DAC_LINK_Z
+    case DAC_LINK_BEGIN:
+        return dac_link_begin_both(l, payload, length, a);
+    case DAC_LINK_DATA:
+        return dac_link_data_both(l, payload, length, a);
+    case DAC_LINK_COMMIT:
+        return dac_link_commit_both(l, payload, length, a);
+#else
     case DAC_LINK_BEGIN:
         return dac_link_begin(l, payload, a);
     case DAC_LINK_DATA:
         return dac_link_data(l, payload, length, a);
     case DAC_LINK_COMMIT:
         return dac_link_commit(l, payload, length, a);
+#endif
     case DAC_LINK_ABORT:
         return dac_link_abort(l, a);
     case DAC_LINK_STATUS:
         return dac_link_status(l, a);
+#if DAC_LINK_Z
+    case DAC_LINK_READ:
+        return dac_link_readback_both(l, payload, a);
+    case DAC_LINK_PARK:
+        return passed_on(dac_link_park(l));
+    case DAC_LINK_ARM:
+        return passed_on(dac_link_arm(l, dac_link_get(payload)));
+    case DAC_LINK_TRIGGER:
+        return passed_on(dac_link_trigger(l));
+    case DAC_LINK_CLEAR:
+        return passed_on(dac_link_clear(l));
+#else
     case DAC_LINK_READ:
         return dac_link_readback(l, payload, a);
     case DAC_LINK_PARK:
@@ -294,6 +319,7 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
         return passed_on(dac_sequencer_trigger(l->sequencer));
     case DAC_LINK_CLEAR:
         return passed_on(dac_sequencer_clear_faults(l->sequencer));
+#endif
     case DAC_LINK_CHALLENGE:
         return dac_link_challenge(l, a);
 #if DAC_STORE

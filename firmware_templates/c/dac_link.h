@@ -103,6 +103,11 @@ typedef struct {
     dac_store *store;         /* opened by dac_store_open() as DAC_STORE_DONE; NULL: no programs are kept */
     bool store_while_playing; /* flash can be written while a scan plays; otherwise the scan is to be parked first */
 #endif
+#if DAC_LINK_Z
+    /* With z: keeps out the interrupt that steps both sequencers, and lets it in again. The link calls it in pairs, with
+     * a few hundred instructions between them at most. */
+    void (*stop_ticks)(bool stopped);
+#endif
 #if DAC_LIBRARY
     const dac_library_entry *library; /* compiled programs, as LIBRARY_library of LIBRARY_library.h */
     uint32_t library_programs;        /* how many; 0: none */
@@ -120,6 +125,9 @@ typedef enum {
     DAC_LINK_NO_CLOCK,    /* a key, but no `milliseconds`: challenges would last for ever */
     DAC_LINK_BAD_SLOW,    /* slow_knots or slow_index_bits out of range, or memory of slow parts missing or shared */
     DAC_LINK_BAD_PIXEL_TABLE /* table_pixels without memory, or with shared memory */
+#if DAC_LINK_Z
+    , DAC_LINK_BAD_Z /* a z without a link that was started, with a key, harmonics or an interlock, or no stop_ticks */
+#endif
 } dac_link_started;
 
 /* Private, down to the functions. It is declared here so that the application can allocate it. */
@@ -172,7 +180,13 @@ typedef struct {
     dac_link_place place;
 } dac_link_check;
 
-typedef struct {
+#if DAC_LINK_Z
+#define DAC_LINK_STRUCT dac_link
+#else
+#define DAC_LINK_STRUCT
+#endif
+
+typedef struct DAC_LINK_STRUCT {
     const dac_link_config *config;
     dac_sequencer *sequencer;
     uint32_t boot, bad_frames;
@@ -229,6 +243,15 @@ typedef struct {
     uint8_t kept, kept_refused; /* slot of this start, or DAC_STORE_NONE; why it is not the one that was due */
 #endif
 
+#if DAC_LINK_Z
+    struct dac_link *z; /* of the second sequencer; NULL without one */
+    bool is_z;          /* this is that one */
+    bool has_z;         /* the upload */
+    bool plays_z;       /* the program that plays or is committed */
+    bool played_z;      /* the one before */
+    bool checks_z;      /* x and y have passed */
+#endif
+
     dac_link_reader reader;
     /* output: dac_link_work() fills it, dac_link_transmit() empties it */
     volatile uint8_t sending;
@@ -245,6 +268,20 @@ typedef struct {
 /* Call it after dac_sequencer_init(), and before the interrupt of the UART is enabled. `boot` should differ from start
  * to start. The application loads and commits the program of the firmware. A link that was not started is silent. */
 dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot);
+
+#if DAC_LINK_Z
+/* Gives a link that was started a second sequencer, whose x is z: `z` is a link of its own with the memory of this
+ * sequencer, and with no line: its receive buffer is not used. `config` of it has neither key, harmonics, tables of
+ * pixels nor interlock. `plays`: the program of the firmware, which the application loads and commits, has z. */
+dac_link_started dac_link_init_z(dac_link *l, dac_link *z, const dac_link_config *config, dac_sequencer *sequencer,
+                                 bool plays);
+
+/* Requests of the application to both sequencers, between the same two ticks; a trigger leaves out a z that rests.
+ * Called where dac_link_work() is. False: there is no room in a queue, and neither sequencer has the request. */
+bool dac_link_arm(dac_link *l, uint32_t frames);
+bool dac_link_trigger(dac_link *l);
+bool dac_link_park(dac_link *l);
+#endif
 
 #if DAC_STORE
 /* Loads and commits the kept program that is due, if it passes the checks of an upload. Call it after dac_link_init(),

@@ -729,13 +729,24 @@ static dac_link_finding check_crc(dac_link *l, bool *done)
         c->crc = DAC_LINK_CRC;
         dac_link_mac_begin(&l->digest, 32, NULL, 0);
     }
+#if DAC_LINK_Z
+    dac_link *const part = c->place.part == DAC_LINK_END && l->has_z ? l->z : l; /* a slice is of one image */
+    dac_link_place *const at = &part->check.place;
+    for (unsigned i = 0; i < 2 * DAC_LINK_SLICE && at->part != DAC_LINK_END; i++) {
+        const uint8_t byte = dac_link_load_byte(part, at);
+#else
     for (unsigned i = 0; i < 2 * DAC_LINK_SLICE && c->place.part != DAC_LINK_END; i++) {
         const uint8_t byte = dac_link_load_byte(l, &c->place);
+#endif
         c->crc = dac_link_crc(c->crc, byte);
         if (l->config->key_bytes != 0)
             dac_link_mac_byte(&l->digest, byte);
     }
+#if DAC_LINK_Z
+    *done = at->part == DAC_LINK_END && (part != l || !l->has_z);
+#else
     *done = c->place.part == DAC_LINK_END;
+#endif
     const bool wrong = *done && ~c->crc != dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC);
     return wrong ? finding(DAC_LINK_IMAGE, 0, 0) : nothing;
 }
@@ -777,6 +788,12 @@ static dac_link_finding check(dac_link *l, bool *done)
     case CRC:
 #if DAC_MOVE
         if (l->moving) { /* nothing was received, and its tag has been checked */
+            *done = true;
+            return nothing;
+        }
+#endif
+#if DAC_LINK_Z
+        if (l->is_z) { /* it is part of the CRC of x and y */
             *done = true;
             return nothing;
         }

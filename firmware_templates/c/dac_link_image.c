@@ -305,6 +305,27 @@ uint8_t dac_link_load_byte(const dac_link *l, dac_link_place *at)
     return (uint8_t)(word >> shift);
 }
 
+#if DAC_LINK_Z
+uint32_t dac_link_read_back_bytes(const dac_link *l)
+{
+    const dac_link_image *const image = &l->image[l->playing];
+    uint32_t bytes = DAC_LINK_PROGRAM;
+
+    for (unsigned axis = 0; axis < 2; axis++) {
+        dac_link_part part[DAC_LINK_PARTS];
+        part[0] = table_of(image, axis);
+#if DAC_SLOW_PART
+        list_slow(l, image, axis, part);
+#endif
+        bytes += bytes_of(part);
+    }
+#if DAC_PIXEL_TABLE
+    bytes += 2 * pixels_of(l, image).words;
+#endif
+    return bytes;
+}
+#endif
+
 uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, uint8_t count)
 {
     const dac_link_image *const image = &l->image[l->playing];

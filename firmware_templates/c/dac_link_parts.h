@@ -101,6 +101,10 @@ enum { DAC_LINK_NONE, DAC_LINK_RECEIVING, DAC_LINK_CHECKING, DAC_LINK_WAITING };
 enum { DAC_LINK_HASH = 0, DAC_LINK_BYTES = 32, DAC_LINK_IMAGE_CRC = 36, DAC_LINK_SHAPES = 40 };
 #define DAC_LINK_PROGRAM 192 /* bytes of the program words */
 #define DAC_LINK_INFO 48     /* bytes of an announcement */
+#if DAC_LINK_Z
+#define DAC_LINK_Z_INFO 12                 /* behind it: bytes of the image of z, and its shapes */
+#define DAC_LINK_OF_Z (UINT32_C(1) << 31) /* in the detail of a refusal */
+#endif
 
 /* Words of the pages. */
 enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LINK_TURN_TICK, DAC_LINK_FORWARD,
@@ -213,6 +217,11 @@ uint8_t dac_link_load_byte(const dac_link *l, dac_link_place *at);
 /* Bytes of the image of the tables that play, by offset; returns how many there are up to its end. */
 uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, uint8_t count);
 
+#if DAC_LINK_Z
+/* Bytes of the image that dac_link_read_back() reads. */
+uint32_t dac_link_read_back_bytes(const dac_link *l);
+#endif
+
 /* The program as the sequencer wants it. */
 void dac_link_program_of(const dac_link *l, dac_program *program);
 
@@ -245,6 +254,39 @@ dac_link_finding dac_link_abort(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_readback(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
 dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+
+#if DAC_LINK_Z
+/* dac_link_z.c: of both sequencers, or of x and y alone where there is no z */
+
+static inline dac_link_finding dac_link_of_z(dac_link_finding found)
+{
+    return found.reason == DAC_LINK_NO_REASON ? found : dac_link_because(found.reason, found.detail | DAC_LINK_OF_Z);
+}
+
+dac_link_finding dac_link_begin_both(dac_link *l, const uint8_t *info, uint8_t length, dac_link_answer *a);
+dac_link_finding dac_link_data_both(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+dac_link_finding dac_link_commit_both(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+dac_link_finding dac_link_readback_both(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
+bool dac_link_clear(dac_link *l);
+
+/* A slice of the checks of both; *passed behind the last. */
+dac_link_finding dac_link_check_both(dac_link *l, bool *passed);
+
+/* Loads the program of z, if there is one, and hands both over by `commit`, between the same two ticks. */
+dac_link_finding dac_link_hand_over(dac_link *l, dac_link_finding (*commit)(const dac_link *l));
+
+/* Withdraws both programs that wait. */
+bool dac_link_withdraw(dac_link *l);
+
+/* What became of a program that waited is true of z too. */
+void dac_link_settle_z(dac_link *l, bool taken);
+
+/* Bytes that were received, of both. */
+uint32_t dac_link_received(const dac_link *l);
+
+/* What STATUS has of z; returns its bytes. */
+uint8_t dac_link_put_z_status(const dac_link *l, uint8_t *at);
+#endif
 
 #if DAC_MOVE
 /* dac_link_move.c */

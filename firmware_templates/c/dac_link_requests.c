@@ -17,6 +17,9 @@ enum { PLAYS_SLOW_PARTS = 1 };
 #if DAC_PIXEL_TABLE
 enum { PLAYS_PIXEL_TABLES = 4 };
 #endif
+#if DAC_LINK_Z
+enum { HAS_Z = 16, Z_AT = 8, Z_BYTES = 48 };
+#endif
 /* Further features, by the options; HELLO ends with them if there are any. */
 #define TAKES_MOVE (DAC_MOVE ? 2u : 0u)
 #if DAC_LIBRARY > 1
@@ -106,7 +109,11 @@ static void put_status(const dac_link *l, uint8_t *at)
     dac_link_put(at + 16, received == DAC_LINK_NONE ? 0 : l->received);
     dac_link_put(at + 20, received == DAC_LINK_NONE ? 0 : dac_link_get(l->image[image].info + DAC_LINK_IMAGE_CRC));
 #else
+#if DAC_LINK_Z
+    dac_link_put(at + 16, upload == DAC_LINK_NONE ? 0 : dac_link_received(l));
+#else
     dac_link_put(at + 16, upload == DAC_LINK_NONE ? 0 : l->received);
+#endif
     dac_link_put(at + 20, upload == DAC_LINK_NONE ? 0 : dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC));
 #endif
     for (unsigned i = 0; i < DAC_FAULTS; i++)
@@ -137,6 +144,48 @@ static uint8_t put_further(const dac_link_config *c, uint32_t further, uint8_t *
 }
 #endif
 
+#if DAC_LINK_Z
+/* What the slow parts of a sequencer may have; 0 without them. */
+static void put_slow(uint8_t *at, const dac_link_config *c)
+{
+#if DAC_SLOW_PART
+    at[0] = c->slow_knots;
+    at[1] = c->slow_knots != 0 ? c->slow_index_bits : 0;
+#else
+    (void)c;
+    at[0] = at[1] = 0;
+#endif
+}
+
+/* Further features of a link with z, which has all fields; returns their bytes. */
+static uint8_t put_z(const dac_link *l, uint8_t *at)
+{
+    const dac_link_config *const c = l->config, *const z = l->z->config;
+    uint32_t further = HAS_Z;
+
+    put_slow(at + 4, c);
+#if DAC_SLOW_PART
+    further |= c->slow_knots != 0 ? (uint32_t)PLAYS_SLOW_PARTS : 0u;
+#endif
+    at[6] = at[7] = 0;
+#if DAC_PIXEL_TABLE
+    further |= c->table_pixels != 0 ? (uint32_t)PLAYS_PIXEL_TABLES : 0u;
+    at[6] = (uint8_t)(c->table_pixels & 255u);
+    at[7] = (uint8_t)(c->table_pixels >> 8 & 255u);
+#endif
+    dac_link_put(at, further);
+    at += Z_AT;
+    dac_link_put(at, dac_link_most_bytes(z));
+    put_slow(at + 4, z);
+    at[6] = at[7] = 0;
+    put_shape(at + 8, &z->x);
+    put_shape(at + 12, &z->y);
+    put_limits(at + 16, &z->x.limits);
+    put_limits(at + 32, &z->y.limits);
+    return Z_AT + Z_BYTES;
+}
+#endif
+
 /* Requests. */
 
 dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *a)
@@ -150,6 +199,12 @@ dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *
     a->length = DEVICE + STATUS;
     put_device(l, a->payload);
     put_status(l, a->payload + DEVICE);
+#if DAC_LINK_Z
+    if (l->z != NULL) {
+        a->length = (uint8_t)(DEVICE + STATUS + put_z(l, a->payload + DEVICE + STATUS));
+        return dac_link_fine();
+    }
+#endif
 #if DAC_PIXEL_TABLE
     if (l->config->table_pixels != 0) {
         a->length = (uint8_t)(DEVICE + STATUS + put_further(l->config, FURTHER(l), a->payload + DEVICE + STATUS));
@@ -178,6 +233,9 @@ dac_link_finding dac_link_status(const dac_link *l, dac_link_answer *a)
 {
     a->length = STATUS;
     put_status(l, a->payload);
+#if DAC_LINK_Z
+    a->length = (uint8_t)(STATUS + dac_link_put_z_status(l, a->payload + STATUS));
+#endif
     return dac_link_fine();
 }
 

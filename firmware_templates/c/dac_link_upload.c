@@ -147,6 +147,9 @@ static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *p
 static void conclude_refused(dac_link *l, dac_link_finding why)
 {
     const bool stays = why.reason == DAC_LINK_INTERLOCK || why.reason == DAC_LINK_KEY || why.reason == DAC_LINK_TICKS
+#if DAC_LINK_Z
+                       || why.reason == DAC_LINK_NOT_PARKED
+#endif
                        || why.reason == DAC_LINK_KEEP;
     uint8_t payload[6], upload = stays ? DAC_LINK_RECEIVING : DAC_LINK_NONE, request = DAC_LINK_COMMIT;
     dac_link_answer a = {0, 0, 0, 0, payload};
@@ -191,7 +194,11 @@ void dac_link_check_on(dac_link *l)
 {
     bool passed = false;
     dac_program program;
+#if DAC_LINK_Z
+    dac_link_finding found = dac_link_check_both(l, &passed);
+#else
     dac_link_finding found = dac_link_check_work(l, &passed);
+#endif
 
     if (passed) {
         dac_link_program_of(l, &program);
@@ -204,7 +211,11 @@ void dac_link_check_on(dac_link *l)
         else if (loaded != DAC_LOADED)
             found = dac_link_because(DAC_LINK_REFUSED, (uint32_t)loaded);
         else
+#if DAC_LINK_Z
+            found = dac_link_hand_over(l, commit_loaded);
+#else
             found = commit_loaded(l);
+#endif
         if (found.reason == DAC_LINK_NO_REASON)
             l->upload = DAC_LINK_WAITING;
     }
@@ -251,9 +262,15 @@ void dac_link_settle(dac_link *l)
         l->playing = l->idle;
 #endif
         l->uploaded = true;
+#if DAC_LINK_Z
+        dac_link_settle_z(l, true);
+#endif
         say_taken(l, payload);
         conclude(l, upload, request | DAC_LINK_ANSWER, payload, sizeof payload);
     } else if (dac_sequencer_writable(l->sequencer) && dac_sequencer_status(l->sequencer).swaps == l->swaps) {
+#if DAC_LINK_Z
+        dac_link_settle_z(l, false);
+#endif
         conclude_refused(l, dac_link_because(DAC_LINK_WITHDRAWN, 0));
     } else {
         l->line = status.line;
@@ -266,7 +283,11 @@ void dac_link_settle(dac_link *l)
 dac_link_finding dac_link_abort(dac_link *l, dac_link_answer *a)
 {
     if (l->upload == DAC_LINK_CHECKING || l->upload == DAC_LINK_WAITING) {
+#if DAC_LINK_Z
+        if (l->upload == DAC_LINK_WAITING && (l->aborts == DAC_LINK_ABORTS || !dac_link_withdraw(l)))
+#else
         if (l->upload == DAC_LINK_WAITING && (l->aborts == DAC_LINK_ABORTS || !dac_sequencer_withdraw(l->sequencer)))
+#endif
             return dac_link_because(DAC_LINK_TICKS, 0);
         l->abort_seq[l->aborts] = l->last.seq;
         l->abort_session[l->aborts] = l->session;

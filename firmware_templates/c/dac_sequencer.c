@@ -122,7 +122,7 @@ bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames)
 
 bool dac_sequencer_trigger(dac_sequencer *s) { return request(s, TRIGGER, 0); }
 
-#if DAC_STORE
+#if DAC_STORE || DAC_LINK_Z
 bool dac_sequencer_starts(const dac_sequencer *s)
 {
     const volatile uint8_t *const running = &s->running; /* the consumer's, which may be at work on another core */

@@ -439,7 +439,7 @@ bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames);
  * that commit, arm and trigger may follow each other at once. Otherwise does nothing. */
 bool dac_sequencer_trigger(dac_sequencer *s);
 
-#if DAC_STORE
+#if DAC_STORE || DAC_LINK_Z
 /* Returns whether a scan runs, or begins with the next tick: a trigger waits for it, and no park or reset behind that.
  * The status has the markers of the last tick, which do not tell that yet. */
 bool dac_sequencer_starts(const dac_sequencer *s);

@@ -283,7 +283,7 @@ class Live:
             raise Rejected([Problem(str(self._path), 0, "scans", why)])
         setup = scans[0].setup
         if setup.scan.z is not None:
-            why = "`live` sends no output z; leave [z] out, or build the C into the firmware"
+            why = "`live` sends no output z; leave [z] out, or send the scan with `tablegen upload`"
             raise Rejected([setup.scan_file.problem("z", why)])
         return scans[0], setup
 

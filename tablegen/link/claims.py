@@ -53,7 +53,8 @@ def most_bytes(info: DeviceInfo) -> int:
     """
     fourier = _FOURIER_BYTES * (2 * info.harmonics + 1)
     tables = sum(max(_table_bytes(axis, info), fourier) for axis in (info.x, info.y))
-    return PROGRAM_BYTES + tables + _PIXEL_BYTES * info.table_pixels
+    of_z = 0 if info.z is None else most_bytes(info.of_z)
+    return PROGRAM_BYTES + tables + _PIXEL_BYTES * info.table_pixels + of_z
 
 
 def _table_bytes(axis: AxisShape, info: DeviceInfo) -> int:
@@ -81,7 +82,14 @@ def check_device(info: DeviceInfo) -> None:
     _check("HELLO", "window", info.window, 1, 255)
     _check("HELLO", "data_bytes", info.data_bytes, 1, DATA_BYTES)
     _check("HELLO", "harmonics", info.harmonics, 0, MAXIMUM_HARMONICS)
-    for name, shape, limits in (("x", info.x, info.x_limits), ("y", info.y, info.y_limits)):
+    _check_parts(info, ("x", "y"))
+    if info.z is not None:
+        _check_parts(info.of_z, ("z", "the axis beside z"))
+
+
+def _check_parts(info: DeviceInfo, names: tuple[str, str]) -> None:
+    """Check what a sequencer of a device has: shapes and limits of its axes, slow parts, pixels, and bytes."""
+    for name, shape, limits in zip(names, (info.x, info.y), (info.x_limits, info.y_limits), strict=True):
         _check_shape(name, shape)
         _check("HELLO", f"{name} code_max", limits.code_max, limits.code_min, (1 << shape.dac_bits) - 1)
         _check("HELLO", f"{name} max_step", limits.max_step, 1, (1 << 32) - 1)
@@ -138,7 +146,7 @@ def has_restarted(before: DeviceStatus, now: DeviceStatus) -> bool:
 def check_status(status: DeviceStatus, info: DeviceInfo, source: str) -> None:
     """Raise ``NotUnderstood`` for the first field of a status that a device cannot have; ``source`` is its request."""
     _check(source, "line", status.line, 0, MAXIMUM_LINE)
-    _check(source, "received", status.received, 0, info.image_bytes)
+    _check(source, "received", status.received, 0, info.whole_image_bytes)
 
 
 def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> None:

@@ -487,7 +487,7 @@ class Device:
         return self._limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
 
     def wait_for(self, state: DeviceState, timeout_s: float) -> DeviceStatus:
-        """Wait until the sequencer is in a state.
+        """Wait until the sequencer is in a state; with an output z, until it is parked too where this is ``PARKED``.
 
         Raises
         ------
@@ -497,7 +497,7 @@ class Device:
         deadline = self._until(timeout_s)
         while True:
             status = self.status()
-            if status.state == state:
+            if status.state == state and not (state == DeviceState.PARKED and _z_moves(status)):
                 return status
             if self._session.now() >= deadline:
                 raise OutOfTime(
@@ -529,3 +529,8 @@ class Device:
         limits = AxisLimits.unpack(payload), AxisLimits.unpack(payload[size:])
         check_limits(limits, self.info)
         return limits
+
+
+def _z_moves(status: DeviceStatus) -> bool:
+    """Return True if the output z is on its way, or plays."""
+    return status.z is not None and status.z.state in (DeviceState.PARKING, DeviceState.PLAYING)

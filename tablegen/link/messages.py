@@ -1,7 +1,7 @@
 """The payloads of requests and answers: the tables of docs/protocol.md."""
 
 import struct
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum, IntFlag
 from typing import ClassVar, Literal, Self
 
@@ -106,6 +106,7 @@ class More(IntFlag):
     MOVE = 2
     PIXEL_TABLES = 4
     PLAY = 8
+    Z = 16
 
 
 NO_MORE = More(0)
@@ -138,6 +139,7 @@ class Upload(IntEnum):
     WAITING = 3
 
 
+OF_Z = 1 << 31  # in the detail of a refusal: it is about the image of z
 PERMITS = 1  # bits of Status.flags
 MOVED = 2
 NO_SLOT = 255  # the program of the firmware, or no trial
@@ -220,12 +222,43 @@ class AxisLimits(_Struct):
 
 
 @dataclass(frozen=True, slots=True)
+class ZInfo:
+    """The properties of the second sequencer of a device (48 bytes), whose x is z and whose y rests.
+
+    They stand in the answer to HELLO behind ``table_pixels``, and are named as those of ``DeviceInfo``.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<I2B2x4s4s16s16s")
+
+    image_bytes: int
+    slow_knots: int
+    slow_index_bits: int
+    x: AxisShape
+    y: AxisShape
+    x_limits: AxisLimits
+    y_limits: AxisLimits
+
+    def pack(self) -> bytes:
+        """Return the end of the answer to HELLO."""
+        parts = (self.x.pack(), self.y.pack(), self.x_limits.pack(), self.y_limits.pack())
+        return self.LAYOUT.pack(self.image_bytes, self.slow_knots, self.slow_index_bits, *parts)
+
+    @classmethod
+    def unpack_from(cls, payload: bytes, at: int) -> "ZInfo":
+        """Read the properties from the answer to HELLO, which has them at this byte."""
+        size, knots, bits, x, y, x_limits, y_limits = cls.LAYOUT.unpack_from(payload, at)
+        limits = AxisLimits.unpack(x_limits), AxisLimits.unpack(y_limits)
+        return cls(size, knots, bits, AxisShape.unpack(x), AxisShape.unpack(y), *limits)
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceInfo:
     """The properties of a device, fixed at its build; ``shaping`` is its highest order of shaped output.
 
     They are 56 bytes in front of the status in the answer to HELLO, and ``more`` behind it, where it is not 0; behind
     that ``slow_knots`` and ``slow_index_bits``, the most knots and the longest slow table, where it plays slow parts or
-    tables of pixels (0 without slow parts); behind those ``table_pixels``, the most pixels of such a table.
+    tables of pixels (0 without slow parts); behind those ``table_pixels``, the most pixels of such a table; and ``z``,
+    which a device without a second sequencer does not have.
     """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
@@ -250,6 +283,33 @@ class DeviceInfo:
     slow_knots: int = 0
     slow_index_bits: int = 0
     table_pixels: int = 0
+    z: ZInfo | None = None
+
+    @property
+    def of_z(self) -> "DeviceInfo":
+        """The properties of the second sequencer, as those of a device that has nothing else."""
+        if self.z is None:
+            raise ValueError("the device has no output z")
+        return replace(
+            self,
+            features=self.features & ~Feature.FOURIER,
+            harmonics=0,
+            image_bytes=self.z.image_bytes,
+            x=self.z.x,
+            y=self.z.y,
+            x_limits=self.z.x_limits,
+            y_limits=self.z.y_limits,
+            more=More.SLOW_PARTS if self.z.slow_knots else NO_MORE,
+            slow_knots=self.z.slow_knots,
+            slow_index_bits=self.z.slow_index_bits,
+            table_pixels=0,
+            z=None,
+        )
+
+    @property
+    def whole_image_bytes(self) -> int:
+        """The largest size of an upload, with the image of z."""
+        return self.image_bytes + (0 if self.z is None else self.z.image_bytes)
 
     def pack(self) -> bytes:
         """Return the beginning of the answer to HELLO."""
@@ -259,11 +319,12 @@ class DeviceInfo:
 
     def hello(self, status: "DeviceStatus") -> bytes:
         """Return the answer to HELLO; without further features it has the length that it had before them."""
-        answer = self.pack() + status.pack() + (self.MORE.pack(self.more) if self.more else b"")
-        pixels = More.PIXEL_TABLES in self.more
+        answer = self.pack() + status.pack_first() + (self.MORE.pack(self.more) if self.more else b"")
+        pixels = bool(self.more & (More.PIXEL_TABLES | More.Z))
         if pixels or More.SLOW_PARTS in self.more:
             answer += self.SLOW.pack(self.slow_knots, self.slow_index_bits)
-        return answer + (self.PIXELS.pack(self.table_pixels) if pixels else b"")
+        answer += self.PIXELS.pack(self.table_pixels) if pixels else b""
+        return answer + (b"" if self.z is None else self.z.pack())
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
@@ -288,6 +349,8 @@ class DeviceInfo:
         pixels_at = slow_at + cls.SLOW.size
         has_pixels = more & More.PIXEL_TABLES and len(payload) >= pixels_at + cls.PIXELS.size
         (pixels,) = cls.PIXELS.unpack_from(payload, pixels_at) if has_pixels else (0,)
+        z_at = pixels_at + cls.PIXELS.size
+        has_z = more & More.Z and len(payload) >= z_at + ZInfo.LAYOUT.size
         return cls(
             version,
             Feature(features),
@@ -306,12 +369,51 @@ class DeviceInfo:
             knots,
             slow_bits,
             pixels,
+            ZInfo.unpack_from(payload, z_at) if has_z else None,
         )
 
 
 @dataclass(frozen=True, slots=True)
+class ZStatus:
+    """The status of the second sequencer of a device (28 bytes), which STATUS has behind that of the first.
+
+    ``plays``: its program belongs to that of x and y; else z rests.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<3Bx2I16s")
+
+    state: DeviceState
+    faults: int
+    plays: bool
+    generation: int
+    line: int
+    fault_counts: tuple[int, int, int, int]  # slew, clamp, overrun, underrun
+
+    def pack(self) -> bytes:
+        """Return the end of the answer to STATUS."""
+        counts = struct.pack("<4I", *self.fault_counts)
+        return self.LAYOUT.pack(self.state, self.faults, self.plays, self.generation, self.line, counts)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> "ZStatus":
+        """Read the end of the answer to STATUS.
+
+        Raises
+        ------
+        ValueError
+            If it is too short, or of an unknown state.
+        """
+        if len(payload) < cls.LAYOUT.size:
+            raise ValueError(f"{len(payload)} bytes, too few for a status of z")
+        state, faults, plays, generation, line, counts = cls.LAYOUT.unpack_from(payload)
+        if state not in list(DeviceState):
+            raise ValueError(f"state of z is {state}; possible: 0 to {max(DeviceState)}")
+        return cls(DeviceState(state), faults, bool(plays), generation, line, struct.unpack("<4I", counts))
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceStatus:
-    """The status of a device (76 bytes)."""
+    """The status of a device (76 bytes), and ``z``, which only STATUS has of a device with a second sequencer."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B5I16sI32s")
 
@@ -327,6 +429,7 @@ class DeviceStatus:
     fault_counts: tuple[int, int, int, int]  # slew, clamp, overrun, underrun
     bad_frames: int
     hash: bytes
+    z: ZStatus | None = None
 
     @property
     def permits(self) -> bool:
@@ -340,6 +443,10 @@ class DeviceStatus:
 
     def pack(self) -> bytes:
         """Return the answer to STATUS."""
+        return self.pack_first() + (b"" if self.z is None else self.z.pack())
+
+    def pack_first(self) -> bytes:
+        """Return the status of x and y, which HELLO has too."""
         return self.LAYOUT.pack(
             self.state,
             self.upload,
@@ -388,8 +495,32 @@ class DeviceStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class ZImageInfo:
+    """The announcement of the image of z (12 bytes): its size, and the shapes of z and of the axis that rests."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<I4s4s")
+
+    image_bytes: int
+    x: AxisShape
+    y: AxisShape
+
+    def pack(self) -> bytes:
+        """Return the end of the payload of BEGIN."""
+        return self.LAYOUT.pack(self.image_bytes, self.x.pack(), self.y.pack())
+
+    @classmethod
+    def unpack_from(cls, payload: bytes, at: int) -> "ZImageInfo":
+        """Read the end of the payload of BEGIN, which begins at this byte."""
+        size, x, y = cls.LAYOUT.unpack_from(payload, at)
+        return cls(size, AxisShape.unpack(x), AxisShape.unpack(y))
+
+
+@dataclass(frozen=True, slots=True)
 class ImageInfo:
-    """The announcement of an image by BEGIN (48 bytes)."""
+    """The announcement of an image by BEGIN (48 bytes), and of the image of z behind it (12 bytes).
+
+    With ``z``, ``image_bytes`` and ``image_crc`` are those of both images together.
+    """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<32s2I4s4s")
 
@@ -398,10 +529,26 @@ class ImageInfo:
     image_crc: int
     x: AxisShape
     y: AxisShape
+    z: ZImageInfo | None = None
+
+    @property
+    def first(self) -> "ImageInfo":
+        """The announcement of the image of x and y; with z, its CRC is that of both."""
+        if self.z is None:
+            return self
+        return replace(self, image_bytes=(self.image_bytes - self.z.image_bytes) & 0xFFFFFFFF, z=None)
+
+    @property
+    def second(self) -> "ImageInfo | None":
+        """The announcement of the image of z, with the CRC of both; None without z."""
+        if self.z is None:
+            return None
+        return replace(self, image_bytes=self.z.image_bytes, x=self.z.x, y=self.z.y, z=None)
 
     def pack(self) -> bytes:
         """Return the payload of BEGIN."""
-        return self.LAYOUT.pack(self.hash, self.image_bytes, self.image_crc, self.x.pack(), self.y.pack())
+        first = self.LAYOUT.pack(self.hash, self.image_bytes, self.image_crc, self.x.pack(), self.y.pack())
+        return first + (b"" if self.z is None else self.z.pack())
 
     @classmethod
     def unpack(cls, payload: bytes) -> "ImageInfo":
@@ -416,6 +563,12 @@ class ImageInfo:
             raise ValueError(f"{len(payload)} bytes, too few for an image")
         digest, size, crc, x, y = cls.LAYOUT.unpack_from(payload)
         return cls(digest, size, crc, AxisShape.unpack(x), AxisShape.unpack(y))
+
+    @classmethod
+    def of_begin(cls, payload: bytes) -> "ImageInfo":
+        """Read the payload of BEGIN, whose length says whether it has the image of z."""
+        info, size = cls.unpack(payload), cls.LAYOUT.size
+        return replace(info, z=ZImageInfo.unpack_from(payload, size)) if len(payload) > size else info
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.messages import (
     HASH_BYTES,
+    OF_Z,
     SPLINE_DEGREE,
     AxisLimits,
     AxisShape,
@@ -36,6 +37,7 @@ from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, m
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table, and of a slow one
 _MIXED_INDEX_BITS = 8  # most index bits of a table of lines with a slow part
 _MIN_KNOTS = 2
+_SCHEDULE_BYTES = 4 * (SCAN_WORDS.index("pixels") + 1)  # program words that the images of x and y and of z share
 _MOVED_BYTES = 12  # words of an axis that MOVE replaces: the gain, and the low and the high part of the offset
 
 
@@ -45,6 +47,10 @@ class RequestRefused(Exception):
     def __init__(self, reason: Reason, detail: int = 0) -> None:
         super().__init__(reason, detail)
         self.reason, self.detail = reason, detail
+
+    def of_z(self) -> "RequestRefused":
+        """Return the refusal that says that this is about the image of z."""
+        return RequestRefused(self.reason, self.detail | OF_Z)
 
 
 @dataclass
@@ -105,11 +111,12 @@ def program_of(contents: Contents, update_rate_hz: int = 0) -> ScanProgram:
 class Bank:
     """The memory of a device: the upload in progress, the one that plays, and the active limits.
 
-    ``staged``: the image is kept, and not its tables.
+    ``staged``: the image is kept, and not its tables. ``second`` is the memory of a second sequencer, for the image of
+    z; an upload, with what was received of it, is here alone.
     """
 
-    def __init__(self, info: DeviceInfo, player: Player, staged: bool) -> None:
-        self._info, self._player, self._staged = info, player, staged
+    def __init__(self, info: DeviceInfo, player: Player, staged: bool, second: "Bank | None" = None) -> None:
+        self._info, self._player, self._staged, self.second = info, player, staged, second
         self.power_up()
 
     def power_up(self) -> None:
@@ -128,10 +135,16 @@ class Bank:
         RequestRefused
             If an upload is being checked, or the image does not fit the device.
         """
-        info = ImageInfo.unpack(payload)
+        info = ImageInfo.of_begin(payload)
         incoming = self.incoming
         self.check_idle()
-        self._check_announcement(info)
+        self._check_announcement(info.first)
+        if info.second is not None and self.second is not None:
+            try:
+                self.second._check_announcement(info.second)
+            except RequestRefused as refused:
+                self.incoming = None
+                raise refused.of_z() from None
         if incoming is None or incoming.announcement != payload:
             self._stage_is_whole = False
             incoming = self.incoming = IncomingUpload(info, payload, bytearray())
@@ -166,13 +179,24 @@ class Bank:
         before = len(incoming.data)
         if offset == before and before + len(payload) - 4 <= incoming.info.image_bytes:
             incoming.data += payload[4:]
-            if before < PROGRAM_BYTES <= len(incoming.data):
-                try:
-                    self._check_words(incoming.info, incoming.data)
-                except RequestRefused:
-                    self.incoming = None
-                    raise
+            try:
+                self._check_pages(incoming, before)
+            except RequestRefused:
+                self.incoming = None
+                raise
         return struct.pack("<I", len(incoming.data))
+
+    def _check_pages(self, incoming: IncomingUpload, before: int) -> None:
+        """Check the program words of both images as soon as they are complete; ``before`` were received before."""
+        info, data = incoming.info, incoming.data
+        if before < PROGRAM_BYTES <= len(data):
+            self._check_words(info.first, data)
+        at = info.first.image_bytes
+        if info.second is not None and self.second is not None and before < at + PROGRAM_BYTES <= len(data):
+            try:
+                self.second._check_words(info.second, data[at:])
+            except RequestRefused as refused:
+                raise refused.of_z() from None
 
     def _check_words(self, info: ImageInfo, data: bytes | bytearray) -> None:
         """Check the program words of an upload: shapes, harmonics, and the length of its image."""
@@ -235,8 +259,10 @@ class Bank:
             raise RequestRefused(Reason.INCOMPLETE, len(incoming.data))
         return incoming
 
-    def accept(self, incoming: IncomingUpload, authentic: Callable[[bytes], None]) -> ScanProgram:
-        """Check an upload, and return its program.
+    def accept(
+        self, incoming: IncomingUpload, authentic: Callable[[bytes], None]
+    ) -> tuple[ScanProgram, ScanProgram | None]:
+        """Check an upload, and return its program, and that of z where it has one.
 
         Parameters
         ----------
@@ -253,7 +279,21 @@ class Bank:
             if zlib.crc32(image) != incoming.info.image_crc:
                 raise RequestRefused(Reason.IMAGE)
             authentic(image)
-        contents = take_apart(image, incoming.info.x, incoming.info.y, self._info.more)
+        whole = ProgramImage(incoming.info, image)
+        first, second = whole.first, whole.second
+        program = self._judge(first)
+        if second is None or self.second is None:
+            return program, None
+        if first.data[:_SCHEDULE_BYTES] != second.data[:_SCHEDULE_BYTES]:
+            raise RequestRefused(Reason.SCHEDULE, OF_Z)
+        try:
+            return program, self.second._judge(second)
+        except RequestRefused as refused:
+            raise refused.of_z() from None
+
+    def _judge(self, image: ProgramImage) -> ScanProgram:
+        """Check the content of an image, and return its program."""
+        contents = take_apart(image.data, image.info.x, image.info.y, self._info.more)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
         if objection := first_objection(contents, *self.limits, playing, self._info.shaping):
@@ -338,7 +378,8 @@ class Bank:
 
     def check_idle(self) -> None:
         """Raise ``RequestRefused`` while a program is checked or waits."""
-        if self._is_at_work() or not self._player.writable:
+        second_waits = self.second is not None and not self.second._player.writable
+        if self._is_at_work() or not self._player.writable or second_waits:
             raise RequestRefused(Reason.BUSY)
 
     def replace(self, image: ProgramImage) -> IncomingUpload:
@@ -392,5 +433,7 @@ class Bank:
 
     def _of_tables(self, active: ActiveUpload) -> bytes:
         """Return the image of the tables that play."""
-        program = program_of(take_apart(active.image, active.info.x, active.info.y, self._info.more))
-        return make_image(program, active.info.hash.hex()).data
+        whole = ProgramImage(active.info, active.image)
+        first, second = whole.first, whole.second
+        program = program_of(take_apart(first.data, first.info.x, first.info.y, self._info.more))
+        return make_image(program, active.info.hash.hex()).data + (b"" if second is None else second.data)

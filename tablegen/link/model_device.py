@@ -31,6 +31,8 @@ from tablegen.link.messages import (
     Refusal,
     Request,
     Upload,
+    ZImageInfo,
+    ZStatus,
 )
 from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused
 from tablegen.link.model_store import ModelStore
@@ -102,6 +104,8 @@ class ModelDevice:
     ``compiled`` are images of the programs that come with the firmware, by their names; over the link they are played
     with ``More.PLAY``.
     ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
+    ``z_player`` is the second sequencer, whose x is z, of a device that has one; ``plays_z`` says that the program with
+    which it starts has z.
     """
 
     def __init__(
@@ -121,6 +125,8 @@ class ModelDevice:
         flash: tuple[Flash, Layout] | None = None,
         stores_while_playing: bool = False,
         compiled: Mapping[str, ProgramImage] | None = None,
+        z_player: Player | None = None,
+        plays_z: bool = False,
     ) -> None:
         if bool(key) != (Feature.KEY in info.features):
             raise ValueError("a key and the feature go together")
@@ -130,13 +136,16 @@ class ModelDevice:
             raise ValueError("a device that takes MOVE keeps tables and has modes of a COMMIT")
         if More.PLAY in info.more and (staged or (not compiled and flash is None)):
             raise ValueError("a device that takes PLAY keeps tables and has programs")
+        _check_z(info, z_player, staged)
         self.info, self.player, self.boot = info, player, boot
+        self.z_player, self._starts_z = z_player, plays_z
         self.permits = True
         if key and len(identity) not in IDENTITY_BYTES:
             raise ValueError(f"an identity of {len(identity)} bytes; a key needs one of 4 to 32")
         self._key, self._identity, self._boot_hash = key, identity, boot_hash
         self._milliseconds = milliseconds
-        self._bank = Bank(info, player, staged)
+        second = None if z_player is None else Bank(info.of_z, z_player, staged)
+        self._bank = Bank(info, player, staged, second)
         self._nonces = nonces or self._counted_nonce
         self._checking, self._most_frames = checking, most_frames
         self._requests: dict[int, Callable[[Frame], bytes | None]] = {
@@ -147,10 +156,10 @@ class ModelDevice:
             Request.ABORT: self._abort,
             Request.STATUS: lambda frame: self.status().pack(),
             Request.READBACK: self._readback,
-            Request.PARK: lambda frame: self._passed_on(self.player.park()),
-            Request.ARM: lambda frame: self._passed_on(self.player.arm(*struct.unpack_from("<I", frame.payload))),
-            Request.TRIGGER: lambda frame: self._passed_on(self.player.trigger()),
-            Request.CLEAR: lambda frame: self._passed_on(self.player.clear()),
+            Request.PARK: lambda frame: self._pass_on(lambda player: player.park()),
+            Request.ARM: self._arm,
+            Request.TRIGGER: lambda frame: self._pass_on(lambda player: player.trigger(), self.plays_z),
+            Request.CLEAR: lambda frame: self._pass_on(lambda player: player.clear()),
             Request.CHALLENGE: self._challenge,
             Request.LIMITS: lambda frame: self._bank.limit(frame.payload),
         }
@@ -189,6 +198,7 @@ class ModelDevice:
         self._aborts: list[_PendingRequest] = []
         self._challenges = 0
         self._before: _LastRequest | None = None  # the request before a COMMIT that is being checked
+        self.plays_z = self._played_z = self._starts_z  # the program that plays or is committed; the one before
 
     def reboot(self) -> None:
         """Start again, with nothing but what is in the firmware, and the next boot count."""
@@ -196,6 +206,8 @@ class ModelDevice:
         self._bank.power_up()
         self._power_up()
         self.player.restart(self._kept_program())
+        if self.z_player is not None:
+            self.z_player.restart()
 
     def _kept_program(self) -> ScanProgram | None:
         """Return the kept program that a start begins with; None for that of the firmware."""
@@ -258,13 +270,21 @@ class ModelDevice:
         commit, incoming = self._pending, self._bank.at_work()
         if commit is not None and incoming is not None and incoming.state is Upload.CHECKING:
             first = min(ticks, commit.ticks)
-            self.player.advance(first)
+            self._advance(first)
             commit.ticks -= first
             ticks -= first
             if commit.ticks == 0:
                 self._check(commit, incoming)
-        self.player.advance(ticks)
+        self._advance(ticks)
         self._settle()
+
+    def _advance(self, ticks: int) -> None:
+        for player in self._players():
+            player.advance(ticks)
+
+    def _players(self, with_z: bool = True) -> list[Player]:
+        """Return the sequencers: that of x and y, then that of z where there is one."""
+        return [self.player] if self.z_player is None or not with_z else [self.player, self.z_player]
 
     def status(self) -> DeviceStatus:
         """Return the answer to STATUS."""
@@ -285,7 +305,11 @@ class ModelDevice:
             fault_counts=player.fault_counts,
             bad_frames=self._reader.bad_frames,
             hash=bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else known,
+            z=None if self.z_player is None else self._status_of_z(self.z_player),
         )
+
+    def _status_of_z(self, player: Player) -> ZStatus:
+        return ZStatus(player.state, player.faults, self.plays_z, player.swaps, player.line, player.fault_counts)
 
     # Checks that every request passes
 
@@ -359,6 +383,8 @@ class ModelDevice:
         sizes = {plain, plain + TAG_BYTES} if self._key and kind in _TAGGED else {plain}
         if kind == Request.COMMIT and Feature.COMMIT_MODES in self.info.features:
             return sizes | {size + 1 for size in sizes}
+        if kind == Request.BEGIN and self.info.z is not None:
+            return sizes | {plain + ZImageInfo.LAYOUT.size}
         if kind == Request.LIMITS:
             return sizes | {0} if Feature.NARROWS in self.info.features else {0}
         return sizes
@@ -452,17 +478,13 @@ class ModelDevice:
         is_upload = request is not None and request.type == Request.COMMIT
         try:
             tagged = request if is_upload else None
-            program = self._bank.accept(incoming, lambda image: self._check_tag(tagged, commit.nonce, image))
+            programs = self._bank.accept(incoming, lambda image: self._check_tag(tagged, commit.nonce, image))
             if not self.permits:
                 raise RequestRefused(Reason.INTERLOCK)
-            mode = _mode_of(request)
-            if mode is CommitMode.KEEP and not self._can_keep(program):
-                raise RequestRefused(Reason.KEEP)
-            if not self.player.commit(program, mode):
-                raise RequestRefused(Reason.TICKS)
+            self._hand_over(*programs, _mode_of(request))
         except RequestRefused as refused:
             self._pending = None
-            stays = refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP)
+            stays = refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS, Reason.KEEP, Reason.PLAYING)
             if incoming is self._bank.move:
                 self._bank.move = None
             elif stays and is_upload:
@@ -477,9 +499,34 @@ class ModelDevice:
         incoming.state = Upload.WAITING
         commit.swaps = self.player.swaps
 
-    def _can_keep(self, program: ScanProgram) -> bool:
+    def _hand_over(self, program: ScanProgram, of_z: ScanProgram | None, mode: CommitMode) -> None:
+        """Commit the programs of both sequencers, or none.
+
+        Raises
+        ------
+        RequestRefused
+            If z would begin or end to play in a scan, a frame cannot go on, or a queue has no room.
+        """
+        begins_or_ends = (of_z is not None) != self.plays_z
+        if begins_or_ends and any(player.state is DeviceState.PLAYING or player.starts for player in self._players()):
+            raise RequestRefused(Reason.PLAYING)
+        commits = [(self.player, program)]
+        if of_z is not None and self.z_player is not None:
+            commits.append((self.z_player, of_z))
+        if mode is CommitMode.KEEP and not all(self._can_keep(*each) for each in commits):
+            raise RequestRefused(Reason.KEEP)
+        if not all(player.has_room(1 + begins_or_ends) for player in self._players()):
+            raise RequestRefused(Reason.TICKS)
+        if begins_or_ends:  # an ARM that only one of them had is forgotten
+            for player in self._players():
+                player.park()
+        for player, each in commits:
+            player.commit(each, mode)
+        self._played_z, self.plays_z = self.plays_z, of_z is not None
+
+    def _can_keep(self, player: Player, program: ScanProgram) -> bool:
         """Return False if a scan plays whose frame this program cannot continue."""
-        playing = self.player.playing
+        playing = player.playing
         return self.player.state != DeviceState.PLAYING or playing is None or can_keep(playing, program)
 
     def _settle(self) -> None:
@@ -488,9 +535,11 @@ class ModelDevice:
         if commit is None or incoming is None or incoming.state is not Upload.WAITING:
             return
         if player.swaps != commit.swaps:
+            self._played_z = self.plays_z
             self._bank.take(incoming)
             self._answer(commit.request, struct.pack("<II", player.swaps, player.swapped_at), commit.memory)
         elif player.writable:
+            self.plays_z = self._played_z
             self._bank.incoming = self._bank.move = None
             self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         else:
@@ -504,8 +553,7 @@ class ModelDevice:
         commit, incoming = self._pending, self._bank.at_work()
         assert self._last is not None
         if incoming is not None and incoming.state is Upload.WAITING:
-            if not self.player.withdraw():
-                raise RequestRefused(Reason.TICKS)
+            self._withdraw(commit)
             self._aborts.append(_PendingRequest(frame, self._last))
             return None
         self._pending = self._bank.incoming = self._bank.move = None
@@ -517,9 +565,27 @@ class ModelDevice:
         offset, count = struct.unpack("<IB", frame.payload)
         return struct.pack("<I", offset) + self._bank.readback(offset, count)
 
-    def _passed_on(self, accepted: bool) -> bytes:
-        if not accepted:
+    def _withdraw(self, commit: _PendingRequest | None) -> None:
+        """Withdraw the programs that wait; where z would have begun or ended, a trigger behind the commit too."""
+        parks = self.plays_z != self._played_z
+        if not all(player.has_room(1 + parks) for player in self._players()):
             raise RequestRefused(Reason.TICKS)
+        for player in self._players():
+            player.withdraw()
+            if parks and commit is not None and self.player.swaps == commit.swaps:
+                player.park()
+
+    def _arm(self, frame: Frame) -> bytes:
+        (frames,) = struct.unpack_from("<I", frame.payload)
+        return self._pass_on(lambda player: player.arm(frames))
+
+    def _pass_on(self, request: Callable[[Player], bool], with_z: bool = True) -> bytes:
+        """Give a request to the sequencers, between the same two ticks."""
+        players = self._players(with_z)
+        if not all(player.has_room(1) for player in players):
+            raise RequestRefused(Reason.TICKS)
+        for player in players:
+            request(player)
         return b""
 
     def _challenge(self, frame: Frame) -> bytes:
@@ -532,6 +598,14 @@ class ModelDevice:
         self._challenges += 1
         count = bytes([len(self._identity)]) + self._identity + struct.pack("<II", self.boot, self._challenges)
         return hashlib.blake2s(count, key=self._key, digest_size=NONCE_BYTES).digest()
+
+
+def _check_z(info: DeviceInfo, player: Player | None, staged: bool) -> None:
+    """Raise ``ValueError`` if a device cannot have the output z, or not as it says."""
+    if len({info.z is None, player is None, More.Z not in info.more}) != 1:
+        raise ValueError("the output z, its feature and its player go together")
+    if info.z is not None and (staged or Feature.STORE in info.features or info.more & (More.MOVE | More.PLAY)):
+        raise ValueError("a device with z keeps tables, takes no moves, and has no programs by number or in slots")
 
 
 def _plain_bytes(frame: Frame) -> int:

@@ -53,6 +53,9 @@ class Player(Protocol):
     def starts(self) -> bool:
         """True if a trigger waits for the next tick, and no park behind it; ``state`` knows nothing of it yet."""
 
+    def has_room(self, requests: int) -> bool:
+        """Return True if so many requests may follow before the next tick."""
+
     def commit(self, program: ScanProgram, mode: CommitMode = CommitMode.LINE) -> bool:
         """Commit a program, to be swapped in as its mode says, or on the next tick where no scan plays."""
 
@@ -134,8 +137,12 @@ class _Queue:
     def _park(self) -> None:
         raise NotImplementedError
 
+    def has_room(self, requests: int) -> bool:
+        """Return True if so many requests may follow before the next tick."""
+        return len(self._requests) + requests <= MAX_REQUESTS
+
     def _ask(self, act: Callable[[], None]) -> bool:
-        if len(self._requests) == MAX_REQUESTS:
+        if not self.has_room(1):
             return False
         self._requests.append(act)
         return True

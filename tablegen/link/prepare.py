@@ -20,11 +20,12 @@ from tablegen.link.program_image import (
     PROGRAM_BYTES,
     ProgramImage,
     fast_of,
+    join,
     make_image,
     shape_of,
     take_apart,
 )
-from tablegen.link.refusal_reasons import Limits, explain, lacks_mode
+from tablegen.link.refusal_reasons import Limits, about_z, explain, lacks_mode, lacks_z
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.read import NotABuild, read_build
 from tablegen.manifest.record import plan_record
@@ -36,7 +37,6 @@ from tablegen.planning.turned_plan import TurnedPlan
 
 Form = Literal["auto", "table", "fourier"]
 TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # bits of AxisShape.converter
-_Z = "the link sends no output z; build the C into the firmware, or leave [z] out of the scan"
 _RATE_TOLERANCE_HZ = 1.0  # a device states its rate to the nearest integer
 
 
@@ -45,7 +45,7 @@ class PreparedScan:
     """A scan that can be uploaded: a program, the hash of its plan, and the Fourier words of both axes.
 
     These are int64 of shape (2 H + 1,), in the order of devices; None of a scan at an angle, whose tables they do not
-    make.
+    make. ``program_of_z`` is that of the second sequencer, whose x is z; None without z.
     """
 
     name: str
@@ -53,33 +53,19 @@ class PreparedScan:
     program: ScanProgram
     x_fourier: Ints | None
     y_fourier: Ints | None
+    program_of_z: ScanProgram | None = None
 
     @classmethod
     def of_plan(cls, plan: Plan) -> "PreparedScan":
-        """Prepare the scan of a plan.
-
-        Raises
-        ------
-        Unsuitable
-            As ``of_turned``.
-        """
-        if plan.z is not None:
-            raise Unsuitable([f"{plan.name}: {_Z}"])
+        """Prepare the scan of a plan."""
         digest = content_hash(plan_record(plan))
-        return cls(plan.name, digest, plan.program, plan.x.fourier.in_order, plan.y.fourier.in_order)
+        words = plan.x.fourier.in_order, plan.y.fourier.in_order
+        return cls(plan.name, digest, plan.program, *words, plan.program_of_z)
 
     @classmethod
     def of_turned(cls, plan: TurnedPlan) -> "PreparedScan":
-        """Prepare the scan of a plan at an angle.
-
-        Raises
-        ------
-        Unsuitable
-            If it has the output z, which a device on a link does not play.
-        """
-        if plan.z is not None:
-            raise Unsuitable([f"{plan.name}: {_Z}"])
-        return cls(plan.name, content_hash(turned_record(plan)), plan.program, None, None)
+        """Prepare the scan of a plan at an angle."""
+        return cls(plan.name, content_hash(turned_record(plan)), plan.program, None, None, plan.program_of_z)
 
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
@@ -88,18 +74,17 @@ class PreparedScan:
         Raises
         ------
         NotABuild
-            If the folder holds none, its manifest was changed, or its scan has the output z.
+            If the folder holds none, or its manifest was changed.
         """
         stored = read_turned(folder) if is_turned(folder) else read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
             raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")
-        if stored.z is not None:
-            raise NotABuild(f"{folder}: {_Z}")
         if isinstance(stored, StoredTurned):
-            return cls(manifest.name, manifest.hash, stored.program, None, None)
+            return cls(manifest.name, manifest.hash, stored.program, None, None, stored.z)
         axes = stored.manifest.axes
-        return cls(manifest.name, manifest.hash, stored.program, axes.x.fourier_words, axes.y.fourier_words)
+        words = axes.x.fourier_words, axes.y.fourier_words
+        return cls(manifest.name, manifest.hash, stored.program, *words, stored.program_of_z)
 
     @property
     def axes(self) -> tuple[tuple[str, AxisProgram, Ints | None], tuple[str, AxisProgram, Ints | None]]:
@@ -129,14 +114,19 @@ class PreparedScan:
             for _, axis, words in self.axes
         ]
         try:
-            return make_image(self.program, self.digest, fourier[0], fourier[1])
+            return self._with_z(make_image(self.program, self.digest, fourier[0], fourier[1]))
         except ValueError as error:
             raise Unsuitable([str(error)]) from None
 
     def like(self, image: bytes) -> ProgramImage:
         """Make the image that a device which plays this scan should hold, each axis in the form that this one has."""
         x, y = harmonics_of(image)
-        return make_image(self.program, self.digest, self.x_fourier if x else None, self.y_fourier if y else None)
+        first = make_image(self.program, self.digest, self.x_fourier if x else None, self.y_fourier if y else None)
+        return self._with_z(first)
+
+    def _with_z(self, image: ProgramImage) -> ProgramImage:
+        """Add the image of z, if there is one."""
+        return image if self.program_of_z is None else join(image, make_image(self.program_of_z, self.digest))
 
 
 def harmonics_of(image: bytes) -> tuple[int, int]:
@@ -189,17 +179,37 @@ def check(
     Unsuitable
         If it would not, with every objection.
     """
-    objections = [*_device(image, info, scan), *_slow_parts(scan, info), *_pixel_table(scan, info)]
+    second = image.second
+    objections = [*_of_sequencer(scan, image.first, info, limits)]
     objections += [] if any_rate else _rate(scan, info)
     if why := lacks_mode(info, swap):
         objections.append(why)
+    if second is not None and scan.program_of_z is not None:
+        beside = PreparedScan(scan.name, scan.digest, scan.program_of_z, None, None)
+        objections += _of_z(beside, second, info)
+    if objections:
+        raise Unsuitable(objections)
+
+
+def _of_z(scan: PreparedScan, image: ProgramImage, info: DeviceInfo) -> list[str]:
+    """Return why the second sequencer of a device does not play the program of z."""
+    if why := lacks_z(info):
+        return [why]
+    info = info.of_z
+    if More.SLOW_PARTS not in info.more:
+        return ["z has a slow part, for which the device has no memory: set slow_knots in the configuration of its z"]
+    return [about_z(why) for why in _of_sequencer(scan, image, info, (info.x_limits, info.y_limits))]
+
+
+def _of_sequencer(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits) -> list[str]:
+    """Return why a sequencer of a device does not play a program."""
+    objections = [*_device(image, info, scan), *_slow_parts(scan, info), *_pixel_table(scan, info)]
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
         objections += [f"{name}: {why}" for why in _axis(axis, shape, theirs)]
     contents = take_apart(image.data, image.info.x, image.info.y)
     if objection := first_objection(contents, *limits, None, info.shaping):
         objections.append(explain(*objection, info, contents, limits))
-    if objections:
-        raise Unsuitable(objections)
+    return objections
 
 
 def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[str]:

@@ -2,7 +2,7 @@
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import OFF, Shaping
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.link.messages import CUBIC, FURTHER_PARTS, AxisShape, ImageInfo, More
+from tablegen.link.messages import CUBIC, FURTHER_PARTS, AxisShape, ImageInfo, More, ZImageInfo
 from tablegen.numerics.arrays import Ints
 
 PROGRAM_WORDS = 3 * PAGE_WORDS
@@ -49,6 +49,18 @@ class ProgramImage:
 
     info: ImageInfo
     data: bytes
+
+    @property
+    def first(self) -> "ProgramImage":
+        """The image of x and y."""
+        info = self.info.first
+        return ProgramImage(info, self.data[: info.image_bytes])
+
+    @property
+    def second(self) -> "ProgramImage | None":
+        """The image of z; None without z."""
+        info = self.info.second
+        return None if info is None else ProgramImage(info, self.data[self.info.first.image_bytes :])
 
 
 class ImagePart(NamedTuple):
@@ -98,6 +110,19 @@ def make_image(
     shapes = shape_of(program.x), shape_of(program.y)
     info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), *shapes)
     return ProgramImage(info, data)
+
+
+def join(first: ProgramImage, second: ProgramImage) -> ProgramImage:
+    """Return the image of an upload of x and y, and z.
+
+    Parameters
+    ----------
+    second
+        Image of the program of the second sequencer, whose x is z.
+    """
+    data, info = first.data + second.data, second.info
+    of_z = ZImageInfo(len(second.data), info.x, info.y)
+    return ProgramImage(replace(first.info, image_bytes=len(data), image_crc=zlib.crc32(data), z=of_z), data)
 
 
 def fast_of(axis: AxisProgram) -> Program:

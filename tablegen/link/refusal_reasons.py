@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.link.errors import Refused
-from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Feature, More, Reason, Request
+from tablegen.link.messages import OF_Z, VERSION, AxisLimits, DeviceInfo, Feature, More, Reason, Request
 
 if TYPE_CHECKING:
     from tablegen.link.program_image import Contents
@@ -48,6 +48,12 @@ _MESSAGES = {
 }
 
 
+_Z_BEGINS = (
+    "one of the old scan and the new one has the output z, which begins and ends to play only where no scan plays; "
+    "`tablegen park --wait` first, then the same upload, which is short, and `tablegen trigger`"
+)
+
+
 def refused(
     request: int,
     reason: int,
@@ -60,6 +66,8 @@ def refused(
     names = [known.name for known in Request if known == request]
     request_name = names[0] if names else f"request {request}"
     sentence = explain(reason, detail, info, contents, limits)
+    if (request, reason) == (Request.COMMIT, Reason.PLAYING):
+        sentence = _Z_BEGINS
     name = Reason(reason).name.lower() if reason in list(Reason) else str(reason)
     return Refused(request, reason, detail, f"the device refused {request_name} ({name}): {sentence}")
 
@@ -91,6 +99,24 @@ def lacks_play(info: DeviceInfo) -> str | None:
     )
 
 
+def lacks_z(info: DeviceInfo) -> str | None:
+    """Return why a device does not play the output z; None if it does."""
+    if info.z is not None:
+        return None
+    return (
+        "the scan has the output z, and the device has none: build its firmware with DAC_LINK_Z=1 and a second "
+        "sequencer for z, or leave [z] out of the scan (FPGAs have none over their link)"
+    )
+
+
+def about_z(why: str) -> str:
+    """Return what is said of the axes x and y as what it means of the second sequencer, whose x is z."""
+    for name, of_z in (("x: ", "z: "), ("y: ", "the axis beside z: ")):
+        if why.startswith(name):
+            return of_z + why.removeprefix(name)
+    return f"z: {why}"
+
+
 def keyless(request: Request) -> Refused:
     """Return the error where a device has a key and the host has none; nothing was sent."""
     why = f"the device has a key, and refuses {request.name} without it; give the key of this device (--key-file FILE)"
@@ -107,7 +133,14 @@ def explain(
     """Explain what a refusal means, and what to do.
 
     ``info``, the active ``limits`` of x and y, and the ``contents`` of what was uploaded are used where they are given.
+    A refusal of z (``OF_Z``) has its own limits, and no contents.
     """
+    if detail & OF_Z:
+        of_z = None if info is None or info.z is None else info.of_z
+        of_build = None if of_z is None else (of_z.x_limits, of_z.y_limits)
+        if reason == Reason.SCHEDULE:
+            return "z: its lines, windows and pixels are not those of x and y, or out of range; build it again"
+        return about_z(explain(reason, detail & ~OF_Z, of_z, None, of_build))
     if reason not in list(Reason):
         return f"reason {reason}, detail {detail}: this version of tablegen does not know it; update it"
     known = Reason(reason)

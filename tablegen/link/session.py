@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
 
 from tablegen.link.claims import check_device, check_length, check_status, check_unchanged, has_restarted
@@ -16,6 +17,7 @@ from tablegen.link.messages import (
     Feature,
     Reason,
     Request,
+    ZStatus,
 )
 from tablegen.link.outcome import restart_count
 from tablegen.link.pace import back_off
@@ -92,6 +94,10 @@ class LinkSession:
         check_length(source, payload, DeviceStatus.LAYOUT.size)
         try:
             status = DeviceStatus.unpack(payload)
+            if source == "STATUS" and self.info.z is not None:
+                size = DeviceStatus.LAYOUT.size
+                check_length(source, payload, size + ZStatus.LAYOUT.size)
+                status = replace(status, z=ZStatus.unpack(payload[size:]))
         except ValueError as error:
             raise NotUnderstood(f"{source}: {error}") from None
         check_status(status, self.info, source)

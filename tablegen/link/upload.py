@@ -403,9 +403,9 @@ class Uploader:
     def _error(self, answer: Answer) -> Refused:
         from tablegen.link.program_image import take_apart
 
-        info, contents = self._image.info, None
+        first, contents = self._image.first, None
         with suppress(ValueError):  # a damaged image is refused without its contents
-            contents = take_apart(self._image.data, info.x, info.y)
+            contents = take_apart(first.data, first.info.x, first.info.y)
         return refused(answer.kind, answer.reason, answer.detail, self._session.info, contents, self._limits)
 
     def _out_of_time(self, now: float) -> OutOfTime:

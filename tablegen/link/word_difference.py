@@ -1,12 +1,12 @@
 """Differences between the words of a device and those of a scan, by their names."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
 from tablegen.link.prepare import PreparedScan
-from tablegen.link.program_image import PROGRAM_BYTES, ImagePart, parts_of, pixel_part
+from tablegen.link.program_image import PROGRAM_BYTES, ImagePart, ProgramImage, parts_of, pixel_part
 
 _SIGNED = {"gain", "offset_high"}
 
@@ -31,9 +31,19 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
 
     Each axis is compared in the form in which the device holds it, words or Fourier words.
     """
-    image_expected = scan.like(image)
+    expected = scan.like(image)
+    first, second = expected.first, expected.second
+    if second is None:
+        return _differences(first, image)
+    size = len(first.data)
+    differing = _differences(first, image[:size])
+    of_z = _differences(second, image[size:])
+    return differing + [replace(each, word=f"z, {each.word}", address=size + each.address) for each in of_z]
+
+
+def _differences(expected: ProgramImage, image: bytes) -> list[Difference]:
     differing = []
-    ours, theirs = _words(image_expected.data), _words(image)
+    ours, theirs = _words(expected.data), _words(image)
     for index, word in enumerate(ours):
         there = theirs[index] if index < len(theirs) else None
         if there != word:
@@ -44,7 +54,7 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
                 )
             )
     at = PROGRAM_BYTES
-    data, info = image_expected.data, image_expected.info
+    data, info = expected.data, expected.info
     parts: list[tuple[str, ImagePart]] = [("x", part) for part in parts_of(ours, 1, info.x)]
     parts += [("y", part) for part in parts_of(ours, 2, info.y)]
     for page, part in [*parts, ("scan", pixel_part(ours))]:

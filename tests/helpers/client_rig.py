@@ -21,7 +21,7 @@ from replacing import replace
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.device import Device
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, AxisShape, DeviceInfo, Feature, More, Request
+from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, AxisShape, DeviceInfo, Feature, More, Request, ZInfo
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import LinePlayer
 from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, PreparedScan
@@ -75,6 +75,16 @@ def info_for(scan: PreparedScan, **changes: object) -> DeviceInfo:
     if isinstance(scan.program.x, FrameProgram):
         info = replace(info, more=More.SLOW_PARTS, slow_knots=17, slow_index_bits=6, degree=SPLINE_DEGREE)
     return replace(info, **changes)  # type: ignore[arg-type]
+
+
+def z_info_for(scan: PreparedScan, **changes: object) -> DeviceInfo:
+    """A device that was built for a scan with the output z; ``changes`` are of its second sequencer."""
+    assert scan.program_of_z is not None
+    of_z = info_for(PreparedScan(scan.name, scan.digest, scan.program_of_z, None, None))
+    names = ("image_bytes", "slow_knots", "slow_index_bits", "x", "y", "x_limits", "y_limits")
+    z = replace(ZInfo(*(getattr(of_z, name) for name in names)), **changes)
+    info = info_for(scan)
+    return replace(info, more=info.more | More.Z, degree=SPLINE_DEGREE, z=z)
 
 
 class Watched(VirtualLine):

@@ -58,6 +58,20 @@ static void furnish(dac_link_axis *axis, const dac_converter *converter, const u
 #endif
 }
 
+#if DAC_LINK_Z
+/* The ticks of this device come from this thread: it only looks that they are stopped in pairs. */
+static bool stopped_now;
+static uint32_t stops;
+
+static void stop_ticks(bool stopped)
+{
+    if (stopped == stopped_now)
+        abort();
+    stopped_now = stopped;
+    stops += stopped;
+}
+#endif
+
 device *device_new(const device_setup *setup, uint32_t boot)
 {
     device *const d = place(1, sizeof *d);
@@ -89,6 +103,9 @@ device *device_new(const device_setup *setup, uint32_t boot)
     c->identity_bytes = setup->identity_bytes;
     c->boot_persists = setup->boot_persists;
     c->milliseconds = milliseconds;
+#if DAC_LINK_Z
+    c->stop_ticks = stop_ticks;
+#endif
     d->permits = true;
     device_start(d, boot);
     return d;
@@ -113,8 +130,113 @@ static void free_slow(const dac_link_axis *axis)
 }
 #endif
 
+#if DAC_LINK_Z
+/* From now on the device has a second sequencer, and starts again. */
+dac_link_started device_add_z(device *d, const device_setup *setup, bool plays)
+{
+    dac_link_config *const c = &d->z_config;
+
+    furnish(&c->x, &setup->x_converter, setup->x_limits, setup->x_word_bits, setup->x_index_bits, 0);
+    furnish(&c->y, &setup->y_converter, setup->y_limits, setup->y_word_bits, setup->y_index_bits, 0);
+#if DAC_SLOW_PART
+    c->slow_knots = SLOW_KNOTS;
+    c->slow_index_bits = SLOW_INDEX_BITS;
+#endif
+    d->z_boot_program = setup->boot_program;
+    d->has_z = true;
+    d->plays_z = plays;
+    device_start(d, d->boot);
+    return d->started;
+}
+
+static void start_z(device *d)
+{
+    memset(&d->z_log, 0, sizeof d->z_log);
+    d->apart = 0;
+    if (!dac_sequencer_init(&d->z_sequencer, &d->z_config.x.converter, &d->z_config.y.converter))
+        abort();
+    d->started = dac_link_init_z(&d->link, &d->z_link, &d->z_config, &d->z_sequencer, d->plays_z);
+    if (d->z_boot_program != NULL
+        && (dac_sequencer_load(&d->z_sequencer, d->z_boot_program) != DAC_LOADED
+            || !dac_sequencer_commit(&d->z_sequencer)))
+        abort();
+}
+
+/* A request of the application: 0 park, 1 arm, 2 trigger. */
+bool device_request(device *d, unsigned request, uint32_t frames)
+{
+    return request == 0 ? dac_link_park(&d->link)
+         : request == 1 ? dac_link_arm(&d->link, frames) : dac_link_trigger(&d->link);
+}
+
+uint32_t device_stops(void)
+{
+    return stops;
+}
+
+uint32_t device_apart(const device *d)
+{
+    return d->apart;
+}
+
+size_t device_z_records(device *d, line_record *records)
+{
+    const size_t count = d->z_records;
+    if (records != NULL && count != 0) {
+        memcpy(records, d->z_record, count * sizeof *records);
+        d->z_records = 0;
+    }
+    return count;
+}
+
+/* Why a link gets no z that has one fault in its configuration; 0 is none. */
+dac_link_started device_z_refusal(device *d, unsigned fault)
+{
+    static dac_link first, second;
+    static dac_sequencer sequencer;
+    dac_link_config c = d->config, z = d->z_config;
+    dac_link *with = &second;
+    dac_sequencer *of_z = &sequencer;
+
+    switch (fault) {
+    case 1: z.x.word_bits = 7; break;
+    case 2: z.key_bytes = 16; z.key = d->setup.key; z.identity = d->setup.identity; z.identity_bytes = 4;
+            z.boot_persists = true; z.milliseconds = milliseconds; break;
+    case 3: z.harmonics = 1; z.sine = d->setup.sine; z.sine_index_bits = 16; break;
+    case 4: z.permits = permits; break;
+    case 5: c.stop_ticks = NULL; break;
+    case 6: of_z = &d->sequencer; break;
+    case 7: c.x.word_bits = 7; break;
+#if DAC_PIXEL_TABLE
+    case 8: z.table_pixels = 1; z.pixel_ticks[0] = c.pixel_ticks[0]; z.pixel_ticks[1] = c.pixel_ticks[1]; break;
+#endif
+    default: break;
+    }
+    (void)dac_link_init(&first, &c, &d->sequencer, 0);
+    return dac_link_init_z(&first, with, &z, of_z, false);
+}
+
+static void free_z(device *d)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        free(d->z_config.x.table[i]);
+        free(d->z_config.y.table[i]);
+    }
+#if DAC_SLOW_PART
+    free_slow(&d->z_config.x);
+    free_slow(&d->z_config.y);
+#endif
+    free(d->z_config.x.fourier);
+    free(d->z_config.y.fourier);
+    free(d->z_record);
+}
+#endif
+
 void device_delete(device *d)
 {
+#if DAC_LINK_Z
+    free_z(d);
+#endif
     for (unsigned i = 0; i < 2; i++) {
         free(d->config.x.table[i]);
         free(d->config.y.table[i]);
@@ -144,6 +266,10 @@ void device_start(device *d, uint32_t boot)
     d->config.store = d->flash.slots != 0 && dac_store_open(&d->store, &d->flash) == DAC_STORE_DONE ? &d->store : NULL;
 #endif
     d->started = dac_link_init(&d->link, &d->config, &d->sequencer, boot);
+#if DAC_LINK_Z
+    if (d->has_z && d->started == DAC_LINK_STARTED)
+        start_z(d);
+#endif
 #if DAC_STORE
     if (dac_link_load_kept(&d->link))
         return;
@@ -248,6 +374,38 @@ unsigned device_run(device *d, unsigned most)
     return times;
 }
 
+static void keep(line_record **records, size_t *count, size_t *room, const line_record *ended)
+{
+    if (*count == *room) {
+        *room = 2 * *room + 64;
+        *records = realloc(*records, *room * sizeof **records);
+        if (*records == NULL)
+            abort();
+    }
+    (*records)[(*count)++] = *ended;
+}
+
+#if DAC_LINK_Z
+/* The tick of z that belongs to one of x and y. */
+static void tick_z(device *d, uint8_t markers)
+{
+    const uint8_t common = DAC_PLAYING | DAC_LINE | DAC_FRAME | DAC_BACKWARD;
+    const uint8_t faults = dac_sequencer_status(&d->z_sequencer).faults;
+    dac_tick tick;
+    line_record ended;
+
+    if (stopped_now)
+        abort();
+    dac_sequencer_step(&d->z_sequencer, &tick);
+    if (line_tick(&d->z_log, tick.x, tick.y, tick.markers, faults, &ended))
+        keep(&d->z_record, &d->z_records, &d->z_room, &ended);
+    if (d->link.plays_z && ((tick.markers ^ markers) & common) != 0)
+        d->apart++;
+    if (!d->link.plays_z && (tick.markers & DAC_PLAYING) != 0)
+        d->apart++;
+}
+#endif
+
 /* So many samples, after each of them the main loop at most `work` times. */
 void device_tick(device *d, uint32_t ticks, unsigned work)
 {
@@ -256,15 +414,12 @@ void device_tick(device *d, uint32_t ticks, unsigned work)
         line_record ended;
         const uint8_t faults = dac_sequencer_status(&d->sequencer).faults;
         dac_sequencer_step(&d->sequencer, &tick);
-        if (line_tick(&d->log, tick.x, tick.y, tick.markers, faults, &ended)) {
-            if (d->records == d->room) {
-                d->room = 2 * d->room + 64;
-                d->record = realloc(d->record, d->room * sizeof *d->record);
-                if (d->record == NULL)
-                    abort();
-            }
-            d->record[d->records++] = ended;
-        }
+        if (line_tick(&d->log, tick.x, tick.y, tick.markers, faults, &ended))
+            keep(&d->record, &d->records, &d->room, &ended);
+#if DAC_LINK_Z
+        if (d->has_z)
+            tick_z(d, tick.markers);
+#endif
         device_run(d, work);
     }
 }
@@ -273,6 +428,10 @@ void device_tick(device *d, uint32_t ticks, unsigned work)
 void device_answer(device *d)
 {
     dac_sequencer_answer(&d->sequencer);
+#if DAC_LINK_Z
+    if (d->has_z)
+        dac_sequencer_answer(&d->z_sequencer);
+#endif
 }
 
 size_t device_take(device *d, uint8_t *bytes)

@@ -36,6 +36,17 @@ typedef struct {
     dac_sequencer sequencer;
     dac_link link;
     line_log log;
+#if DAC_LINK_Z
+    bool has_z, plays_z; /* a second sequencer; the program of the firmware has z */
+    dac_link_config z_config;
+    dac_sequencer z_sequencer;
+    dac_link z_link;
+    const dac_program *z_boot_program; /* or NULL */
+    line_log z_log;
+    uint32_t apart; /* ticks on which the markers of a scan differ though z plays */
+    size_t z_records, z_room;
+    line_record *z_record;
+#endif
 #if DAC_STORE
     dac_store store;
     dac_store_flash flash; /* of no slot: none */
@@ -52,6 +63,14 @@ typedef struct {
 } device;
 
 device *device_new(const device_setup *setup, uint32_t boot);
+#if DAC_LINK_Z
+dac_link_started device_add_z(device *d, const device_setup *setup, bool plays);
+size_t device_z_records(device *d, line_record *records);
+uint32_t device_apart(const device *d);
+uint32_t device_stops(void);
+bool device_request(device *d, unsigned request, uint32_t frames);
+dac_link_started device_z_refusal(device *d, unsigned fault);
+#endif
 #if DAC_SLOW_PART
 void device_refuse_slow(device *d);
 #endif

@@ -80,6 +80,7 @@ class Started(IntEnum):
     NO_CLOCK = 6
     BAD_SLOW = 7
     BAD_PIXEL_TABLE = 8
+    BAD_Z = 9
 
 
 class _Record(Structure):
@@ -152,6 +153,10 @@ class DeviceLibrary(Library):
         self.dll.device_new.restype = c_void_p
         for name in ("device_feed", "device_take", "device_records", "device_sizes"):
             getattr(self.dll, name).restype = c_size_t
+        if hasattr(self.dll, "device_add_z"):
+            self.dll.device_z_records.restype = c_size_t
+            self.dll.device_apart.restype = self.dll.device_stops.restype = c_uint32
+            self.dll.device_request.restype = c_bool
         self.dll.device_run.restype = self.dll.device_lost.restype = c_uint32
         self.dll.device_table.restype = c_int32
         if hasattr(self.dll, "device_play"):
@@ -179,12 +184,13 @@ def device_library(
     slow: bool = False,
     pixels: bool = False,
     plays: bool = False,
+    z: bool = False,
 ) -> DeviceLibrary:
     """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
 
     ``shaping`` is its highest order; with ``modes`` a COMMIT has a mode, with ``store`` programs may be kept and played
     by number, with ``slow`` they may have slow parts, with ``pixels`` a table of pixels; one that ``moves`` takes MOVE,
-    one that ``plays`` LIST and PLAY.
+    one that ``plays`` LIST and PLAY. It may have a second sequencer with ``z``.
     """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -196,6 +202,7 @@ def device_library(
     more += [f"-DDAC_LIBRARY={1 + plays}"] if store or plays else []
     more += ["-DDAC_SLOW_PART=1"] if slow else []
     more += ["-DDAC_PIXEL_TABLE=1"] if pixels else []
+    more += ["-DDAC_LINK_Z=1"] if z else []
     sources = [*c_runtime(), *c_link(), *(c_store() if store else [])]
     return DeviceLibrary(compile_device(folder / "device.so", bits, sources=sources, more=more))
 
@@ -213,7 +220,7 @@ class HostDevice:
     ``slow`` parts, tables of ``pixels``, and LIST and PLAY where it ``plays``. Nonces are those of ``derived_nonce``,
     changed by what ``random`` gives, or ``nonces``; ``started`` is why the link was not.
     ``permits`` is the input of the interlock, if it has one. It keeps programs in ``flash``, with a layout; its library
-    has the programs ``compiled``.
+    has the programs ``compiled``. A second sequencer, whose x is z, is like ``z``, and boots into ``z_boot``.
     """
 
     def __init__(
@@ -245,11 +252,17 @@ class HostDevice:
         flash: tuple[CutFlash, Layout] | None = None,
         stores_while_playing: bool = False,
         compiled: Sequence[CompiledProgram] = (),
+        z: ScanProgram | None = None,
+        z_boot: ScanProgram | None = None,
+        z_limits: tuple[AxisLimits, AxisLimits] | None = None,
     ) -> None:
         x, y = fast_of(like.x), fast_of(like.y)
-        bits = 16 if max(x.bits, y.bits, x.output.word_bits, y.output.word_bits) <= 16 else 32
-        spline, store = "cubic" in (x.mode, y.mode), flash is not None
-        self.library = library or device_library(bits, shaping, spline, modes, store, moves, slow, pixels, plays)
+        tables = [x, y] if z is None else [x, y, fast_of(z.x), fast_of(z.y)]
+        bits = 16 if max(max(table.bits, table.output.word_bits) for table in tables) <= 16 else 32
+        spline, store = "cubic" in (table.mode for table in tables), flash is not None
+        self.library = library or device_library(
+            bits, shaping, spline, modes, store, moves, slow, pixels, plays, z is not None
+        )
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True
@@ -302,9 +315,55 @@ class HostDevice:
             self._flash = c_flash(*flash)
             self._dll.device_keep(self._device, ctypes.byref(self._flash), c_bool(stores_while_playing))
         self.started = Started(self._dll.device_started(self._device))
+        if z is not None:
+            self.started = self._add_z(z, z_boot, z_limits)
         self._compiled = [(*each, self.library.program(each.program)) for each in compiled]
         for name, digest, _, (program, _) in self._compiled:
             self._dll.device_compile(self._device, c_char_p(name), c_char_p(digest), ctypes.byref(program))
+
+    def _add_z(
+        self, like: ScanProgram, boot: ScanProgram | None, limits: tuple[AxisLimits, AxisLimits] | None
+    ) -> Started:
+        """Give it a second sequencer with the converters of ``like``."""
+        x, y = fast_of(like.x), fast_of(like.y)
+        x_limits, y_limits = limits or (widest(like.x.output), widest(like.y.output))
+        setup = _Setup(
+            x_converter=converter_of(like.x.output, 0),
+            y_converter=converter_of(like.y.output, 0),
+            x_limits=_four(x_limits),
+            y_limits=_four(y_limits),
+            x_word_bits=x.bits,
+            x_index_bits=x.index_bits,
+            y_word_bits=y.bits,
+            y_index_bits=y.index_bits,
+        )
+        if boot is not None:
+            self._z_boot_program, self._z_axes = self.library.program(boot)
+            setup.boot_program = ctypes.addressof(self._z_boot_program)
+        return Started(self._dll.device_add_z(self._device, ctypes.byref(setup), c_bool(boot is not None)))
+
+    def z_lines(self) -> list[Line]:
+        """The lines of the second sequencer that ended since the last call."""
+        return self._records(self._dll.device_z_records)
+
+    @property
+    def apart(self) -> int:
+        """Ticks since the start on which the markers of z were not those of x and y, or z did not rest."""
+        return int(self._dll.device_apart(self._device))
+
+    @property
+    def stops(self) -> int:
+        """How often the link has stopped the ticks of a device of this library."""
+        return int(self._dll.device_stops())
+
+    def request(self, name: str, frames: int = 0) -> bool:
+        """The application parks, arms or triggers both sequencers."""
+        number = ("park", "arm", "trigger").index(name)
+        return bool(self._dll.device_request(self._device, c_uint32(number), c_uint32(frames)))
+
+    def z_refusal(self, fault: int) -> Started:
+        """Why a link gets no z whose configuration has a fault; 0 is none."""
+        return Started(self._dll.device_z_refusal(self._device, c_uint32(fault)))
 
     def __del__(self) -> None:
         if hasattr(self, "_device"):
@@ -391,9 +450,12 @@ class HostDevice:
 
     def lines(self) -> list[Line]:
         """The lines that ended since the last call."""
-        count = int(self._dll.device_records(self._device, None))
+        return self._records(self._dll.device_records)
+
+    def _records(self, take: Any) -> list[Line]:
+        count = int(take(self._device, None))
         records = (_Record * max(count, 1))()
-        self._dll.device_records(self._device, records)
+        take(self._device, records)
         return [Line(*(getattr(record, name) for name in Line._fields)) for record in records[:count]]
 
     def refusal(self, fault: int) -> Started:

@@ -11,6 +11,7 @@ from replacing import replace
 
 from tablegen.device.dual_program import AxisProgram, DualProgram, ScanProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, SLOW_WORDS
+from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.link.messages import AxisLimits
 from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image, parts_of
@@ -67,6 +68,15 @@ def random_slow_program(rng: Generator, shape: SequencerShape, order: int = 0) -
     if order:
         program = shaped_scan(rng, program, order)
     if rng.random() < 0.3:
+        return program
+    return replace(program, x=_fitted(rng, program.x), y=_fitted(rng, program.y))
+
+
+def random_z_program(rng: Generator, shape: SequencerShape, schedule: Schedule) -> ScanProgram:
+    """A program for a second sequencer, of this schedule; mostly of two slow parts, as that of z is."""
+    slow, kind = str(rng.choice(["xy", "xy", "xy", "x", "y"])), str(rng.choice(["smooth", "smooth", "smooth", "wild"]))
+    program = common_knots(rng, scan_program(rng, shape, replace(schedule, pixel_table=None), slow, kind))
+    if rng.random() < 0.2:
         return program
     return replace(program, x=_fitted(rng, program.x), y=_fitted(rng, program.y))
 

@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 from cut_flash import MODES, CutFlash
 from link_device import SLOW_INDEX_BITS, SLOW_KNOTS, TABLE_PIXELS, CompiledProgram, HostDevice, Started, widest
-from link_images import damaged, damaged_slow, digest, random_image, random_limits, random_slow_program, resealed
+from link_images import (
+    damaged,
+    damaged_slow,
+    digest,
+    random_image,
+    random_limits,
+    random_slow_program,
+    random_z_program,
+    resealed,
+)
 from link_talk import IDENTITY, Talk
 from pixel_tables import PIXELS, damaged_table, long_windows, table_image
 from programs import random_dual, with_table
@@ -20,6 +29,7 @@ from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, PIXEL_TABLE_WORD
 from tablegen.link.acceptance import first_objection
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
+    OF_Z,
     SPLINE_DEGREE,
     VERSION,
     AxisShape,
@@ -31,10 +41,11 @@ from tablegen.link.messages import (
     Reason,
     Refusal,
     Request,
+    ZInfo,
 )
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
-from tablegen.link.program_image import ProgramImage, fast_of, make_image, take_apart
+from tablegen.link.program_image import ProgramImage, fast_of, join, make_image, take_apart
 from tablegen.link.store import Layout
 from tablegen.verification.play.sequencer_shape import SequencerShape
 
@@ -45,6 +56,7 @@ SLOTS, COMPILED = 3, 2
 LONG_NAME = "program_1" + 200 * "_"  # longer than an answer to LIST has room for
 KEEPING = (Request.SLOT, Request.SAVE, Request.SELECT, Request.CONFIRM, Request.DELETE)
 CERTAIN_MODES = tuple(mode for mode in MODES if mode != "unstable")  # whatever is read, and how often
+CHECKED_OF_Z = frozenset(Reason) - {Reason.LENGTH, Reason.INCOMPLETE}  # whose detail is no number of bytes
 TAGGED = (Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS)
 
 
@@ -66,14 +78,18 @@ class Dialogue:
         slow: bool = False,
         pixels: bool = False,
         plays: bool = False,
+        z: bool = False,
         **how: Any,
     ) -> None:
-        self.slow, self.pixels = slow, pixels
+        self.slow, self.pixels, self.z = slow, pixels, z
         self.rng = np.random.default_rng(seed)
         self.shape, self.key, self.order = shape, key, order
         boot = self._some_boot(slow) if self.rng.random() < 0.9 else None
         like = boot or random_dual(self.rng, shape, kind="smooth")
         limits = (widest(like.x.output), widest(like.y.output))
+        z_boot = self._some_z(boot) if z and boot is not None and self.rng.random() < 0.6 else None
+        if z:
+            how |= {"z": z_boot or like, "z_boot": z_boot}
         if self.rng.random() < 0.2:
             limits = random_limits(self.rng, like)
         index = tuple(max(bits, 3) for bits in (shape.x_index_bits, shape.y_index_bits))
@@ -132,6 +148,10 @@ class Dialogue:
                 for size, each in zip(sizes, shapes, strict=True)
             ]
         most = 192 + sum(max(size, 4 * (2 * HARMONICS + 1)) for size in sizes) + 4 * TABLE_PIXELS * pixels
+        z_info = None
+        if z:
+            knots = (SLOW_KNOTS, SLOW_INDEX_BITS) if slow else (0, 0)
+            z_info = ZInfo(192 + sum(sizes), *knots, shapes[0], shapes[1], *(widest(like.x.output),) * 2)
         ring = self.device.library.ring // 256
         degree = SPLINE_DEGREE if "cubic" in (x.mode, y.mode) else 0
         info = DeviceInfo(
@@ -149,9 +169,11 @@ class Dialogue:
             (More.MOVE if self._moves else More(0))
             | (More.SLOW_PARTS if slow else More(0))
             | (More.PIXEL_TABLES if pixels else More(0))
-            | (More.PLAY if plays else More(0)),
+            | (More.PLAY if plays else More(0))
+            | (More.Z if z else More(0)),
             *((SLOW_KNOTS, SLOW_INDEX_BITS) if slow else (0, 0)),
             TABLE_PIXELS if pixels else 0,
+            z_info,
         )
         self._clock = 0
         self.device.set_clock(0)
@@ -163,6 +185,8 @@ class Dialogue:
             boot_hash=BOOT_HASH,
             identity=IDENTITY,
             milliseconds=lambda: self._clock,
+            z_player=SequencerPlayer(z_boot) if z else None,
+            plays_z=z_boot is not None,
             **kept,
         )
         self.talk = Talk(int(self.rng.integers(1, 1 << 32)), key)
@@ -195,7 +219,38 @@ class Dialogue:
                 return image, program
         return random_image(self.rng, self.shape, 0, "smooth", self.order)
 
+    def _some_z(self, beside: ScanProgram) -> ScanProgram:
+        """A program of z that a device can load, with the schedule of that of x and y."""
+        while True:
+            program = random_z_program(self.rng, self.shape, beside.schedule)
+            image = make_image(program, "00" * 32)
+            limits = widest(program.x.output), widest(program.y.output)
+            if first_objection(take_apart(image.data, image.info.x, image.info.y), *limits, None) is None:
+                return program
+
     def _some_image(self) -> ProgramImage:
+        if not self.z or self.rng.random() < 0.25:
+            return self._some_first_image()
+        rng = self.rng
+        program = random_slow_program(rng, self.shape)
+        first, fourier = make_image(program, digest(rng)), rng.random()
+        if fourier < 0.3:
+            first, program = random_image(rng, self.shape, HARMONICS, "smooth", self.order)
+        elif fourier < 0.4:
+            first = damaged_slow(rng, first)
+        second = make_image(random_z_program(rng, self.shape, program.schedule), digest(rng))
+        if rng.random() < 0.1:
+            second = make_image(random_slow_program(rng, self.shape), digest(rng))  # another schedule
+        if rng.random() < 0.1:  # form
+            data = bytearray(second.data)
+            at = 4 * (PAGE_WORDS * int(rng.integers(1, 3)) + int(rng.choice([10, 12])))
+            data[at + int(rng.integers(0, 3))] ^= 1 << int(rng.integers(0, 8))
+            second = resealed(second, bytes(data))
+        elif rng.random() < 0.4:
+            second = damaged_slow(rng, second)
+        return join(first, second)
+
+    def _some_first_image(self) -> ProgramImage:
         if self.slow and self.rng.random() < 0.7:
             return self._some_slow_image()
         if self.pixels and self.rng.random() < 0.7:
@@ -269,6 +324,8 @@ class Dialogue:
             if frame.type == 0xFF:
                 refusal = Refusal.unpack(frame.payload)
                 self.seen[refusal.type, refusal.reason] += 1
+                if refusal.detail & OF_Z and refusal.reason in CHECKED_OF_Z:
+                    self.seen[refusal.type, refusal.reason, "z"] += 1
             else:
                 self.seen[frame.type & 0x7F] += 1
                 if frame.type & 0x7F in (Request.BEGIN, Request.DATA):
@@ -297,6 +354,8 @@ class Dialogue:
             doings += [(15, self._move), (2, self._whole)]
         if self.pixels:
             doings += [(8, self._another)]
+        if self.z:
+            doings += [(10, self._begin_z), (6, self._whole), (3, self._another)]
         if self.device.notes is not None:  # a replay has no cuts
             doings = [doing for doing in doings if doing[1] != self._cut]
         weights = np.array([weight for weight, _ in doings])
@@ -387,6 +446,22 @@ class Dialogue:
         self._send(self._tagged(Request.MOVE, bytes(payload)))
         if self.rng.random() < 0.3:
             self._send(self.talk.request(Request.READBACK, struct.pack("<IB", 64, 240)))
+
+    def _begin_z(self) -> None:
+        """An upload with z or without, in place of what plays; mostly where no scan plays."""
+        self._send(self.talk.acting(Request.ABORT))
+        if self.rng.random() < 0.7:
+            self._send(self._tagged(Request.PARK))
+            self._tick(int(self.rng.choice([0, 1, 60])))
+        self._image = self._some_image()
+        self._whole()
+        self._tick(int(self.rng.choice([0, 1, 60])))
+        if self.rng.random() < 0.8:
+            self._send(self._tagged(Request.ARM, struct.pack("<I", int(self.rng.choice([0, 1])))))
+            self._send(self._tagged(Request.TRIGGER))
+        if self.rng.random() < 0.2:
+            self._send(self.talk.acting(Request.ABORT))
+        self._tick(int(self.rng.choice([0, 1, 60])))
 
     def _ticks(self) -> None:
         self._tick(int(self.rng.choice([0, 1, 2, 20, 60])))

@@ -17,11 +17,12 @@ OPTIONS = (
     ("-DDAC_SPLINE=1", "-DDAC_STORE=1", "-DDAC_LIBRARY=2"),
     ("-DDAC_COMMIT_MODES=1", "-DDAC_LIBRARY=1"),
     ("-DDAC_MOVE=1",),
+    ("-DDAC_LINK_Z=1", "-DDAC_COMMIT_MODES=1"),
     ("-DDAC_SLOW_PART=1", "-DDAC_SPLINE=1"),
     ("-DDAC_SLOW_PART=1", "-DDAC_LONG_MULTIPLY=0"),
     ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SMALL=1", "-DDAC_TABLE_STORAGE_BITS=32"),
 )
-# All macros in three runs, which report every rule; each run takes ten seconds.
+# All macros in four runs, which report every rule; each run takes ten seconds.
 FEW = (
     (),
     (
@@ -32,6 +33,7 @@ FEW = (
         "-DDAC_LONG_MULTIPLY=0", "-DDAC_SMALL=1", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_COMMIT_MODES=1",
         "-DDAC_LIBRARY=1",
     ),
+    ("-DDAC_LINK_Z=1", "-DDAC_COMMIT_MODES=1", "-DDAC_SLOW_PART=1", "-DDAC_PIXEL_TABLE=1"),
 )  # fmt: skip
 
 

@@ -35,6 +35,8 @@ CHOICES = {
     "moves": ["-DDAC_MOVE=1", "-DDAC_COMMIT_MODES=1"],
     "slow_part": ["-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1"],
     "pixel_table": ["-DDAC_PIXEL_TABLE=1"],
+    "z": ["-DDAC_LINK_Z=1", "-DDAC_COMMIT_MODES=1", "-DDAC_SLOW_PART=1"],
+    "z_alone": ["-DDAC_LINK_Z=1", "-DDAC_PIXEL_TABLE=1"],
     "slow_part_wide": [
         "-DDAC_SLOW_PART=1",
         "-DDAC_SPLINE=1",
@@ -68,7 +70,7 @@ COMPILERS = {
 }
 QUICK = ("default", "small")
 # Each alternative of each #if is in one of these; the others are combinations of them.
-ANALYSED = (*QUICK, "wide", "spline_shaped_no_long_multiplication", "commit_modes", "slow_part")
+ANALYSED = (*QUICK, "wide", "spline_shaped_no_long_multiplication", "commit_modes", "slow_part", "z")
 # An analyser reports what it finds in a file that is wrong in this way.
 FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
 ANALYSERS = {
@@ -142,6 +144,7 @@ def declared(*headers: str, options: Sequence[str] = ALL_FUNCTIONS) -> set[str]:
         ("DAC_STORE", "-DDAC_STORE=1"),
         ("DAC_MOVE", "-DDAC_MOVE=1"),
         ("DAC_LIBRARY", "-DDAC_LIBRARY=2"),
+        ("DAC_LINK_Z", "-DDAC_LINK_Z=1"),
     ):
         if given not in options:
             text = re.sub(rf"^#if {option}\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
@@ -174,6 +177,22 @@ def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
     # Of absolute value, for the linker to compare: they are in no memory.
     assert found.pop("A") == {"dac_objects_need_the_same_options", "dac_objects_need_the_same_link_ring"}
     assert set(found) <= {"t", "r"}, found
+
+
+@pytest.mark.rest
+def test_a_link_with_z_exports_what_its_headers_declare_for_it(tmp_path: Path) -> None:
+    """z goes without kept programs, moves and libraries, so this is the difference that its option makes."""
+    exported = []
+    for name, options in (("without", []), ("with", ["-DDAC_LINK_Z=1"])):
+        folder = tmp_path / name
+        folder.mkdir()
+        run_clean(["gcc", "-std=c99", "-ffreestanding", "-O2", *options, "-c", *SOURCES], folder)
+        lines = [run_clean(["nm", path]).splitlines() for path in sorted(folder.glob("*.o"))]
+        exported.append({line.split()[-1] for each in lines for line in each if " T " in line})
+    own = declared(*HEADERS, options=[*ALL_FUNCTIONS, "-DDAC_LINK_Z=1"]) - declared(*HEADERS)
+    assert exported[1] - exported[0] == own | {"dac_sequencer_starts"}
+    assert own >= {"dac_link_init_z", "dac_link_arm", "dac_link_trigger", "dac_link_park"}
+    assert not exported[0] - exported[1]
 
 
 def test_public_names_have_the_prefix_of_the_sequencer() -> None:

@@ -123,6 +123,10 @@ def _frames(count: int) -> str:
     return "1 frame" if count == 1 else f"{count} frames"
 
 
+def _has_faults(status: "DeviceStatus") -> bool:
+    return bool(status.faults or (status.z is not None and status.z.faults))
+
+
 @click.command(short_help="Clear the faults of a device.")
 @port_option()
 @baud_option
@@ -142,8 +146,8 @@ def clear(port: str, baud: int, key_file: Path | None) -> int:
     """
     with connected(port, baud, key_file) as device:
         device.clear()
-        status = _look(device, lambda status: not status.faults)
-    if status.faults:
+        status = _look(device, lambda status: not _has_faults(status))
+    if _has_faults(status):
         fail(["the device took the request, but has faults; see `tablegen status`"], ExitStatus.REFUSED)
     click.echo("faults cleared")
     return ExitStatus.OK

@@ -9,7 +9,7 @@ from tablegen.cli.device.connection import baud_option, connected, key_option, p
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
-    from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, DeviceStatus
+    from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, DeviceStatus, ZStatus
 
 _FAULTS = ("slew", "clamp", "overrun", "underrun")
 _FAULT_BITS = (1, 2, 4, 8)
@@ -67,6 +67,7 @@ def _record(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status:
                     ("y", info.y, info.y_limits, limits[1]),
                 )
             },
+            "z": None if info.z is None else _second(info.of_z),
         },
         "status": {
             "state": status.state.name.lower(),
@@ -82,7 +83,30 @@ def _record(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status:
             "bad_frames": status.bad_frames,
             "hash": status.hash.hex() if any(status.hash) else None,
             "moved": status.moved,
+            "z": None if status.z is None else _second_status(status.z),
         },
+    }
+
+
+def _second(of_z: "DeviceInfo") -> dict[str, Any]:
+    """Return what the second sequencer has, whose x is z; its limits are those of the build."""
+    axes = (("z", of_z.x, of_z.x_limits), ("rest", of_z.y, of_z.y_limits))
+    return {
+        "image_bytes": of_z.image_bytes,
+        "slow_knots": of_z.slow_knots,
+        "slow_index_bits": of_z.slow_index_bits,
+        "axes": {name: {**_fields(shape), "limits": _fields(limits)} for name, shape, limits in axes},
+    }
+
+
+def _second_status(status: "ZStatus") -> dict[str, Any]:
+    return {
+        "plays": status.plays,
+        "state": status.state.name.lower(),
+        "faults": [name for name, bit in zip(_FAULTS, _FAULT_BITS, strict=True) if status.faults & bit],
+        "fault_counts": dict(zip(_FAULTS, status.fault_counts, strict=True)),
+        "generation": status.generation,
+        "line": status.line,
     }
 
 
@@ -110,8 +134,7 @@ def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "
         Upload.CHECKING: "being checked",
         Upload.WAITING: "complete, waiting for the start of a line",
     }[status.upload]
-    counts = [f"{name} {count}" for name, count in zip(_FAULTS, status.fault_counts, strict=True) if count]
-    faults = f"{', '.join(counts)}; clear with `tablegen clear`" if counts or status.faults else "none"
+    faults = _fault_text(status)
     rows = [("state", state), ("scan", f"{scan}, generation {status.generation}"), ("upload", upload)]
     rows.append(("faults", faults))
     if Feature.INTERLOCK in info.features:
@@ -121,7 +144,10 @@ def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "
     takes += [f"Fourier words of {info.harmonics} harmonics"] if Feature.FOURIER in info.features else []
     key = ", has a key" if Feature.KEY in info.features else ""
     rows.append(("device", f"{rate}, accepts {' and '.join(takes)}, {info.image_bytes} bytes{key}"))
-    for name, shape, limit in (("x", info.x, limits[0]), ("y", info.y, limits[1])):
+    axes = [("x", info.x, limits[0]), ("y", info.y, limits[1])]
+    if info.z is not None:
+        axes.append(("z", info.z.x, info.z.x_limits))
+    for name, shape, limit in axes:
         rows.append(
             (
                 name,
@@ -129,5 +155,13 @@ def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "
                 f"{shape.dac_bits} bits, steps up to {limit.max_step}, jumps up to {limit.max_jump}",
             )
         )
+    if status.z is not None:
+        follows = "follows the scan" if status.z.plays else "is not in the scan, and rests at its park code"
+        rows.append(("output z", f"{follows}; faults: {_fault_text(status.z)}"))
     rows.append(("line", f"{status.bad_frames} bad frames since start {status.boot}"))
     return rows
+
+
+def _fault_text(status: "DeviceStatus | ZStatus") -> str:
+    counts = [f"{name} {count}" for name, count in zip(_FAULTS, status.fault_counts, strict=True) if count]
+    return f"{', '.join(counts)}; clear with `tablegen clear`" if counts or status.faults else "none"
