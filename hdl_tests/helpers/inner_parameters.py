@@ -74,7 +74,7 @@ RANGES: dict[str, dict[str, Range]] = {
     "dac_pair_ring": {"BITS": (1, 32)},
     "dac_pair_slew": {"BITS": (1, 32)},
     "dac_pair_table": {"WORD_BITS": WIDTH},
-    "dac_slow_divide": {"REST_BITS": (2, None), "QUOTIENT_BITS": (20, None)},
+    "dac_slow_divide": {"REST_BITS": (2, None), "QUOTIENT_BITS": (2, None)},
     "dac_slow_engine": {"SLOW_INDEX_BITS": (3, 14), "LINE_BITS": (1, 16)},
     "dac_slow_fit": {"SLOW_INDEX_BITS": (3, 14), "LINE_BITS": (1, 16)},
     "dac_slow_store": {"INDEX_BITS": (1, 14), "WORD_BITS": WIDTH, "SLOW_INDEX_BITS": (1, 14)},

@@ -10,7 +10,7 @@
 
 module dac_slow_divide #(
     parameter REST_BITS = 18,     // twice the greatest divisor fits
-    parameter QUOTIENT_BITS = 24  // 20 or more
+    parameter QUOTIENT_BITS = 24  // of words of 18 bits 20 or more
 ) (
     input  wire                     clock,
     input  wire                     enable,
@@ -33,8 +33,8 @@ module dac_slow_divide #(
         if (REST_BITS < 2) begin : guard_0
             dac_slow_divide_REST_BITS_is_less_than_2 stop ();
         end
-        if (QUOTIENT_BITS < 20) begin : guard_1
-            dac_slow_divide_QUOTIENT_BITS_is_less_than_20 stop ();
+        if (QUOTIENT_BITS < 2) begin : guard_1
+            dac_slow_divide_QUOTIENT_BITS_is_less_than_2 stop ();
         end
     endgenerate
 
