@@ -41,35 +41,6 @@ module dac_axis #(
     output wire                  reached,   // the code is at its target
     output wire                  clamped    // a limit has changed the target
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (INTERPOLATED != 0 && INTERPOLATED != 1 && INTERPOLATED != 3) begin : guard_0
-            dac_axis_INTERPOLATED_is_not_0_1_or_3 stop ();
-        end
-        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
-            dac_axis_INDEX_BITS_is_not_2_to_16 stop ();
-        end
-        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_2
-            dac_axis_WORD_BITS_is_not_8_to_24 stop ();
-        end
-        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_3
-            dac_axis_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
-        end
-        if (SHAPING < 0 || SHAPING > 3) begin : guard_4
-            dac_axis_SHAPING_is_not_0_to_3 stop ();
-        end
-        if (SPLINE < 0 || SPLINE > 1) begin : guard_5
-            dac_axis_SPLINE_is_not_0_to_1 stop ();
-        end
-        if (INTERPOLATED == 3 && SPLINE == 0) begin : guard_6
-            dac_axis_SPLINE_is_0_with_a_cubic_table stop ();
-        end
-        if (LATENCY != (SPLINE != 0 ? 43 : PLAIN_MULTIPLIER != 0 ? 10 : 15) + (PLAIN_MULTIPLIER != 0 ? 12 : 19) +
-            (SHAPING != 0 ? 1 : 0)) begin : guard_7
-            dac_axis_LATENCY_follows_from_PLAIN_MULTIPLIER_SHAPING_and_SPLINE stop ();
-        end
-    endgenerate
-
     localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
     localparam SAMPLE_AT = SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15;  // clocks from the tick to its sample
@@ -161,6 +132,35 @@ module dac_axis #(
         .step_inverse(step_inverse), .code(code), .reached(reached)
     );
     dac_delay #(.BITS(1), .CLOCKS(4)) with_code (.clock(clock), .in(target_clamped), .out(clamped));
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (INTERPOLATED != 0 && INTERPOLATED != 1 && INTERPOLATED != 3) begin : guard_0
+            dac_axis_INTERPOLATED_is_not_0_1_or_3 stop ();
+        end
+        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
+            dac_axis_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_2
+            dac_axis_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_3
+            dac_axis_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
+        end
+        if (SHAPING < 0 || SHAPING > 3) begin : guard_4
+            dac_axis_SHAPING_is_not_0_to_3 stop ();
+        end
+        if (SPLINE < 0 || SPLINE > 1) begin : guard_5
+            dac_axis_SPLINE_is_not_0_to_1 stop ();
+        end
+        if (INTERPOLATED == 3 && SPLINE == 0) begin : guard_6
+            dac_axis_SPLINE_is_0_with_a_cubic_table stop ();
+        end
+        if (LATENCY != (SPLINE != 0 ? 43 : PLAIN_MULTIPLIER != 0 ? 10 : 15) + (PLAIN_MULTIPLIER != 0 ? 12 : 19) +
+            (SHAPING != 0 ? 1 : 0)) begin : guard_7
+            dac_axis_LATENCY_follows_from_PLAIN_MULTIPLIER_SHAPING_and_SPLINE stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -37,37 +37,6 @@ module dac_axis_serial #(
     output reg                   reached,   // the code is at its target
     output reg                   clamped    // a limit has changed the target
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (INTERPOLATED != 0 && INTERPOLATED != 1 && INTERPOLATED != 3) begin : guard_0
-            dac_axis_serial_INTERPOLATED_is_not_0_1_or_3 stop ();
-        end
-        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
-            dac_axis_serial_INDEX_BITS_is_not_2_to_16 stop ();
-        end
-        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_2
-            dac_axis_serial_WORD_BITS_is_not_8_to_24 stop ();
-        end
-        if (INTERPOLATED == 3 && (INDEX_BITS < 3 || INDEX_BITS > 14)) begin : guard_3
-            dac_axis_serial_INDEX_BITS_of_a_cubic_table_is_not_3_to_14 stop ();
-        end
-        if (INTERPOLATED == 3 && WORD_BITS > 21) begin : guard_4
-            dac_axis_serial_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
-        end
-        if (DAC_BITS < 2 || DAC_BITS > 24) begin : guard_5
-            dac_axis_serial_DAC_BITS_is_not_2_to_24 stop ();
-        end
-        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_6
-            dac_axis_serial_PERIOD_BITS_is_not_1_to_31 stop ();
-        end
-        if (SHAPING < 0 || SHAPING > 3) begin : guard_7
-            dac_axis_serial_SHAPING_is_not_0_to_3 stop ();
-        end
-        if (POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_8
-            dac_axis_serial_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
-        end
-    endgenerate
-
     localparam [3:0] PHASE_STEP = 4'd0, PHASE_REMAINDER = 4'd1, PHASE_PERIOD = 4'd2, GAIN = 4'd3;
     localparam [3:0] OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5, CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8;
     localparam [3:0] PARK_CODE = 4'd9, SHAPING_WORD = 4'd11;
@@ -376,6 +345,37 @@ module dac_axis_serial #(
         end else begin : exact
             assign fraction = 15'd0;
             assign sample = {table_word, {GUARD_BITS{1'b0}}};
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (INTERPOLATED != 0 && INTERPOLATED != 1 && INTERPOLATED != 3) begin : guard_0
+            dac_axis_serial_INTERPOLATED_is_not_0_1_or_3 stop ();
+        end
+        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
+            dac_axis_serial_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_2
+            dac_axis_serial_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (INTERPOLATED == 3 && (INDEX_BITS < 3 || INDEX_BITS > 14)) begin : guard_3
+            dac_axis_serial_INDEX_BITS_of_a_cubic_table_is_not_3_to_14 stop ();
+        end
+        if (INTERPOLATED == 3 && WORD_BITS > 21) begin : guard_4
+            dac_axis_serial_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
+        end
+        if (DAC_BITS < 2 || DAC_BITS > 24) begin : guard_5
+            dac_axis_serial_DAC_BITS_is_not_2_to_24 stop ();
+        end
+        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_6
+            dac_axis_serial_PERIOD_BITS_is_not_1_to_31 stop ();
+        end
+        if (SHAPING < 0 || SHAPING > 3) begin : guard_7
+            dac_axis_serial_SHAPING_is_not_0_to_3 stop ();
+        end
+        if (POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_8
+            dac_axis_serial_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
         end
     endgenerate
 endmodule

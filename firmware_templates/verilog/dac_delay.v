@@ -10,16 +10,6 @@ module dac_delay #(
     input  wire [BITS-1:0] in,
     output wire [BITS-1:0] out
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            dac_delay_BITS_is_less_than_1 stop ();
-        end
-        if (CLOCKS < 0) begin : guard_1
-            dac_delay_CLOCKS_is_less_than_0 stop ();
-        end
-    endgenerate
-
     generate
         if (CLOCKS == 0) begin : none
             wire unused = clock;
@@ -33,6 +23,16 @@ module dac_delay #(
                 always @(posedge clock) line <= {line[BITS*(CLOCKS-1)-1:0], in};
             end
             assign out = line[BITS*CLOCKS-1 -: BITS];
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_delay_BITS_is_less_than_1 stop ();
+        end
+        if (CLOCKS < 0) begin : guard_1
+            dac_delay_CLOCKS_is_less_than_0 stop ();
         end
     endgenerate
 endmodule

@@ -16,16 +16,6 @@ module dac_direct_table #(
     input  wire [INDEX_BITS-1:0]       index,
     output reg  signed [WORD_BITS-1:0] word
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (WORD_BITS < 1) begin : guard_0
-            dac_direct_table_WORD_BITS_is_less_than_1 stop ();
-        end
-        if (INDEX_BITS < 1) begin : guard_1
-            dac_direct_table_INDEX_BITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     reg [WORD_BITS-1:0] memory [0:(2<<INDEX_BITS)-1];
     reg [INDEX_BITS:0] row;
 
@@ -36,6 +26,16 @@ module dac_direct_table #(
         row <= {read_bank, index};
         word <= memory[row];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (WORD_BITS < 1) begin : guard_0
+            dac_direct_table_WORD_BITS_is_less_than_1 stop ();
+        end
+        if (INDEX_BITS < 1) begin : guard_1
+            dac_direct_table_INDEX_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -30,38 +30,6 @@ module dac_fit #(
     input  wire        discard,
     output wire        fits         // with the write of this clock
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (DAC_BITS < 8 || DAC_BITS > 24) begin : guard_0
-            dac_fit_DAC_BITS_is_not_8_to_24 stop ();
-        end
-        if ((X_INTERPOLATED != 0 && X_INTERPOLATED != 1 && X_INTERPOLATED != 3) ||
-            (Y_INTERPOLATED != 0 && Y_INTERPOLATED != 1 && Y_INTERPOLATED != 3)) begin : guard_1
-            dac_fit_X_or_Y_INTERPOLATED_are_not_0_1_or_3 stop ();
-        end
-        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_2
-            dac_fit_X_or_Y_INDEX_BITS_are_not_2_to_16 stop ();
-        end
-        if (X_WORD_BITS < 8 || X_WORD_BITS > 24 || Y_WORD_BITS < 8 || Y_WORD_BITS > 24) begin : guard_3
-            dac_fit_X_or_Y_WORD_BITS_are_not_8_to_24 stop ();
-        end
-        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_4
-            dac_fit_TICK_BITS_is_not_3_to_30 stop ();
-        end
-        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_5
-            dac_fit_LINE_BITS_is_not_1_to_16 stop ();
-        end
-        if (X_PERIOD_BITS < 1 || X_PERIOD_BITS > 31 || Y_PERIOD_BITS < 1 || Y_PERIOD_BITS > 31) begin : guard_6
-            dac_fit_X_or_Y_PERIOD_BITS_are_not_1_to_31 stop ();
-        end
-        if (HARMONICS < 0 || HARMONICS > 512) begin : guard_7
-            dac_fit_HARMONICS_is_not_0_to_512 stop ();
-        end
-        if (SHAPING < 0 || SHAPING > 3) begin : guard_8
-            dac_fit_SHAPING_is_not_0_to_3 stop ();
-        end
-    endgenerate
-
     localparam [3:0] LINE_TICKS = 4'd0, FRAME_LINES = 4'd1, SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, TICKS_END = 4'd8;
     localparam [3:0] LINES_END = 4'd12, PIXELS = 4'd12, Y_STEPS = 4'd13;
     localparam [3:0] REMAINDER = 4'd1, PERIOD = 4'd2, GAIN = 4'd3, OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5;
@@ -148,6 +116,38 @@ module dac_fit #(
     end
 
     assign fits = !spoilt && !spoils && (!empty || begins);
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (DAC_BITS < 8 || DAC_BITS > 24) begin : guard_0
+            dac_fit_DAC_BITS_is_not_8_to_24 stop ();
+        end
+        if ((X_INTERPOLATED != 0 && X_INTERPOLATED != 1 && X_INTERPOLATED != 3) ||
+            (Y_INTERPOLATED != 0 && Y_INTERPOLATED != 1 && Y_INTERPOLATED != 3)) begin : guard_1
+            dac_fit_X_or_Y_INTERPOLATED_are_not_0_1_or_3 stop ();
+        end
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_2
+            dac_fit_X_or_Y_INDEX_BITS_are_not_2_to_16 stop ();
+        end
+        if (X_WORD_BITS < 8 || X_WORD_BITS > 24 || Y_WORD_BITS < 8 || Y_WORD_BITS > 24) begin : guard_3
+            dac_fit_X_or_Y_WORD_BITS_are_not_8_to_24 stop ();
+        end
+        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_4
+            dac_fit_TICK_BITS_is_not_3_to_30 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_5
+            dac_fit_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (X_PERIOD_BITS < 1 || X_PERIOD_BITS > 31 || Y_PERIOD_BITS < 1 || Y_PERIOD_BITS > 31) begin : guard_6
+            dac_fit_X_or_Y_PERIOD_BITS_are_not_1_to_31 stop ();
+        end
+        if (HARMONICS < 0 || HARMONICS > 512) begin : guard_7
+            dac_fit_HARMONICS_is_not_0_to_512 stop ();
+        end
+        if (SHAPING < 0 || SHAPING > 3) begin : guard_8
+            dac_fit_SHAPING_is_not_0_to_3 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -106,9 +106,6 @@ module dac_fourier #(
         if (MULTIPLIER < 0 || MULTIPLIER > 1) begin : guard_5
             dac_fourier_MULTIPLIER_is_not_0_to_1 stop ();
         end
-        if (SINE_FILE == "") begin : guard_6
-            dac_fourier_SINE_FILE_is_not_set stop ();
-        end
     endgenerate
 
     // Coefficients and the quarter of the sine: block RAMs, one clocked read port each. One is written while not busy
@@ -349,6 +346,13 @@ module dac_fourier #(
                 position <= position + step;
         end
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (SINE_FILE == "") begin : guard_6
+            dac_fourier_SINE_FILE_is_not_set stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -25,13 +25,6 @@ module dac_fourier_product #(
     output wire signed [DIGIT_BITS+31:0] product,
     output wire                         negative
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (DIGIT_BITS != 2 && DIGIT_BITS != 16) begin : guard_0
-            dac_fourier_product_DIGIT_BITS_is_not_2_or_16 stop ();
-        end
-    endgenerate
-
     generate
         if (DIGIT_BITS == 2) begin : shift_and_add
             // Digit i is -2 b[2i+1] + b[2i] + b[2i-1]. The topmost, of a number below 2^31, is never negative.
@@ -84,6 +77,13 @@ module dac_fourier_product #(
             wire unused = &{1'b0, digit_number[3:1], registered[48]};
             assign product = registered[47:0];
             assign negative = 1'b0;
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (DIGIT_BITS != 2 && DIGIT_BITS != 16) begin : guard_0
+            dac_fourier_product_DIGIT_BITS_is_not_2_or_16 stop ();
         end
     endgenerate
 endmodule

@@ -22,13 +22,6 @@ module dac_fourier_sum #(
     input  wire                          clear,
     output reg  signed [DIGIT_BITS+32:0] sum
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (DIGIT_BITS != 2 && DIGIT_BITS != 16) begin : guard_0
-            dac_fourier_sum_DIGIT_BITS_is_not_2_or_16 stop ();
-        end
-    endgenerate
-
     reg signed [DIGIT_BITS+32:0] operand;
     reg one;  // -product is ~product + 1
 
@@ -55,6 +48,13 @@ module dac_fourier_sum #(
         else
             sum <= next[DIGIT_BITS+33:1];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (DIGIT_BITS != 2 && DIGIT_BITS != 16) begin : guard_0
+            dac_fourier_sum_DIGIT_BITS_is_not_2_or_16 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -17,22 +17,6 @@ module dac_interpolator #(
     input  wire [14:0]                            fraction,
     output reg  signed [WORD_BITS+GUARD_BITS-1:0] sample
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_0
-            dac_interpolator_WORD_BITS_is_not_8_to_24 stop ();
-        end
-        if (GUARD_BITS != (WORD_BITS > 21 ? 25 - WORD_BITS : 4)) begin : guard_1
-            dac_interpolator_GUARD_BITS_follows_from_WORD_BITS stop ();
-        end
-        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_2
-            dac_interpolator_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
-        end
-        if (LATENCY != (PLAIN_MULTIPLIER != 0 ? 5 : 10)) begin : guard_3
-            dac_interpolator_LATENCY_follows_from_PLAIN_MULTIPLIER stop ();
-        end
-    endgenerate
-
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
     localparam DROP = 14 - GUARD_BITS;  // one bit less than the rounding drops: that bit decides how it rounds
     localparam STEP_BITS = SAMPLE_BITS + 2;
@@ -70,6 +54,22 @@ module dac_interpolator #(
     wire unused = &{sum[0], step[STEP_BITS-1]};
 
     always @(posedge clock) sample <= sum[SAMPLE_BITS:1];
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_0
+            dac_interpolator_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (GUARD_BITS != (WORD_BITS > 21 ? 25 - WORD_BITS : 4)) begin : guard_1
+            dac_interpolator_GUARD_BITS_follows_from_WORD_BITS stop ();
+        end
+        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_2
+            dac_interpolator_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
+        end
+        if (LATENCY != (PLAIN_MULTIPLIER != 0 ? 5 : 10)) begin : guard_3
+            dac_interpolator_LATENCY_follows_from_PLAIN_MULTIPLIER stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -36,16 +36,6 @@ module dac_loader_core #(
     output wire                    request,        // of a, for one clock
     output wire                    send
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (ADDRESS_BITS < 11 || ADDRESS_BITS > 16) begin : guard_0
-            dac_loader_core_ADDRESS_BITS_is_not_11_to_16 stop ();
-        end
-        if (TARGET_BITS != 10) begin : guard_1
-            dac_loader_core_TARGET_BITS_is_not_10 stop ();
-        end
-    endgenerate
-
     localparam [2:0] LOAD = 3'd0, ADD = 3'd1, SUBTRACT = 3'd2, COMPARE = 3'd3, AND = 3'd4, EXCLUSIVE_OR = 3'd5;
     localparam [2:0] STORE = 3'd6, INCREMENT = 3'd7;
     localparam [2:0] JUMP_IF_ZERO = 3'd1, JUMP_IF_NOT_ZERO = 3'd2, JUMP_IF_CARRY = 3'd3, JUMP_IF_NOT_CARRY = 3'd4;
@@ -182,6 +172,16 @@ module dac_loader_core #(
     assign program_write = control && instruction[5];
     assign request = control && instruction[7];
     assign send = control && instruction[8];
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (ADDRESS_BITS < 11 || ADDRESS_BITS > 16) begin : guard_0
+            dac_loader_core_ADDRESS_BITS_is_not_11_to_16 stop ();
+        end
+        if (TARGET_BITS != 10) begin : guard_1
+            dac_loader_core_TARGET_BITS_is_not_10 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -14,13 +14,6 @@ module dac_loader_memory #(
     input  wire [ADDRESS_BITS-1:0] write_address,
     input  wire [7:0]              write_data
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (ADDRESS_BITS < 11 || ADDRESS_BITS > 16) begin : guard_0
-            dac_loader_memory_ADDRESS_BITS_is_not_11_to_16 stop ();
-        end
-    endgenerate
-
     localparam NUMBERS_AT = 'h30, DEVICE_AT = 'h100;
 
     reg [7:0] bytes [0:(1<<ADDRESS_BITS)-1];
@@ -35,6 +28,13 @@ module dac_loader_memory #(
         if (write) bytes[write_address] <= write_data;
         read_data <= bytes[read_address];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (ADDRESS_BITS < 11 || ADDRESS_BITS > 16) begin : guard_0
+            dac_loader_memory_ADDRESS_BITS_is_not_11_to_16 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -10,13 +10,6 @@ module dac_loader_program #(
     input  wire [TARGET_BITS-1:0] address,
     output reg  [15:0]            instruction
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (TARGET_BITS != 10) begin : guard_0
-            dac_loader_program_TARGET_BITS_is_not_10 stop ();
-        end
-    endgenerate
-
     localparam WORDS = 1023;
     localparam [16*WORDS-1:0] PROGRAM = {
         16'hd1d9, 16'h616a, 16'h61ae, 16'h61de, 16'h0002, 16'he080, 16'h61d1, 16'h01f1, 16'h616b, 16'h0000, 16'h61d0,
@@ -123,6 +116,13 @@ module dac_loader_program #(
     end
 
     always @(posedge clock) if (enable) instruction <= words[address];
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (TARGET_BITS != 10) begin : guard_0
+            dac_loader_program_TARGET_BITS_is_not_10 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -40,19 +40,6 @@ module dac_markers #(
     output wire                 checking,
     output wire                 refused
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_0
-            dac_markers_TICK_BITS_is_not_3_to_30 stop ();
-        end
-        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_1
-            dac_markers_LINE_BITS_is_not_1_to_16 stop ();
-        end
-        if (PIXEL_INDEX_BITS != 0 && (PIXEL_INDEX_BITS < 2 || PIXEL_INDEX_BITS > 16)) begin : guard_2
-            dac_markers_PIXEL_INDEX_BITS_is_not_0_or_2_to_16 stop ();
-        end
-    endgenerate
-
     localparam [3:0] SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, FORWARD_FIRST = 4'd4, FORWARD_COUNT = 4'd5;
     localparam [3:0] BACKWARD_FIRST = 4'd6, BACKWARD_COUNT = 4'd7, UP_FIRST = 4'd8, UP_COUNT = 4'd9;
     localparam [3:0] DOWN_FIRST = 4'd10, DOWN_COUNT = 4'd11, PIXELS = 4'd12, PIXEL_TABLE = 4'd14;
@@ -220,6 +207,19 @@ module dac_markers #(
         end
     end
     wire unused = &{unused_up, unused_down, unused_up_count, unused_down_count, write_data};
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_0
+            dac_markers_TICK_BITS_is_not_3_to_30 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_1
+            dac_markers_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (PIXEL_INDEX_BITS != 0 && (PIXEL_INDEX_BITS < 2 || PIXEL_INDEX_BITS > 16)) begin : guard_2
+            dac_markers_PIXEL_INDEX_BITS_is_not_0_or_2_to_16 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -17,16 +17,6 @@ module dac_memory #(
     input  wire [ADDRESS_BITS-1:0] address,
     output reg  [BITS-1:0]         word
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            dac_memory_BITS_is_less_than_1 stop ();
-        end
-        if (ADDRESS_BITS < 1) begin : guard_1
-            dac_memory_ADDRESS_BITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     reg [BITS-1:0] words [0:(1<<ADDRESS_BITS)-1];
     reg [ADDRESS_BITS-1:0] row;
 
@@ -36,6 +26,16 @@ module dac_memory #(
         row <= address;
         word <= words[row];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_memory_BITS_is_less_than_1 stop ();
+        end
+        if (ADDRESS_BITS < 1) begin : guard_1
+            dac_memory_ADDRESS_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -23,25 +23,6 @@ module dac_multiply_digits #(
     input  wire [2*DIGITS-1:0]           digits,  // the digits of b + 0101..01
     output wire signed [RESULT_BITS-1:0] result
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (A_BITS < 1) begin : guard_0
-            dac_multiply_digits_A_BITS_is_less_than_1 stop ();
-        end
-        if (DIGITS < 2) begin : guard_1
-            dac_multiply_digits_DIGITS_is_less_than_2 stop ();
-        end
-        if (DROP < 0) begin : guard_2
-            dac_multiply_digits_DROP_is_less_than_0 stop ();
-        end
-        if (LOW_BITS < 1 || LOW_BITS > A_BITS + 1) begin : guard_3
-            dac_multiply_digits_LOW_BITS_is_not_1_to_A_BITS_and_1 stop ();
-        end
-        if (RESULT_BITS < 1) begin : guard_4
-            dac_multiply_digits_RESULT_BITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     localparam PAIRS_DROPPED = DROP / 2 < DIGITS ? DROP / 2 : DIGITS;
     localparam KEPT = 2 * (DIGITS - PAIRS_DROPPED);  // finished bits that are part of the result
     localparam WIDE = A_BITS + KEPT;
@@ -99,6 +80,25 @@ module dac_multiply_digits #(
             assign result = {{RESULT_BITS-WIDE-4{shifted[WIDE+3]}}, shifted};
         end else begin : cut
             assign result = shifted[RESULT_BITS-1:0];
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (A_BITS < 1) begin : guard_0
+            dac_multiply_digits_A_BITS_is_less_than_1 stop ();
+        end
+        if (DIGITS < 2) begin : guard_1
+            dac_multiply_digits_DIGITS_is_less_than_2 stop ();
+        end
+        if (DROP < 0) begin : guard_2
+            dac_multiply_digits_DROP_is_less_than_0 stop ();
+        end
+        if (LOW_BITS < 1 || LOW_BITS > A_BITS + 1) begin : guard_3
+            dac_multiply_digits_LOW_BITS_is_not_1_to_A_BITS_and_1 stop ();
+        end
+        if (RESULT_BITS < 1) begin : guard_4
+            dac_multiply_digits_RESULT_BITS_is_less_than_1 stop ();
         end
     endgenerate
 endmodule

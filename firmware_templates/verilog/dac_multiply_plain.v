@@ -20,28 +20,6 @@ module dac_multiply_plain #(
     input  wire [LOW_BITS-1:0]           low,
     output reg  signed [RESULT_BITS-1:0] result
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (A_BITS < 1) begin : guard_0
-            dac_multiply_plain_A_BITS_is_less_than_1 stop ();
-        end
-        if (B_BITS < 1) begin : guard_1
-            dac_multiply_plain_B_BITS_is_less_than_1 stop ();
-        end
-        if (DROP < 0) begin : guard_2
-            dac_multiply_plain_DROP_is_less_than_0 stop ();
-        end
-        if (LOW_BITS < 1 || LOW_BITS > A_BITS + B_BITS) begin : guard_3
-            dac_multiply_plain_LOW_BITS_is_not_1_to_the_bits_of_a_product stop ();
-        end
-        if (RESULT_BITS < 1 || RESULT_BITS > A_BITS + B_BITS + 1) begin : guard_4
-            dac_multiply_plain_RESULT_BITS_is_not_1_to_the_bits_of_a_sum stop ();
-        end
-        if (BLOCK_BITS < 2) begin : guard_5
-            dac_multiply_plain_BLOCK_BITS_is_less_than_2 stop ();
-        end
-    endgenerate
-
     localparam SPLIT = A_BITS > BLOCK_BITS ? A_BITS - BLOCK_BITS : 0;  // bits of a that a block has no port for
     localparam PRODUCT_BITS = A_BITS + B_BITS + 1;
 
@@ -79,6 +57,28 @@ module dac_multiply_plain #(
         rest <= lowest + {{PRODUCT_BITS-LOW_BITS{1'b0}}, low};
         result <= floored[RESULT_BITS-1:0];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (A_BITS < 1) begin : guard_0
+            dac_multiply_plain_A_BITS_is_less_than_1 stop ();
+        end
+        if (B_BITS < 1) begin : guard_1
+            dac_multiply_plain_B_BITS_is_less_than_1 stop ();
+        end
+        if (DROP < 0) begin : guard_2
+            dac_multiply_plain_DROP_is_less_than_0 stop ();
+        end
+        if (LOW_BITS < 1 || LOW_BITS > A_BITS + B_BITS) begin : guard_3
+            dac_multiply_plain_LOW_BITS_is_not_1_to_the_bits_of_a_product stop ();
+        end
+        if (RESULT_BITS < 1 || RESULT_BITS > A_BITS + B_BITS + 1) begin : guard_4
+            dac_multiply_plain_RESULT_BITS_is_not_1_to_the_bits_of_a_sum stop ();
+        end
+        if (BLOCK_BITS < 2) begin : guard_5
+            dac_multiply_plain_BLOCK_BITS_is_less_than_2 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -22,22 +22,6 @@ module dac_offset #(
     output reg  [LOW_BITS-1:0]      low,
     output reg  [BITS-LOW_BITS-1:0] high
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 20 || BITS > 44) begin : guard_0
-            dac_offset_BITS_is_not_20_to_44 stop ();
-        end
-        if (LOW_BITS < 1 || LOW_BITS >= BITS) begin : guard_1
-            dac_offset_LOW_BITS_is_not_1_to_less_than_BITS stop ();
-        end
-        if (GAIN_Q < 1 || CODE_BITS < 1 || GAIN_Q + CODE_BITS >= BITS) begin : guard_2
-            dac_offset_GAIN_Q_and_CODE_BITS_are_not_less_than_BITS stop ();
-        end
-        if (HALF < 0 || HALF > 1) begin : guard_3
-            dac_offset_HALF_is_not_0_to_1 stop ();
-        end
-    endgenerate
-
     wire unused = &data;
     reg [BITS-1:0] idle;
     wire [BITS-1:0] playing =
@@ -54,6 +38,22 @@ module dac_offset #(
         if (load_low) low <= playing[LOW_BITS-1:0];
         if (load_high) high <= playing[BITS-1:LOW_BITS];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 20 || BITS > 44) begin : guard_0
+            dac_offset_BITS_is_not_20_to_44 stop ();
+        end
+        if (LOW_BITS < 1 || LOW_BITS >= BITS) begin : guard_1
+            dac_offset_LOW_BITS_is_not_1_to_less_than_BITS stop ();
+        end
+        if (GAIN_Q < 1 || CODE_BITS < 1 || GAIN_Q + CODE_BITS >= BITS) begin : guard_2
+            dac_offset_GAIN_Q_and_CODE_BITS_are_not_less_than_BITS stop ();
+        end
+        if (HALF < 0 || HALF > 1) begin : guard_3
+            dac_offset_HALF_is_not_0_to_1 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

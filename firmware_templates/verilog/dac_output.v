@@ -34,28 +34,6 @@ module dac_output #(
     output reg  [DAC_BITS-1:0]           step_inverse,
     output reg                           clamped    // with its target: a limit has changed it
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (SAMPLE_BITS < 12 || SAMPLE_BITS > 25) begin : guard_0
-            dac_output_SAMPLE_BITS_is_not_12_to_25 stop ();
-        end
-        if (DAC_BITS < 2 || DAC_BITS > 24) begin : guard_1
-            dac_output_DAC_BITS_is_not_2_to_24 stop ();
-        end
-        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_2
-            dac_output_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
-        end
-        if (SHAPING < 0 || SHAPING > 3) begin : guard_3
-            dac_output_SHAPING_is_not_0_to_3 stop ();
-        end
-        if (POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_4
-            dac_output_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
-        end
-        if (LATENCY != (PLAIN_MULTIPLIER != 0 ? 8 : 15) + (SHAPING != 0 ? 1 : 0)) begin : guard_5
-            dac_output_LATENCY_follows_from_PLAIN_MULTIPLIER_and_SHAPING stop ();
-        end
-    endgenerate
-
     localparam [3:0] GAIN = 4'd3, OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5;
     localparam [3:0] CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8, PARK_CODE = 4'd9, SHAPING_WORD = 4'd11;
 
@@ -202,6 +180,28 @@ module dac_output #(
         target <= code_max + room_inverse + 1;
         clamped <= clamps;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (SAMPLE_BITS < 12 || SAMPLE_BITS > 25) begin : guard_0
+            dac_output_SAMPLE_BITS_is_not_12_to_25 stop ();
+        end
+        if (DAC_BITS < 2 || DAC_BITS > 24) begin : guard_1
+            dac_output_DAC_BITS_is_not_2_to_24 stop ();
+        end
+        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_2
+            dac_output_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
+        end
+        if (SHAPING < 0 || SHAPING > 3) begin : guard_3
+            dac_output_SHAPING_is_not_0_to_3 stop ();
+        end
+        if (POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_4
+            dac_output_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+        if (LATENCY != (PLAIN_MULTIPLIER != 0 ? 8 : 15) + (SHAPING != 0 ? 1 : 0)) begin : guard_5
+            dac_output_LATENCY_follows_from_PLAIN_MULTIPLIER_and_SHAPING stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -19,13 +19,6 @@ module dac_phase #(
     input  wire        advance,  // with a tick: the tick advances the phase
     output reg  [31:0] phase
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_0
-            dac_phase_PERIOD_BITS_is_not_1_to_31 stop ();
-        end
-    endgenerate
-
     localparam [3:0] PHASE_STEP = 4'd0, PHASE_REMAINDER = 4'd1, PHASE_PERIOD = 4'd2;
 
     wire [31:0] step;  // floor(2^32 / N)
@@ -79,6 +72,13 @@ module dac_phase #(
         else if (advances)
             phase <= phase + step + {31'd0, wraps};
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_0
+            dac_phase_PERIOD_BITS_is_not_1_to_31 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

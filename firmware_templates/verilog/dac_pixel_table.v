@@ -40,16 +40,6 @@ module dac_pixel_table #(
     input  wire                  counted,         // of a program without a table, a clock after its tick
     output reg                   pixel
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_0
-            dac_pixel_table_TICK_BITS_is_not_3_to_30 stop ();
-        end
-        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
-            dac_pixel_table_INDEX_BITS_is_not_2_to_16 stop ();
-        end
-    endgenerate
-
     localparam [31:0] MOST_PIXELS = 1 << (INDEX_BITS - 1);
     localparam ROOM_BITS = (TICK_BITS > 15 ? TICK_BITS : 15) + 2;  // of the ticks that a window has left, signed
 
@@ -206,6 +196,16 @@ module dac_pixel_table #(
     end
     assign accepted = (commit && !has_table_now) || (ends && !is_wrong);
     assign refused = (loads && !in_backward && !complete) || (ends && is_wrong);
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_0
+            dac_pixel_table_TICK_BITS_is_not_3_to_30 stop ();
+        end
+        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
+            dac_pixel_table_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -15,13 +15,6 @@ module dac_pixels #(
     input  wire signed [BITS+1:0] pixels_less_count_less_1,  // negative: the window has a tick for each pixel
     output reg                    pixel
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            dac_pixels_BITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     // i pixels - count (strobes), less another count, so that its sign decides; below `pixels`, and not below -count.
     reg signed [BITS+1:0] behind;
     initial behind = 0;
@@ -35,6 +28,13 @@ module dac_pixels #(
             // Minus the inverse is plus the value and the 1 that it lacks.
             behind <= (opens ? {BITS+2{1'b0}} : behind) - ~(starts ? pixels_less_count_less_1 : pixels_less_1);
         end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_pixels_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -14,6 +14,15 @@ module dac_product #(
     input  wire signed [B_BITS-1:0]        b,
     output reg  signed [A_BITS+B_BITS-1:0] product
 );
+    reg signed [A_BITS-1:0] a_in;
+    reg signed [B_BITS-1:0] b_in;
+
+    always @(posedge clock) begin
+        a_in <= a;
+        b_in <= b;
+        product <= a_in * b_in;
+    end
+
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
     generate
         if (A_BITS < 1) begin : guard_0
@@ -23,15 +32,6 @@ module dac_product #(
             dac_product_B_BITS_is_less_than_1 stop ();
         end
     endgenerate
-
-    reg signed [A_BITS-1:0] a_in;
-    reg signed [B_BITS-1:0] b_in;
-
-    always @(posedge clock) begin
-        a_in <= a;
-        b_in <= b;
-        product <= a_in * b_in;
-    end
 endmodule
 
 `default_nettype wire

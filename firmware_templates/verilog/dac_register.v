@@ -15,16 +15,6 @@ module dac_register #(
     input  wire            load,
     output reg  [BITS-1:0] value
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1 || BITS > 64) begin : guard_0
-            dac_register_BITS_is_not_1_to_64 stop ();
-        end
-        if (POWER_UP >> BITS != 64'd0) begin : guard_1
-            dac_register_POWER_UP_has_more_than_BITS stop ();
-        end
-    endgenerate
-
     reg [BITS-1:0] idle;
     initial idle = 0;
 
@@ -34,6 +24,16 @@ module dac_register #(
         if (write) idle <= data;
         if (load) value <= idle;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1 || BITS > 64) begin : guard_0
+            dac_register_BITS_is_not_1_to_64 stop ();
+        end
+        if (POWER_UP >> BITS != 64'd0) begin : guard_1
+            dac_register_POWER_UP_has_more_than_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

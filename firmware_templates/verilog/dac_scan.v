@@ -42,19 +42,6 @@ module dac_scan #(
     output reg [TICK_BITS-1:0]   tick_number,
     output reg [LINE_BITS-1:0]   line_number
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_0
-            dac_scan_TICK_BITS_is_not_3_to_30 stop ();
-        end
-        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_1
-            dac_scan_LINE_BITS_is_not_1_to_16 stop ();
-        end
-        if (FRAME_BITS < 1) begin : guard_2
-            dac_scan_FRAME_BITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     localparam [3:0] LINE_TICKS = 4'd0, FRAME_LINES = 4'd1, Y_STEPS = 4'd13;
 
     // The program. Numbers of ticks and lines are kept as what the counters are compared with.
@@ -180,6 +167,19 @@ module dac_scan #(
     always @(posedge clock)
         // Where y steps it goes on with a new line; otherwise with every tick.
         y_advance <= plays && (first || !y_steps);
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_0
+            dac_scan_TICK_BITS_is_not_3_to_30 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_1
+            dac_scan_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (FRAME_BITS < 1) begin : guard_2
+            dac_scan_FRAME_BITS_is_less_than_1 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -28,16 +28,6 @@ module dac_shaper #(
     output reg  signed [2:0] more,     // codes
     output reg               carry
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 2) begin : guard_0
-            dac_shaper_BITS_is_less_than_2 stop ();
-        end
-        if (SHAPING < 1 || SHAPING > 3) begin : guard_1
-            dac_shaper_SHAPING_is_not_1_to_3 stop ();
-        end
-    endgenerate
-
     localparam [BITS-1:0] HALF = {1'b1, {BITS-1{1'b0}}};
 
     reg [1:0] order;
@@ -129,6 +119,16 @@ module dac_shaper #(
                 end
                 assign feedback = fed_back;
             end
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 2) begin : guard_0
+            dac_shaper_BITS_is_less_than_2 stop ();
+        end
+        if (SHAPING < 1 || SHAPING > 3) begin : guard_1
+            dac_shaper_SHAPING_is_not_1_to_3 stop ();
         end
     endgenerate
 endmodule

@@ -11,13 +11,6 @@ module dac_skew #(
     input  wire [2*DIGITS-1:0] value,
     output wire [2*DIGITS-1:0] digits
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (DIGITS < 1) begin : guard_0
-            dac_skew_DIGITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     reg [2*DIGITS-1:0] recoded;
     initial recoded = 0;
 
@@ -27,6 +20,13 @@ module dac_skew #(
     generate
         for (i = 0; i < DIGITS; i = i + 1) begin : digit
             dac_delay #(.BITS(2), .CLOCKS(i)) later (.clock(clock), .in(recoded[2*i +: 2]), .out(digits[2*i +: 2]));
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (DIGITS < 1) begin : guard_0
+            dac_skew_DIGITS_is_less_than_1 stop ();
         end
     endgenerate
 endmodule

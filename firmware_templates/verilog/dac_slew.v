@@ -24,16 +24,6 @@ module dac_slew #(
     output wire [BITS-1:0] code,
     output reg             reached       // the code is at its target
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1 || BITS > 64) begin : guard_0
-            dac_slew_BITS_is_not_1_to_64 stop ();
-        end
-        if (POWER_UP >> BITS != 64'd0) begin : guard_1
-            dac_slew_POWER_UP_has_more_than_BITS stop ();
-        end
-    endgenerate
-
     // Clock 1: the difference of two targets. Clock 2: that difference minus and plus the step.
     reg delta_valid, limit_valid, behind_valid;
     reg [BITS-1:0] delta_inverse, limit_inverse, behind_inverse, code_inverse;  // inverted values
@@ -83,6 +73,16 @@ module dac_slew #(
             reached <= behind == 0;
         end
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1 || BITS > 64) begin : guard_0
+            dac_slew_BITS_is_not_1_to_64 stop ();
+        end
+        if (POWER_UP >> BITS != 64'd0) begin : guard_1
+            dac_slew_POWER_UP_has_more_than_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -22,19 +22,6 @@ module dac_spline #(
     input  wire [29:0]                 ticks,  // bit i: a phase came i clocks ago
     output reg  signed [WORD_BITS+3:0] sample
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (INDEX_BITS < 3 || INDEX_BITS > 14) begin : guard_0
-            dac_spline_INDEX_BITS_is_not_3_to_14 stop ();
-        end
-        if (WORD_BITS < 8 || WORD_BITS > 21) begin : guard_1
-            dac_spline_WORD_BITS_is_not_8_to_21 stop ();
-        end
-        if (SPACING != 11) begin : guard_2
-            dac_spline_SPACING_is_not_11 stop ();
-        end
-    endgenerate
-
     localparam BITS = WORD_BITS + 7;  // of a sum of Horner's rule
     localparam FIRST = 7;             // clocks from a phase to its b3
     localparam SECOND = FIRST + SPACING, THIRD = SECOND + SPACING;
@@ -113,6 +100,19 @@ module dac_spline #(
         .half(third_half)
     );
     always @(posedge clock) sample <= sum[WORD_BITS+4:1];
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (INDEX_BITS < 3 || INDEX_BITS > 14) begin : guard_0
+            dac_spline_INDEX_BITS_is_not_3_to_14 stop ();
+        end
+        if (WORD_BITS < 8 || WORD_BITS > 21) begin : guard_1
+            dac_spline_WORD_BITS_is_not_8_to_21 stop ();
+        end
+        if (SPACING != 11) begin : guard_2
+            dac_spline_SPACING_is_not_11 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -16,13 +16,6 @@ module dac_spline_step #(
     output reg  signed [BITS-1:0] product,
     output reg                    half
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 2) begin : guard_0
-            dac_spline_step_BITS_is_less_than_2 stop ();
-        end
-    endgenerate
-
     reg signed [BITS-1:0] factor;
     wire minus = digit == 2'd0;
     wire [BITS+1:0] term = digit == 2'd0 ? ~{{2{factor[BITS-1]}}, factor} :
@@ -41,6 +34,13 @@ module dac_spline_step #(
             product <= total[BITS+2:3];
         half <= total[2];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 2) begin : guard_0
+            dac_spline_step_BITS_is_less_than_2 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -20,16 +20,6 @@ module dac_table #(
     output reg  signed [WORD_BITS-1:0]  here,
     output reg  signed [WORD_BITS-1:0]  there
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (WORD_BITS < 1) begin : guard_0
-            dac_table_WORD_BITS_is_less_than_1 stop ();
-        end
-        if (INDEX_BITS < 2) begin : guard_1
-            dac_table_INDEX_BITS_is_less_than_2 stop ();
-        end
-    endgenerate
-
     localparam ROW_BITS = INDEX_BITS - 1;
 
     wire [ROW_BITS-1:0] row = index[INDEX_BITS-1:1];
@@ -54,6 +44,16 @@ module dac_table #(
         here <= odd_at_word ? odd_word : even_word;
         there <= odd_at_word ? even_word : odd_word;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (WORD_BITS < 1) begin : guard_0
+            dac_table_WORD_BITS_is_less_than_1 stop ();
+        end
+        if (INDEX_BITS < 2) begin : guard_1
+            dac_table_INDEX_BITS_is_less_than_2 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

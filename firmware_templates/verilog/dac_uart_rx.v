@@ -13,13 +13,6 @@ module dac_uart_rx #(
     output reg  [7:0] data,
     output reg        received      // for one clock; `data` stays for half a bit at least
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (CLOCKS_PER_BIT < 8 || CLOCKS_PER_BIT > 65536) begin : guard_0
-            dac_uart_rx_CLOCKS_PER_BIT_is_not_8_to_65536 stop ();
-        end
-    endgenerate
-
     localparam BITS = $clog2(CLOCKS_PER_BIT);
     localparam [31:0] WHOLE = CLOCKS_PER_BIT - 1, HALF = CLOCKS_PER_BIT / 2 - 2;  // the way to here takes the rest
     localparam [3:0] WAIT = 4'd0, START = 4'd1, STOP = 4'd10, BREAK = 4'd11;
@@ -59,6 +52,13 @@ module dac_uart_rx #(
             end
         endcase
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (CLOCKS_PER_BIT < 8 || CLOCKS_PER_BIT > 65536) begin : guard_0
+            dac_uart_rx_CLOCKS_PER_BIT_is_not_8_to_65536 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

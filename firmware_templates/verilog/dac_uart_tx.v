@@ -11,13 +11,6 @@ module dac_uart_tx #(
     output wire       ready,
     output reg        line
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (CLOCKS_PER_BIT < 2 || CLOCKS_PER_BIT > 65536) begin : guard_0
-            dac_uart_tx_CLOCKS_PER_BIT_is_not_2_to_65536 stop ();
-        end
-    endgenerate
-
     localparam BITS = $clog2(CLOCKS_PER_BIT);
     localparam [31:0] WHOLE = CLOCKS_PER_BIT - 1;
     wire unused = &{WHOLE};
@@ -51,6 +44,13 @@ module dac_uart_tx #(
             end
         end
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (CLOCKS_PER_BIT < 2 || CLOCKS_PER_BIT > 65536) begin : guard_0
+            dac_uart_tx_CLOCKS_PER_BIT_is_not_2_to_65536 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -43,19 +43,6 @@ module dac_verdict #(
     output wire [3:0]              faults,      // slew, clamp, overrun, underrun
     output wire [4*COUNT_BITS-1:0] fault_counts
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (DAC_BITS < 1) begin : guard_0
-            dac_verdict_DAC_BITS_is_less_than_1 stop ();
-        end
-        if (X_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_1
-            dac_verdict_X_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
-        end
-        if (Y_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_2
-            dac_verdict_Y_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
-        end
-    endgenerate
-
     reg catching_up;
     initial catching_up = 0;
     wire was_catching_up = catching_up || begins;
@@ -101,6 +88,19 @@ module dac_verdict #(
         end else if (faulty)
             valid_marker <= 1'b0;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (DAC_BITS < 1) begin : guard_0
+            dac_verdict_DAC_BITS_is_less_than_1 stop ();
+        end
+        if (X_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_1
+            dac_verdict_X_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+        if (Y_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_2
+            dac_verdict_Y_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -17,19 +17,6 @@ module dac_whole_table #(
     input  wire [31:0] data,
     output wire        whole
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (INTERPOLATED != 0 && INTERPOLATED != 1 && INTERPOLATED != 3) begin : guard_0
-            dac_whole_table_INTERPOLATED_is_not_0_1_or_3 stop ();
-        end
-        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
-            dac_whole_table_INDEX_BITS_is_not_2_to_16 stop ();
-        end
-        if (HARMONICS < 0 || HARMONICS > 512) begin : guard_2
-            dac_whole_table_HARMONICS_is_not_0_to_512 stop ();
-        end
-    endgenerate
-
     localparam [3:0] PERIOD_WORD = 4'd2, HARMONICS_WORD = 4'd10;
     localparam RENDERS = HARMONICS != 0 ? 1 : 0;
     // Bits of the most Fourier words less one, 2 HARMONICS.
@@ -75,6 +62,19 @@ module dac_whole_table #(
         else if (counts && !count[BITS]) count <= count + 1;
     assign whole = count >= needed;
     wire unused_bits = &{write_program, address, data};
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (INTERPOLATED != 0 && INTERPOLATED != 1 && INTERPOLATED != 3) begin : guard_0
+            dac_whole_table_INTERPOLATED_is_not_0_1_or_3 stop ();
+        end
+        if (INDEX_BITS < 2 || INDEX_BITS > 16) begin : guard_1
+            dac_whole_table_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (HARMONICS < 0 || HARMONICS > 512) begin : guard_2
+            dac_whole_table_HARMONICS_is_not_0_to_512 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -21,16 +21,6 @@ module dac_window #(
     output reg           imaging,
     output reg  [BITS:0] idle_count  // length of the window in the idle program
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            dac_window_BITS_is_less_than_1 stop ();
-        end
-        if (JUMPS < 0 || JUMPS > 1) begin : guard_1
-            dac_window_JUMPS_is_not_0_to_1 stop ();
-        end
-    endgenerate
-
     // Where positions jump they are compared by the sign of a difference, with both ends stored inverted.
     localparam [BITS:0] INVERTED = {BITS+1{JUMPS != 0}};
     reg [BITS:0] idle_first, first, stop;
@@ -75,6 +65,16 @@ module dac_window #(
             imaging <= !is_stop && (is_first || (JUMPS == 0 && imaging && !is_zero));
         end
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_window_BITS_is_less_than_1 stop ();
+        end
+        if (JUMPS < 0 || JUMPS > 1) begin : guard_1
+            dac_window_JUMPS_is_not_0_to_1 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

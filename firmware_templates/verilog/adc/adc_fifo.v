@@ -19,16 +19,6 @@ module adc_fifo #(
     output reg             out_valid,
     input  wire            out_ready
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            adc_fifo_BITS_is_less_than_1 stop ();
-        end
-        if (DEPTH_BITS < 1 || DEPTH_BITS > 16) begin : guard_1
-            adc_fifo_DEPTH_BITS_is_not_1_to_16 stop ();
-        end
-    endgenerate
-
     reg [BITS-1:0] words [0:(1<<DEPTH_BITS)-1];
     reg [DEPTH_BITS-1:0] first, next;
     reg [DEPTH_BITS:0] stored;  // words in the memory
@@ -59,6 +49,16 @@ module adc_fifo #(
             else if (out_ready) out_valid <= 1'b0;
         end
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            adc_fifo_BITS_is_less_than_1 stop ();
+        end
+        if (DEPTH_BITS < 1 || DEPTH_BITS > 16) begin : guard_1
+            adc_fifo_DEPTH_BITS_is_not_1_to_16 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -17,6 +17,11 @@ module dac_direct_table #(
     input  wire [INDEX_BITS-1:0]       index,
     output wire signed [WORD_BITS-1:0] word
 );
+    dac_memory #(.BITS(WORD_BITS), .ADDRESS_BITS(INDEX_BITS + 1)) memory (
+        .clock(clock), .write(write), .write_address({write_bank, write_index}), .write_data(write_data),
+        .address({read_bank, index}), .word(word)
+    );
+
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
     generate
         if (WORD_BITS < 1) begin : guard_0
@@ -26,11 +31,6 @@ module dac_direct_table #(
             dac_direct_table_INDEX_BITS_is_less_than_1 stop ();
         end
     endgenerate
-
-    dac_memory #(.BITS(WORD_BITS), .ADDRESS_BITS(INDEX_BITS + 1)) memory (
-        .clock(clock), .write(write), .write_address({write_bank, write_index}), .write_data(write_data),
-        .address({read_bank, index}), .word(word)
-    );
 endmodule
 
 `default_nettype wire

@@ -16,16 +16,6 @@ module dac_memory #(
     input  wire [ADDRESS_BITS-1:0] address,
     output wire [BITS-1:0]         word
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            dac_memory_BITS_is_less_than_1 stop ();
-        end
-        if (ADDRESS_BITS < 1) begin : guard_1
-            dac_memory_ADDRESS_BITS_is_less_than_1 stop ();
-        end
-    endgenerate
-
     localparam WIDTH = // of a block
         ADDRESS_BITS < 11 ? 18 : ADDRESS_BITS == 11 ? 9 : ADDRESS_BITS == 12 ? 4 : ADDRESS_BITS == 13 ? 2 : 1;
     localparam BLOCKS = (BITS + WIDTH - 1) / WIDTH;
@@ -78,6 +68,16 @@ module dac_memory #(
                     .DOB5(out[5]), .DOB4(out[4]), .DOB3(out[3]), .DOB2(out[2]), .DOB1(out[1]), .DOB0(out[0])
                 );
             end
+        end
+    endgenerate
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_memory_BITS_is_less_than_1 stop ();
+        end
+        if (ADDRESS_BITS < 1) begin : guard_1
+            dac_memory_ADDRESS_BITS_is_less_than_1 stop ();
         end
     endgenerate
 endmodule

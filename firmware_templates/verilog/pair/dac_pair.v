@@ -46,25 +46,6 @@ module dac_pair #(
     output wire                   reached,        // both are at their targets
     output wire                   clamped         // a limit has changed one of them
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (X_INTERPOLATED < 0 || X_INTERPOLATED > 1) begin : guard_0
-            dac_pair_X_INTERPOLATED_is_not_0_to_1 stop ();
-        end
-        if (Y_INTERPOLATED < 0 || Y_INTERPOLATED > 1) begin : guard_1
-            dac_pair_Y_INTERPOLATED_is_not_0_to_1 stop ();
-        end
-        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_2
-            dac_pair_X_or_Y_INDEX_BITS_are_not_2_to_16 stop ();
-        end
-        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_3
-            dac_pair_WORD_BITS_is_not_8_to_24 stop ();
-        end
-        if (LONGER_BITS != (X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS)) begin : guard_4
-            dac_pair_LONGER_BITS_follows_from_X_and_Y_INDEX_BITS stop ();
-        end
-    endgenerate
-
     localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
     localparam RUNNING_AT = 37;
@@ -201,6 +182,25 @@ module dac_pair #(
     assign y = beat ? ~code_inverse : ~code_1;
     assign reached = reached_1 && (beat ? code_reached : reached_2);
     assign clamped = clamped_1 || (beat ? code_clamped : clamped_2);
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (X_INTERPOLATED < 0 || X_INTERPOLATED > 1) begin : guard_0
+            dac_pair_X_INTERPOLATED_is_not_0_to_1 stop ();
+        end
+        if (Y_INTERPOLATED < 0 || Y_INTERPOLATED > 1) begin : guard_1
+            dac_pair_Y_INTERPOLATED_is_not_0_to_1 stop ();
+        end
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_2
+            dac_pair_X_or_Y_INDEX_BITS_are_not_2_to_16 stop ();
+        end
+        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_3
+            dac_pair_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (LONGER_BITS != (X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS)) begin : guard_4
+            dac_pair_LONGER_BITS_follows_from_X_and_Y_INDEX_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

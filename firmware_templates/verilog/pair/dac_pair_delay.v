@@ -11,16 +11,6 @@ module dac_pair_delay #(
     input  wire [BITS-1:0] in,
     output reg  [BITS-1:0] out
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1) begin : guard_0
-            dac_pair_delay_BITS_is_less_than_1 stop ();
-        end
-        if (CLOCKS < 2 || CLOCKS > 65) begin : guard_1
-            dac_pair_delay_CLOCKS_is_not_2_to_65 stop ();
-        end
-    endgenerate
-
     // The word of CLOCKS - 1 clocks ago. As a sum, a synthesis sees that it is never the one that is written, and adds
     // no logic for that case.
     localparam [31:0] BEHIND = 65 - CLOCKS;
@@ -37,6 +27,16 @@ module dac_pair_delay #(
         words[at] <= in;
         out <= words[from];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1) begin : guard_0
+            dac_pair_delay_BITS_is_less_than_1 stop ();
+        end
+        if (CLOCKS < 2 || CLOCKS > 65) begin : guard_1
+            dac_pair_delay_CLOCKS_is_not_2_to_65 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -14,16 +14,6 @@ module dac_pair_interpolator #(
     input  wire [14:0]                            fraction,
     output reg  signed [WORD_BITS+GUARD_BITS-1:0] sample
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_0
-            dac_pair_interpolator_WORD_BITS_is_not_8_to_24 stop ();
-        end
-        if (GUARD_BITS != (WORD_BITS > 21 ? 25 - WORD_BITS : 4)) begin : guard_1
-            dac_pair_interpolator_GUARD_BITS_follows_from_WORD_BITS stop ();
-        end
-    endgenerate
-
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
     localparam DROP = 14 - GUARD_BITS;  // one bit less than the rounding drops: that bit decides how it rounds
     localparam STEP_BITS = SAMPLE_BITS + 2;
@@ -48,6 +38,16 @@ module dac_pair_interpolator #(
     wire unused = &{sum[0], step[STEP_BITS-1]};
 
     always @(posedge clock) sample <= sum[SAMPLE_BITS:1];
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (WORD_BITS < 8 || WORD_BITS > 24) begin : guard_0
+            dac_pair_interpolator_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (GUARD_BITS != (WORD_BITS > 21 ? 25 - WORD_BITS : 4)) begin : guard_1
+            dac_pair_interpolator_GUARD_BITS_follows_from_WORD_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -29,25 +29,6 @@ module dac_pair_output #(
     output reg  [DAC_BITS-1:0]           target,
     output reg                           clamped     // with its target, where a scan plays: a limit has changed it
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (SAMPLE_BITS < 12 || SAMPLE_BITS > 25) begin : guard_0
-            dac_pair_output_SAMPLE_BITS_is_not_12_to_25 stop ();
-        end
-        if (DAC_BITS < 2) begin : guard_1
-            dac_pair_output_DAC_BITS_is_less_than_2 stop ();
-        end
-        if (SAMPLE_BITS < DAC_BITS + 3) begin : guard_2
-            dac_pair_output_SAMPLE_BITS_are_less_than_DAC_BITS_takes stop ();
-        end
-        if (X_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_3
-            dac_pair_output_X_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
-        end
-        if (Y_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_4
-            dac_pair_output_Y_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
-        end
-    endgenerate
-
     localparam GAIN_Q = 16 + SAMPLE_BITS - DAC_BITS;
     localparam A_BITS = GAIN_Q > SAMPLE_BITS ? GAIN_Q : SAMPLE_BITS;
     localparam HIGH_BITS = SAMPLE_BITS;  // of the sum, above the low word of the offset
@@ -144,6 +125,25 @@ module dac_pair_output #(
         target <= running ? limited : park;
         clamped <= clamps;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (SAMPLE_BITS < 12 || SAMPLE_BITS > 25) begin : guard_0
+            dac_pair_output_SAMPLE_BITS_is_not_12_to_25 stop ();
+        end
+        if (DAC_BITS < 2) begin : guard_1
+            dac_pair_output_DAC_BITS_is_less_than_2 stop ();
+        end
+        if (SAMPLE_BITS < DAC_BITS + 3) begin : guard_2
+            dac_pair_output_SAMPLE_BITS_are_less_than_DAC_BITS_takes stop ();
+        end
+        if (X_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_3
+            dac_pair_output_X_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+        if (Y_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_4
+            dac_pair_output_Y_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

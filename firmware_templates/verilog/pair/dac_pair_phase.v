@@ -19,13 +19,6 @@ module dac_pair_phase #(
     input  wire                   advance,    // the sample advances the phase
     output reg  [31:0]            phase
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_0
-            dac_pair_phase_PERIOD_BITS_is_not_1_to_31 stop ();
-        end
-    endgenerate
-
     wire [PERIOD_BITS-1:0] at_remainder, other_remainder;
     wire [PERIOD_BITS:0] at_less, other_less;
     wire [31:0] at_step, other_step;
@@ -78,6 +71,13 @@ module dac_pair_phase #(
         carry <= advances && wraps;
         phase <= sum[32:1];
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_0
+            dac_pair_phase_PERIOD_BITS_is_not_1_to_31 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -16,13 +16,6 @@ module dac_pair_ring #(
     output reg  [BITS-1:0] now,
     output reg  [BITS-1:0] other
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1 || BITS > 32) begin : guard_0
-            dac_pair_ring_BITS_is_not_1_to_32 stop ();
-        end
-    endgenerate
-
     initial begin
         now = POWER_UP_NOW[BITS-1:0];
         other = POWER_UP_OTHER[BITS-1:0];
@@ -32,6 +25,13 @@ module dac_pair_ring #(
         now <= load ? value : other;
         other <= now;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1 || BITS > 32) begin : guard_0
+            dac_pair_ring_BITS_is_not_1_to_32 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -19,19 +19,6 @@ module dac_pair_slew #(
     output reg  [BITS-1:0] code_inverse,
     output reg             reached     // the code is at its target
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (BITS < 1 || BITS > 32) begin : guard_0
-            dac_pair_slew_BITS_is_not_1_to_32 stop ();
-        end
-        if (X_POWER_UP >> BITS != 64'd0) begin : guard_1
-            dac_pair_slew_X_POWER_UP_has_more_than_BITS stop ();
-        end
-        if (Y_POWER_UP >> BITS != 64'd0) begin : guard_2
-            dac_pair_slew_Y_POWER_UP_has_more_than_BITS stop ();
-        end
-    endgenerate
-
     wire [BITS-1:0] step_inverse, last_step;
     dac_pair_ring #(.BITS(BITS), .POWER_UP_NOW(32'hffffffff), .POWER_UP_OTHER(32'hffffffff)) steps (
         .clock(clock), .load(load), .value(~max_step), .now(step_inverse), .other(last_step)
@@ -89,6 +76,19 @@ module dac_pair_slew #(
         code_inverse <= target_4 + behind[BITS-1:0];
         reached <= behind == 0;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (BITS < 1 || BITS > 32) begin : guard_0
+            dac_pair_slew_BITS_is_not_1_to_32 stop ();
+        end
+        if (X_POWER_UP >> BITS != 64'd0) begin : guard_1
+            dac_pair_slew_X_POWER_UP_has_more_than_BITS stop ();
+        end
+        if (Y_POWER_UP >> BITS != 64'd0) begin : guard_2
+            dac_pair_slew_Y_POWER_UP_has_more_than_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

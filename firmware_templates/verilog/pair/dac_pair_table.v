@@ -23,19 +23,6 @@ module dac_pair_table #(
     output reg  signed [WORD_BITS-1:0] here,
     output reg  signed [WORD_BITS-1:0] there
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (WORD_BITS < 1) begin : guard_0
-            dac_pair_table_WORD_BITS_is_less_than_1 stop ();
-        end
-        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_1
-            dac_pair_table_X_or_Y_INDEX_BITS_are_not_2_to_16 stop ();
-        end
-        if (LONGER_BITS != (X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS)) begin : guard_2
-            dac_pair_table_LONGER_BITS_follows_from_X_and_Y_INDEX_BITS stop ();
-        end
-    endgenerate
-
     localparam X_ROW_BITS = X_INDEX_BITS - 1, Y_ROW_BITS = Y_INDEX_BITS - 1, ROW_BITS = LONGER_BITS - 1;
 
     reg [WORD_BITS-1:0] even_words [0:(2<<LONGER_BITS)-1];
@@ -84,6 +71,19 @@ module dac_pair_table #(
         here <= odd_at_word ? odd_word : even_word;
         there <= odd_at_word ? even_word : odd_word;
     end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (WORD_BITS < 1) begin : guard_0
+            dac_pair_table_WORD_BITS_is_less_than_1 stop ();
+        end
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_1
+            dac_pair_table_X_or_Y_INDEX_BITS_are_not_2_to_16 stop ();
+        end
+        if (LONGER_BITS != (X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS)) begin : guard_2
+            dac_pair_table_LONGER_BITS_follows_from_X_and_Y_INDEX_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

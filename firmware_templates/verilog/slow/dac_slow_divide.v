@@ -28,16 +28,6 @@ module dac_slow_divide #(
     output wire                     reduces,    // the rest is not below the divisor
     output reg  [QUOTIENT_BITS-1:0] quotient
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (REST_BITS < 2) begin : guard_0
-            dac_slow_divide_REST_BITS_is_less_than_2 stop ();
-        end
-        if (QUOTIENT_BITS < 2) begin : guard_1
-            dac_slow_divide_QUOTIENT_BITS_is_less_than_2 stop ();
-        end
-    endgenerate
-
     reg [REST_BITS-1:0] rest, whole, part;
     wire [REST_BITS-1:0] whole_less_part = whole - part;
     wire [REST_BITS-1:0] from = twice ? {rest[REST_BITS-2:0], 1'b0} : rest;
@@ -64,6 +54,16 @@ module dac_slow_divide #(
             else if ((add && here && there) || (reduce && reduces))
                 quotient <= quotient + 1;
         end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (REST_BITS < 2) begin : guard_0
+            dac_slow_divide_REST_BITS_is_less_than_2 stop ();
+        end
+        if (QUOTIENT_BITS < 2) begin : guard_1
+            dac_slow_divide_QUOTIENT_BITS_is_less_than_2 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -47,28 +47,6 @@ module dac_slow_engine #(
     output wire                       write_ramp,
     output wire [43:0]                ramp
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 14 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 14) begin : guard_0
-            dac_slow_engine_X_or_Y_INDEX_BITS_are_not_2_to_14 stop ();
-        end
-        if (X_WORD_BITS < 8 || X_WORD_BITS > 21 || Y_WORD_BITS < 8 || Y_WORD_BITS > 21) begin : guard_1
-            dac_slow_engine_X_or_Y_WORD_BITS_are_not_8_to_21 stop ();
-        end
-        if (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14) begin : guard_2
-            dac_slow_engine_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
-        end
-        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_3
-            dac_slow_engine_LINE_BITS_is_not_1_to_16 stop ();
-        end
-        if (INDEX_BITS != (X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS)) begin : guard_4
-            dac_slow_engine_INDEX_BITS_follows_from_X_and_Y_INDEX_BITS stop ();
-        end
-        if (WORD_BITS != (X_WORD_BITS > Y_WORD_BITS ? X_WORD_BITS : Y_WORD_BITS)) begin : guard_5
-            dac_slow_engine_WORD_BITS_follows_from_X_and_Y_WORD_BITS stop ();
-        end
-    endgenerate
-
     localparam W = 46;                        // twice the distance of two offsets
     localparam REST_BITS = LINE_BITS + 2;
     localparam PLACE_BITS = SLOW_INDEX_BITS + 18;
@@ -338,6 +316,28 @@ module dac_slow_engine #(
     assign write_table = enable && state == MIXED;
     assign table_data = beyond ? limits ^ sign_bit : mixed[WORD_BITS-1:0];
     wire unused = &{page_word, line_wide[LINE_BITS]};
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 14 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 14) begin : guard_0
+            dac_slow_engine_X_or_Y_INDEX_BITS_are_not_2_to_14 stop ();
+        end
+        if (X_WORD_BITS < 8 || X_WORD_BITS > 21 || Y_WORD_BITS < 8 || Y_WORD_BITS > 21) begin : guard_1
+            dac_slow_engine_X_or_Y_WORD_BITS_are_not_8_to_21 stop ();
+        end
+        if (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14) begin : guard_2
+            dac_slow_engine_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_3
+            dac_slow_engine_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (INDEX_BITS != (X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS)) begin : guard_4
+            dac_slow_engine_INDEX_BITS_follows_from_X_and_Y_INDEX_BITS stop ();
+        end
+        if (WORD_BITS != (X_WORD_BITS > Y_WORD_BITS ? X_WORD_BITS : Y_WORD_BITS)) begin : guard_5
+            dac_slow_engine_WORD_BITS_follows_from_X_and_Y_WORD_BITS stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

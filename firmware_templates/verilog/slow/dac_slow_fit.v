@@ -22,19 +22,6 @@ module dac_slow_fit #(
     output wire        exists,   // the address is one of region 5 or 6
     output wire        fits
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 14 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 14) begin : guard_0
-            dac_slow_fit_X_or_Y_INDEX_BITS_are_not_2_to_14 stop ();
-        end
-        if (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14) begin : guard_1
-            dac_slow_fit_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
-        end
-        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_2
-            dac_slow_fit_LINE_BITS_is_not_1_to_16 stop ();
-        end
-    endgenerate
-
     localparam [2:0] PROGRAM = 3'd0, X_PARTS = 3'd5, Y_PARTS = 3'd6;
     localparam [11:0] X_PAGE = 12'd1, Y_PAGE = 12'd2;
     localparam [1:0] PART = 2'd0, SPACING = 2'd1;  // words 12 and 13
@@ -91,6 +78,19 @@ module dac_slow_fit #(
     wire [7:0] knots = {1'b0, x_knots} + {1'b0, y_knots};
     wire [17:0] needed = WORDS[17:0] + {9'd0, knots, 1'b0} + (18'd1 << x_bits) + (18'd1 << y_bits);
     assign fits = !spoilt && x_known && y_known && count >= needed;
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 14 || Y_INDEX_BITS < 2 || Y_INDEX_BITS > 14) begin : guard_0
+            dac_slow_fit_X_or_Y_INDEX_BITS_are_not_2_to_14 stop ();
+        end
+        if (SLOW_INDEX_BITS < 3 || SLOW_INDEX_BITS > 14) begin : guard_1
+            dac_slow_fit_SLOW_INDEX_BITS_is_not_3_to_14 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_2
+            dac_slow_fit_LINE_BITS_is_not_1_to_16 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

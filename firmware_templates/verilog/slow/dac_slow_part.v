@@ -66,14 +66,6 @@ module dac_slow_part #(
     output wire                 y_reached,
     output wire                 y_clamped
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if ((X_INTERPOLATED != 1 && X_INTERPOLATED != 3) ||
-            (Y_INTERPOLATED != 1 && Y_INTERPOLATED != 3)) begin : guard_0
-            dac_slow_part_X_or_Y_INTERPOLATED_are_not_1_or_3 stop ();
-        end
-    endgenerate
-
     localparam [2:0] X_TABLE = 3'd1, Y_TABLE = 3'd2, X_PARTS = 3'd5, Y_PARTS = 3'd6;
     localparam [3:0] FRAME_LINES = 4'd1;
     localparam INDEX_BITS = X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS;
@@ -192,6 +184,14 @@ module dac_slow_part #(
         .tick(tick), .next(changes), .line(line), .begins(begins), .runs(runs), .done(y_done), .code(y),
         .reached(y_reached), .clamped(y_clamped)
     );
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if ((X_INTERPOLATED != 1 && X_INTERPOLATED != 3) ||
+            (Y_INTERPOLATED != 1 && Y_INTERPOLATED != 3)) begin : guard_0
+            dac_slow_part_X_or_Y_INTERPOLATED_are_not_1_or_3 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire

@@ -33,19 +33,6 @@ module dac_slow_store #(
     output reg  [17:0]                gain,
     output reg  [15:0]                ratio
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (INDEX_BITS < 1 || INDEX_BITS > 14) begin : guard_0
-            dac_slow_store_INDEX_BITS_is_not_1_to_14 stop ();
-        end
-        if (WORD_BITS < 1) begin : guard_1
-            dac_slow_store_WORD_BITS_is_less_than_1 stop ();
-        end
-        if (SLOW_INDEX_BITS < 1 || SLOW_INDEX_BITS > 14) begin : guard_2
-            dac_slow_store_SLOW_INDEX_BITS_is_not_1_to_14 stop ();
-        end
-    endgenerate
-
     localparam [1:0] SECOND = 2'd0, SLOW = 2'd1, GAINS = 2'd2, RATIOS = 2'd3;
 
     reg [31:0] pages [0:63];
@@ -78,6 +65,19 @@ module dac_slow_store #(
             gain <= gains[{bank, axis, knot}];
             ratio <= ratios[{bank, axis, knot}];
         end
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (INDEX_BITS < 1 || INDEX_BITS > 14) begin : guard_0
+            dac_slow_store_INDEX_BITS_is_not_1_to_14 stop ();
+        end
+        if (WORD_BITS < 1) begin : guard_1
+            dac_slow_store_WORD_BITS_is_less_than_1 stop ();
+        end
+        if (SLOW_INDEX_BITS < 1 || SLOW_INDEX_BITS > 14) begin : guard_2
+            dac_slow_store_SLOW_INDEX_BITS_is_not_1_to_14 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire
