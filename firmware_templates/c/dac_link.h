@@ -104,8 +104,8 @@ typedef struct {
     bool store_while_playing; /* flash can be written while a scan plays; otherwise the scan is to be parked first */
 #endif
 #if DAC_LINK_Z
-    /* With z: keeps out the interrupt that steps both sequencers, and lets it in again. The link calls it in pairs, with
-     * a few hundred instructions between them at most. */
+    /* With z: keeps out the interrupt that steps both sequencers, and lets it in again. The link calls it in pairs,
+     * with a few hundred instructions between them at most. */
     void (*stop_ticks)(bool stopped);
 #endif
 #if DAC_LIBRARY

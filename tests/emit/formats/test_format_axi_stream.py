@@ -14,7 +14,7 @@ PINS = ["m_axis_tdata", "m_axis_tuser", "m_axis_tvalid", "m_axis_tready"]
 
 
 def ports(text: str) -> list[str]:
-    return re.findall(r"^    (?:input|output) +wire (?:\[[^\]]*\])? *(\w+)", text, re.MULTILINE)
+    return re.findall(r"^    (?:, )?(?:input|output) +wire (?:\[[^\]]*\])? *(\w+)", text, re.MULTILINE)
 
 
 def parameters(text: str) -> list[str]:

@@ -14,7 +14,7 @@ PINS = ["sclk", "cs_x_n", "cs_y_n", "mosi_x", "mosi_y", "ldac_n", "sending"]
 
 
 def ports(text: str) -> list[str]:
-    return re.findall(r"^    (?:input|output) +wire (?:\[[^\]]*\])? *(\w+)", text, re.MULTILINE)
+    return re.findall(r"^    (?:, )?(?:input|output) +wire (?:\[[^\]]*\])? *(\w+)", text, re.MULTILINE)
 
 
 def parameters(text: str) -> list[str]:
