@@ -220,6 +220,13 @@ CASES = {
         {**_TWO_CUBIC, "PLAIN_MULTIPLIER": 1},
         folder="ecp5",
     ),
+    "sequencer_fourier_ECP5_cells": Case(
+        "two axes, a sample a clock, Fourier words, with ecp5/",
+        "dac_sequencer",
+        "ECP5",
+        {**_TOP, "PLAIN_MULTIPLIER": 1, "FOURIER": 1},
+        folder="ecp5",
+    ),
     "sequencer_low_area_ECP5": Case("two axes, low area", "dac_sequencer", "ECP5", {**_TOP, "LOW_AREA": 1}),
     "sequencer_slow_part_ECP5": Case(
         "two axes at an angle, low area",
