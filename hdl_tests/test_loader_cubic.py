@@ -57,7 +57,7 @@ FOUND_SOON = (
 
 def keeps_to_its_modes(x: int, y: int, folder: Path, sources: list[Path]) -> None:
     """Of a device of these degrees: what HELLO says, and which tables BEGIN takes."""
-    given = {"X_INTERPOLATED": x, "Y_INTERPOLATED": y, "LOW_AREA": 1}
+    given = {"X_INTERPOLATED": x, "Y_INTERPOLATED": y, "LOW_AREA": 1, "FOURIER": 0}
     with Simulation(compile_loader(folder, given, "icarus", sources)) as simulation:
         talk = Talk()
         (hello,) = talk.answers(simulation.talk(talk.hello()))
