@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.played_lines import LineTicks, play_line
-from tablegen.device.sequencer import Sequencer, Tick
+from tablegen.device.sequencer import Sequencer, Tick, can_keep
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.play.stream import FLAGS
 
@@ -185,7 +185,7 @@ class LineCheck:
             elif played.generation == self._generation + 1:
                 for name, program in self._offered.items():
                     yield name, self._swapped(self._play.program, program, self._codes)
-                    if self._keeps:
+                    if self._keeps and can_keep(self._play.program, program):
                         yield name, self._swapped(self._play.program, program, self._codes, self._play.line)
         if played.line != 0 or played.generation < self._generation:
             return

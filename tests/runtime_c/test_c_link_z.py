@@ -513,7 +513,6 @@ MUTANTS = {
     "a trigger reaches a z that rests": (Z, "(what != DAC_LINK_TRIGGER || l->plays_z)", "true"),
     "ticks go on": (Z, "        l->config->stop_ticks(stopped);", "        (void)stopped;"),
     "z may begin in a scan": (Z, "    if (changes && (plays", "    if (false && (plays"),
-    "a waiting trigger is overlooked": (Z, "    return starts || ", "    return "),
     "an old ARM stays": (Z, "    if (found.reason == DAC_LINK_NO_REASON && changes) {", "    if (false) {"),
     "a frame of z need not go on": (Z, "(l->has_z && !dac_sequencer_can_keep(l->z->sequencer))", "false"),
     "one queue may be full": (Z, " && (z == NULL || has_room(z, 1));", ";"),
