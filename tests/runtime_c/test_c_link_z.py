@@ -329,6 +329,26 @@ def test_a_scan_without_z_parks_z_and_needs_a_parked_device() -> None:
     assert host.follow()[1] > z_lines
 
 
+def test_a_trigger_that_waits_keeps_z_from_ending() -> None:
+    """Between a trigger and its tick no scan plays yet, but it begins before a program would be taken."""
+    host = Host(1)
+    plain = make_image(pair(11, 1)[0], digest(np.random.default_rng(8)))
+    host.send(plain)
+    host.start()  # no tick follows
+    answer = host.act(Request.COMMIT, struct.pack("<IB", plain.info.image_crc, CommitMode.LINE))
+    for _ in range(5000):
+        if answer is not None:
+            break
+        host.device.work()
+        answer = host.answer(Request.COMMIT)
+    assert answer == (Reason.PLAYING, 0)
+    host.device.tick(2000)
+    status, of_z = host.status()
+    assert (status.state, of_z.state, of_z.plays) == (DeviceState.PLAYING, DeviceState.PLAYING, True)
+    assert (status.generation, of_z.generation) == (1, 1)
+    host.follow()
+
+
 def test_a_withdrawal_takes_back_both() -> None:
     host = Host(1)
     host.start()
@@ -479,6 +499,7 @@ def ask_all(path: Path, seeds: int) -> None:
     test_a_refused_z_leaves_x_y_and_z_as_they_were()
     test_an_upload_goes_on_in_either_image()
     test_a_scan_without_z_parks_z_and_needs_a_parked_device()
+    test_a_trigger_that_waits_keeps_z_from_ending()
     test_a_withdrawal_takes_back_both()
     test_a_withdrawn_begin_of_z_stops_the_trigger_behind_it()
     test_a_full_queue_gives_neither_a_request()
@@ -513,6 +534,7 @@ MUTANTS = {
     "a trigger reaches a z that rests": (Z, "(what != DAC_LINK_TRIGGER || l->plays_z)", "true"),
     "ticks go on": (Z, "        l->config->stop_ticks(stopped);", "        (void)stopped;"),
     "z may begin in a scan": (Z, "    if (changes && (plays", "    if (false && (plays"),
+    "a waiting trigger is overlooked": (Z, "    return starts || ", "    return "),
     "an old ARM stays": (Z, "    if (found.reason == DAC_LINK_NO_REASON && changes) {", "    if (false) {"),
     "a frame of z need not go on": (Z, "(l->has_z && !dac_sequencer_can_keep(l->z->sequencer))", "false"),
     "one queue may be full": (Z, " && (z == NULL || has_room(z, 1));", ";"),
