@@ -13,7 +13,7 @@ from sets import common
 from short_scans import CUBIC, short
 from test_lint import lint
 
-from tablegen.verification.verilog.top_play import OUTPUTS
+from tablegen.verification.verilog.outputs import OUTPUTS
 
 WIDER_Y = {"y.dac": {"word_bits": 20}}
 SCANS: dict[str, dict[str, object]] = {"Fourier": {}, "cubic": {"x.table": CUBIC, "y.table": CUBIC}}

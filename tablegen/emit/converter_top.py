@@ -1,5 +1,6 @@
 """A module around ``NAME_top`` with an output for the converters behind it."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -41,9 +42,9 @@ class ConverterTop(PackageOfVerilog):
         }
         return {f"{module}.v": template(f"{_FOLDER}/{self.output}.v.j2", context, str)}
 
+    @abstractmethod
     def pins(self, word_bits: int) -> Sequence[str]:
         """Return the ports that ``NAME_top`` has not, as Verilog declares them, for words of so many bits."""
-        raise NotImplementedError
 
     def sources(self) -> list[Path]:
         """Return the templates."""

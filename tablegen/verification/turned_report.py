@@ -19,8 +19,8 @@ from tablegen.verification.c.frame_play import frame_checks
 from tablegen.verification.c.host import host_compiler
 from tablegen.verification.checks.directory import copies, wrong_digests
 from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.verilog.outputs import played_outputs
 from tablegen.verification.verilog.simulate import require
-from tablegen.verification.verilog.top_play import played_outputs
 from tablegen.verification.verilog.turned_play import USUAL_TICKS, TurnedPlay
 from tablegen.version import __version__
 

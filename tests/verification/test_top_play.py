@@ -19,7 +19,8 @@ from verifying import edit, failed, make_right
 
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import read_build
-from tablegen.verification.verilog.top_play import OUTPUTS, Output, TopPlay, instances
+from tablegen.verification.verilog.outputs import OUTPUTS, Output
+from tablegen.verification.verilog.top_play import TopPlay, instances
 
 TOP = f"{NAME}_top.v"
 TICKS = 400
@@ -75,7 +76,7 @@ OUTPUT_EDITS: dict[str, tuple[Output, tuple[str, str]]] = {
 }
 WRAPPED = ("Fourier", "cubic", "18 bits")
 WIDER_Y = {"y.dac": {"word_bits": 20}}  # in the scanner file
-PAIR = "module pair;\n    wire [0:0] tops_finished;\n{}\nendmodule\n"
+ALONE = "module alone;\n    wire [0:0] tops_finished;\n{}\nendmodule\n"
 
 
 def judge(folder: Path, work: Path, output: Output = "top") -> str | None:
@@ -84,8 +85,8 @@ def judge(folder: Path, work: Path, output: Output = "top") -> str | None:
     play = TopPlay.of(content, TICKS, output=output)
     work.mkdir()
     sources = play.prepare(folder, work, work / "run")
-    (work / "pair.v").write_text(PAIR.format("\n".join(instances([output]))), "ascii")
-    line = ["iverilog", "-g2005", "-s", "pair", "-o", "model.vvp", "pair.v"]
+    (work / "alone.v").write_text(ALONE.format("\n".join(instances([output]))), "ascii")
+    line = ["iverilog", "-g2005", "-s", "alone", "-o", "model.vvp", "alone.v"]
     if output != "top":
         line.append(str(folder / TOP))
     runtime = sorted(map(str, folder.glob("dac_*.v")))

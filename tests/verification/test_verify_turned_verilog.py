@@ -26,7 +26,7 @@ from tablegen.planning.clock import slow_clocks_per_tick
 from tablegen.verification.build_report import Report
 from tablegen.verification.run import verify
 from tablegen.verification.verilog import turned_play
-from tablegen.verification.verilog.top_play import OUTPUTS
+from tablegen.verification.verilog.outputs import OUTPUTS
 
 pytestmark = pytest.mark.common
 

@@ -81,7 +81,7 @@ static const char device[] = LINK_DEVICE;
 typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
-#define AXIS(NAME, axis, bits)                                                                               \
+#define AXIS(NAME, axis, bits)                                                                                        \
     {                                                                                                                 \
         CONVERTER(CONSTANT(NAME)), {CONSTANT(NAME##_CODE_MIN), CONSTANT(NAME##_CODE_MAX),                             \
         CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, DAC_TABLE_ROOM(bits),           \

@@ -4,7 +4,6 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.emit.converter_top import ConverterTop
 from tablegen.emit.package import VerilogPackage
 
-_MOST_BITS = 32  # of a frame
 _LEAST_REST_CLOCKS = 1
 
 
@@ -23,12 +22,10 @@ class Spi(ConverterTop):
         Raises
         ------
         Unphysical
-            If the clocks of a tick are fewer than the fastest frame takes, or words have more bits than a frame.
+            If the clocks of a tick are fewer than the shortest frame takes.
         """
         bits, clocks = max(package.word_bits), package.clocks_per_tick
-        if bits > _MOST_BITS:
-            raise Unphysical(f"a frame of SPI has at most {_MOST_BITS} bits, and the word of a converter has {bits}")
-        least = 2 * bits + 1 + _LEAST_REST_CLOCKS
+        least = 2 * bits + 1 + _LEAST_REST_CLOCKS  # with a half period of one clock
         if 0 < clocks < least:
             raise Unphysical(
                 f"emit.clock_hz has {clocks} clocks a tick, and the shortest frame of {bits} bits takes {least}; take "

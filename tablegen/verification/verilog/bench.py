@@ -13,7 +13,8 @@ import numpy as np
 from tablegen.emit.constants import verilog_constants
 from tablegen.emit.content import Content
 from tablegen.verification.play.stream import Words, read_capture
-from tablegen.verification.verilog.top_play import Output, instances
+from tablegen.verification.verilog.outputs import Output
+from tablegen.verification.verilog.top_play import instances
 
 TOP = "verify_bench"
 WORDS, WIRES, STATES, CONSTANTS = "words.hex", "wires.hex", "states.hex", "constants.txt"  # in the folder of a bench

@@ -54,9 +54,10 @@ from tablegen.verification.verilog.bench import (
     read_wires,
     write_boot_files,
 )
+from tablegen.verification.verilog.outputs import played_outputs
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
 from tablegen.verification.verilog.simulate import Design, compile_design, require
-from tablegen.verification.verilog.top_play import TopPlay, played_outputs
+from tablegen.verification.verilog.top_play import TopPlay
 from tablegen.verification.verilog.turned_play import TurnedPlay
 
 _SESSION_TICKS = 30_000  # of the program of a build, in a session that has its frame apart

@@ -9,7 +9,7 @@ tables instead. The other parameters serve both ways.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,61 +35,15 @@ from tablegen.verification.play.stream import (
     pack,
     read_capture,
 )
+from tablegen.verification.verilog.outputs import PINS, SIGNALS, WRITTEN, Output, output_pace, output_ticks, word_bits
 
-Output = Literal["top", "spi", "axi_stream"]
-"""A module of a build with all that its scan needs: ``NAME_top``, or the one of an output around it."""
-OUTPUTS: dict[str, Output] = {"spi": "spi", "axi-stream": "axi_stream"}
-"""The modules around ``NAME_top`` by their formats."""
-_MOST_OUTPUT_TICKS = 1000  # of a module around the top, which was played itself
 _CLOCKS = 6000  # that ticks take, unless a line takes more
 _MAX_TICKS = 20_000
 _OTHER_CLOCKS = 2000  # to boot, to withdraw and to drain, beside the words
 _REST_CLOCKS = 100  # before the tick that takes the program, and before the trigger
-_REST_OF_A_FRAME = 7  # clocks between two frames of dac_spi with its defaults
 _WORD = (1 << 32) - 1
 
 _OTHER_SINE = '{}.sequencer.SINE_FILE != "{}_sine.mem"'  # which only a rendering would read
-
-# What an output has beside the ports of NAME_top: its connections, its signals, what writes them down, and when.
-_PINS: dict[Output, str] = {
-    "top": "",
-    "spi": """, .sclk(sclk), .cs_x_n(cs_n), .cs_y_n(), .mosi_x(mosi_x), .mosi_y(mosi_y), .ldac_n(ldac_n),
-        .sending()""",
-    "axi_stream": """, .m_axis_tdata(beat), .m_axis_tuser(user), .m_axis_tvalid(valid_beat), .m_axis_tready(1'b1)""",
-}
-_SIGNALS: dict[Output, str] = {
-    "top": "",
-    "spi": """
-    wire sclk, cs_n, mosi_x, mosi_y, ldac_n;
-    reg [63:0] held = 0;
-    reg [31:0] x_shift = 0, y_shift = 0;
-    always @(posedge sclk)
-        if (!cs_n) begin
-            x_shift <= {x_shift[30:0], mosi_x};
-            y_shift <= {y_shift[30:0], mosi_y};
-        end
-    always @(negedge cs_n) begin
-        x_shift <= 0;
-        y_shift <= 0;
-    end
-    always @(negedge ldac_n)
-        if (cs_n) $fwrite(played, "%016x\\n%016x\\n", held, {y_shift, x_shift});
-""",
-    "axi_stream": """
-    wire [2*LANE_BITS-1:0] beat;
-    wire [4:0] user;
-    wire valid_beat;
-    reg [63:0] held = 0;
-    wire [31:0] x_lane = beat[LANE_BITS-1:0], y_lane = beat[2*LANE_BITS-1:LANE_BITS];
-""",
-}
-_WRITTEN: dict[Output, str] = {
-    "top": """if (strobe) $fwrite(played, "%016x\\n%016x\\n", sample, {y_sent, x_sent});""",
-    "spi": "if (strobe) held = sample;",
-    "axi_stream": """if (valid_beat)
-                $fwrite(played, "%016x\\n%016x\\n", {held[63:53], user, held[47:0]}, {y_lane, x_lane});
-            if (strobe) held = sample;""",
-}
 
 _MODULE = """\
 // The bench of NAME_top.v: compares nothing, writes down what the top boots and plays.
@@ -292,21 +246,6 @@ def writes(regions: "list[tuple[int, np.ndarray]]", address: int = 0) -> list[Wr
     ]
 
 
-def played_outputs(formats: Iterable[str]) -> list[Output]:
-    """Return the modules that are played of a build in these formats."""
-    return ["top", *(OUTPUTS[each] for each in formats if each in OUTPUTS)]
-
-
-def output_pace(pace: int, program: ScanProgram, output: Output) -> int:
-    """Return the clocks from tick to tick of a module whose sequencer takes ``pace``."""
-    return max(pace, 2 * max(_word_bits(program)) + 1 + _REST_OF_A_FRAME) if output == "spi" else pace
-
-
-def output_ticks(ticks: int, output: Output) -> int:
-    """Return how many of the ticks of a top a module of a build plays."""
-    return ticks if output == "top" else min(ticks, _MOST_OUTPUT_TICKS)
-
-
 def instances(outputs: Sequence[Output]) -> list[str]:
     """Return the Verilog that instantiates the benches of these modules; each raises its ``tops_finished``."""
     return [
@@ -327,10 +266,6 @@ def _bench_files(output: Output) -> str:
 def _files(output: Output) -> dict[str, str]:
     """Return the files of a bench by its parameters."""
     return {key: f"{output}_{key.lower()}.hex" for key in ("UPLOAD", "BOOTED", "PLAYED")}
-
-
-def _word_bits(program: ScanProgram) -> tuple[int, int]:
-    return program.x.output.word_bits, program.y.output.word_bits
 
 
 def _top(output: Output) -> str:
@@ -366,14 +301,14 @@ def top_bench_text(
     other_sine, withdraws
         An expression that is 1 for a wrong sine, and whether what was booted is replaced by an upload.
     """
-    x_bits, y_bits = _word_bits(program)
+    x_bits, y_bits = word_bits(program)
     return _MODULE.format(
         bench=_bench_name(output),
         module=f"{name}_{output}",
         top=_top(output),
-        pins=_PINS[output],
-        signals=_SIGNALS[output],
-        written=_WRITTEN[output],
+        pins=PINS[output],
+        signals=SIGNALS[output],
+        written=WRITTEN[output],
         lane_bits=8 * ((max(x_bits, y_bits) + 7) // 8),
         dac_bits=program.x.output.dac_bits,
         x_bits=x_bits,

@@ -23,17 +23,8 @@ from tablegen.verification.checks.played_checks import Check
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.stream import PROGRAM, X_TABLE, Y_TABLE
 from tablegen.verification.verilog.bench import CONSTANTS, TOP, different_constants, written_constants
-from tablegen.verification.verilog.top_play import (
-    Output,
-    Write,
-    check_top,
-    instances,
-    output_pace,
-    output_ticks,
-    top_bench_text,
-    write_top,
-    writes,
-)
+from tablegen.verification.verilog.outputs import Output, output_pace, output_ticks
+from tablegen.verification.verilog.top_play import Write, check_top, instances, top_bench_text, write_top, writes
 
 _X_PARTS, _Y_PARTS = 5, 6  # regions
 _PART_SHIFT = 14  # of the address: second table, slow table, gains, ratios
