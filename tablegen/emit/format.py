@@ -89,7 +89,8 @@ class Format(ABC):
             return f"byte {at} is not as the manifest has it; {len(body)} bytes, {len(expected)} by the manifest"
         for at, (line, other) in enumerate(zip(ours, others, strict=False)):
             if line != other:
-                return f"line {skipped + at + 1} is {line.strip()[:40]!r}, it is {other.strip()[:40]!r} by the manifest"
+                ours_there, others_there = _at_difference(line.strip(), other.strip())
+                return f"line {skipped + at + 1} is {ours_there!r}, it is {others_there!r} by the manifest"
         return f"has {skipped + len(ours)} lines, {skipped + len(others)} by the manifest"
 
     def _after_comment(self, content: bytes) -> tuple[int, bytes]:
@@ -100,6 +101,13 @@ class Format(ABC):
             while skipped < len(lines) and (lines[skipped].startswith(mark) or not lines[skipped].strip()):
                 skipped += 1
         return skipped, b"".join(lines[skipped:])
+
+
+def _at_difference(line: str, other: str) -> tuple[str, str]:
+    """Cut two lines to 40 characters with the first one that differs, and what stands before it."""
+    pairs = enumerate(zip(line, other, strict=False))
+    start = max(next((at for at, (ours, theirs) in pairs if ours != theirs), min(len(line), len(other))) - 20, 0)
+    return line[start : start + 40], other[start : start + 40]
 
 
 def differing(name: str, stored: Mapping[str, int | str], expected: Mapping[str, int | str]) -> list[str]:

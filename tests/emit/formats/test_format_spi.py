@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from building import NAME
+from editing import run
 from formatted import check_finds_a_flip, formatted
 
 FILE = f"{NAME}_spi.v"
@@ -32,3 +33,14 @@ def test_it_has_the_ports_and_parameters_of_the_top(tmp_path: Path) -> None:
 
 def test_a_changed_digit_is_found(tmp_path: Path) -> None:
     check_finds_a_flip(formatted(tmp_path, "short", "spi"), "spi", [FILE])
+
+
+def test_a_difference_is_shown_where_it_is(tmp_path: Path) -> None:
+    """Also at the end of a long line."""
+    built = formatted(tmp_path, "short", "spi")
+    path = built.folder / FILE
+    path.write_text(path.read_text("ascii").replace(".mosi_y(mosi_y)", ".mosi_y(mosi_x)"), "ascii")
+    messages = run("verify", "--target", "files", built.folder).messages
+    (told,) = (line for line in messages if line.startswith("spi files"))
+    assert ".mosi_y(mosi_x)" in told
+    assert ".mosi_y(mosi_y)" in told
