@@ -171,13 +171,6 @@ module dac_loader_program #(
     input  wire [TARGET_BITS-1:0] address,
     output reg  [15:0]            instruction
 );
-    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
-    generate
-        if (TARGET_BITS != 10) begin : guard_0
-            dac_loader_program_TARGET_BITS_is_not_10 stop ();
-        end
-    endgenerate
-
     localparam WORDS = {len(words)};
     localparam [16*WORDS-1:0] PROGRAM = {{
 {text}
@@ -192,6 +185,13 @@ module dac_loader_program #(
     end
 
     always @(posedge clock) if (enable) instruction <= words[address];
+
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
+    generate
+        if (TARGET_BITS != 10) begin : guard_0
+            dac_loader_program_TARGET_BITS_is_not_10 stop ();
+        end
+    endgenerate
 endmodule
 
 `default_nettype wire
