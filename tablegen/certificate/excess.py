@@ -54,7 +54,7 @@ class Excess(Struct, frozen=True):
             figure = f"{self.percent:.3g} %"
             if self.percent > LARGEST_PERCENT:
                 above.append(f"{LARGEST_PERCENT:g} %")
-            if self.percent > parts.uncompensated >= _NOTHING_PERCENT:
+            if parts.uncompensated is not None and self.percent > parts.uncompensated >= _NOTHING_PERCENT:
                 above.append(f"the {parts.uncompensated:.3g} % of the uncompensated line")
         else:
             figure = f"{self.percent:+.3g} %"
@@ -76,7 +76,7 @@ def excess(scaling: Mapping[str, ScalingError], most: float | None = None) -> Ex
     for side, parts in scaling.items():
         error = max(parts.total, parts.band_limit)
         limit = size_limit = LARGEST_PERCENT if most is None else most
-        if most is None and parts.uncompensated >= _NOTHING_PERCENT:
+        if most is None and parts.uncompensated is not None and parts.uncompensated >= _NOTHING_PERCENT:
             limit = min(limit, parts.uncompensated)
         if error > limit:
             candidates.append(Excess("scaling error", side, error, limit, parts))

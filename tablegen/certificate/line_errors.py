@@ -30,6 +30,7 @@ _CHUNK_RUNS = 1 << 14  # runs whose figures are summed together
 # the system, and each page of the next ones is fetched anew, which takes longer than the arithmetic.
 _CHUNK = 1 << 12
 _MOST_KEPT_RUNS = 1 << 18  # runs whose errors are kept; of more they are computed again where they are needed
+_PLACES = 1025  # at which a line is asked whether it rises
 _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
@@ -38,7 +39,8 @@ class ScalingError(Struct, frozen=True):
 
     ``total`` is of the emitted integers through the scanner's model; ``band_limit``, ``quantisation`` and
     ``model`` are its parts taken alone, the last being what the boost limit leaves of the dynamics. ``size`` is the
-    error of the window's extent. ``uncompensated`` is what a triangle of the same amplitude would give.
+    error of the window's extent. ``uncompensated`` is what a triangle of the same amplitude would give; None where
+    the compensated line does not rise over so much of the drive, so that no place follows from it.
     """
 
     total: float
@@ -46,7 +48,7 @@ class ScalingError(Struct, frozen=True):
     quantisation: float
     model: float
     size: float
-    uncompensated: float
+    uncompensated: float | None
 
 
 class LayerEffect(Struct, frozen=True):
@@ -332,16 +334,26 @@ def _scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swe
     deviation, speed, target_speed = followed.deviation, followed.speed, followed.target_speed
     sweep = followed.position if side == "forward" else 1.0 - followed.position
     chords = [_chords(line, one, side, followed) for one in played.arriving()]
-    # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'; the last one is of its middle.
-    triangle = 1.0 / branch.slope(branch.inverse(np.append(sweep, 0.5)))
     return ScalingError(
         total=max(_peak_to_peak(total) for total, _ in chords),
         band_limit=_peak_to_peak(target_speed),
         quantisation=max(_peak_to_peak(noise) for _, noise in chords),
         model=_peak_to_peak(speed - target_speed),
         size=100.0 * float(deviation[-1] - deviation[0]) / (high - low),
-        uncompensated=_peak_to_peak(triangle[:-1] / triangle[-1]),
+        uncompensated=_uncompensated(branch, sweep),
     )
+
+
+def _uncompensated(branch: Sweep, sweep: Floats) -> float | None:
+    """Return what a triangle would give, which leaves the piezo at the inverse of the branch, whose slope is 1 / u'."""
+    values = branch.value(np.linspace(0.0, 1.0, _PLACES))
+    falls = np.flatnonzero(np.diff(values) <= 0.0)  # at the turns, where a band limit rounds them
+    low = max((int(k) + 1 for k in falls if k < _PLACES // 2), default=0)
+    high = min((int(k) for k in falls if k >= _PLACES // 2), default=_PLACES - 1)
+    if np.min(sweep) < values[low] or np.max(sweep) > values[high]:
+        return None
+    triangle = 1.0 / branch.slope(branch.inverse(np.append(sweep, 0.5)))  # the last one is of its middle
+    return _peak_to_peak(triangle[:-1] / triangle[-1])
 
 
 def _followed(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> FollowedSweep:

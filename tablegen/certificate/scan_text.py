@@ -41,7 +41,7 @@ def _rows(plan: Plan, line: LinePlan, certificate: Certificate) -> list[tuple[st
         ("drive at the piezo", f"{drive.v_amplitude:.4g} V peak to peak about {drive.v_offset:.4g} V"),
     ]
     if certificate.scaling:
-        bare = max(one.uncompensated for one in certificate.scaling.values())
+        bare = max((one.uncompensated or 0.0) for one in certificate.scaling.values())
         if bare > 0.0005:
             rows.append(("without correction", f"the local size would vary by {bare:.3g} % along the image"))
         scaling = certificate.scaling_error_percent

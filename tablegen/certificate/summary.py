@@ -118,7 +118,8 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
             f"band limit {_percent(e.band_limit)}, quantisation {_percent(e.quantisation)}, model {_percent(e.model)}"
         )
         rows.append(("scaling " + side, f"{_percent(e.total)} % peak to peak ({parts})"))
-        rows.append(("", f"uncompensated {_percent(e.uncompensated)} %; window's size off by {e.size:+.4f} %"))
+        bare = "" if e.uncompensated is None else f"uncompensated {_percent(e.uncompensated)} %; "
+        rows.append(("", f"{bare}window's size off by {e.size:+.4f} %"))
     if c.position is not None:
         sides = ", ".join(f"scaling {side} {_percent(value)} %" for side, value in c.position.scaling.items())
         rows.append(("position", f"{sides}, with the steps of the codes"))

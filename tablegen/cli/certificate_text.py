@@ -24,8 +24,9 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
             step = f"{certificate.largest_step}/{certificate.max_step}"
             if i:
                 start, step = " " * len(start), ""
+            bare = f"{'-':>13}" if error.uncompensated is None else f"{error.uncompensated:13.2f}"
             lines.append(
-                f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
+                f"{start}   {side:<9}  {bare}  {error.total:7.3f}  {error.band_limit:10.4f}  "
                 f"{error.size:+.3f}  {step}".rstrip()
             )
         if line.drive.resting:

@@ -113,7 +113,7 @@ def _parts(subject: Subject) -> Grid:
     rows = []
     for axis, entry in subject.axes:
         for side, error in (entry.certificate.scaling_error_percent or {}).items():
-            cells = [figure(error.get(name, 0.0), 3) for name in _PARTS]
+            cells = [figure(error[name], 3) if name in error else "-" for name in _PARTS]
             if entry.fourier.place is not None:
                 cells[0] = "-"  # a sine is not a bent line
             rows.append(row(f"{axis} {side}", *cells))

@@ -180,7 +180,8 @@ def _expected(expectation: Expectation) -> dict[str, Any]:
 
 def _sides(figures: Mapping[str, ScalingError] | Mapping[str, LayerEffect]) -> dict[str, dict[str, Any]]:
     return {
-        side: {part: _figure(getattr(one, part)) for part in one.__struct_fields__} for side, one in figures.items()
+        side: {part: _figure(value) for part in one.__struct_fields__ if (value := getattr(one, part)) is not None}
+        for side, one in figures.items()
     }
 
 

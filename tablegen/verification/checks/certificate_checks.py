@@ -120,6 +120,9 @@ def _check(
             for side, parts in (sides or {}).items():
                 count += len(parts)
                 wrong += different_figures(stated[side], parts, period.is_whole, f"{key}.{side}.")
+                wrong += [
+                    f"certificate.{key}.{side} has {shortened(part)}" for part in stated[side] if part not in parts
+                ]
                 most = axis.fourier.max_scaling_error_percent
                 if key == "scaling_error_percent" and most is not None and parts["band_limit"] > most * _ROUNDED:
                     wrong.append(f"fourier.max_scaling_error_percent is {most}, {side} has {parts['band_limit']:.6g}")

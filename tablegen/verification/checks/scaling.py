@@ -21,6 +21,7 @@ CHORD = 0.05  # share of the line
 OPERATOR = "operator"  # the model whose waveform follows from no equation
 _POINTS = 16, 513  # per harmonic, and beside them, over the window
 _ACCELERATION_POINTS = 32  # per harmonic
+_PLACES = 1025  # at which a branch is asked whether it rises
 _GRID = 4097  # points on which a branch is inverted first
 
 
@@ -367,16 +368,30 @@ def _direction(axis: ManifestAxis, periods: "Sequence[PlayedPeriod | PositionErr
         )
     deviation = (value - shape) / steepness
     chords = [_chords(axis, period, side, position, deviation, steepness) for period in periods]
-    triangle = 1.0 / branch.slope(branch.inverse(sweep))
-    middle = 1.0 / branch.slope(branch.inverse(np.array([0.5])))[0]
     return {
         "total": max(_peak_to_peak(total) for total, _ in chords),
         "band_limit": _peak_to_peak(target_slope / ideal),
         "quantisation": max(_peak_to_peak(noise) for _, noise in chords),
         "model": _peak_to_peak((arrived_slope - target_slope) / ideal),
         "size": 100.0 * float(deviation[-1] - deviation[0]) / (high - low),
-        "uncompensated": _peak_to_peak(triangle / middle),
+        **_uncompensated(branch, sweep),
     }
+
+
+def _uncompensated(branch: ModelBranch | WaveformBranch, sweep: Floats) -> dict[str, float]:
+    """Return what a triangle would give; nothing where the branch does not rise over so much of u."""
+    values = branch.value(np.linspace(0.0, 1.0, _PLACES))
+    rises, middle_place = np.diff(values) > 0.0, _PLACES // 2
+    low, high = middle_place, middle_place
+    while low > 0 and rises[low - 1]:
+        low -= 1
+    while high < _PLACES - 1 and rises[high]:
+        high += 1
+    if np.min(sweep) < values[low] or np.max(sweep) > values[high]:
+        return {}
+    triangle = 1.0 / branch.slope(branch.inverse(sweep))
+    middle = 1.0 / branch.slope(branch.inverse(np.array([0.5])))[0]
+    return {"uncompensated": _peak_to_peak(triangle / middle)}
 
 
 def _chords(
