@@ -1,10 +1,11 @@
 """Scans at an angle on simulated piezos that the project does not contain, for docs/angle.md.
 
 ``python benchmarks/scan_angle.py`` prints the errors at some angles, ``--step 7`` the worst over 0, 7, 14, ... 357
-degrees; ``--write`` puts the table of angles into the page. Each axis is identified from ten traces; a scan of 300 nm
-and 48 lines at 100 Hz is planned at the angle, and its emitted integers are played on the piezo itself: hysteresis
-stepped over the frame, creep, two modes and a dead time. 0 degrees is planned in the same way. ``--coupled`` does the
-same on axes of which each moves along the other by 2 %, and prints beside it the worst of a plan that does not know it.
+degrees, with ``--further`` from four more traces an axis; ``--write`` puts the table of angles into the page. Each axis
+is identified from ten traces; a scan of 300 nm and 48 lines at 100 Hz is planned at the angle, and its emitted integers
+are played on the piezo itself: hysteresis stepped over the frame, creep, two modes and a dead time. 0 degrees is
+planned in the same way. ``--coupled`` does the same on axes of which each moves along the other by 2 %, and prints
+beside it the worst of a plan that does not know it.
 ``--refine`` prints the errors at 30 degrees before and after each of two rounds of learning from a sensor with noise
 and drift.
 """
@@ -21,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
 
-from turned_scans import PIEZOS, UNCOUPLED, on_the_piezo, sensor_trace, turned_setup
+from turned_scans import FURTHER, PIEZOS, UNCOUPLED, Further, on_the_piezo, sensor_trace, turned_setup
 
 from tablegen.planning.turned_plan import make_turned_plan
 from tablegen.refinement.frame_round import FrameOptions, refine_frame
@@ -38,10 +39,13 @@ HEAD = (
 )
 
 
-def errors(piezo: str, angle_deg: float, coupling: tuple[float, float], known: bool = True) -> dict[str, float]:
+def errors(
+    piezo: str, angle_deg: float, coupling: tuple[float, float], known: bool = True, further: Further = ()
+) -> dict[str, float]:
     """Errors of a scan at an angle on a piezo, in percent; its axes are coupled, whether the plan knows it or not."""
     with tempfile.TemporaryDirectory() as folder:
-        setup = turned_setup(Path(folder), angle_deg, piezo=piezo, coupling=coupling if known else UNCOUPLED)
+        told = coupling if known else UNCOUPLED
+        setup = turned_setup(Path(folder), angle_deg, piezo=piezo, coupling=told, further=further)
         return on_the_piezo(make_turned_plan(setup), piezo, coupling)
 
 
@@ -79,6 +83,7 @@ def main() -> None:
     """Print the table, or write it into the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--step", type=int, metavar="DEGREES", help="print the worst over all angles in steps")
+    parser.add_argument("--further", action="store_true", help="with --step: from fourteen traces an axis")
     parser.add_argument("--coupled", action="store_true", help="print the worst over some angles on coupled axes")
     parser.add_argument("--refine", action="store_true", help="print the errors of two rounds of learning")
     parser.add_argument("--write", action="store_true", help="put the table into docs/angle.md")
@@ -88,7 +93,10 @@ def main() -> None:
         angles = [float(angle) for angle in range(0, 360, options.step)] if options.step else ANGLES
         coupling = COUPLED if options.coupled else UNCOUPLED
         for piezo in (one for one in PIEZOS if one not in WITHOUT_MEMORY_OF_TURNS):
-            print(worst(piezo, [errors(piezo, angle, coupling) for angle in angles]), flush=True)
+            further = FURTHER if options.further else ()
+            if options.step:
+                print(row(f"{piezo}, 0", errors(piezo, 0.0, coupling, further=further)), flush=True)
+            print(worst(piezo, [errors(piezo, angle, coupling, further=further) for angle in angles]), flush=True)
             if options.coupled:
                 unknown = [errors(piezo, angle, coupling, known=False) for angle in angles]
                 print(worst(f"{piezo}, coupling not in the plan", unknown), flush=True)

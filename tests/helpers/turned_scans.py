@@ -21,6 +21,10 @@ from tablegen.numerics.arrays import Ints
 from tablegen.planning.turned_plan import TurnedPlan
 from tablegen.virtual.preisach import Preisach
 
+# Traces beside the ten, for a scan at an angle: two at the rate of a frame, two of what an axis takes of a line. Centre
+# and stroke in shares of the range, and Hz.
+FURTHER = ((0.5, 0.45, 2.0), (0.5, 0.97, 2.0), (0.5, 0.35, 100.0), (0.5, 0.17, 100.0))
+Further = tuple[tuple[float, float, float], ...]
 SIMPLE = "simple"  # an operator that no fit has made
 UNCOUPLED = 0.0, 0.0
 SAMPLES = 320  # of a line, on which foreign piezos are stepped
@@ -59,12 +63,13 @@ OPERATORS = (
 
 
 @cache
-def operator_bytes(piezo: str, axis: str) -> bytes:
-    """The operator's file of one axis of a piezo, or of plays that nobody measured."""
+def operator_bytes(piezo: str, axis: str, further: Further = ()) -> bytes:
+    """The operator's file of one axis of a piezo, from ten traces and further, or of plays nobody measured."""
     if piezo == SIMPLE:
         return operator_text(operator_file_of_plays(axis), []).encode("utf-8")
     plant = ForeignPlant(PIEZOS[piezo]["xy".index(axis)])
     traces = [Trace(f"{k}", *record(plant, at, stroke, seed=k)) for k, (at, stroke) in enumerate(TEN)]
+    traces += [Trace(f"{k}", *record(plant, *one, seed=k)) for k, one in enumerate(further, len(TEN))]
     fit = fit_operator([periodic_line(trace, V_MAX) for trace in traces], None, lambda _: 1.0)
     return operator_file(fit, "x" if axis == "x" else "y", V_MAX)
 
@@ -76,10 +81,11 @@ def write_turned(
     piezo: str = SIMPLE,
     size_nm: float = 300.0,
     coupling: tuple[float, float] = UNCOUPLED,
+    further: Further = (),
 ) -> Path:
     """The example at an angle, of so many lines, with an operator on both axes; coupling is ``x_per_y, y_per_x``."""
     for axis in "xy":
-        (folder / f"operator_{axis}.toml").write_bytes(operator_bytes(piezo, axis))
+        (folder / f"operator_{axis}.toml").write_bytes(operator_bytes(piezo, axis, further))
     sizes = (f"x.size_nm = {size_nm}", f"y.size_nm = {size_nm}", "timing.lines = 48")
     scan = f"angle_deg = {angle_deg}\n" + edited(SCAN, *EDITS, *sizes, *edits)
     coupled = f"+ [coupling]\nx_per_y = {coupling[0]}\ny_per_x = {coupling[1]}"
@@ -93,9 +99,12 @@ def turned_setup(
     piezo: str = SIMPLE,
     size_nm: float = 300.0,
     coupling: tuple[float, float] = UNCOUPLED,
+    further: Further = (),
 ) -> Setup:
     """The setup of it."""
-    return load(write_turned(folder, angle_deg, *edits, piezo=piezo, size_nm=size_nm, coupling=coupling))
+    return load(
+        write_turned(folder, angle_deg, *edits, piezo=piezo, size_nm=size_nm, coupling=coupling, further=further)
+    )
 
 
 def on_the_piezo(plan: TurnedPlan, piezo: str, coupling: tuple[float, float] = UNCOUPLED) -> dict[str, float]:
