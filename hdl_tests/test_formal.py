@@ -84,6 +84,10 @@ PROOFS = {
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
     "slow_play": Proof("slow_play_properties", 3, 26, {}, SLOW_STUBS, 26),
     "slow_divide": Proof("slow_divide_properties", 1, 20, covers=20),
+    **{
+        f"slow_store_{kind}": Proof("slow_store_properties", 1, 8, {"KIND": number})
+        for number, kind in enumerate(("page", "fast", "second", "slow", "gains", "ratios"))
+    },
     "slow_fit": Proof("slow_fit_properties", 1, 50, covers=4, skip=44),
     "slow_fit_of_14_bits": Proof("slow_fit_properties", 1, 0, {**_14_BITS, "LINE_BITS": 16}),
     "slow_engine": Proof("slow_engine_properties", 2, 6),
@@ -103,6 +107,17 @@ COVERS_AS_ASSERTIONS = """
 (* techmap_celltype = "$cover" *)
 module cover_as_assertion (input A, input EN);
     \\$assert assertion (.A(!A), .EN(EN));
+endmodule
+"""
+# A further port to read a memory of an instance: the name of both is known after flattening alone.
+MEMORY_PORT = """
+module memory_port (input CLK, input EN, input [ABITS-1:0] ADDR, output [WIDTH-1:0] DATA);
+    parameter MEMID = "";
+    parameter ABITS = 1;
+    parameter WIDTH = 1;
+    parameter CLK_ENABLE = 0;
+    parameter CLK_POLARITY = 1;
+    parameter TRANSPARENT = 0;
 endmodule
 """
 
@@ -135,10 +150,13 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
         text = (FORMAL / f"{stub}.v").read_text("utf-8")
         (folder / f"{stub}_stub.v").write_text(text if proof.asserts_in_stubs else ASIDE.sub("", text), "utf-8")
         lines.append(f"read_verilog -formal -defer {folder / stub}_stub.v")
+    port = folder / "memory_port.v"
+    port.write_text(MEMORY_PORT, "utf-8")
     lines += [
+        f"read_verilog -lib {port}",
         f"read_verilog -formal -defer {harness}",
         f"hierarchy -check -top {proof.top} " + " ".join(f"-chparam {k} {v}" for k, v in proof.parameters.items()),
-        "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten",
+        "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten; chtype -set $memrd t:memory_port",
         *(f"connect -nounset -set {name} {_inner(name, short)}" for name in seen),
         f"check -assert; opt_clean; prep -top {proof.top}; memory_nordff; dffunmap; opt_clean",
     ]
@@ -194,6 +212,8 @@ SLOW_PROOFS = {
     "pair_phase_of_31_bits",
     "pair_delay_of_64_clocks",
     "slow_fit_of_14_bits",
+    "slow_store_gains",
+    "slow_store_ratios",
 }
 
 
@@ -458,6 +478,31 @@ MUTANTS = {
         "slow_divide", "dac_slow_divide", "rest <= reduces ? less : from", "rest <= from"
     ),
     "slow_both_bits_are_one": ("slow_divide", "dac_slow_divide", "(add && here && there)", "(add && here)"),
+    "slow_word_of_the_other_axis": (
+        "slow_store_fast", "dac_slow_store", "fast_words[{write_bank, write_axis,", "fast_words[{write_bank, 1'b0,"
+    ),
+    "slow_word_of_another_part": (
+        "slow_store_second", "dac_slow_store", "write_part && part == SECOND", "write_part && !part[1]"
+    ),
+    "slow_word_of_the_other_bank": (
+        "slow_store_slow", "dac_slow_store", "{bank, axis, slow_index}", "{!bank, axis, slow_index}"
+    ),
+    "slow_word_does_not_stay": ("slow_store_slow", "dac_slow_store", "if (enable) begin", "begin"),
+    "slow_page_by_turns": (
+        "slow_store_page",
+        "dac_slow_store",
+        "pages[{write_bank, write_axis, write_address",
+        "pages[{write_axis, write_bank, write_address",
+    ),
+    "slow_gain_of_another_knot": (
+        "slow_store_gains",
+        "dac_slow_store",
+        "gains[{write_bank, write_axis, write_address[6:0]}]",
+        "gains[{write_bank, write_axis, 1'b0, write_address[5:0]}]",
+    ),
+    "slow_ratio_of_another_knot": (
+        "slow_store_ratios", "dac_slow_store", "ratios[{bank, axis, knot}]", "ratios[{bank, axis, 1'b0, knot[5:0]}]"
+    ),
     "slow_gain_behind_the_last_one": (
         "slow_fit", "dac_slow_fit", "place < {7'd0, MOST_KNOTS}", "place <= {7'd0, MOST_KNOTS}"
     ),
@@ -477,6 +522,8 @@ MUTANTS = {
 # With the first one of each module in each harness.
 FIRSTS = {(harness, module): name for name, (harness, module, _, _) in reversed(MUTANTS.items())}
 LATE = {"pair_digits_of_the_other_axis", "pair_step_of_x_for_y"}  # many clocks deep
+LATE |= {"slow_knots_of_more", "slow_word_too_few"}
+LATE |= {"slow_page_by_turns", "slow_gain_of_another_knot", "slow_ratio_of_another_knot"}  # large memories
 SOME = {*list(MUTANTS)[::6], *FIRSTS.values()} - LATE
 
 
