@@ -40,11 +40,13 @@ class Proof:
     covers: int = 0
     asserts_in_stubs: bool = True
     maps_memory: bool = False  # its memories are registers, and words of them signals of the harness
+    skip: int = 0  # clocks after power-up in which a mutant is not asked for a violation
 
 
 ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit", "dac_whole")
 SLOW_STUBS = ("dac_fit", "dac_whole", "dac_slow_fit", "dac_slow_engine", "dac_slow_store", "dac_slow_axis")
 CONTROL_STUBS = ("dac_axis", "dac_fit", "dac_whole")
+_14_BITS = {"X_INDEX_BITS": 14, "Y_INDEX_BITS": 14, "SLOW_INDEX_BITS": 14}
 SERIAL = Proof("serial_properties", 1, 0)
 PROOFS = {
     "slew": Proof("slew_properties", 1, 12, {"BITS": 4}),
@@ -82,6 +84,14 @@ PROOFS = {
     "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
     "slow_play": Proof("slow_play_properties", 3, 26, {}, SLOW_STUBS, 26),
     "slow_divide": Proof("slow_divide_properties", 1, 20, covers=20),
+    **{
+        f"slow_store_{kind}": Proof("slow_store_properties", 1, 8, {"KIND": number})
+        for number, kind in enumerate(("page", "fast", "second", "slow", "gains", "ratios"))
+    },
+    "slow_fit": Proof("slow_fit_properties", 1, 50, covers=4, skip=44),
+    "slow_fit_of_14_bits": Proof("slow_fit_properties", 1, 0, {**_14_BITS, "LINE_BITS": 16}),
+    "slow_engine": Proof("slow_engine_properties", 2, 6),
+    "slow_axis": Proof("slow_axis_properties", 1, 14, {}, ("dac_axis_serial",), 16, asserts_in_stubs=False),
     "pair_slew": Proof("pair_slew_properties", 1, 14, {"BITS": 4}),
     "pair_slew_of_16_bits": Proof("pair_slew_properties", 1, 0, {"BITS": 16}),
     "pair_phase": Proof("pair_phase_properties", 1, 12, {"PERIOD_BITS": 4}),
@@ -99,13 +109,25 @@ module cover_as_assertion (input A, input EN);
     \\$assert assertion (.A(!A), .EN(EN));
 endmodule
 """
+# A further port to read a memory of an instance: the name of both is known after flattening alone.
+MEMORY_PORT = """
+module memory_port (input CLK, input EN, input [ABITS-1:0] ADDR, output [WIDTH-1:0] DATA);
+    parameter MEMID = "";
+    parameter ABITS = 1;
+    parameter WIDTH = 1;
+    parameter CLK_ENABLE = 0;
+    parameter CLK_POLARITY = 1;
+    parameter TRANSPARENT = 0;
+endmodule
+"""
 
 
 def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = False, cover: int = -1) -> str:
     """The start of a yosys script: everything read, flattened, and the signals of the properties connected.
 
-    ``alone`` leaves out what makes a harness inductive, where it marks that: a mutant has to break a property. Of the
-    cover statements only number ``cover`` stays.
+    ``alone`` leaves out what makes a harness inductive, where it marks that: a mutant has to break a property. A
+    harness may choose its inputs then, so that a deep counterexample is found. Of the cover statements only number
+    ``cover`` stays.
     """
     for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
         shutil.copy(path, folder)
@@ -115,7 +137,7 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
             (folder / f"{name}.v").write_text(text, "utf-8")
     text = (FORMAL / f"{proof.top}.v").read_text("utf-8")
     if alone:
-        text = ASIDE.sub("", text)
+        text = "`define PROPERTIES_ALONE\n" + ASIDE.sub("", text)
     text = PIPELINED.sub("" if alone or proof.parameters.get("LOW_AREA") else r"\1", text)
     numbers = itertools.count()
     text = COVER.sub(lambda statement: statement[0] if next(numbers) == cover else ";", text)
@@ -128,10 +150,13 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
         text = (FORMAL / f"{stub}.v").read_text("utf-8")
         (folder / f"{stub}_stub.v").write_text(text if proof.asserts_in_stubs else ASIDE.sub("", text), "utf-8")
         lines.append(f"read_verilog -formal -defer {folder / stub}_stub.v")
+    port = folder / "memory_port.v"
+    port.write_text(MEMORY_PORT, "utf-8")
     lines += [
+        f"read_verilog -lib {port}",
         f"read_verilog -formal -defer {harness}",
         f"hierarchy -check -top {proof.top} " + " ".join(f"-chparam {k} {v}" for k, v in proof.parameters.items()),
-        "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten",
+        "proc; flatten; memory_map" if proof.maps_memory else "proc; flatten; chtype -set $memrd t:memory_port",
         *(f"connect -nounset -set {name} {_inner(name, short)}" for name in seen),
         f"check -assert; opt_clean; prep -top {proof.top}; memory_nordff; dffunmap; opt_clean",
     ]
@@ -150,15 +175,17 @@ def _proven(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None
     return _sat(read, induction, folder, "Induction step proven: SUCCESS!")
 
 
-def _has_counterexample(read: str, reach: int, folder: Path) -> bool:
-    """Search from power-up, over so many clocks."""
+def _has_counterexample(read: str, reach: int, folder: Path, skip: int = 0) -> bool:
+    """Search from power-up, over so many clocks, for a violation that does not come in the first ones."""
+    if skip:
+        return not _sat(read, f"-seq {reach} -prove-skip {skip}", folder, "no model found: SUCCESS!")
     return not _sat(read, f"-tempinduct -tempinduct-baseonly -maxsteps {reach}", folder, "proved base case")
 
 
 def _mutant_has_counterexample(proof: Proof, folder: Path, modules: Mapping[str, str]) -> bool:
     """Search for a violation of a property, not of what makes it inductive."""
     read = _read(proof, modules, folder, alone=True)
-    return _has_counterexample(read, proof.reach, folder)
+    return _has_counterexample(read, proof.reach, folder, proof.skip)
 
 
 def _sat(read: str, how: str, folder: Path, success: str) -> bool:
@@ -184,6 +211,9 @@ SLOW_PROOFS = {
     "pair_slew_of_16_bits",
     "pair_phase_of_31_bits",
     "pair_delay_of_64_clocks",
+    "slow_fit_of_14_bits",
+    "slow_store_gains",
+    "slow_store_ratios",
 }
 
 
@@ -448,6 +478,43 @@ MUTANTS = {
         "slow_divide", "dac_slow_divide", "rest <= reduces ? less : from", "rest <= from"
     ),
     "slow_both_bits_are_one": ("slow_divide", "dac_slow_divide", "(add && here && there)", "(add && here)"),
+    "slow_word_of_the_other_axis": (
+        "slow_store_fast", "dac_slow_store", "fast_words[{write_bank, write_axis,", "fast_words[{write_bank, 1'b0,"
+    ),
+    "slow_word_of_another_part": (
+        "slow_store_second", "dac_slow_store", "write_part && part == SECOND", "write_part && !part[1]"
+    ),
+    "slow_word_of_the_other_bank": (
+        "slow_store_slow", "dac_slow_store", "{bank, axis, slow_index}", "{!bank, axis, slow_index}"
+    ),
+    "slow_word_does_not_stay": ("slow_store_slow", "dac_slow_store", "if (enable) begin", "begin"),
+    "slow_page_by_turns": (
+        "slow_store_page",
+        "dac_slow_store",
+        "pages[{write_bank, write_axis, write_address",
+        "pages[{write_axis, write_bank, write_address",
+    ),
+    "slow_gain_of_another_knot": (
+        "slow_store_gains",
+        "dac_slow_store",
+        "gains[{write_bank, write_axis, write_address[6:0]}]",
+        "gains[{write_bank, write_axis, 1'b0, write_address[5:0]}]",
+    ),
+    "slow_ratio_of_another_knot": (
+        "slow_store_ratios", "dac_slow_store", "ratios[{bank, axis, knot}]", "ratios[{bank, axis, 1'b0, knot[5:0]}]"
+    ),
+    "slow_gain_behind_the_last_one": (
+        "slow_fit", "dac_slow_fit", "place < {7'd0, MOST_KNOTS}", "place <= {7'd0, MOST_KNOTS}"
+    ),
+    "slow_knots_of_more": ("slow_fit", "dac_slow_fit", "data[6:0] <= MOST_KNOTS && !data[7]", "!data[7]"),
+    "slow_word_too_few": ("slow_fit", "dac_slow_fit", "(1 << Y_INDEX_BITS) + 8", "(1 << Y_INDEX_BITS) + 7"),
+    "slow_ramp_of_the_next_line": ("slow_axis", "dac_slow_axis", "if (next) by <= next_ramp", "by <= next_ramp"),
+    "slow_offset_in_the_next_line": ("slow_axis", "dac_slow_axis", "half ^ of_offset", "half"),
+    "slow_offset_is_cut": ("slow_axis", "dac_slow_axis", "{{6{at[43]}}, at[43:18]}", "{6'd0, at[43:18]}"),
+    "slow_axis_begins_too_early": ("slow_axis", "dac_slow_axis", ".tick(ticks[2])", ".tick(ticks[1])"),
+    "slow_engine_writes_while_it_stands": (
+        "slow_engine", "dac_slow_engine", "write = enable && ((state", "write = ((state"
+    ),
     "slow_half_is_lost": ("slow_divide", "dac_slow_divide", "half ? {1'b0, whole[REST_BITS-1:1]}", "half ? 0"),
 }  # fmt: skip
 
@@ -455,6 +522,8 @@ MUTANTS = {
 # With the first one of each module in each harness.
 FIRSTS = {(harness, module): name for name, (harness, module, _, _) in reversed(MUTANTS.items())}
 LATE = {"pair_digits_of_the_other_axis", "pair_step_of_x_for_y"}  # many clocks deep
+LATE |= {"slow_knots_of_more", "slow_word_too_few"}
+LATE |= {"slow_page_by_turns", "slow_gain_of_another_knot", "slow_ratio_of_another_knot"}  # large memories
 SOME = {*list(MUTANTS)[::6], *FIRSTS.values()} - LATE
 
 
@@ -481,9 +550,16 @@ SERIAL_MUTANTS = {
 }
 
 
+# As these do, whose counterexamples lie 500 clocks of arithmetic deep: of the proof, module, text, and instead.
+ENGINE_MUTANTS = {
+    "slow_search_without_end": ("slow_engine", "if (reduces && knot != 7'd63)", "if (reduces)"),
+    "slow_table_a_word_longer": ("slow_engine", "if (word_ends) begin", "if (word_ends && !enable) begin"),
+}
+
+
 def test_the_documentation_counts_them() -> None:
     page = MODULES.parents[1] / "docs" / "verilog.md"
-    assert f"{len(MUTANTS) + len(SERIAL_MUTANTS)} in all" in page.read_text("utf-8")
+    assert f"{len(MUTANTS) + len(SERIAL_MUTANTS) + len(ENGINE_MUTANTS)} in all" in page.read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", long(("word_a_clock_late", "moves_at_once", "powers_up_elsewhere"), SERIAL_MUTANTS))
@@ -492,3 +568,11 @@ def test_mutant_of_the_low_area_axis_is_not_proven(name: str, tmp_path: Path) ->
     original = (MODULES / "dac_axis_serial.v").read_text("utf-8")
     assert original.count(text) == 1, f"{text} is {original.count(text)} times in dac_axis_serial"
     assert not _proven(SERIAL, tmp_path, {"dac_axis_serial": original.replace(text, instead)})
+
+
+@pytest.mark.parametrize("name", long(("slow_search_without_end",), ENGINE_MUTANTS))
+def test_mutant_of_the_engine_is_not_proven(name: str, tmp_path: Path) -> None:
+    proof, text, instead = ENGINE_MUTANTS[name]
+    original = path_of("dac_slow_engine").read_text("utf-8")
+    assert original.count(text) == 1, f"{text} is {original.count(text)} times in dac_slow_engine"
+    assert not _proven(PROOFS[proof], tmp_path, {"dac_slow_engine": original.replace(text, instead)})
