@@ -68,12 +68,10 @@ CASES = {
     "dac_8_words_21": Case(SequencerShape(8, 3, 3, 20, 1, 4, 21)),
     "small_counters": Case(CUBIC, parameters={"TICK_BITS": 6, "LINE_BITS": 3, "COUNT_BITS": 5}),
     "power_up_codes": Case(CUBIC, 60, {"X_POWER_UP_CODE": 5, "Y_POWER_UP_CODE": 65535}),
-    "first": Case(CUBIC, parameters={"SHAPING": 1}),
     "second_lines": Case(LINES, parameters={"SHAPING": 2}),
-    "scanner": Case(CUBIC, parameters={"SHAPING": 3}),
+    "scanner_cubic": Case(CUBIC, parameters={"SHAPING": 3}),
     "first_dac_24_words_8": Case(SequencerShape(24, 1, 2, 8, 3, 5, 8), parameters={"SHAPING": 1}),
     "second_dac_8_words_21": Case(SequencerShape(8, 3, 3, 20, 1, 4, 21), parameters={"SHAPING": 2}),
-    "scanner_lines_dac_20": Case(SequencerShape(20, 1, 4, 21, 1, 3, 9), parameters={"SHAPING": 3}),
 }
 
 
@@ -140,7 +138,9 @@ def swaps_of(run: BenchRun) -> set[str]:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(["lines"], ["cubic", "lines", "small_counters", "second_lines", "scanner"]))
+@pytest.mark.parametrize(
+    "name", common(["lines"], ["cubic", "lines", "small_counters", "second_lines", "scanner_cubic"])
+)
 def test_random_commits_of_every_mode(name: str, tmp_path: Path) -> None:
     case = CASES[name]
     script = case.script
