@@ -42,7 +42,6 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "cubic_y_plain": ("dac_sequencer", {"Y_INTERPOLATED": 3, "PLAIN_MULTIPLIER": 1, "SHAPING": 3}),
     "cubic_low_area": ("dac_sequencer", {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3, "LOW_AREA": 1}),
     "slow_part": ("dac_sequencer", {"SLOW_PART": 1, "LOW_AREA": 1, "X_INTERPOLATED": 3, "X_INDEX_BITS": 6}),
-    "slow_part_scanner": ("dac_sequencer", {"SLOW_PART": 1, "LOW_AREA": 1, "SHAPING": 3, "X_INTERPOLATED": 3}),
     "pixels": ("dac_sequencer", {"PIXEL_INDEX_BITS": 9, "LOW_AREA": 1}),
     "alternate": ("dac_sequencer", {"ALTERNATE": 1, "X_INTERPOLATED": 0, "X_POWER_UP_CODE": 32768}),
     "spi": ("dac_spi", {}),
@@ -65,6 +64,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
         "program_loader",
         {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "DAC_BITS": 24, "MEMORY_BYTES": 8192, "UPDATE_RATE": 500_000},
     ),
+    "slow_part_scanner": ("dac_sequencer", {"SLOW_PART": 1, "LOW_AREA": 1, "SHAPING": 3, "X_INTERPOLATED": 3}),
 }
 
 

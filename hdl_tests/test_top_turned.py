@@ -20,9 +20,9 @@ SHAPES = {
     "cubic": SequencerShape(16, 3, 4, 16, 3, 3, 16),
     "cubic and lines": SequencerShape(20, 3, 4, 21, 1, 5, 9),
     "lines": SequencerShape(8, 1, 4, 12, 1, 3, 8),
-    "shaped": SequencerShape(16, 1, 4, 16, 1, 3, 16),
+    "scanner lines": SequencerShape(16, 1, 4, 16, 1, 3, 16),
 }
-SHAPING = {"shaped": 3}
+SHAPING = {"scanner lines": 3}
 LINES = 3
 REFUSED = {
     "SLOW_INDEX_BITS": "SLOW_INDEX_BITS_is_less_than_the_scan_takes",
@@ -85,7 +85,7 @@ def test_a_parameter_that_the_scan_does_not_fit_is_refused_by_name(tmp_path: Pat
 @pytest.mark.common
 def test_an_order_below_that_of_the_scan_is_refused_and_one_above_takes_its_clocks(tmp_path: Path) -> None:
     """A sequencer that shapes takes 2 clocks more a tick, whatever it plays first."""
-    emitted("shaped", tmp_path)
+    emitted("scanner lines", tmp_path)
     assert f"{TOP}_SHAPING_is_less_than_that_of_the_scan" in refusal(tmp_path, "SHAPING", 2)
     unshaped = emitted("lines", tmp_path)
     assert least_slow_clocks(unshaped.program) == slow_pace(SHAPES["lines"]) == 44
