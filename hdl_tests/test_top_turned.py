@@ -85,8 +85,11 @@ def test_a_parameter_that_the_scan_does_not_fit_is_refused_by_name(tmp_path: Pat
 @pytest.mark.common
 def test_an_order_below_that_of_the_scan_is_refused_and_one_above_takes_its_clocks(tmp_path: Path) -> None:
     """A sequencer that shapes takes 2 clocks more a tick, whatever it plays first."""
-    emitted("scanner lines", tmp_path)
+    shaped = emitted("scanner lines", tmp_path)
+    assert least_slow_clocks(shaped.program) == slow_pace(SHAPES["lines"], 3) == 46
     assert f"{TOP}_SHAPING_is_less_than_that_of_the_scan" in refusal(tmp_path, "SHAPING", 2)
-    unshaped = emitted("lines", tmp_path)
-    assert least_slow_clocks(unshaped.program) == slow_pace(SHAPES["lines"]) == 44
-    assert "localparam CLOCKS = SHAPING != 0 ? 46 : 44;" in (tmp_path / f"{TOP}.v").read_text("ascii")
+    for name, clocks in (("lines", 44), ("cubic", 93)):
+        unshaped = emitted(name, tmp_path)
+        assert least_slow_clocks(unshaped.program) == clocks
+        text = (tmp_path / f"{TOP}.v").read_text("ascii")
+        assert f"localparam CLOCKS = SHAPING != 0 ? {clocks + 2} : {clocks};" in text
