@@ -138,9 +138,7 @@ def swaps_of(run: BenchRun) -> set[str]:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize(
-    "name", common(["lines"], ["cubic", "lines", "small_counters", "second_lines", "scanner_cubic"])
-)
+@pytest.mark.parametrize("name", common(["lines"], ["cubic", "lines", "small_counters", "scanner_cubic"]))
 def test_random_commits_of_every_mode(name: str, tmp_path: Path) -> None:
     case = CASES[name]
     script = case.script
