@@ -29,9 +29,9 @@ def compiled(bus: str, folder: Path, modules: Sequence[Path] = (), *, slow: bool
     every = sorted([*MODULES.glob("*.v"), *BUS.glob("*.v"), *SLOW_FOLDER.glob("*.v")])
     sources = [changed.get(path.name, path) for path in every]
     parameters = with_sine(folder, SEQUENCER, HARMONICS) | {"WISHBONE": int(bus == "wishbone")}
-    parameters |= (
-        {"SLOW_PART": 1, "SLOW_INDEX_BITS": SLOW_INDEX_BITS, "FOURIER": 0, "PIXEL_INDEX_BITS": 0} if slow else {}
-    )
+    if slow:
+        parameters |= {"SLOW_PART": 1, "SLOW_INDEX_BITS": SLOW_INDEX_BITS, "SHAPING": 3}
+        parameters |= {"FOURIER": 0, "PIXEL_INDEX_BITS": 0}
     return compile_design("icarus", Design([BENCHES / "bus_bench.v", *sources], "bus_bench", parameters, [BUS]), folder)
 
 

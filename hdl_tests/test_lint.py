@@ -65,7 +65,7 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
         for kind in ("digits", "plain", "low_area")
     },
     **{
-        f"slow_part_{degree}_words_{words}_converter_{converter}": {
+        f"slow_part_{degree}_words_{words}_converter_{converter}{f'_shaping_{shaping}' if shaping else ''}": {
             "SLOW_PART": 1,
             "LOW_AREA": 1,
             "X_INTERPOLATED": degree,
@@ -74,8 +74,16 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
             "Y_INDEX_BITS": index_bits,
             "DAC_BITS": converter,
             "SLOW_INDEX_BITS": index_bits,
+            "SHAPING": shaping,
         }
-        for degree, words, index_bits, converter in ((3, 16, 6, 16), (1, 21, 3, 8), (3, 8, 14, 24))
+        for degree, words, index_bits, converter, shaping in (
+            (3, 16, 6, 16, 0),
+            (1, 21, 3, 8, 0),
+            (3, 8, 14, 24, 0),
+            (3, 16, 6, 16, 3),
+            (1, 21, 3, 8, 1),
+            (3, 8, 14, 24, 2),
+        )
     },
     "pixels": {"PIXEL_INDEX_BITS": 9},
     "pixels_alternate": {"PIXEL_INDEX_BITS": 4, "ALTERNATE": 1},

@@ -53,6 +53,12 @@ class Case:
     samples: int = 200
     parameters: dict[str, int | str] = field(default_factory=dict)
 
+    @property
+    def script(self) -> SlowScript:
+        """An empty script for programs of this case."""
+        codes = tuple(int(self.parameters.get(f"{axis}_POWER_UP_CODE", 0)) for axis in "XY")
+        return SlowScript((codes[0], codes[1]), shape=self.shape, shaping=int(self.parameters.get("SHAPING", 0)))
+
 
 CASES = {
     "cubic": Case(CUBIC),
@@ -62,6 +68,10 @@ CASES = {
     "dac_8_words_21": Case(SequencerShape(8, 3, 3, 20, 1, 4, 21)),
     "small_counters": Case(CUBIC, parameters={"TICK_BITS": 6, "LINE_BITS": 3, "COUNT_BITS": 5}),
     "power_up_codes": Case(CUBIC, 60, {"X_POWER_UP_CODE": 5, "Y_POWER_UP_CODE": 65535}),
+    "second_lines": Case(LINES, parameters={"SHAPING": 2}),
+    "scanner_cubic": Case(CUBIC, parameters={"SHAPING": 3}),
+    "first_dac_24_words_8": Case(SequencerShape(24, 1, 2, 8, 3, 5, 8), parameters={"SHAPING": 1}),
+    "second_dac_8_words_21": Case(SequencerShape(8, 3, 3, 20, 1, 4, 21), parameters={"SHAPING": 2}),
 }
 
 
@@ -100,8 +110,7 @@ def begun(program: ScanProgram, shape: SequencerShape) -> SlowScript:
 @pytest.mark.parametrize("name", common(["power_up_codes"], CASES))
 def test_random_programs(name: str, tmp_path: Path) -> None:
     case = CASES[name]
-    codes = tuple(int(case.parameters.get(f"{axis}_POWER_UP_CODE", 0)) for axis in "XY")
-    script = SlowScript((codes[0], codes[1]), shape=case.shape)
+    script = case.script
     most = 7 if "LINE_BITS" in case.parameters else 9
     slow_play(np.random.default_rng(sum(name.encode())), script, case.samples, most)
     run = equal(bench_of("icarus", case.shape, tmp_path, **case.parameters), script)
@@ -129,9 +138,10 @@ def swaps_of(run: BenchRun) -> set[str]:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(["lines"], ["cubic", "lines", "small_counters"]))
+@pytest.mark.parametrize("name", common(["lines"], ["cubic", "lines", "small_counters", "scanner_cubic"]))
 def test_random_commits_of_every_mode(name: str, tmp_path: Path) -> None:
-    case, script = CASES[name], SlowScript(shape=CASES[name].shape)
+    case = CASES[name]
+    script = case.script
     slow_modes(np.random.default_rng(sum(name.encode())), script, 16)
     run = equal(bench_of("icarus", case.shape, tmp_path, COMMIT_MODES=1, **case.parameters), script)
     assert swaps_of(run) == {"begins", "goes on"}

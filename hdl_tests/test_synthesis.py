@@ -64,6 +64,7 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
         "program_loader",
         {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "DAC_BITS": 24, "MEMORY_BYTES": 8192, "UPDATE_RATE": 500_000},
     ),
+    "slow_part_scanner": ("dac_sequencer", {"SLOW_PART": 1, "LOW_AREA": 1, "SHAPING": 3, "X_INTERPOLATED": 3}),
 }
 
 

@@ -20,7 +20,9 @@ SHAPES = {
     "cubic": SequencerShape(16, 3, 4, 16, 3, 3, 16),
     "cubic and lines": SequencerShape(20, 3, 4, 21, 1, 5, 9),
     "lines": SequencerShape(8, 1, 4, 12, 1, 3, 8),
+    "scanner lines": SequencerShape(16, 1, 4, 16, 1, 3, 16),
 }
+SHAPING = {"scanner lines": 3}
 LINES = 3
 REFUSED = {
     "SLOW_INDEX_BITS": "SLOW_INDEX_BITS_is_less_than_the_scan_takes",
@@ -34,8 +36,9 @@ REFUSED = {
 def emitted(name: str, folder: Path) -> TurnedContent:
     """The files of a random program of a shape, as a build has them."""
     shape = SHAPES[name]
-    ticks = least_ticks(shape, slow_pace(shape))
-    program = random_scan(np.random.default_rng(sum(name.encode())), shape, ticks, LINES, "wild")
+    ticks, order = least_ticks(shape, slow_pace(shape)), SHAPING.get(name, 0)
+    program = random_scan(np.random.default_rng(sum(name.encode())), shape, ticks, LINES, "wild", order)
+    assert program.shaping_order == order
     content = TurnedContent("slow", "5" * 64, program)
     runtime = {path.name: path.read_bytes() for path in turned_verilog_runtime()}
     for file, text in (turned_verilog_files(content) | runtime).items():
@@ -62,13 +65,31 @@ def test_no_tool_warns_of_it(name: str, tmp_path: Path) -> None:
     assert lint(TOP, {}, tmp_path) == ""
 
 
+def refusal(folder: Path, key: str, value: int) -> str:
+    """What Icarus says of the top with a parameter that it refuses."""
+    sources = [folder / f"{TOP}.v", *sorted(folder.glob("dac_*.v"))]
+    command = ["iverilog", "-g2005", "-t", "null", "-s", TOP, f"-P{TOP}.{key}={value}", *sources]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    return done.stderr
+
+
 @pytest.mark.common
 def test_a_parameter_that_the_scan_does_not_fit_is_refused_by_name(tmp_path: Path) -> None:
     content = emitted("cubic", tmp_path)
-    sources = [tmp_path / f"{TOP}.v", *sorted(tmp_path.glob("dac_*.v"))]
     for key, reason in REFUSED.items():
         value = least_slow_clocks(content.program) - 1 if key == "CLOCKS_PER_TICK" else 1
-        command = ["iverilog", "-g2005", "-t", "null", "-s", TOP, f"-P{TOP}.{key}={value}", *sources]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode != 0
-        assert f"Unknown module type: {TOP}_{reason}" in done.stderr
+        assert f"Unknown module type: {TOP}_{reason}" in refusal(tmp_path, key, value)
+
+
+@pytest.mark.common
+def test_an_order_below_that_of_the_scan_is_refused_and_one_above_takes_its_clocks(tmp_path: Path) -> None:
+    """A sequencer that shapes takes 2 clocks more a tick, whatever it plays first."""
+    shaped = emitted("scanner lines", tmp_path)
+    assert least_slow_clocks(shaped.program) == slow_pace(SHAPES["lines"], 3) == 46
+    assert f"{TOP}_SHAPING_is_less_than_that_of_the_scan" in refusal(tmp_path, "SHAPING", 2)
+    for name, clocks in (("lines", 44), ("cubic", 93)):
+        unshaped = emitted(name, tmp_path)
+        assert least_slow_clocks(unshaped.program) == clocks
+        text = (tmp_path / f"{TOP}.v").read_text("ascii")
+        assert f"localparam CLOCKS = SHAPING != 0 ? {clocks + 2} : {clocks};" in text

@@ -183,8 +183,8 @@ module dac_sequencer #(
         if (SLOW_PART < 0 || SLOW_PART > 1) begin : guard_25
             dac_sequencer_SLOW_PART_is_not_0_to_1 stop ();
         end
-        if (SLOW_PART != 0 && (LOW_AREA == 0 || FOURIER != 0 || SHAPING != 0)) begin : guard_26
-            dac_sequencer_SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER_or_SHAPING stop ();
+        if (SLOW_PART != 0 && (LOW_AREA == 0 || FOURIER != 0)) begin : guard_26
+            dac_sequencer_SLOW_PART_needs_LOW_AREA_and_has_no_FOURIER stop ();
         end
         if (SLOW_PART != 0 && (X_INTERPOLATED == 0 || Y_INTERPOLATED == 0)) begin : guard_27
             dac_sequencer_SLOW_PART_plays_no_direct_table stop ();
@@ -402,9 +402,9 @@ module dac_sequencer #(
                     .fits(slow_fits)
                 );
                 dac_slow_part #(
-                    .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS),
-                    .X_WORD_BITS(X_WORD_BITS), .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS),
-                    .Y_WORD_BITS(Y_WORD_BITS), .SLOW_INDEX_BITS(SLOW_INDEX_BITS), .LINE_BITS(LINE_BITS),
+                    .DAC_BITS(DAC_BITS), .LINE_BITS(LINE_BITS), .SHAPING(SHAPING), .X_INTERPOLATED(X_INTERPOLATED),
+                    .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS), .Y_INTERPOLATED(Y_INTERPOLATED),
+                    .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .SLOW_INDEX_BITS(SLOW_INDEX_BITS),
                     .PERIOD_BITS(X_PERIOD_BITS), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
                 ) axes (
                     .clock(clock), .scan_write(scan_write), .x_write(x_write), .y_write(y_write),

@@ -8,6 +8,7 @@ module dac_slow_axis #(
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 25,
+    parameter SHAPING = 0,
     parameter [63:0] POWER_UP_CODE = 0
 ) (
     input  wire                  clock,

@@ -450,7 +450,10 @@ async def moves(dut: Any) -> None:
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def slow_parts(dut: Any) -> None:
-    """Programs with a slow part on both axes are uploaded while one of them plays; a commit keeps the frame, or not."""
+    """Programs with a slow part on both axes, shaped in any order, are uploaded while one of them plays.
+
+    A commit keeps the frame, or not.
+    """
     host = Host(dut)
     rig = Rig(dut, host.wishbone)
     await rig.start()
@@ -463,11 +466,11 @@ async def slow_parts(dut: Any) -> None:
                 await RisingEdge(dut.clock)
             await rig.tick()
 
-    program = random_scan(random, SEQUENCER, ticks, 3, "smooth")
+    program = random_scan(random, SEQUENCER, ticks, 3, "smooth", shaping=3)
     await start_scan(host, rig, program)
     await play(ticks // 2)
     for mode in (CommitMode.KEEP, CommitMode.LINE):
-        program = random_scan(random, SEQUENCER, ticks, 3, "smooth")
+        program = random_scan(random, SEQUENCER, ticks, 3, "smooth", shaping=3)
         await play(rig.random.randrange(1, ticks))
         await host.upload(program, mode=mode, waits=False)
         # The line after the next one is its first.

@@ -236,10 +236,11 @@ HANDED_ON: dict[str, dict[str, str]] = {
     ),
     "dac_sequencer": {"SINE_FILE": "dac_render"},
     "dac_slow_axis": dict.fromkeys(
-        ("INTERPOLATED", "INDEX_BITS", "WORD_BITS", "DAC_BITS", "PERIOD_BITS", "POWER_UP_CODE"), "dac_axis_serial"
+        ("INTERPOLATED", "INDEX_BITS", "WORD_BITS", "DAC_BITS", "PERIOD_BITS", "SHAPING", "POWER_UP_CODE"),
+        "dac_axis_serial",
     ),
     "dac_slow_part": {
-        **dict.fromkeys(("DAC_BITS", "PERIOD_BITS", "X_POWER_UP_CODE", "Y_POWER_UP_CODE"), "dac_slow_axis"),
+        **dict.fromkeys(("DAC_BITS", "PERIOD_BITS", "SHAPING", "X_POWER_UP_CODE", "Y_POWER_UP_CODE"), "dac_slow_axis"),
         **dict.fromkeys(
             ("X_INDEX_BITS", "X_WORD_BITS", "Y_INDEX_BITS", "Y_WORD_BITS", "SLOW_INDEX_BITS", "LINE_BITS"),
             "dac_slow_engine",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from building import REPOSITORY
-from frame_programs import common_knots, scan_program
+from frame_programs import common_knots, scan_program, shaped_scan
 from numpy.random import Generator
 from programs import random_schedule
 from replacing import replace
@@ -31,9 +31,9 @@ def slow_sources() -> list[Path]:
     return [*verilog_runtime(), *sorted(SLOW_FOLDER.glob("*.v"))]
 
 
-def slow_pace(shape: SequencerShape) -> int:
+def slow_pace(shape: SequencerShape, shaping: int = 0) -> int:
     """The fewest clocks from tick to tick."""
-    return 93 if 3 in (shape.x_interpolated, shape.y_interpolated) else 44
+    return (93 if 3 in (shape.x_interpolated, shape.y_interpolated) else 44) + (2 if shaping else 0)
 
 
 def line_clocks(shape: SequencerShape) -> int:
@@ -49,15 +49,21 @@ def least_ticks(shape: SequencerShape, pace: int) -> int:
 
 @dataclass
 class SlowScript(Script):
-    """A script of programs with a slow part, on both axes."""
+    """A script of programs with a slow part, on both axes, shaped up to the order ``shaping``."""
 
     drain: int = DRAIN
     shape: SequencerShape = field(default_factory=lambda: SequencerShape(16, 3, 4, 16, 3, 4, 16))
+    shaping: int = 0
     played: list[ScanProgram] = field(default_factory=list)  # one a swap
 
     def _swapped(self) -> None:
         assert self.model.playing is not None
         self.played.append(self.model.playing)
+
+    @property
+    def pace(self) -> int:
+        """The fewest clocks from tick to tick."""
+        return slow_pace(self.shape, self.shaping)
 
     @property
     def endless(self) -> bool:
@@ -124,10 +130,13 @@ class SlowScript(Script):
         self.tick_every(period)
 
 
-def random_scan(rng: Generator, shape: SequencerShape, ticks: int, lines: int, kind: str) -> ScanProgram:
-    """A random program with a slow part on both axes, of a line of so many ticks."""
+def random_scan(
+    rng: Generator, shape: SequencerShape, ticks: int, lines: int, kind: str, shaping: int = 0
+) -> ScanProgram:
+    """A random program with a slow part on both axes, of a line of so many ticks, shaped up to an order."""
     program = scan_program(rng, shape, random_schedule(rng, ticks, lines), kind=kind)
-    return common_knots(rng, program) if kind == "wild" else _tame_ratios(program)
+    program = common_knots(rng, program) if kind == "wild" else _tame_ratios(program)
+    return shaped_scan(rng, program, shaping) if shaping else program
 
 
 def straight(program: ScanProgram) -> ScanProgram:
@@ -138,12 +147,12 @@ def straight(program: ScanProgram) -> ScanProgram:
 
 def slow_play(rng: Generator, script: SlowScript, samples: int, most_lines: int) -> None:
     """Random programs, each of them played for a while, with whatever a host may ask meanwhile."""
-    pace = slow_pace(script.shape)
+    pace = script.pace
     least = least_ticks(script.shape, pace)
     script.tick_every(pace)
     while len(script.expected) < samples:
         ticks, lines = least + int(rng.integers(0, 9)), int(rng.integers(1, most_lines + 1))
-        program = random_scan(rng, script.shape, ticks, lines, str(rng.choice(["smooth", "wild"])))
+        program = random_scan(rng, script.shape, ticks, lines, str(rng.choice(["smooth", "wild"])), script.shaping)
         script.put(program)
         script.swap(program)
         script.wait_ticks(3 * (least + 9) if script.model.running else 2)
@@ -163,14 +172,14 @@ def slow_play(rng: Generator, script: SlowScript, samples: int, most_lines: int)
 
 def slow_modes(rng: Generator, script: SlowScript, swaps: int) -> None:
     """Commits of every mode at any tick of a scan that seldom parks; most programs have the frame of the last one."""
-    pace = slow_pace(script.shape)
+    pace = script.pace
     least = least_ticks(script.shape, pace)
     script.tick_every(pace)
     size = least + 2, 3
     for _ in range(swaps):
         if rng.random() < 0.35:
             size = least + int(rng.integers(0, 9)), int(rng.integers(1, 6))
-        program = random_scan(rng, script.shape, *size, str(rng.choice(["smooth", "wild"])))
+        program = random_scan(rng, script.shape, *size, str(rng.choice(["smooth", "wild"])), script.shaping)
         script.put(program)
         if script.model.running:
             script.wait_ticks(int(rng.integers(1, size[0])))

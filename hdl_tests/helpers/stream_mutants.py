@@ -62,6 +62,7 @@ SHAPES = {
     "modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
     "slow": SequencerShape(24, 3, 3, 8, 1, 2, 9),
     "slow modes": SequencerShape(16, 1, 2, 16, 1, 2, 16),
+    "slow scanner": SequencerShape(16, 1, 2, 16, 1, 2, 16),
     "pair": SequencerShape(16, 1, 4, 16, 1, 3, 16),
     "pair direct": SequencerShape(8, 0, 6, 8, 1, 2, 8),
     "pair long table": SequencerShape(20, 1, 12, 20, 1, 2, 20),
@@ -81,7 +82,8 @@ SPLINES = {  # parameters, how it is placed, samples
 PIXELS = ("pixels", "pixel tables")
 PAIRS = ("pair", "pair direct", "pair long table", "pair sweep")
 BENCHES = tuple(SHAPES)
-SLOW = ("slow", "slow modes")
+SLOW = ("slow", "slow modes", "slow scanner")
+SLOW_SHAPING = {"slow scanner": 3}
 
 
 @dataclass(frozen=True)
@@ -106,11 +108,11 @@ def _pixel_script(rng: np.random.Generator, shape: SequencerShape, bench: str) -
 
 
 def _slow_script(rng: np.random.Generator, shape: SequencerShape, bench: str) -> Script:
-    script = SlowScript(shape=shape)
+    script = SlowScript(shape=shape, shaping=SLOW_SHAPING.get(bench, 0))
     if bench == "slow modes":
         slow_modes(np.random.default_rng(5), script, 14)  # with a program that cannot keep the frame, on a middle line
     else:
-        slow_play(rng, script, 700, 5)  # slow tables of both signs play by then
+        slow_play(rng, script, 400 if script.shaping else 700, 5)  # slow tables of both signs play by then
     return script
 
 
@@ -189,7 +191,7 @@ def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[l
     if bench in PAIRS:
         parameters |= ALTERNATE
     if bench in SLOW:
-        parameters |= SLOW_PART
+        parameters |= SLOW_PART | {"SHAPING": SLOW_SHAPING.get(bench, 0)}
     if bench in PIXELS:
         parameters |= PIXEL_TABLE | {"PLAIN_MULTIPLIER": 1}
     if bench == "fourier":
@@ -1091,6 +1093,15 @@ def _slow() -> Iterator[Mutant]:
         ("each mode begins a frame", "dac_sequencer", ".keeps(keep && same_frame)", ".keeps(1'b0)"),
     ):  # fmt: skip
         yield Mutant(breaks, file, old, new, "slow modes")
+    for breaks, file, old, new in (
+        ("remainders are lost with every line", "dac_slow_axis", ".begins(begin_waits)", ".begins(restarts)"),
+        ("remainders of the last scan go on", "dac_slow_axis", ".begins(begin_waits)", ".begins(1'b0)"),
+        ("the order of a line is not written", "dac_slow_engine", "state == COPY && count != 6'd0)",
+         "state == COPY && count != 6'd0 && count != 6'd12)"),
+        ("the sequencer has no order for x", "dac_slow_part", ".SHAPING(SHAPING), .POWER_UP_CODE(X_POWER_UP_CODE)",
+         ".SHAPING(0), .POWER_UP_CODE(X_POWER_UP_CODE)"),
+    ):  # fmt: skip
+        yield Mutant(breaks, file, old, new, "slow scanner")
 
 
 def _pair() -> Iterator[Mutant]:

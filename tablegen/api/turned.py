@@ -79,7 +79,7 @@ def build_turned(
         raise Rejected([setup.scan_file.problem("name", why)])
     names = formats_of_turned(setup, formats)
     plan = make_turned_plan(setup, progress)
-    clocks = turned_clocks(setup, plan, names, explicit=formats is not None)
+    clocks = turned_clocks(setup, plan, names)
     certificate = certify_turned(plan, progress)
     if broken := broken_limits(setup, plan, certificate):
         raise BrokenLimit(broken)

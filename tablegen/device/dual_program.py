@@ -27,6 +27,11 @@ class ScanProgram(Struct, frozen=True, eq=False):
                     f"{name} has {axis.lines} lines of {axis.fast.phase.ticks} ticks, the schedule {lines} of {ticks}"
                 )
 
+    @property
+    def shaping_order(self) -> int:
+        """Highest order of shaping of both axes, which a device must have; 0 where neither shapes."""
+        return max(axis.output.shaping.order for axis in (self.x, self.y))
+
 
 class DualProgram(ScanProgram, frozen=True, eq=False):
     """The content of a bank without a slow part: both axes play one table each."""

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from tablegen.base.input_errors import Unphysical
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.base.resources import c_link, c_runtime, c_store
 from tablegen.device.dual_program import ScanProgram
@@ -14,20 +13,6 @@ from tablegen.emit.package_format import PackageOfC, PackageOfVerilog
 from tablegen.emit.slow_c import slow_c_files, slow_constants, slow_storage
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.emit.turned_verilog import turned_top_parameters, turned_verilog_files, turned_verilog_runtime
-
-
-def require_format(format_name: str, program: ScanProgram) -> None:
-    """Check that a format of ``SEQUENCER_FORMATS`` can hold a scan at an angle.
-
-    Raises
-    ------
-    Unphysical
-        If it is Verilog, and the output is shaped.
-    """
-    if format_name == "verilog" and max(axis.output.shaping.order for axis in (program.x, program.y)):
-        raise Unphysical(
-            "the Verilog sequencer shapes no scan at an angle; take the format c, or leave shaping out of the dac"
-        )
 
 
 def turned_files(content: TurnedContent, formats: Iterable[str]) -> dict[str, bytes]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tablegen.base.input_errors import Problems, Rejected, Unphysical
+from tablegen.base.input_errors import Problems, Rejected
 from tablegen.certificate.turned_errors import TurnedCertificate
 from tablegen.certificate.turned_summary import turned_summary
 from tablegen.config.load import Setup
@@ -11,7 +11,7 @@ from tablegen.device.clocks import least_slow_clocks
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import format_rejected
 from tablegen.emit.templates import comment_safe
-from tablegen.emit.turned import require_format, turned_files, turned_runtime
+from tablegen.emit.turned import turned_files, turned_runtime
 from tablegen.emit.turned_content import TurnedContent
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.turned_record import turned_manifest, turned_record
@@ -48,19 +48,14 @@ def formats_of_turned(setup: Setup, formats: Sequence[str] | None = None) -> tup
     return needed
 
 
-def turned_clocks(setup: Setup, plan: TurnedPlan, formats: Sequence[str], *, explicit: bool = False) -> int:
+def turned_clocks(setup: Setup, plan: TurnedPlan, formats: Sequence[str]) -> int:
     """Return the clocks of a tick of an FPGA, 0 where none plays the scan or its clock is not known.
 
     Raises
     ------
     Rejected
-        If a format cannot hold the scan, or the clock is too slow for it.
+        If the clock is too slow for the scan.
     """
-    for name in formats:
-        try:
-            require_format(name, plan.program)
-        except Unphysical as error:
-            raise format_rejected(setup, str(error), explicit=explicit) from None
     if "verilog" not in formats:
         return 0
     programs = [each for each in (plan.program, plan.program_of_z) if each is not None]

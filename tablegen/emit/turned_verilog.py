@@ -7,7 +7,7 @@ from tablegen.base.resources import verilog_runtime, verilog_slow_part
 from tablegen.device.clocks import least_slow_clocks
 from tablegen.device.registers import program_words
 from tablegen.device.widths import least_widths
-from tablegen.emit.constants import axis_constants, sequence_constants
+from tablegen.emit.constants import sequence_constants, verilog_axis_constants
 from tablegen.emit.memory import Memory, memory_file
 from tablegen.emit.templates import comment_safe, template
 from tablegen.emit.turned_content import TurnedContent
@@ -80,6 +80,7 @@ def _device(content: TurnedContent) -> dict[str, int]:
         "SLOW_PART": 1,
         "LOW_AREA": 1,
         "SLOW_INDEX_BITS": _slow_index_bits(content),
+        "SHAPING": content.program.shaping_order,
         **least_widths(content.program.schedule, y),
         "CLOCKS": least_slow_clocks(content.program),
         "CLOCKS_PER_TICK": content.clocks_per_tick,
@@ -88,8 +89,13 @@ def _device(content: TurnedContent) -> dict[str, int]:
 
 def turned_top_parameters(content: TurnedContent) -> dict[str, int]:
     """Return the parameters of ``NAME_top`` with their defaults, in order."""
-    own = {"CLOCKS_PER_TICK": content.clocks_per_tick, "SLOW_INDEX_BITS": _slow_index_bits(content)}
-    return {**own, "COMMIT_MODES": 0, **COUNTERS}
+    return {
+        "CLOCKS_PER_TICK": content.clocks_per_tick,
+        "SLOW_INDEX_BITS": _slow_index_bits(content),
+        "SHAPING": content.program.shaping_order,
+        "COMMIT_MODES": 0,
+        **COUNTERS,
+    }
 
 
 def _slow_index_bits(content: TurnedContent) -> int:
@@ -97,7 +103,7 @@ def _slow_index_bits(content: TurnedContent) -> int:
 
 
 def _constants(axis: FrameProgram) -> dict[str, int]:
-    own = {key: value for key, value in axis_constants(axis.fast, 0).items() if key not in _LEFT_OUT}
+    own = {key: value for key, value in verilog_axis_constants(axis.fast, 0).items() if key not in _LEFT_OUT}
     return own | {
         "GAIN_WORD": axis.slow.gain_word,
         "OFFSET_WORD": axis.slow.offset_word,
@@ -128,6 +134,8 @@ def _context(content: TurnedContent) -> dict[str, Any]:
         "widths": least_widths(content.program.schedule, content.axes[1].fast),
         "clocks_per_tick": content.clocks_per_tick,
         "least_clocks": least_slow_clocks(content.program),
+        "shaping_clocks": least_slow_clocks(content.program, shaping=True),
+        "shaping": content.program.shaping_order,
         "slow_index_bits": _slow_index_bits(content),
         "slow_word_bits": turned_memories(content)[2].bits,
         "files": files,

@@ -16,10 +16,8 @@ from tilted_scans import write_tilted
 from turned_scans import turned_setup
 
 from tablegen.api.turned import TurnedBuild, build_turned
-from tablegen.base.input_errors import Problems, Rejected, Unphysical
+from tablegen.base.input_errors import Problems, Rejected
 from tablegen.device.clocks import least_slow_clocks
-from tablegen.emit.turned import require_format
-from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.read import NotABuild
 from tablegen.manifest.turned import read_turned
 from tablegen.planning.clock import slow_clocks_per_tick
@@ -193,12 +191,6 @@ def test_a_clock_that_does_not_serve_is_refused(planned: TurnedBuild) -> None:
 
 
 def test_what_the_verilog_does_not_play_is_refused(planned: TurnedBuild, build: Path) -> None:
-    program, x = planned.plan.program, planned.plan.x.program
-    output = replace(x.output, shaping=Shaping(1, 0))
-    shaped = replace(program, x=replace(x, fast=replace(x.fast, output=output)))
-    with pytest.raises(Unphysical, match="the Verilog sequencer shapes no scan at an angle; take the format c"):
-        require_format("verilog", shaped)
-    require_format("c", shaped)
     with pytest.raises(Rejected, match="'vhdl' holds no scan at an angle"):
         build_turned(planned.setup, formats=["vhdl"])
     with pytest.raises(NotABuild, match="which no emulator plays"):
@@ -240,3 +232,46 @@ def test_a_changed_word_is_found_in_the_top_of_z_alone(tilted: Path, tmp_path: P
     failures = [one for one in verify(tmp_path / "out", ticks=PART).failures if "_top.v: " in one]
     assert len(failures) == 1
     assert failures[0].startswith(f"{NAME}_z_top.v: write 70 of its boot is"), failures
+
+
+@pytest.fixture(scope="module")
+def shaped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The build of the same frame with shaped x and y, and with z, which is never shaped."""
+    folder = tmp_path_factory.mktemp("shaped")
+    emit = f"+ [emit]\nformats = ['c', 'verilog']\nclock_hz = {CLOCKS * 9600}"
+    build_turned(write_tilted(folder, 30.0, *SMALL, "dac.shaping = 'second'", emit), folder / "out")
+    return folder / "out"
+
+
+def test_shaped_lines_are_those_of_the_model(shaped: Path) -> None:
+    stored = read_turned(shaped)
+    assert stored.z is not None
+    assert (stored.program.shaping_order, stored.z.shaping_order) == (2, 0)
+    report = verify(shaped, ticks=3 * 24)
+    assert report.failures == []
+    assert subjects(report)[-4:] == ["verilog header", "top", "verilog header, z", "top, z"]
+    for name, order in ((NAME, 2), (f"{NAME}_z", 0)):
+        assert f"_SHAPING = 32'sd{order};" in (shaped / f"{name}.vh").read_text("ascii")
+        assert f"parameter SHAPING = {order}," in (shaped / f"{name}_top.v").read_text("ascii")
+
+
+AXIS = "dac_slow_axis.v"
+UNSHAPED: dict[str, tuple[Callable[[Path], None], str]] = {
+    "the order of x": (memory_word("program", 16 + 11), "at address 27 of region 0"),
+    "an order that the sequencer has not": (
+        edit(TOP, "parameter SHAPING = 2,", "parameter SHAPING = 1,"),
+        "SHAPING_is",
+    ),
+    "remainders": (edit(AXIS, ".begins(begin_waits)", ".begins(restarts)"), f"{TOP}: tick "),
+}
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("what", long(["the order of x", "remainders"], UNSHAPED))
+def test_what_changes_the_shaping_is_found(what: str, shaped: Path, tmp_path: Path) -> None:
+    change, says = UNSHAPED[what]
+    copytree(shaped, tmp_path / "out")
+    change(tmp_path / "out")
+    signed(tmp_path / "out")
+    failures = verify(tmp_path / "out", ticks=PART).failures
+    assert any(says in failure for failure in failures), failures

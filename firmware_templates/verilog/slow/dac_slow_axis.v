@@ -1,8 +1,7 @@
 // One axis with a slow part: the offset, which grows by the ramp with every tick, and an axis in little area behind it.
 //
-// The axis has two banks, here the line that plays and the next one. All words of the next line are written into the
-// half that does not play, and the halves change with the line. The offset of a tick is written over that of the last
-// one, low and high part, before the axis begins: 3 clocks more a tick. On these two clocks nothing else is written.
+// Its banks are the line that plays and the next one, whose words are written meanwhile. On two of the 3 clocks before
+// it begins a tick, the offset of the tick is written over that of the last one, and nothing else.
 
 `default_nettype none
 
@@ -12,6 +11,7 @@ module dac_slow_axis #(
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 25,
+    parameter SHAPING = 0,         // highest order of shaping
     parameter [63:0] POWER_UP_CODE = 0
 ) (
     input  wire                  clock,
@@ -64,7 +64,7 @@ module dac_slow_axis #(
     wire of_offset = ticks[0] || ticks[1];
     dac_axis_serial #(
         .INTERPOLATED(INTERPOLATED), .INDEX_BITS(INDEX_BITS), .WORD_BITS(WORD_BITS), .DAC_BITS(DAC_BITS),
-        .PERIOD_BITS(PERIOD_BITS), .POWER_UP_CODE(POWER_UP_CODE)
+        .PERIOD_BITS(PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(POWER_UP_CODE)
     ) axis (
         .clock(clock), .write(of_offset || write),
         .write_address(ticks[0] ? OFFSET_LOW : ticks[1] ? OFFSET_HIGH : write_address),

@@ -1,10 +1,9 @@
 // Both axes with a slow part, and which line of which program is worked out for them.
 //
 // While a line plays, the next one is worked out. A commit is `prepared` when line 0 of its program is, or with `keeps`
-// the line that is due: at once where no scan runs, and otherwise in the line after it, so that the scan goes on as it
-// is until then; with `at_frame` in the last line of a frame. Where no scan runs it is line 0 of the program that
-// plays, for the next trigger; a trigger that comes before waits, armed, and a park or a reset ends it. `late` is high
-// where the next tick begins a line that is not ready.
+// the line that is due: at once where no scan runs, else in the line after it, and the scan goes on as it is until
+// then; with `at_frame` in the last line of a frame. Where no scan runs it is line 0 of the program that plays, for the
+// next trigger; a trigger before that waits, armed, until a park or a reset. `late`: the next line is not ready.
 
 `default_nettype none
 
@@ -19,6 +18,7 @@ module dac_slow_part #(
     parameter SLOW_INDEX_BITS = 7,
     parameter LINE_BITS = 16,
     parameter PERIOD_BITS = 25,
+    parameter SHAPING = 0,          // highest order of shaping
     parameter [63:0] X_POWER_UP_CODE = 0,
     parameter [63:0] Y_POWER_UP_CODE = 0
 ) (
@@ -164,7 +164,7 @@ module dac_slow_part #(
 
     dac_slow_axis #(
         .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
-        .PERIOD_BITS(PERIOD_BITS), .POWER_UP_CODE(X_POWER_UP_CODE)
+        .PERIOD_BITS(PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(X_POWER_UP_CODE)
     ) x_axis (
         .clock(clock), .write(write && !is_y), .write_address(write_address), .write_data(write_data),
         .table_write(write_table && !is_y), .table_address(index[X_INDEX_BITS-1:0]),
@@ -175,7 +175,7 @@ module dac_slow_part #(
     );
     dac_slow_axis #(
         .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
-        .PERIOD_BITS(PERIOD_BITS), .POWER_UP_CODE(Y_POWER_UP_CODE)
+        .PERIOD_BITS(PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(Y_POWER_UP_CODE)
     ) y_axis (
         .clock(clock), .write(write && is_y), .write_address(write_address), .write_data(write_data),
         .table_write(write_table && is_y), .table_address(index[Y_INDEX_BITS-1:0]),
