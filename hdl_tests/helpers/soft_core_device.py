@@ -3,7 +3,7 @@
 import shutil
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,18 +144,16 @@ def compiled_firmware(folder: Path, example: Path, scan: Path, clocks: int, z: b
     return folder / FIRMWARE
 
 
-def compiled_device(folder: Path, scan: Path, clocks: int, ticks: int, z: bool = False) -> Device:
-    """Compile the device with the firmware of a scan in its bench, with z if the scan has it."""
-    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scan, clocks, z)
+def compiled_device(folder: Path, scan: Path, clocks: int, ticks: int, of_z: Sequence[Path] = ()) -> Device:
+    """Compile the device with the firmware of a scan in its bench; ``of_z`` are the sources of z, if it has that."""
+    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scan, clocks, bool(of_z))
     runtime = resource_folder("firmware_templates") / "verilog"
     parts = [path for name in ("bus", "slow") for path in sorted((runtime / name).glob("dac_*.v"))]
-    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *parts]
-    if z:
-        sources += [EXAMPLE / "soft_core_z.v", EXAMPLE / "soft_core_both.v"]
+    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *of_z, *parts]
     sources += [path for path in verilog_runtime() if path.name != "program_loader.v"]
     values: dict[str, int | str] = {"FIRMWARE": FIRMWARE, "LINES": LINES, "Z_LINES": Z_LINES, "APART": APART}
     values |= {"CLOCKS_PER_TICK": clocks, "CLOCKS_PER_BIT": CLOCKS_PER_BIT}
     design = Design(sources, "soft_core_bench", values, includes=[firmware.parent])
     compiled = compile_design("verilator", design, folder / "model")
     shutil.copy(firmware, compiled.folder)
-    return Device(compiled, scan, clocks, ticks, z)
+    return Device(compiled, scan, clocks, ticks, bool(of_z))
