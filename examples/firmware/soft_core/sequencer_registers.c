@@ -316,7 +316,7 @@ static bool accepted(const dac_sequencer *s)
         return true; /* its first line is worked out before it counts as committed */
 #endif
     let_samples_pass();
-    return !waits(s);
+    return swaps(s) != s->loaded_after;
 }
 
 /* Takes a commit back that was not accepted, or one that waits. */

@@ -88,7 +88,7 @@ module soft_core_both #(
     reg together;
     initial together = 1'b0;
     wire parks;  // both
-    always @(posedge clock) together <= (trigger ? z_trigger : together) && !z_parks;
+    always @(posedge clock) together <= (trigger ? z_trigger : together) && !(xy_parks && z_parks);
     wire alone = together && z_running && !running;
     assign xy_starts = (trigger && !z_trigger) || alone;
     assign z_starts = z_trigger;
@@ -98,7 +98,8 @@ module soft_core_both #(
     always @(posedge clock) starting <= ((trigger && armed) || starting) && !running && !xy_parks;
 
     // Ticks wait while one of them has a program or runs, and the other one will soon.
-    wire waits = alone || (joint && committed != z_committed && (SLOW_PART == 0 || !running));
+    wire plays_on = running && playing;
+    wire waits = alone || (joint && committed != z_committed && (SLOW_PART == 0 || !plays_on));
     reg [DIVIDER_BITS-1:0] divider;
     initial divider = 0;
     wire due = divider == LAST[DIVIDER_BITS-1:0];
