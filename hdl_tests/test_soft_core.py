@@ -32,6 +32,7 @@ from soft_core_device import (
     compiled_device,
     refusal,
 )  # fmt: skip
+from tilted_scans import write_straight
 from turned_scans import write_turned
 
 from tablegen.config.load import load
@@ -241,12 +242,17 @@ def damaged(image: ProgramImage) -> ProgramImage:
 
 
 def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans, tmp_path: Path) -> None:
-    """Scans at an angle; a damaged image; one for other tables, which the hardware does not have; an open interlock."""
+    """Scans at an angle, or with z; a damaged image; tables that the hardware does not have; an open interlock."""
     info = host.start()
     turned = PreparedScan.of_turned(make_turned_plan(load(write_turned(tmp_path, 30.0, "timing.lines = 16"))))
     with pytest.raises(Unsuitable, match="one table for each axis alone"):
         check(turned, turned.image("table"), info, (info.x_limits, info.y_limits), any_rate=True)
     assert refusal(host.send(turned.image("table"))) == (Reason.SHAPE, 0)
+    (tmp_path / "z").mkdir()
+    tilted = PreparedScan.of_plan(make_plan(load(write_straight(tmp_path / "z"))))
+    with pytest.raises(Unsuitable, match="the scan has the output z, and the device has none"):
+        check(tilted, tilted.image("table"), info, (info.x_limits, info.y_limits), any_rate=True)
+    assert refusal(host.send(tilted.image("table"))) == (Reason.PAYLOAD, 0)
     whole = image_of(scans.first)
     image = damaged(whole)
     assert is_answer(host.send(image), Request.DATA)

@@ -107,7 +107,7 @@ module soft_core_both_bench #(
         .arm(arm), .trigger(xy_starts), .park(xy_parks), .writable(writable), .committed(committed), .armed(armed),
         .running(running), .strobe(strobe), .playing(playing), .markers(markers), .refused(refused)
     );
-    line_sequencer #(.SLOW_PART(1), .WORK(SLOW_PART != 0 ? 60 : 88 + SEED)) of_z (
+    line_sequencer #(.SLOW_PART(1), .WORK(SLOW_PART != 0 ? 60 : 90 + SEED)) of_z (
         .clock(clock), .tick(tick), .commit(z_commits), .mode(mode), .withdraw(z_withdraws), .arm(arm),
         .trigger(z_starts), .park(z_parks), .writable(z_writable), .committed(z_committed), .armed(z_armed),
         .running(z_running), .strobe(z_strobe), .playing(z_playing), .markers(z_markers), .refused(z_refused)
