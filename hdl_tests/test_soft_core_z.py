@@ -398,8 +398,6 @@ def test_a_commit_of_each_parks_both(device: Device, scans: Scans, tmp_path: Pat
 @pytest.mark.timeout(86_400)
 def test_the_bitstream_is_made(tmp_path: Path) -> None:
     """It is placed in time for the clock of the board, or nextpnr ends with an error."""
-    write_tilted(tmp_path, 30.0, "dac.update_rate_hz = 250e3", "+ [emit]\nformats = ['c', 'verilog']")
-    make(
-        EXAMPLE, "bitstream", f"BUILD={tmp_path / 'bits'}", f"PYTHON={sys.executable}", f"SCAN={tmp_path / 'scan.toml'}"
-    )
+    scan = write_tilted(tmp_path, 30.0, "dac.update_rate_hz = 250e3", "+ [emit]\nformats = ['c', 'verilog']")
+    make(EXAMPLE, "bitstream", "DEVICE=45k", f"BUILD={tmp_path / 'bits'}", f"PYTHON={sys.executable}", f"SCAN={scan}")
     assert (tmp_path / "bits" / "ulx3s.bit").stat().st_size > 100_000
