@@ -2,8 +2,8 @@
 // requests on random clocks. APART gets a line for each tick on which their markers differ, and RESULT the ticks that
 // were played, those that waited, the programs taken and the longest wait.
 //
-// z works its line out, for about as long as a line plays, before a program can be taken or a scan can start; so do x and y with
-// SLOW_PART. With LOSES a request now and then reaches z alone: it is then parked with x and y.
+// z works its line out, for about as long as a line plays, before a program can be taken or a scan can start; so do x
+// and y with SLOW_PART. With LOSES a request now and then reaches z alone: it is then parked with x and y.
 
 `timescale 1ns / 1ps
 `default_nettype none

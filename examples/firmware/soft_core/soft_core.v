@@ -7,10 +7,11 @@
 //   0x90000000  that of z; 0xA0000000 writes to both at once
 //   0xC0000000  the serial line, interlock and lines of the frame: soft_core.h
 //
-// The ports are those of examples/verilog/linked_scanner.v. While `permit` is low, no new scan becomes active. The scan
-// of the build gives widths, modes and power-up codes; its update rate has to be that of CLOCKS_PER_TICK. soft_core.vh,
-// which the Makefile writes, has the constants of the build with the prefix SCAN_. A scan at an angle has a slow part on
-// both axes, and the sequencer then plays such scans alone. A scan with z has a second sequencer, in soft_core_z.v.
+// The ports are those of examples/verilog/linked_scanner.v, and z_data. While `permit` is low, no new scan becomes
+// active. The scan of the build gives widths, modes and power-up codes; its update rate has to be that of
+// CLOCKS_PER_TICK. soft_core.vh, which the Makefile writes, has the constants of the build with the prefix SCAN_. A
+// scan at an angle has a slow part on both axes, and the sequencer then plays such scans alone. With z there is a
+// second sequencer, in soft_core_z.v.
 
 `default_nettype none
 
@@ -117,8 +118,8 @@ module soft_core #(
             default: read_data = system_data;
         endcase
 
-    // System: 0 a received byte, or one to send; 4 state; 8 line of the frame; 12 programs taken; 16, 20 these of z. What
-    // was received waits in 2048 bytes, more than the link lets a host send without an answer.
+    // System: 0 a received byte, or one to send; 4 state; 8 line of the frame; 12 programs taken; 16, 20 those of z.
+    // What was received waits in 2048 bytes, more than the link lets a host send without an answer.
     localparam FIFO_BITS = 11;
     wire system = at_once && target == SYSTEM && of_data;
     wire send = system && write && address[2:0] == 3'd0;
@@ -214,8 +215,8 @@ module soft_core #(
                 .failed(z_failed), .commit(host_commit), .withdraw(withdraw), .trigger(trigger), .park(park),
                 .xy_commits(commits), .xy_withdraws(withdraws), .xy_starts(starts), .xy_parks(parks),
                 .writable(writable), .committed(committed), .armed(armed), .running(running), .strobe(strobe),
-                .playing(playing), .markers({swapped, xy_backward, xy_pixel, xy_frame, xy_line}), .committing(committing),
-                .starting(starting), .tick(tick), .z_strobe(z_strobe), .z_data(z_data), .line_number(z_line_number),
+                .playing(playing), .markers({swapped, xy_backward, xy_pixel, xy_frame, xy_line}),
+                .committing(committing), .starting(starting), .tick(tick), .z_strobe(z_strobe), .z_data(z_data), .line_number(z_line_number),
                 .swaps(z_swaps), .image(z_image), .fault(z_fault)
             );
             reg [4:0] shown;  // with the converters, for which z is the last one
