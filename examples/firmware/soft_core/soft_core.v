@@ -216,8 +216,8 @@ module soft_core #(
                 .xy_commits(commits), .xy_withdraws(withdraws), .xy_starts(starts), .xy_parks(parks),
                 .writable(writable), .committed(committed), .armed(armed), .running(running), .strobe(strobe),
                 .playing(playing), .markers({swapped, xy_backward, xy_pixel, xy_frame, xy_line}),
-                .committing(committing), .starting(starting), .tick(tick), .z_strobe(z_strobe), .z_data(z_data), .line_number(z_line_number),
-                .swaps(z_swaps), .image(z_image), .fault(z_fault)
+                .committing(committing), .starting(starting), .tick(tick), .z_strobe(z_strobe), .z_data(z_data),
+                .line_number(z_line_number), .swaps(z_swaps), .image(z_image), .fault(z_fault)
             );
             reg [4:0] shown;  // with the converters, for which z is the last one
             initial shown = 5'd0;
