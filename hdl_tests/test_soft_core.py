@@ -234,6 +234,16 @@ def test_a_frame_goes_on(host: Host, scans: Scans) -> None:
     assert line.sum(LINE) == (last.crc, last.markers)
 
 
+def test_a_core_without_z_refuses_it(host: Host, tmp_path: Path) -> None:
+    """The client before it sends anything, and the device."""
+    info = host.start()
+    tilted = PreparedScan.of_plan(make_plan(load(write_straight(tmp_path))))
+    image = tilted.image("table")
+    with pytest.raises(Unsuitable, match="the scan has the output z, and the device has none"):
+        check(tilted, image, info, (info.x_limits, info.y_limits), any_rate=True)
+    assert refusal(host.send(image)) == (Reason.PAYLOAD, 0)
+
+
 def damaged(image: ProgramImage) -> ProgramImage:
     """The image with a bit of its last word changed, and the CRC of what it was."""
     data = bytearray(image.data)
@@ -242,17 +252,12 @@ def damaged(image: ProgramImage) -> ProgramImage:
 
 
 def test_what_is_refused_leaves_the_scan_alone(host: Host, scans: Scans, tmp_path: Path) -> None:
-    """Scans at an angle, or with z; a damaged image; tables that the hardware does not have; an open interlock."""
+    """Scans at an angle; a damaged image; one for other tables, which the hardware does not have; an open interlock."""
     info = host.start()
     turned = PreparedScan.of_turned(make_turned_plan(load(write_turned(tmp_path, 30.0, "timing.lines = 16"))))
     with pytest.raises(Unsuitable, match="one table for each axis alone"):
         check(turned, turned.image("table"), info, (info.x_limits, info.y_limits), any_rate=True)
     assert refusal(host.send(turned.image("table"))) == (Reason.SHAPE, 0)
-    (tmp_path / "z").mkdir()
-    tilted = PreparedScan.of_plan(make_plan(load(write_straight(tmp_path / "z"))))
-    with pytest.raises(Unsuitable, match="the scan has the output z, and the device has none"):
-        check(tilted, tilted.image("table"), info, (info.x_limits, info.y_limits), any_rate=True)
-    assert refusal(host.send(tilted.image("table"))) == (Reason.PAYLOAD, 0)
     whole = image_of(scans.first)
     image = damaged(whole)
     assert is_answer(host.send(image), Request.DATA)
