@@ -341,10 +341,10 @@ def test_the_command_line(device: Device, simulation: Simulation, scans: Scans) 
 # Controls
 
 
-def test_a_trigger_of_each_is_found(device: Device, scans: Scans, tmp_path: Path) -> None:
-    """Firmware that triggers x and y, and then z: ticks come between."""
-    right = "const uint32_t of_both = x_y->command & z->command;"
-    wrong = right.replace(";", " & ~DAC_COMMAND_TRIGGER_MASK;")
+def test_a_tick_between_two_requests_is_found(device: Device, scans: Scans, tmp_path: Path) -> None:
+    """Firmware that gives x and y what is requested of both, lets ticks pass, and then gives it z."""
+    right = "    command_at(OF_BOTH, of_both);"
+    wrong = "    command_at(0, of_both);\n    let_samples_pass();\n    command_at(OF_Z, of_both);"
     with device.edited(tmp_path, "sequencer_registers.c", right, wrong) as host:
         host.start()
         host.play(LINES)
