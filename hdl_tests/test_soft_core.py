@@ -32,6 +32,7 @@ from soft_core_device import (
     compiled_device,
     refusal,
 )  # fmt: skip
+from tilted_scans import write_straight
 from turned_scans import write_turned
 
 from tablegen.config.load import load
@@ -231,6 +232,16 @@ def test_a_frame_goes_on(host: Host, scans: Scans) -> None:
     assert last.generation == 3
     line = LineCheck(program).steady(program, last.line, settled=True)
     assert line.sum(LINE) == (last.crc, last.markers)
+
+
+def test_a_core_without_z_refuses_it(host: Host, tmp_path: Path) -> None:
+    """The client before it sends anything, and the device."""
+    info = host.start()
+    tilted = PreparedScan.of_plan(make_plan(load(write_straight(tmp_path))))
+    image = tilted.image("table")
+    with pytest.raises(Unsuitable, match="the scan has the output z, and the device has none"):
+        check(tilted, image, info, (info.x_limits, info.y_limits), any_rate=True)
+    assert refusal(host.send(image)) == (Reason.PAYLOAD, 0)
 
 
 def damaged(image: ProgramImage) -> ProgramImage:

@@ -1,7 +1,9 @@
 // Bench of examples/firmware/soft_core: the whole device, with an asynchronous line to cocotb_loader.py.
 //
 // A command: `host_count` bytes of `host_data` go onto the line, and `run_clocks` go by. Then `done` is `go`.
-// line_log.v writes LINES. While `underrun` is set, the converters miss samples.
+// line_log.v writes LINES. While `underrun` is set, the converters miss samples. With z there is a log of its lines,
+// Z_LINES, and one of the ticks on which markers of z are not those of x and y, APART: the number of the tick, both
+// markers. z has no valid ticks of its own there, and no parked ones.
 
 `timescale 1ns / 1ps
 `default_nettype none
@@ -10,8 +12,12 @@ module soft_core_bench #(
     parameter CLOCKS_PER_TICK = 50,
     parameter CLOCKS_PER_BIT = 16,
     parameter FIRMWARE = "firmware.mem",
-    parameter LINES = ""
+    parameter LINES = "",
+    parameter Z_LINES = "",
+    parameter APART = ""
 );
+    `include "soft_core.vh"
+
     localparam MOST = 1024;
     reg clock = 0, go = 0, done = 0, until_idle = 0, permit = 1, underrun = 0, finished = 0;
     reg [31:0] run_clocks = 0, clocks_left = 0;
@@ -30,7 +36,7 @@ module soft_core_bench #(
         .CLOCKS_PER_TICK(CLOCKS_PER_TICK), .CLOCKS_PER_BIT(CLOCKS_PER_BIT), .START_CLOCKS(16), .FIRMWARE(FIRMWARE)
     ) dut (
         .clock(clock), .line_in(host_line), .line_out(device_line), .permit(permit), .sclk(), .select_n(), .x_data(),
-        .y_data(), .load_n(), .line(), .frame(), .pixel(), .backward(), .image(), .fault(fault)
+        .y_data(), .z_data(), .load_n(), .line(), .frame(), .pixel(), .backward(), .image(), .fault(fault)
     );
 
     // What is written belongs to the clock that follows.
@@ -84,9 +90,45 @@ module soft_core_bench #(
 
     line_log #(.LINES(LINES)) lines (
         .clock(clock), .strobe(dut.strobe), .x_code(dut.x_code), .y_code(dut.y_code), .markers({
-            dut.parked, dut.playing, dut.swapped, dut.image, dut.backward, dut.pixel, dut.frame, dut.line
+            dut.parked, dut.playing, dut.swapped, dut.xy_image, dut.xy_backward, dut.xy_pixel, dut.xy_frame, dut.xy_line
         }), .faults(dut.faults)
     );
+
+`ifdef SOFT_CORE_Z  // of soft_core.vh: a name of a module that is not there is an error wherever it stands
+    generate
+        if (SCAN_Z != 0) begin : of_z
+            wire [7:0] markers = {
+                dut.with_z.z.parked, dut.with_z.z.z_playing, dut.with_z.z.swapped, dut.with_z.z.valid,
+                dut.with_z.z.backward, dut.with_z.z.pixel, dut.with_z.z.frame, dut.with_z.z.line
+            };
+            line_log #(.LINES(Z_LINES)) z_lines (
+                .clock(clock), .strobe(dut.with_z.z.z_strobe), .x_code(dut.with_z.z.z_code),
+                .y_code(dut.with_z.z.rest_code), .markers(markers), .faults(dut.with_z.z.faults)
+            );
+            // A tick of x and y is followed by its tick of z, or comes with it.
+            integer log;
+            reg [31:0] number = 0, z_number = 0;
+            reg [6:0] queue = 0;
+            wire [6:0] now = {
+                dut.playing, dut.swapped, 1'b0, dut.xy_backward, dut.xy_pixel, dut.xy_frame, dut.xy_line
+            };
+            wire [6:0] of_tick = dut.strobe ? now : queue;
+            wire [6:0] z_now = markers & 7'b1101111;
+            initial log = $fopen(APART, "w");
+            always @(posedge clock) begin
+                if (dut.strobe) queue <= now;
+                if (dut.strobe) number = number + 1;
+                if (dut.with_z.z.z_strobe) begin
+                    z_number = z_number + 1;
+                    if (number != z_number || ((of_tick[6] || z_now[6]) && of_tick != z_now)) begin
+                        $fwrite(log, "%h %h %h\n", number, of_tick, z_now);
+                        $fflush(log);
+                    end
+                end
+            end
+        end
+    endgenerate
+`endif
 endmodule
 
 `default_nettype wire

@@ -3,7 +3,7 @@
 import shutil
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +24,7 @@ EXAMPLE = REPOSITORY / "examples" / "firmware" / "soft_core"
 CORE = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_Lite.v"
 UPDATE_RATE_HZ = 50_000
 FIRMWARE = "firmware.mem"
+Z_LINES, APART = "z_lines.log", "apart.log"  # what the bench writes of z
 CLOCKS_PER_BIT = 8
 BAUD = 300  # the least, by which a client reckons its time-outs; a simulation has no rate of its own
 STEP = 5_000  # clocks between two looks at what has come
@@ -104,6 +105,7 @@ class Device:
     scan: Path
     clocks: int
     ticks: int
+    z: bool = False
 
     def host(self, simulation: Simulation) -> Host:
         """Return a host once the firmware has started."""
@@ -124,7 +126,7 @@ class Device:
         text = source.read_text("utf-8")
         assert text.count(right) == 1
         source.write_text(text.replace(right, wrong), "utf-8")
-        firmware = compiled_firmware(folder / "build", copy / "soft_core", self.scan, self.clocks)
+        firmware = compiled_firmware(folder / "build", copy / "soft_core", self.scan, self.clocks, self.z)
         usual = (self.compiled.folder / FIRMWARE).read_bytes()
         shutil.copy(firmware, self.compiled.folder)
         try:
@@ -134,23 +136,24 @@ class Device:
             (self.compiled.folder / FIRMWARE).write_bytes(usual)
 
 
-def compiled_firmware(folder: Path, example: Path, scan: Path, clocks: int) -> Path:
+def compiled_firmware(folder: Path, example: Path, scan: Path, clocks: int, z: bool = False) -> Path:
     """Compile the firmware of a scan with the Makefile of the example, and return the content of its RAM."""
     command = ["make", "-C", example, f"SCAN={scan}", f"BUILD={folder}", f"TABLEGEN={sys.executable} -m tablegen"]
-    run_warned([*command, f"CLOCK_HZ={UPDATE_RATE_HZ * clocks}", f"CLOCKS_PER_TICK={clocks}", "MOVE=1"])
+    clock = [f"CLOCK_HZ={UPDATE_RATE_HZ * clocks}", f"CLOCKS_PER_TICK={clocks}"]
+    run_warned([*command, *clock, *([] if z else ["MOVE=1"])])
     return folder / FIRMWARE
 
 
-def compiled_device(folder: Path, scan: Path, clocks: int, ticks: int) -> Device:
-    """Compile the device with the firmware of a scan in its bench."""
-    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scan, clocks)
+def compiled_device(folder: Path, scan: Path, clocks: int, ticks: int, of_z: Sequence[Path] = ()) -> Device:
+    """Compile the device with the firmware of a scan in its bench; ``of_z`` are the sources of z, if it has that."""
+    firmware = compiled_firmware(folder / "firmware", EXAMPLE, scan, clocks, bool(of_z))
     runtime = resource_folder("firmware_templates") / "verilog"
     parts = [path for name in ("bus", "slow") for path in sorted((runtime / name).glob("dac_*.v"))]
-    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *parts]
+    sources = [BENCHES / "soft_core_bench.v", LINE_LOG, EXAMPLE / "soft_core.v", CORE, *of_z, *parts]
     sources += [path for path in verilog_runtime() if path.name != "program_loader.v"]
-    values: dict[str, int | str] = {"FIRMWARE": FIRMWARE, "LINES": LINES}
+    values: dict[str, int | str] = {"FIRMWARE": FIRMWARE, "LINES": LINES, "Z_LINES": Z_LINES, "APART": APART}
     values |= {"CLOCKS_PER_TICK": clocks, "CLOCKS_PER_BIT": CLOCKS_PER_BIT}
     design = Design(sources, "soft_core_bench", values, includes=[firmware.parent])
     compiled = compile_design("verilator", design, folder / "model")
     shutil.copy(firmware, compiled.folder)
-    return Device(compiled, scan, clocks, ticks)
+    return Device(compiled, scan, clocks, ticks, bool(of_z))

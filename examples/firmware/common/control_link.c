@@ -6,6 +6,9 @@
 #include "uart.h"
 
 static dac_link link;
+#if DAC_LINK_Z
+static dac_link z_link;
+#endif
 
 /* Not initialised, so that it survives a reset, but no power cycle: for hosts that want to know of a reset, not for the
  * key. */
@@ -17,7 +20,27 @@ static bool start_link(void)
     if (dac_store_open(&scan_store, &scan_flash) != DAC_STORE_DONE)
         return false;
 #endif
+#if DAC_LINK_Z
+    return dac_link_init(&link, scan_link(), &sequencer, ++boots) == DAC_LINK_STARTED
+        && dac_link_init_z(&link, &z_link, scan_link_of_z(), &sequencer_of_z, true) == DAC_LINK_STARTED;
+#else
     return dac_link_init(&link, scan_link(), &sequencer, ++boots) == DAC_LINK_STARTED;
+#endif
+}
+
+static bool commit_scan(void)
+{
+#if DAC_LINK_Z
+    if (dac_sequencer_load(&sequencer, &scan_whole) != DAC_LOADED
+        || dac_sequencer_load(&sequencer_of_z, &scan_z) != DAC_LOADED)
+        return false;
+    scan_link()->stop_ticks(true); /* both begin on one tick */
+    const bool x_y = dac_sequencer_commit(&sequencer), z = dac_sequencer_commit(&sequencer_of_z);
+    scan_link()->stop_ticks(false);
+    return x_y && z;
+#else
+    return dac_sequencer_load(&sequencer, &scan_whole) == DAC_LOADED && dac_sequencer_commit(&sequencer);
+#endif
 }
 
 bool control_start(void)
@@ -28,7 +51,7 @@ bool control_start(void)
     if (dac_link_load_kept(&link))
         return true;
 #endif
-    return dac_sequencer_load(&sequencer, &scan_whole) == DAC_LOADED && dac_sequencer_commit(&sequencer);
+    return commit_scan();
 }
 
 void control_ready(bool good)

@@ -3,12 +3,19 @@
 
 #include "names.h"
 #include SCAN_HEADER
+#if DAC_LINK_Z
+#include SCAN_Z_HEADER
+#endif
 
 #if !DAC_SLOW_PART
 const dac_program scan_whole = PROGRAM(SCAN_UPPER, SCAN);
 #endif
 const dac_converter scan_x_converter = CONVERTER(CONSTANT(_X));
 const dac_converter scan_y_converter = CONVERTER(CONSTANT(_Y));
+#if DAC_LINK_Z
+const dac_converter scan_z_converter = CONVERTER(CONSTANT(_Z_X));
+const dac_converter scan_z_rest_converter = CONVERTER(CONSTANT(_Z_Y));
+#endif
 
 #if CONSTANT(_SLOW_PART)
 bool scan_half(dac_program *program, unsigned place)

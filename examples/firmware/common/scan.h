@@ -16,6 +16,12 @@ extern const dac_converter scan_x_converter, scan_y_converter;
 #define scan_whole NAMED(_program) /* of NAME_program.c, which has the slow part of a scan at an angle */
 #endif
 extern const dac_program scan_whole;
+#if DAC_LINK_Z
+#define scan_z NAMED(_z_program) /* of NAME_z_program.c */
+extern const dac_program scan_z;
+extern const dac_converter scan_z_converter, scan_z_rest_converter;
+extern dac_sequencer sequencer_of_z; /* in the port */
+#endif
 
 /* The half scan. Its tables are computed here from Fourier words, into one of two places: see dac_sequencer_idle().
  * Returns false if the build has no such words, as that of a scan at an angle. */

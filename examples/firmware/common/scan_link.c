@@ -6,12 +6,15 @@
  * file that defines LINK_KEY as the bytes of an array, and LINK_DEVICE, a name as a string; with a key the port has
  * random.h. With DAC_STORE=1 the port has scan_flash, and LINK_STORE_WHILE_PLAYING where writing to it does not stop
  * the processor. With DAC_LIBRARY LIBRARY and LIBRARY_UPPER are the names of a library of tablegen sweep, and
- * LIBRARY_HEADER its header.
+ * LIBRARY_HEADER its header. With DAC_LINK_Z the scan has the output z, and LINK_STOP_TICKS is a function of the port.
  */
 #include "scan_link.h"
 
 #include "names.h"
 #include SCAN_HEADER
+#if DAC_LINK_Z
+#include SCAN_Z_HEADER
+#endif
 #if DAC_LIBRARY
 #include LIBRARY_HEADER
 #endif
@@ -48,26 +51,29 @@
 
 static dac_word x_tables[2][DAC_TABLE_ROOM(LINK_X_INDEX_BITS)], y_tables[2][DAC_TABLE_ROOM(LINK_Y_INDEX_BITS)];
 static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
-#if CONSTANT(_SLOW_PART)
+/* A scan without operators has slow parts for z alone: its x and y have Fourier words in their place. */
+#define TURNED (CONSTANT(_SLOW_PART) && !CONSTANT(_X_HARMONICS))
 #define WORDS_OF(words) (sizeof(words) / sizeof(words)[0])
 #define LARGER(a, b) ((a) > (b) ? (a) : (b))
+#define SLOW_MEMORY(axis, bits, knots, index_bits)                                                                    \
+    static int8_t axis##_second[2][UINT32_C(1) << (bits)];                                                            \
+    static dac_word axis##_slow_tables[2][DAC_LINK_SLOW_ROOM(index_bits)];                                            \
+    static dac_word axis##_mixed[DAC_TABLE_ROOM(bits)];                                                               \
+    static int32_t axis##_gains[2][knots];                                                                            \
+    static int16_t axis##_ratios[2][knots]
+#define HAS_SLOW(axis)                                                                                                \
+    , {{axis##_second[0], axis##_slow_tables[0], axis##_gains[0], axis##_ratios[0]},                                  \
+       {axis##_second[1], axis##_slow_tables[1], axis##_gains[1], axis##_ratios[1]}}, axis##_mixed
+#if TURNED
 #ifndef LINK_SLOW_KNOTS /* frames of fewer than 17 lines have fewer, and others are to be taken */
 #define LINK_SLOW_KNOTS LARGER(LARGER(WORDS_OF(NAMED(_x_gains)), WORDS_OF(NAMED(_y_gains))), 17u)
 #endif
 #ifndef LINK_SLOW_INDEX_BITS /* behind the last word of a slow table stand its first three */
 #define LINK_SLOW_INDEX_BITS BITS_FOR(LARGER(WORDS_OF(NAMED(_x_slow)), WORDS_OF(NAMED(_y_slow))) - 3)
 #endif
-#define SLOW_MEMORY(axis, bits)                                                                                       \
-    static int8_t axis##_second[2][UINT32_C(1) << (bits)];                                                            \
-    static dac_word axis##_slow_tables[2][DAC_LINK_SLOW_ROOM(LINK_SLOW_INDEX_BITS)];                                  \
-    static dac_word axis##_mixed[DAC_TABLE_ROOM(bits)];                                                               \
-    static int32_t axis##_gains[2][LINK_SLOW_KNOTS];                                                                  \
-    static int16_t axis##_ratios[2][LINK_SLOW_KNOTS]
-SLOW_MEMORY(x, LINK_X_INDEX_BITS);
-SLOW_MEMORY(y, LINK_Y_INDEX_BITS);
-#define SLOW_OF(axis)                                                                                                 \
-    , {{axis##_second[0], axis##_slow_tables[0], axis##_gains[0], axis##_ratios[0]},                                  \
-       {axis##_second[1], axis##_slow_tables[1], axis##_gains[1], axis##_ratios[1]}}, axis##_mixed
+SLOW_MEMORY(x, LINK_X_INDEX_BITS, LINK_SLOW_KNOTS, LINK_SLOW_INDEX_BITS);
+SLOW_MEMORY(y, LINK_Y_INDEX_BITS, LINK_SLOW_KNOTS, LINK_SLOW_INDEX_BITS);
+#define SLOW_OF(axis) HAS_SLOW(axis)
 #elif DAC_SLOW_PART
 #define SLOW_OF(axis) , {{NULL, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}}, NULL
 #else
@@ -81,11 +87,28 @@ static const char device[] = LINK_DEVICE;
 typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
-#define AXIS(NAME, axis, bits)                                                                                        \
+#if DAC_LINK_Z
+#ifndef LINK_Z_INDEX_BITS /* of the table of z, and of the one that rests */
+#define LINK_Z_INDEX_BITS BITS_FOR(LARGER(CONSTANT(_Z_X_TABLE_LENGTH), CONSTANT(_Z_Y_TABLE_LENGTH)))
+#endif
+#ifndef LINK_Z_SLOW_KNOTS
+#define LINK_Z_SLOW_KNOTS LARGER(LARGER(WORDS_OF(NAMED(_z_x_gains)), WORDS_OF(NAMED(_z_y_gains))), 17u)
+#endif
+#ifndef LINK_Z_SLOW_INDEX_BITS
+#define LINK_Z_SLOW_INDEX_BITS BITS_FOR(LARGER(WORDS_OF(NAMED(_z_x_slow)), WORDS_OF(NAMED(_z_y_slow))) - 3)
+#endif
+static dac_word z_tables[2][DAC_TABLE_ROOM(LINK_Z_INDEX_BITS)], rest_tables[2][DAC_TABLE_ROOM(LINK_Z_INDEX_BITS)];
+SLOW_MEMORY(z, LINK_Z_INDEX_BITS, LINK_Z_SLOW_KNOTS, LINK_Z_SLOW_INDEX_BITS);
+SLOW_MEMORY(rest, LINK_Z_INDEX_BITS, LINK_Z_SLOW_KNOTS, LINK_Z_SLOW_INDEX_BITS);
+void LINK_STOP_TICKS(bool stopped);
+#endif
+
+#define AXIS(NAME, axis, bits) AXIS_OF(NAME, axis, bits, axis##_fourier, SLOW_OF(axis))
+#define AXIS_OF(NAME, axis, bits, fourier, slow)                                                                      \
     {                                                                                                                 \
         CONVERTER(CONSTANT(NAME)), {CONSTANT(NAME##_CODE_MIN), CONSTANT(NAME##_CODE_MAX),                             \
         CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, DAC_TABLE_ROOM(bits),           \
-        {axis##_tables[0], axis##_tables[1]}, axis##_fourier SLOW_OF(axis)                                            \
+        {axis##_tables[0], axis##_tables[1]}, fourier slow                                                            \
     }
 
 #ifdef LINK_PERMITS
@@ -102,7 +125,7 @@ static const dac_link_config config = {
     .sine_index_bits = SINE_BITS,
     .sine = SINE,
     .update_rate_hz = UPDATE_RATE_HZ,
-#if CONSTANT(_SLOW_PART)
+#if TURNED
     .slow_knots = LINK_SLOW_KNOTS,
     .slow_index_bits = LINK_SLOW_INDEX_BITS,
 #endif
@@ -128,7 +151,25 @@ static const dac_link_config config = {
     .random = random_bytes,
     .milliseconds = clock_milliseconds,
 #endif
+#if DAC_LINK_Z
+    .stop_ticks = LINK_STOP_TICKS,
+#endif
 };
+
+#if DAC_LINK_Z
+static const dac_link_config config_of_z = {
+    .x = AXIS_OF(_Z_X, z, LINK_Z_INDEX_BITS, NULL, HAS_SLOW(z)),
+    .y = AXIS_OF(_Z_Y, rest, LINK_Z_INDEX_BITS, NULL, HAS_SLOW(rest)),
+    .update_rate_hz = UPDATE_RATE_HZ,
+    .slow_knots = LINK_Z_SLOW_KNOTS,
+    .slow_index_bits = LINK_Z_SLOW_INDEX_BITS,
+};
+
+const dac_link_config *scan_link_of_z(void)
+{
+    return &config_of_z;
+}
+#endif
 
 static uint8_t digit(char c)
 {

@@ -5,6 +5,9 @@
 #include "dac_link.h"
 
 const dac_link_config *scan_link(void);
+#if DAC_LINK_Z
+const dac_link_config *scan_link_of_z(void);
+#endif
 
 #if DAC_LIBRARY
 bool board_pressed(void); /* in the port: whether the button has been pressed since the last call */

@@ -1,7 +1,10 @@
 /* The producer's functions of dac_sequencer.h, for the sequencer in the FPGA: this file takes the place of
  * dac_sequencer.c, and the link does not see the difference. dac_program.c still checks a program and keeps it in
  * `sequencer`, where the link finds what plays. The linker's --wrap puts __wrap_dac_sequencer_load around its
- * dac_sequencer_load, so that a program that is loaded is also written to the registers. */
+ * dac_sequencer_load, so that a program that is loaded is also written to the registers.
+ *
+ * With DAC_LINK_Z there are two of these sequencers. Ticks go on while the link has them stopped: what it requests of
+ * both meanwhile is written at the end, with one write for both. */
 #include "dac_registers.h"
 #include "scan.h"
 #include "soft_core.h"
@@ -16,14 +19,33 @@ enum { SLOW_PART = 4 * 8192 };  /* bytes from a part of a slow part to the next 
 #endif
 
 dac_sequencer sequencer;
+#if DAC_LINK_Z
+dac_sequencer sequencer_of_z;
+#define IS_Z(s) ((s) == &sequencer_of_z)
+#define OF(s) (IS_Z(s) ? OF_Z : 0u) /* what the offsets of its registers begin with */
+#else
+#define OF(s) ((void)(s), 0u)
+#endif
+
+static uint32_t status_of(const dac_sequencer *s)
+{
+    return SEQUENCER(OF(s) + DAC_STATUS_ADDRESS);
+}
 
 /* Programs that were taken; banks take turns. */
-static uint32_t swaps(void)
+static uint32_t swaps(const dac_sequencer *s)
 {
+#if DAC_LINK_Z
+    dac_sequencer *const own = IS_Z(s) ? &sequencer_of_z : &sequencer;
+    const uint32_t taken = IS_Z(s) ? SYSTEM_Z_SWAPS : SYSTEM_SWAPS;
+#else
+    dac_sequencer *const own = &sequencer;
     const uint32_t taken = SYSTEM_SWAPS;
+    (void)s;
+#endif
 
-    sequencer.swaps = taken;
-    sequencer.playing = (uint8_t)(taken == 0 ? NO_PROGRAM : (taken - 1) & 1);
+    own->swaps = taken;
+    own->playing = (uint8_t)(taken == 0 ? NO_PROGRAM : (taken - 1) & 1);
     return taken;
 }
 
@@ -34,52 +56,64 @@ static void let_samples_pass(void)
         (void)SEQUENCER(DAC_STATUS_ADDRESS);
 }
 
-static bool power_up(dac_axis *axis, const dac_converter *converter)
+static bool power_up(dac_axis *axis, const dac_converter *converter, uint32_t offset)
 {
     axis->bits = converter->bits;
     axis->word_bits = converter->word_bits;
     axis->flip = converter->twos_complement ? UINT32_C(1) << (converter->bits - 1) : 0;
     axis->shift = (uint8_t)(converter->left_aligned ? converter->word_bits - converter->bits : 0);
-    return (SEQUENCER(DAC_FEATURES_ADDRESS) & DAC_FEATURES_DAC_BITS_MASK) == converter->bits;
+    return (SEQUENCER(offset + DAC_FEATURES_ADDRESS) & DAC_FEATURES_DAC_BITS_MASK) == converter->bits;
 }
 
 bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
 {
-    (void)swaps();
-    return SEQUENCER(DAC_IDENTITY_ADDRESS) == DAC_IDENTITY_VALUE
-        && SEQUENCER(DAC_VERSION_ADDRESS) == DAC_VERSION_VALUE && power_up(&s->x, x) && power_up(&s->y, y);
+    (void)swaps(s);
+    return SEQUENCER(OF(s) + DAC_IDENTITY_ADDRESS) == DAC_IDENTITY_VALUE
+        && SEQUENCER(OF(s) + DAC_VERSION_ADDRESS) == DAC_VERSION_VALUE && power_up(&s->x, x, OF(s))
+        && power_up(&s->y, y, OF(s));
 }
 
 /* A program that was committed waits until it is counted, which is later than the registers free its bank. */
 static bool waits(const dac_sequencer *s)
 {
-    return s->waiting != 0 && swaps() == s->loaded_after;
+    if (s->waiting == 0 || swaps(s) != s->loaded_after)
+        return false;
+#if DAC_LINK_Z
+    if ((status_of(s) & DAC_STATUS_WRITABLE_MASK) != 0) {
+        let_samples_pass(); /* it is counted, or the hardware has withdrawn it, since the other sequencer refused */
+        return false;
+    }
+#endif
+    return true;
 }
 
 bool dac_sequencer_writable(const dac_sequencer *s)
 {
-    return !waits(s) && (SEQUENCER(DAC_STATUS_ADDRESS) & DAC_STATUS_WRITABLE_MASK) != 0;
+    return !waits(s) && (status_of(s) & DAC_STATUS_WRITABLE_MASK) != 0;
 }
 
 unsigned dac_sequencer_idle(const dac_sequencer *s)
 {
-    (void)s;
-    return swaps() & 1;
+    return swaps(s) & 1;
 }
 
 dac_status dac_sequencer_status(const dac_sequencer *s)
 {
     dac_status now;
-    (void)s;
 
-    now.line = SYSTEM_LINE; /* before the swaps: a line of the old program, if these have not grown */
-    now.swaps = swaps();
-    const uint32_t state = SEQUENCER(DAC_STATUS_ADDRESS);
+    /* Before the swaps: a line of the old program, if these have not grown. */
+#if DAC_LINK_Z
+    now.line = IS_Z(s) ? SYSTEM_Z_LINE : SYSTEM_LINE;
+#else
+    now.line = SYSTEM_LINE;
+#endif
+    now.swaps = swaps(s);
+    const uint32_t state = status_of(s);
     now.markers = (uint8_t)((state & DAC_STATUS_PLAYING_MASK ? DAC_PLAYING : 0)
                             | (state & DAC_STATUS_PARKED_MASK ? DAC_PARKED : 0));
-    now.faults = (uint8_t)SEQUENCER(DAC_FAULTS_ADDRESS);
+    now.faults = (uint8_t)SEQUENCER(OF(s) + DAC_FAULTS_ADDRESS);
     for (unsigned i = 0; i < DAC_FAULTS; i++)
-        now.fault_counts[i] = SEQUENCER(DAC_SLEW_COUNT_ADDRESS + 4 * i);
+        now.fault_counts[i] = SEQUENCER(OF(s) + DAC_SLEW_COUNT_ADDRESS + 4 * i);
     return now;
 }
 
@@ -157,9 +191,9 @@ static void write_table(uint32_t offset, const dac_axis_program *p)
 
 #if DAC_SLOW_PART
 /* Whether the hardware has room for a slow part. Its gains and ratios are at the same lines. */
-static bool slow_fits(const dac_slow_part *slow)
+static bool slow_fits(const dac_slow_part *slow, uint32_t offset)
 {
-    const uint32_t shape = SEQUENCER(DAC_MEMORY_SHAPE_ADDRESS);
+    const uint32_t shape = SEQUENCER(offset + DAC_MEMORY_SHAPE_ADDRESS);
     const uint32_t index_bits =
         (shape & DAC_MEMORY_SHAPE_SLOW_INDEX_BITS_MASK) >> DAC_MEMORY_SHAPE_SLOW_INDEX_BITS_SHIFT;
 
@@ -205,13 +239,13 @@ static void write_slow(uint32_t offset, const dac_axis_program *p)
 #endif
 
 /* Whether the hardware plays the slow parts of a program: it has them on both axes, or on none. */
-static bool slow_parts_fit(const dac_program *p)
+static bool slow_parts_fit(const dac_program *p, uint32_t offset)
 {
-    const bool slow = (SEQUENCER(DAC_FEATURES_ADDRESS) & DAC_FEATURES_SLOW_PART_MASK) != 0;
+    const bool slow = (SEQUENCER(offset + DAC_FEATURES_ADDRESS) & DAC_FEATURES_SLOW_PART_MASK) != 0;
 
 #if DAC_SLOW_PART
     if (slow)
-        return p->x.slow != NULL && p->y.slow != NULL && slow_fits(p->x.slow) && slow_fits(p->y.slow);
+        return p->x.slow != NULL && p->y.slow != NULL && slow_fits(p->x.slow, offset) && slow_fits(p->y.slow, offset);
     return p->x.slow == NULL && p->y.slow == NULL;
 #else
     (void)p;
@@ -226,6 +260,7 @@ dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *progra
 dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *program)
 {
     uint32_t words[WORDS] = {0};
+    const uint32_t of = OF(s);
     const dac_loaded loaded = __real_dac_sequencer_load(s, program);
 
     if (loaded != DAC_LOADED)
@@ -235,9 +270,10 @@ dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *progra
     if (program->schedule.line_ticks < 8 || program->schedule.frame_lines > UINT32_C(1) << 16
         || program->schedule.settle_lines > 255)
         return DAC_BAD_SCHEDULE;
-    if (!fits(&program->x, SEQUENCER(DAC_X_SHAPE_ADDRESS)) || !fits(&program->y, SEQUENCER(DAC_Y_SHAPE_ADDRESS)))
+    if (!fits(&program->x, SEQUENCER(of + DAC_X_SHAPE_ADDRESS))
+        || !fits(&program->y, SEQUENCER(of + DAC_Y_SHAPE_ADDRESS)))
         return DAC_BAD_TABLE;
-    if (!slow_parts_fit(program))
+    if (!slow_parts_fit(program, of))
         return DAC_BAD_SLOW_PART;
 #if DAC_SLOW_PART
     if (program->x.slow != NULL && !line_is_long_enough(program))
@@ -252,19 +288,117 @@ dac_loaded __wrap_dac_sequencer_load(dac_sequencer *s, const dac_program *progra
         put_slow(words + 2 * PAGE, program->y.slow, program->schedule.frame_lines);
     }
 #endif
-    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK; /* what may have been there, and did not fit */
+    SEQUENCER(of + DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK; /* what may have been there, and did not fit */
     for (unsigned i = 0; i < WORDS; i++)
-        SEQUENCER(DAC_PROGRAM_ADDRESS + 4 * i) = words[i];
-    write_table(DAC_X_TABLE_ADDRESS, &program->x);
-    write_table(DAC_Y_TABLE_ADDRESS, &program->y);
+        SEQUENCER(of + DAC_PROGRAM_ADDRESS + 4 * i) = words[i];
+    write_table(of + DAC_X_TABLE_ADDRESS, &program->x);
+    write_table(of + DAC_Y_TABLE_ADDRESS, &program->y);
 #if DAC_SLOW_PART
     if (program->x.slow != NULL) {
-        write_slow(DAC_X_SLOW_ADDRESS, &program->x);
-        write_slow(DAC_Y_SLOW_ADDRESS, &program->y);
+        write_slow(of + DAC_X_SLOW_ADDRESS, &program->x);
+        write_slow(of + DAC_Y_SLOW_ADDRESS, &program->y);
     }
 #endif
     s->loaded = 1;
     return DAC_LOADED;
+}
+
+/* Whether a commit has been accepted. A tick may have taken its program already; or the interlock has opened, or a word
+ * did not fit. */
+static bool accepted(const dac_sequencer *s)
+{
+    const uint32_t state = status_of(s);
+
+    if ((state & DAC_STATUS_COMMITTED_MASK) != 0)
+        return true;
+#if DAC_SLOW_PART
+    if ((state & (DAC_STATUS_REFUSED_MASK | DAC_STATUS_WRITABLE_MASK)) == 0)
+        return true; /* its first line is worked out before it counts as committed */
+#endif
+    let_samples_pass();
+    return swaps(s) != s->loaded_after;
+}
+
+/* Takes a commit back that was not accepted, or one that waits. */
+static void forget(dac_sequencer *s)
+{
+    SEQUENCER(OF(s) + DAC_COMMAND_ADDRESS) =
+        DAC_COMMAND_WITHDRAW_MASK
+        | (status_of(s) & DAC_STATUS_REFUSED_MASK ? DAC_COMMAND_CLEAR_FAULTS_MASK : 0);
+    s->waiting = 0;
+}
+
+#if DAC_LINK_Z
+/* What is requested of x and y, and of z, while ticks are stopped for the link. */
+typedef struct {
+    uint32_t command, frames;
+    bool arms;
+} dac_requests;
+static dac_requests requests[2];
+static bool collects;
+
+static void command_at(uint32_t offset, uint32_t command)
+{
+    if (command != 0)
+        SEQUENCER(offset + DAC_COMMAND_ADDRESS) = command;
+}
+
+/* What became of a commit or a withdrawal of both. */
+static void settle_both(uint32_t of_both)
+{
+    if ((of_both & DAC_COMMAND_COMMIT_MASK) != 0 && !(accepted(&sequencer) && accepted(&sequencer_of_z))) {
+        forget(&sequencer);
+        forget(&sequencer_of_z);
+    }
+    if ((of_both & DAC_COMMAND_WITHDRAW_MASK) != 0) {
+        let_samples_pass(); /* they may have been taken just before */
+        if (waits(&sequencer))
+            sequencer.waiting = 0;
+        if (waits(&sequencer_of_z))
+            sequencer_of_z.waiting = 0;
+    }
+}
+
+/* `stop_ticks` of the link. A request of one of them alone follows those of both: a commit without z, where both have
+ * been parked. */
+void requests_to_both(bool begin)
+{
+    dac_requests *const x_y = &requests[0], *const z = &requests[1];
+
+    collects = begin;
+    if (begin) {
+        x_y->command = z->command = 0;
+        x_y->arms = z->arms = false;
+        return;
+    }
+    const uint32_t of_both = x_y->command & z->command;
+    if (x_y->arms)
+        SEQUENCER((z->arms ? OF_BOTH : 0) + DAC_ARM_ADDRESS) = x_y->frames;
+    command_at(OF_BOTH, of_both);
+    command_at(0, x_y->command & ~of_both);
+    command_at(OF_Z, z->command & ~of_both);
+    settle_both(of_both);
+    if ((x_y->command & ~of_both & DAC_COMMAND_COMMIT_MASK) != 0 && !accepted(&sequencer))
+        forget(&sequencer);
+}
+
+bool dac_sequencer_starts(const dac_sequencer *s)
+{
+    return (status_of(s) & DAC_STATUS_RUNNING_MASK) != 0;
+}
+#endif
+
+/* Writes a command, or keeps it for later; returns whether it has been written. */
+static bool command(dac_sequencer *s, uint32_t mask)
+{
+#if DAC_LINK_Z
+    if (collects) {
+        requests[IS_Z(s)].command |= mask;
+        return false;
+    }
+#endif
+    SEQUENCER(OF(s) + DAC_COMMAND_ADDRESS) = mask;
+    return true;
 }
 
 /* The modes of the registers have the numbers of dac_commit_mode. */
@@ -272,22 +406,10 @@ bool dac_sequencer_commit_at(dac_sequencer *s, dac_commit_mode mode)
 {
     if (!s->loaded || (unsigned)mode > DAC_COMMIT_FRAME)
         return false;
-    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_COMMIT_MASK | (uint32_t)mode << DAC_COMMAND_COMMIT_MODE_SHIFT;
     s->waiting = 1;
-    const uint32_t state = SEQUENCER(DAC_STATUS_ADDRESS);
-    if ((state & DAC_STATUS_COMMITTED_MASK) != 0)
+    if (!command(s, DAC_COMMAND_COMMIT_MASK | (uint32_t)mode << DAC_COMMAND_COMMIT_MODE_SHIFT) || accepted(s))
         return true;
-#if DAC_SLOW_PART
-    if ((state & (DAC_STATUS_REFUSED_MASK | DAC_STATUS_WRITABLE_MASK)) == 0)
-        return true; /* its first line is worked out before it counts as committed */
-#endif
-    /* A tick has taken it already; or the interlock has opened, or a word did not fit. */
-    let_samples_pass();
-    if (!waits(s))
-        return true;
-    s->waiting = 0;
-    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK
-                                   | (state & DAC_STATUS_REFUSED_MASK ? DAC_COMMAND_CLEAR_FAULTS_MASK : 0);
+    forget(s);
     return false;
 }
 
@@ -298,48 +420,48 @@ bool dac_sequencer_commit(dac_sequencer *s)
 
 bool dac_sequencer_can_keep(const dac_sequencer *s)
 {
-    (void)s;
-    return swaps() == 0 || (SEQUENCER(DAC_STATUS_ADDRESS) & DAC_STATUS_CAN_KEEP_MASK) != 0;
+    return swaps(s) == 0 || (status_of(s) & DAC_STATUS_CAN_KEEP_MASK) != 0;
 }
 
 bool dac_sequencer_withdraw(dac_sequencer *s)
 {
-    SEQUENCER(DAC_COMMAND_ADDRESS) = DAC_COMMAND_WITHDRAW_MASK;
+    if (!command(s, DAC_COMMAND_WITHDRAW_MASK))
+        return true;
     let_samples_pass(); /* it may have been taken just before */
     if (waits(s))
         s->waiting = 0;
     return true;
 }
 
-static bool command(uint32_t mask)
-{
-    SEQUENCER(DAC_COMMAND_ADDRESS) = mask;
-    return true;
-}
-
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames)
 {
-    (void)s;
     if (frames > DAC_ARM_FRAMES_MASK)
         return false;
-    SEQUENCER(DAC_ARM_ADDRESS) = frames;
+#if DAC_LINK_Z
+    if (collects) {
+        requests[IS_Z(s)].arms = true;
+        requests[IS_Z(s)].frames = frames;
+        return true;
+    }
+#endif
+    SEQUENCER(OF(s) + DAC_ARM_ADDRESS) = frames;
     return true;
 }
 
 bool dac_sequencer_trigger(dac_sequencer *s)
 {
-    (void)s;
-    return command(DAC_COMMAND_TRIGGER_MASK);
+    (void)command(s, DAC_COMMAND_TRIGGER_MASK);
+    return true;
 }
 
 bool dac_sequencer_park(dac_sequencer *s)
 {
-    (void)s;
-    return command(DAC_COMMAND_PARK_MASK);
+    (void)command(s, DAC_COMMAND_PARK_MASK);
+    return true;
 }
 
 bool dac_sequencer_clear_faults(dac_sequencer *s)
 {
-    (void)s;
-    return command(DAC_COMMAND_CLEAR_FAULTS_MASK);
+    (void)command(s, DAC_COMMAND_CLEAR_FAULTS_MASK);
+    return true;
 }

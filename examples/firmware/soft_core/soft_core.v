@@ -4,12 +4,14 @@
 //
 //   0x00000000  RAM, which begins with FIRMWARE
 //   0x80000000  the sequencer: docs/registers.md
+//   0x90000000  that of z; 0xA0000000 writes to both at once
 //   0xC0000000  the serial line, interlock and lines of the frame: soft_core.h
 //
-// The ports are those of examples/verilog/linked_scanner.v. While `permit` is low, no new scan becomes active. The scan
-// of the build gives widths, modes and power-up codes; its update rate has to be that of CLOCKS_PER_TICK. soft_core.vh,
-// which the Makefile writes, has the constants of the build with the prefix SCAN_. A scan at an angle has a slow part on
-// both axes, and the sequencer then plays such scans alone.
+// The ports are those of examples/verilog/linked_scanner.v, and z_data. While `permit` is low, no new scan becomes
+// active. The scan of the build gives widths, modes and power-up codes; its update rate has to be that of
+// CLOCKS_PER_TICK. soft_core.vh, which the Makefile writes, has the constants of the build with the prefix SCAN_. A
+// scan at an angle has a slow part on both axes, and the sequencer then plays such scans alone. With z there is a
+// second sequencer, in soft_core_z.v.
 
 `default_nettype none
 
@@ -28,6 +30,7 @@ module soft_core #(
     output wire select_n,
     output wire x_data,
     output wire y_data,
+    output wire z_data,
     output wire load_n,
     output wire line,
     output wire frame,
@@ -80,12 +83,18 @@ module soft_core #(
     assign d_done = done && access && of_data;
     assign d_failed = failed && access && of_data;
 
-    // RAM and system answer after a clock, the sequencer when it has done.
+    // RAM and system answer after a clock, the sequencer when it has done. A write to both ends with that to x and y.
     reg answered;
     initial answered = 1'b0;
     wire at_once = access && target != SEQUENCER && !answered;
-    wire scan_done, scan_failed;
-    wire [31:0] scan_data;
+    wire of_z = SCAN_Z != 0 && address[27:26] == 2'd1, of_both = SCAN_Z != 0 && address[27:26] == 2'd2;
+    wire xy_access = access && target == SEQUENCER && !of_z;
+    wire z_access = access && target == SEQUENCER && (of_z || of_both);
+    wire xy_done, xy_failed, z_done, z_failed;
+    wire [31:0] xy_read, z_read;
+    wire scan_done = of_z ? z_done : xy_done;
+    wire scan_failed = xy_failed || z_failed;
+    wire [31:0] scan_data = of_z ? z_read : xy_read;
     always @(posedge clock) answered <= at_once;
     assign done = answered || scan_done;
     assign failed = scan_failed;
@@ -109,12 +118,12 @@ module soft_core #(
             default: read_data = system_data;
         endcase
 
-    // System: 0 a received byte, or one to send; 4 state; 8 line of the frame; 12 programs taken. What was received
-    // waits in 2048 bytes, more than the link lets a host send without an answer.
+    // System: 0 a received byte, or one to send; 4 state; 8 line of the frame; 12 programs taken; 16, 20 those of z.
+    // What was received waits in 2048 bytes, more than the link lets a host send without an answer.
     localparam FIFO_BITS = 11;
     wire system = at_once && target == SYSTEM && of_data;
-    wire send = system && write && address[1:0] == 2'd0;
-    wire taken = system && !write && address[1:0] == 2'd0;
+    wire send = system && write && address[2:0] == 3'd0;
+    wire taken = system && !write && address[2:0] == 3'd0;
     wire [7:0] received;
     wire byte_came, can_send;
     reg [7:0] fifo [0:(1<<FIFO_BITS)-1];
@@ -143,26 +152,30 @@ module soft_core #(
     initial {permit_1, permit_2} = 2'd0;
     always @(posedge clock) {permit_2, permit_1} <= {permit_1, permit};
 
-    wire strobe, swapped, playing, parked;
+    wire strobe, swapped, playing, parked, xy_line, xy_frame, xy_pixel, xy_backward, xy_image;
     reg [15:0] line_number;
     reg [31:0] swaps;
+    wire [15:0] z_line_number;
+    wire [31:0] z_swaps;
     initial line_number = 16'd0;
     initial swaps = 32'd0;
     always @(posedge clock) if (strobe) begin
-        if (line || !playing) line_number <= frame || !playing ? 16'd0 : line_number + 16'd1;
+        if (xy_line || !playing) line_number <= xy_frame || !playing ? 16'd0 : line_number + 16'd1;
         if (swapped) swaps <= swaps + 32'd1;
     end
     always @(posedge clock)
-        case (address[1:0])
-            2'd0: system_data <= {23'd0, fresh, first};
-            2'd1: system_data <= {30'd0, permit_2, can_send};
-            2'd2: system_data <= {16'd0, line_number};
-            2'd3: system_data <= swaps;
+        case (address[2:0])
+            3'd0: system_data <= {23'd0, fresh, first};
+            3'd1: system_data <= {30'd0, permit_2, can_send};
+            3'd2: system_data <= {16'd0, line_number};
+            3'd3: system_data <= swaps;
+            3'd4: system_data <= {16'd0, z_line_number};
+            default: system_data <= z_swaps;
         endcase
 
     // The sequencer on the bus. The interlock is in the way of the commit itself, whatever the firmware thinks of it.
     wire host_write, writable, refused, host_commit, withdraw, committed, arm, trigger, park, clear_faults;
-    wire armed, running, busy, missed, can_keep;
+    wire armed, running, busy, missed, can_keep, committing, starting;
     wire [1:0] commit_mode;
     wire [2:0] region;
     wire [15:0] word_address, arm_frames;
@@ -176,20 +189,52 @@ module soft_core #(
         .Y_INDEX_BITS(SCAN_Y_INDEX_BITS), .Y_WORD_BITS(SCAN_Y_TABLE_BITS), .COMMIT_MODES(1),
         .SLOW_PART(SCAN_SLOW_PART), .SLOW_INDEX_BITS(SCAN_SLOW_INDEX_BITS)
     ) registers (
-        .clock(clock), .reset(reset), .wb_cyc_i(access && target == SEQUENCER),
-        .wb_stb_i(access && target == SEQUENCER), .wb_we_i(write), .wb_adr_i(address[17:0]), .wb_sel_i(d_bytes),
-        .wb_dat_i(d_data), .wb_dat_o(scan_data), .wb_ack_o(scan_done), .wb_err_o(scan_failed), .irq(),
+        .clock(clock), .reset(reset), .wb_cyc_i(xy_access), .wb_stb_i(xy_access), .wb_we_i(write),
+        .wb_adr_i(address[17:0]), .wb_sel_i(d_bytes), .wb_dat_i(d_data), .wb_dat_o(xy_read), .wb_ack_o(xy_done),
+        .wb_err_o(xy_failed), .irq(),
         .write(host_write), .write_region(region), .write_address(word_address), .write_data(word),
-        .writable(writable), .refused(refused), .commit(host_commit), .commit_mode(commit_mode),
-        .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .booting(1'b0), .missing(1'b0), .arm(arm),
-        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
-        .running(running), .busy(busy), .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
+        .writable(writable && !committing), .refused(refused), .commit(host_commit), .commit_mode(commit_mode),
+        .withdraw(withdraw), .committed(committed || committing), .can_keep(can_keep), .booting(1'b0), .missing(1'b0),
+        .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
+        .running(running || starting), .busy(busy), .playing(playing), .parked(parked), .faults(faults),
+        .fault_counts(fault_counts)
     );
 
-    reg [$clog2(CLOCKS_PER_TICK)-1:0] divider;
-    initial divider = 0;
-    wire tick = divider == CLOCKS_PER_TICK - 1;
-    always @(posedge clock) divider <= tick ? 0 : divider + 1'b1;
+    // What the sequencer gets of these requests, and when. With z that is a matter of both.
+    wire tick, commits, withdraws, starts, parks;
+    wire z_strobe, z_image, z_fault;
+    wire update = SCAN_Z != 0 ? z_strobe : strobe;  // of all converters
+    reg [1:0] last_mode;  // of a commit that waits for z
+    always @(posedge clock) if (host_commit) last_mode <= commit_mode;
+    wire [1:0] mode = host_commit || SCAN_Z == 0 ? commit_mode : last_mode;
+    generate
+        if (SCAN_Z != 0) begin : with_z
+            soft_core_z #(.CLOCKS_PER_TICK(CLOCKS_PER_TICK), .COUNT_BITS(COUNT_BITS)) z (
+                .clock(clock), .reset(reset), .permit(permit_2), .access(z_access), .write(write),
+                .address(address[17:0]), .bytes(d_bytes), .data(d_data), .read_data(z_read), .done(z_done),
+                .failed(z_failed), .commit(host_commit), .withdraw(withdraw), .trigger(trigger), .park(park),
+                .xy_commits(commits), .xy_withdraws(withdraws), .xy_starts(starts), .xy_parks(parks),
+                .writable(writable), .committed(committed), .armed(armed), .running(running), .strobe(strobe),
+                .playing(playing), .markers({swapped, xy_backward, xy_pixel, xy_frame, xy_line}),
+                .committing(committing), .starting(starting), .tick(tick), .z_strobe(z_strobe), .z_data(z_data),
+                .line_number(z_line_number), .swaps(z_swaps), .image(z_image), .fault(z_fault)
+            );
+            reg [4:0] shown;  // with the converters, for which z is the last one
+            initial shown = 5'd0;
+            always @(posedge clock)
+                if (z_strobe) shown <= {xy_image && z_image, xy_backward, xy_pixel, xy_frame, xy_line};
+            assign {image, backward, pixel, frame, line} = shown;
+        end else begin : without_z
+            reg [$clog2(CLOCKS_PER_TICK)-1:0] divider;
+            initial divider = 0;
+            assign tick = divider == CLOCKS_PER_TICK - 1;
+            always @(posedge clock) divider <= tick ? 0 : divider + 1'b1;
+            assign {commits, withdraws, starts, parks} = {host_commit && permit_2, withdraw, trigger, park};
+            assign {z_done, z_failed, z_read, z_strobe, z_fault, committing, starting} = 38'd0;
+            assign {z_data, z_line_number, z_swaps, z_image} = 50'd0;
+            assign {image, backward, pixel, frame, line} = {xy_image, xy_backward, xy_pixel, xy_frame, xy_line};
+        end
+    endgenerate
 
     wire [SCAN_X_DAC_BITS-1:0] x_code, y_code;
     dac_sequencer #(
@@ -200,12 +245,13 @@ module soft_core #(
         .COMMIT_MODES(1), .SLOW_PART(SCAN_SLOW_PART), .SLOW_INDEX_BITS(SCAN_SLOW_INDEX_BITS)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(host_write), .write_region(region), .write_address(word_address),
-        .write_data(word), .writable(writable), .refused(refused), .commit(host_commit && permit_2),
-        .commit_mode(commit_mode), .withdraw(withdraw), .committed(committed), .can_keep(can_keep), .arm(arm),
-        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(armed),
+        .write_data(word), .writable(writable), .refused(refused), .commit(commits),
+        .commit_mode(mode), .withdraw(withdraws), .committed(committed), .can_keep(can_keep), .arm(arm),
+        .arm_frames(arm_frames), .trigger(starts), .park(parks), .clear_faults(clear_faults), .armed(armed),
         .running(running), .tick(tick), .underrun(missed), .busy(busy), .strobe(strobe), .x_code(x_code),
-        .y_code(y_code), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
-        .valid_marker(image), .swapped_marker(swapped), .playing(playing), .parked(parked), .faults(faults),
+        .y_code(y_code), .line_marker(xy_line), .frame_marker(xy_frame), .pixel_marker(xy_pixel),
+        .backward_marker(xy_backward), .valid_marker(xy_image), .swapped_marker(swapped), .playing(playing),
+        .parked(parked), .faults(faults),
         .fault_counts(fault_counts)
     );
 
@@ -219,11 +265,11 @@ module soft_core #(
         .TWOS_COMPLEMENT(SCAN_Y_DAC_TWOS_COMPLEMENT), .LEFT_ALIGNED(SCAN_Y_DAC_LEFT_ALIGNED)
     ) y_coding (.code(y_code), .word(y_word));
     dac_spi #(.WORD_BITS(16), .FRAME_BITS(16)) converters (
-        .clock(clock), .reset(1'b0), .strobe(strobe), .x_word(x_word), .y_word(y_word), .sclk(sclk), .cs_x_n(select_n),
+        .clock(clock), .reset(1'b0), .strobe(update), .x_word(x_word), .y_word(y_word), .sclk(sclk), .cs_x_n(select_n),
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
-    assign fault = faults != 4'd0 || refused;
+    assign fault = faults != 4'd0 || refused || z_fault;
 
     // What this device plays. The reason of a refusal is the name of a module that does not exist.
     localparam CUBIC = SCAN_X_INTERPOLATED == 3 || SCAN_Y_INTERPOLATED == 3;
