@@ -17,11 +17,6 @@ Z_BEGINS = (
     'plays: park first, with `tablegen park --wait`, or in a session with "park" and "status" until the device is '
     'parked; then do the same again, and in a session "trigger"'
 )
-Z_BEGINS = (
-    "one of the scan that plays and the new one has the output z, which begins and ends to play only where no scan "
-    'plays: park first (`tablegen park --wait`, or "park" and "status" until it is parked), then do the same again; '
-    '"trigger" starts what is changed meanwhile'
-)
 _PLACE_KEYS = frozenset(f"{axis}.{name}" for axis in "xy" for name in OFFSETS)
 _ROUNDING = 1.0  # a code, by which the ends of a frame differ from one place to another
 _NO_SHIFT = 1e-6  # of a code
