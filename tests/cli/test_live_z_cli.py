@@ -9,6 +9,7 @@ from typing import Any
 from unittest.mock import patch
 
 import pytest
+from building import REPOSITORY
 from client_line import VirtualLine
 from client_rig import Bench, Watched, client, info_for, z_info_for
 from editing import edited, run
@@ -258,6 +259,9 @@ def test_a_move_beyond_the_range_of_z_is_refused_and_what_fits_is_taken(
         found = re.search(rf"takes z to {number}\.\.{number} V, beyond its 0\.\.99\.9985 V; x_nm = {number} and "
                           rf"y_nm = {number} of it fit$", why)  # fmt: skip
         assert found is not None, why
+        if (offset_v, move) == (97.9, (120.0, 0.0)):
+            page = (REPOSITORY / "docs" / "live.md").read_text("utf-8")
+            assert f'"{why[why.index("z: a move") :]}"' in " ".join(page.split())
         low, high, *part = map(float, found.groups())
         assert low < 0.0 or high > 100.0
         assert all(
@@ -407,7 +411,7 @@ def test_libraries_with_z_stay_refused(tmp_path: Path) -> None:
     path.write_text(path.read_text("utf-8") + '\n[[scans]]\nname = "a"\n\n[[scans]]\nname = "b"\n', "utf-8")
     outcome = run("sweep", path, "-o", tmp_path / "out")
     assert outcome.status == 2
-    assert "z" in outcome.err
+    assert "z: a library plays no output z; build this scan alone, or leave [z] out" in outcome.err
 
 
 # Previews
