@@ -1,4 +1,4 @@
-"""The kept corpus of ``make fuzz`` with sanitizers, on both of its targets; and that it finds what is broken."""
+"""The kept corpus of ``make fuzz`` with sanitizers, on all of its targets; and that it finds what is broken."""
 
 import subprocess
 from collections.abc import Sequence
@@ -33,8 +33,12 @@ FOUND = {
 }
 
 
-# As `make fuzz` compiles it: the runtime as most have it, and with all that it can play.
-TARGETS: dict[str, tuple[str, ...]] = {"plain": (), "all": ("-DDAC_SPLINE=1", "-DDAC_SHAPING=3")}
+# As `make fuzz` compiles it: the runtime as most have it, with all that it can play, and with a second sequencer for z.
+TARGETS: dict[str, tuple[str, ...]] = {
+    "plain": (),
+    "all": ("-DDAC_SPLINE=1", "-DDAC_SHAPING=3"),
+    "z": ("-DDAC_SPLINE=1", "-DDAC_COMMIT_MODES=1", "-DDAC_LINK_Z=1"),
+}
 # Codes of a buffer that are not those of steps, of what only the second target plays.
 FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
     "a run along a spline begins with a later segment": ("dac_run.h", "goes_on ? 1 : 0", "1"),
