@@ -12,6 +12,7 @@ from c_mutants_shaping import MUTANTS as SHAPED
 from kept_objects import objects
 from limits import within
 from link_mutants import MUTANTS
+from test_c_link_z import MUTANTS as OF_Z
 
 from tablegen.base.resources import c_link, c_runtime
 
@@ -46,6 +47,8 @@ FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
         (each.file, each.old, each.new) for each in SHAPED if each.breaks == "a tick has half a code less"
     ),
 }
+# A z that is not on the ticks of x and y, or not of their scan.
+FOUND_WITH_Z = ("z is not committed", "z has no mode of its COMMIT", "a trigger is of x and y alone")
 
 
 def replay(
@@ -87,3 +90,8 @@ def test_the_corpus_finds_what_is_broken(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", FOUND_WITH_ALL)
 def test_the_corpus_finds_what_is_broken_in_splines_and_shaping(name: str, tmp_path: Path) -> None:
     assert replay(tmp_path, "all", CMutant(name, *FOUND_WITH_ALL[name])).returncode != 0
+
+
+@pytest.mark.parametrize("name", FOUND_WITH_Z)
+def test_the_corpus_finds_what_is_broken_in_z(name: str, tmp_path: Path) -> None:
+    assert replay(tmp_path, "z", CMutant(name, *OF_Z[name])).returncode != 0
