@@ -11,7 +11,7 @@ from c_faults import Mutant as CMutant
 from c_mutants_shaping import MUTANTS as SHAPED
 from kept_objects import objects
 from limits import within
-from link_mutants import MUTANTS
+from link_mutants import MUTANTS, Mutant
 from test_c_link_z import MUTANTS as OF_Z
 
 from tablegen.base.resources import c_link, c_runtime
@@ -52,7 +52,7 @@ FOUND_WITH_Z = ("z is not committed", "z has no mode of its COMMIT", "a trigger 
 
 
 def replay(
-    folder: Path, target: str = "plain", mutant: mutants.Mutant | None = None
+    folder: Path, target: str = "plain", mutant: mutants.Mutant | Mutant | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Compile a target, with a mutant in it or with none, and give it every file of the corpus."""
     sources: Sequence[Path] = [*c_runtime(), *c_link()]
@@ -94,4 +94,4 @@ def test_the_corpus_finds_what_is_broken_in_splines_and_shaping(name: str, tmp_p
 
 @pytest.mark.parametrize("name", FOUND_WITH_Z)
 def test_the_corpus_finds_what_is_broken_in_z(name: str, tmp_path: Path) -> None:
-    assert replay(tmp_path, "z", CMutant(name, *OF_Z[name])).returncode != 0
+    assert replay(tmp_path, "z", Mutant(name, *OF_Z[name])).returncode != 0
