@@ -44,6 +44,7 @@ from tablegen.api.live import (
     LiveScan as LiveScan,
 )
 from tablegen.api.live_preview import LivePreview as LivePreview
+from tablegen.api.live_tilt import LiveZ as LiveZ
 from tablegen.config.load import Setup as Setup
 from tablegen.planning.line_plan import Plan as Plan
 from tablegen.certificate.certificate import Certificate as Certificate

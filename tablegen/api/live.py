@@ -11,6 +11,7 @@ from msgspec import structs
 
 from tablegen.api.build import Build, build_planned
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
+from tablegen.api.live_tilt import OFFSET_KEY, Z_BEGINS, LiveZ, check_room, followed_offset_v, split_table
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.certificate.certificate import EmittedPeriods
@@ -30,7 +31,7 @@ from tablegen.link.prepare import PreparedScan, check
 from tablegen.planning.driven_frames import driven_frames
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.planning.turned_plan import TurnedPlan
-from tablegen.planning.turned_preview import turned_preview
+from tablegen.planning.turned_preview import TurnedPreview, turned_preview
 
 AnyPlan = Plan | TurnedPlan
 _AXES = "xy"
@@ -76,7 +77,7 @@ class LiveScan:
 
     ``swap`` is the mode in which it took the place of the scan before: ``keep`` where the frame went on; None where
     the device played it already. ``generation`` counts the programs of the device. ``preview`` is what played first,
-    None without one.
+    None without one. ``z`` is the output on a tilted sample, None without one.
     """
 
     name: str
@@ -89,6 +90,7 @@ class LiveScan:
     x: LiveAxis
     y: LiveAxis
     preview: LivePreview | None = None
+    z: LiveZ | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields, and those of the axes, as plain data."""
@@ -113,6 +115,11 @@ class _Scan:
     def straight(self) -> Plan:
         """The plan, of a scan at an angle that at 0 degrees."""
         return self.plan.straight if isinstance(self.plan, TurnedPlan) else self.plan
+
+    @cached_property
+    def z(self) -> LiveZ | None:
+        """The place of the output z, None without one."""
+        return None if self.plan.z is None else LiveZ.of_plan(self.plan.z, self.setup)
 
     @cached_property
     def prepared(self) -> PreparedScan:
@@ -159,6 +166,10 @@ class Live:
     A device with ``DAC_MOVE`` plays a preview first where the schedule stays: the tables that it has, with the gain and
     the offset that come closest to the new plan. It plays when the plan is there and keeps all limits; the plan follows
     at once, certified.
+
+    A scan may have the output z, on a device with ``DAC_LINK_Z``: z stays on the plane of the sample through all moves,
+    so that each gives it another voltage in the centre of the scan. A move beyond the range of z is refused. Such a
+    device has no ``DAC_MOVE``.
     """
 
     def __init__(
@@ -191,7 +202,7 @@ class Live:
         """
         self._device, self._path, self._on_stage = device, Path(scan), on_stage
         self._limits = device.limits()
-        scan_settings = dict(settings or {})
+        scan_settings = split_table(settings or {})
         planned = self._planned(scan_settings, *self._variant(scan_settings))
         self._scan = replace(planned, build=planned.certified())
         self._sent: _Scan | None = None  # by an upload whose end is not known
@@ -209,6 +220,11 @@ class Live:
     def place(self) -> tuple[LinePlan, LinePlan]:
         """Both axes of that plan; of one at an angle, those of the scan at 0 degrees with its sizes and place."""
         return self._scan.straight.lines
+
+    @property
+    def z(self) -> LiveZ | None:
+        """The output z of that plan: its voltage in the centre, its heights and the room about them; None without z."""
+        return self._scan.z
 
     @property
     def angle_deg(self) -> float:
@@ -262,11 +278,11 @@ class Live:
         Parameters
         ----------
         settings
-            Values by key, such as ``{"timing.line_rate_hz": 2.0}``.
+            Values by key, such as ``{"timing.line_rate_hz": 2.0}``. Slopes of z turn the plane about the centre of the
+            scan before. ``z.offset_v`` is the voltage in the new centre; without it the plane gives this voltage.
         """
         self._settle()
-        settings = other_settings(self._scan.settings, settings)
-        variant, setup = self._variant(settings)
+        settings, variant, setup = self._followed(split_table(settings))
         preview = self._preview_at_angle(setup)
         try:
             return self._send(self._planned(settings, variant, setup), preview)
@@ -276,16 +292,32 @@ class Live:
                 self._go_back()
             raise
 
+    def _followed(self, settings: dict[str, Any]) -> tuple[dict[str, Any], Variant, Setup]:
+        """Return all settings, the variant and the setup of a change, whose z is on the plane of the scan before.
+
+        Raises
+        ------
+        Rejected
+            If a key is wrong, or the change is a move that leaves the range of an axis or of z.
+        """
+        every = other_settings(self._scan.settings, settings)
+        variant, setup = self._variant(every)
+        before, z = self._scan.setup, self._scan.plan.z
+        if z is None or setup.scan.z is None or OFFSET_KEY in settings:
+            return every, variant, setup
+        offset_v = followed_offset_v(before, setup)
+        if offset_v != setup.scan.z.offset_v:
+            every = {**every, OFFSET_KEY: offset_v}
+            variant, setup = self._variant(every)
+            check_room(z, before, setup, settings)
+        return every, variant, setup
+
     def _variant(self, settings: dict[str, Any]) -> tuple[Variant, Setup]:
         _, scans = variants(self._path, {key: [value] for key, value in settings.items()})
         if len(scans) != 1:
             why = f"has {len(scans)} scans in [[scans]]; a device plays one of them: give the scan a file of its own"
             raise Rejected([Problem(str(self._path), 0, "scans", why)])
-        setup = scans[0].setup
-        if setup.scan.z is not None:
-            why = "`live` sends no output z; leave [z] out, or send the scan with `tablegen upload`"
-            raise Rejected([setup.scan_file.problem("z", why)])
-        return scans[0], setup
+        return scans[0], scans[0].setup
 
     def _planned(self, settings: dict[str, Any], variant: Variant, setup: Setup) -> "_Scan":
         """Plan a scan, and measure what limits are compared with; a preview does not wait for the whole certificate.
@@ -316,9 +348,10 @@ class Live:
         if Feature.COMMIT_MODES not in device.info.features:  # it would restart the frame
             return None
         preview = turned_preview(setup, before)
-        if preview is None or not is_accepted(preview.program, self._limits, before.program, device.info.shaping):
+        if preview is None or not self._is_accepted(preview, before):
             return None
-        scan = PreparedScan(before.name, program_digest(preview.program), preview.program, None, None)
+        digest = program_digest(preview.program, preview.program_of_z)
+        scan = PreparedScan(before.name, digest, preview.program, None, None, preview.program_of_z)
         try:
             image = scan.image("table", device.info)
             check(scan, image, device.info, self._limits, swap=CommitMode.KEEP)
@@ -329,6 +362,15 @@ class Live:
         if self._on_preview is not None:
             self._on_preview(live_preview)
         return live_preview
+
+    def _is_accepted(self, preview: TurnedPreview, before: TurnedPlan) -> bool:
+        """Return True if the device accepts the programs of a preview behind those of a plan, by both sequencers."""
+        info, of_z, z_before = self._device.info, preview.program_of_z, before.program_of_z
+        if not is_accepted(preview.program, self._limits, before.program, info.shaping):
+            return False
+        if of_z is None or z_before is None:
+            return True
+        return is_accepted(of_z, (info.of_z.x_limits, info.of_z.y_limits), z_before, info.of_z.shaping)
 
     def _go_back(self) -> None:
         """Play the scan before a preview whose plan was refused; a lost link leaves the preview."""
@@ -355,6 +397,7 @@ class Live:
         image = prepared.image("auto", device.info)
         swap = self._swap(plan)
         check(prepared, image, device.info, self._limits, swap=swap)
+        self._check_z_begins(plan)
         before, playing = (self.plan if self._is_sent else None), self._playing
         preview = None
         try:
@@ -390,7 +433,23 @@ class Live:
             x=x,
             y=y,
             preview=preview or played,
+            z=scan.z,
         )
+
+    def _check_z_begins(self, plan: AnyPlan) -> None:
+        """Check that z does not begin or end to play while a scan plays, which a device refuses behind the upload.
+
+        Raises
+        ------
+        Unsuitable
+            If it does.
+        """
+        same = self._is_sent and (self.plan.z is None) == (plan.z is None)
+        if same or self._device.info.z is None:
+            return
+        status = self._device.status()
+        if status.state == DeviceState.PLAYING and status.z is not None and status.z.plays != (plan.z is not None):
+            raise Unsuitable([Z_BEGINS])
 
     def _move(self, plan: AnyPlan) -> LivePreview | None:
         """Play the preview of a plan that is checked; None where there is none, or the device refuses it."""

@@ -74,9 +74,10 @@ def preview_words(playing: DualProgram, plan: DualProgram) -> PreviewWords | Non
     return PreviewWords(x, y, x_error_percent, y_error_percent)
 
 
-def program_digest(program: ScanProgram) -> str:
-    """Return a digest of a program that is no plan's."""
-    return hashlib.sha256(make_image(program, _NO_HASH).data).hexdigest()
+def program_digest(program: ScanProgram, program_of_z: ScanProgram | None = None) -> str:
+    """Return a digest of a program that is no plan's, with that of its z."""
+    programs = [program] if program_of_z is None else [program, program_of_z]
+    return hashlib.sha256(b"".join(make_image(each, _NO_HASH).data for each in programs)).hexdigest()
 
 
 def is_accepted(program: ScanProgram, limits: Limits, playing: ScanProgram, order: int) -> bool:

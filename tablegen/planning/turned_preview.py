@@ -7,7 +7,7 @@ line and of the frame about the new place. Only their shapes stay those of the s
 from dataclasses import replace
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
@@ -17,7 +17,15 @@ from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.fixedpoint.frame_words import scaled_frame
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.planning.turned_plan import FrameGeometry, TurnedAxis, TurnedPlan, check_reach, plan_at_0, within_range
+from tablegen.planning.turned_plan import (
+    FrameGeometry,
+    TurnedAxis,
+    TurnedPlan,
+    check_reach,
+    plan_at_0,
+    plan_z,
+    within_range,
+)
 from tablegen.waveform.series import FourierSeries
 
 _ROUNDS = 1
@@ -29,16 +37,19 @@ _LEAST_SHARE = 0.02  # of the longer motion: a part that is shorter is not made 
 class TurnedPreview(Struct, frozen=True, eq=False):
     """Both axes of a preview, and their largest distances from the wanted position by the operators.
 
-    They are in percent of the longer motion of each axis.
+    They are in percent of the longer motion of each axis. ``program_of_z`` is that of the plan behind the preview.
     """
 
     program: ScanProgram
     x_error_percent: float
     y_error_percent: float
+    program_of_z: ScanProgram | None = None
 
 
 def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     """Scale the program that plays to another scan; None where it has other lines or windows, or leaves a limit.
+
+    Nothing is learnt for z, so that of the preview is the exact one; there is no preview where z begins or ends.
 
     Raises
     ------
@@ -50,7 +61,10 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     same_keys = ("ticks", "lines", "turn_tick", "forward", "backward", "up", "down")
     if any(getattr(old, key) != getattr(new, key) for key in same_keys):
         return None
-    shares = FrameGeometry.of(setup, straight).shares
+    geometry, problems = FrameGeometry.of(setup, straight), Problems()
+    shares, z = geometry.shares, plan_z(setup, straight, geometry, problems)
+    if problems.entries or (z is None) != (plan.z is None):
+        return None
     programs, errors = [], []
     for axis, line in zip(plan.axes, straight.lines, strict=True):
         try:
@@ -61,7 +75,8 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
             return None
         programs.append(program)
         errors.append(error)
-    return TurnedPreview(ScanProgram(programs[0], programs[1], old), errors[0], errors[1])
+    program_of_z = structs.replace(plan, z=z).program_of_z
+    return TurnedPreview(ScanProgram(programs[0], programs[1], old), errors[0], errors[1], program_of_z)
 
 
 def _scaled(

@@ -21,7 +21,6 @@ from link_programs import INFO
 from operator_files import operator_file, write_operator_scan
 from replacing import replace
 from sets import LONG_TEST
-from tilted_scans import write_tilted
 from turned_scans import write_turned
 
 import tablegen
@@ -112,6 +111,7 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
         "digest": slower["scan"]["digest"],
         "moved": False,
         **{axis: {key: slower["scan"][axis][key] for key in ("position_nm", "size_nm")} for axis in "xy"},
+        "z": None,
     }
     words = [(line.program.output, line.program.words.tolist()) for line in same.lines]
     device_words = Bench(model(info, boot=BOOT))
@@ -217,12 +217,6 @@ def test_a_library_of_scans_is_none(info: DeviceInfo, tmp_path: Path) -> None:
     assert "this file is a library of scans" in outcome.err
     with client(VirtualLine(model(info, boot=BOOT))) as device, pytest.raises(Rejected, match="has 2 scans"):
         Live(device, file)
-
-
-def test_a_scan_with_z_is_refused(info: DeviceInfo, tmp_path: Path) -> None:
-    outcome = Bench(model(info, boot=BOOT)).run("live", write_tilted(tmp_path, 0.0))
-    assert outcome.status == 2
-    assert "z: `live` sends no output z; leave [z] out" in outcome.err
 
 
 def test_a_change_that_breaks_a_limit_of_the_scan_file_is_refused(info: DeviceInfo, file: Path) -> None:

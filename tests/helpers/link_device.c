@@ -179,6 +179,13 @@ uint32_t device_apart(const device *d)
     return d->apart;
 }
 
+/* From now on every tick is noted; with NULL none. */
+void device_watch(device *d, tick_record *to)
+{
+    d->watched = to;
+    d->watched_ticks = 0;
+}
+
 size_t device_z_records(device *d, line_record *records)
 {
     const size_t count = d->z_records;
@@ -387,8 +394,9 @@ static void keep(line_record **records, size_t *count, size_t *room, const line_
 
 #if DAC_LINK_Z
 /* The tick of z that belongs to one of x and y. */
-static void tick_z(device *d, uint8_t markers)
+static void tick_z(device *d, const dac_tick *of_x_y)
 {
+    const uint8_t markers = of_x_y->markers;
     const uint8_t common = DAC_PLAYING | DAC_LINE | DAC_FRAME | DAC_BACKWARD;
     const uint8_t faults = dac_sequencer_status(&d->z_sequencer).faults;
     dac_tick tick;
@@ -397,6 +405,10 @@ static void tick_z(device *d, uint8_t markers)
     if (stopped_now)
         abort();
     dac_sequencer_step(&d->z_sequencer, &tick);
+    if (d->watched != NULL) {
+        const tick_record record = {of_x_y->x, of_x_y->y, tick.x, markers, tick.markers};
+        d->watched[d->watched_ticks++] = record;
+    }
     if (line_tick(&d->z_log, tick.x, tick.y, tick.markers, faults, &ended))
         keep(&d->z_record, &d->z_records, &d->z_room, &ended);
     if (d->link.plays_z && ((tick.markers ^ markers) & common) != 0)
@@ -418,7 +430,7 @@ void device_tick(device *d, uint32_t ticks, unsigned work)
             keep(&d->record, &d->records, &d->room, &ended);
 #if DAC_LINK_Z
         if (d->has_z)
-            tick_z(d, tick.markers);
+            tick_z(d, &tick);
 #endif
         device_run(d, work);
     }

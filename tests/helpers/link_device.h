@@ -30,6 +30,13 @@ typedef struct {
     const dac_program *boot_program; /* or NULL */
 } device_setup;
 
+#if DAC_LINK_Z
+/* What both sequencers play on a tick. */
+typedef struct {
+    uint32_t x, y, z, markers, z_markers;
+} tick_record;
+#endif
+
 typedef struct {
     device_setup setup;
     dac_link_config config;
@@ -46,6 +53,8 @@ typedef struct {
     uint32_t apart; /* ticks on which the markers of a scan differ though z plays */
     size_t z_records, z_room;
     line_record *z_record;
+    tick_record *watched; /* NULL: none */
+    size_t watched_ticks;
 #endif
 #if DAC_STORE
     dac_store store;
@@ -67,6 +76,7 @@ device *device_new(const device_setup *setup, uint32_t boot);
 dac_link_started device_add_z(device *d, const device_setup *setup, bool plays);
 size_t device_z_records(device *d, line_record *records);
 uint32_t device_apart(const device *d);
+void device_watch(device *d, tick_record *to);
 uint32_t device_stops(void);
 bool device_request(device *d, unsigned request, uint32_t frames);
 dac_link_started device_z_refusal(device *d, unsigned fault);

@@ -444,6 +444,15 @@ class HostDevice:
         """Leave no memory for slow parts to the link."""
         self._dll.device_refuse_slow(self._device)
 
+    def played(self, ticks: int) -> dict[str, Any]:
+        """Words of x, y and z, and the markers of both sequencers, of so many samples from now on; uint32 each."""
+        names = ("x", "y", "z", "markers", "z_markers")
+        records = np.zeros((ticks, len(names)), dtype=np.uint32)
+        self._dll.device_watch(self._device, records.ctypes.data_as(c_void_p))
+        self.tick(ticks)
+        self._dll.device_watch(self._device, None)
+        return dict(zip(names, records.T, strict=True))
+
     def take_requests(self) -> None:
         """The requests that wait act, and no tick follows."""
         self._dll.device_answer(self._device)

@@ -64,10 +64,10 @@ def wanted_y(phase: Floats, turn: float) -> Floats:
     return np.asarray(SIZE_NM * (triangle(phase, turn) - 0.5))
 
 
-def wanted_places(angle_deg: float, line: Ints, t: Floats) -> tuple[Floats, Floats]:
+def wanted_places(angle_deg: float, line: Ints, t: Floats, lines: int = LINES) -> tuple[Floats, Floats]:
     """Return the wanted x and y in nm on the sample, from the centre of the scan, at phases of lines, broadcast."""
     along = SIZE_NM * (triangle(t, TURN) - 0.5) + 0.0 * line
-    across = SIZE_NM * (triangle((line + t) / LINES, SLOW_TURN) - 0.5)
+    across = SIZE_NM * (triangle((line + t) / lines, SLOW_TURN) - 0.5)
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
     return c * along - s * across, s * along + c * across
 

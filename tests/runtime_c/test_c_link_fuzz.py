@@ -1,4 +1,4 @@
-"""The kept corpus of ``make fuzz`` with sanitizers, on both of its targets; and that it finds what is broken."""
+"""The kept corpus of ``make fuzz`` with sanitizers, on all of its targets; and that it finds what is broken."""
 
 import subprocess
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ from c_faults import Mutant as CMutant
 from c_mutants_shaping import MUTANTS as SHAPED
 from kept_objects import objects
 from limits import within
-from link_mutants import MUTANTS
+from link_mutants import MUTANTS, Mutant
+from test_c_link_z import MUTANTS as OF_Z
 
 from tablegen.base.resources import c_link, c_runtime
 
@@ -33,8 +34,12 @@ FOUND = {
 }
 
 
-# As `make fuzz` compiles it: the runtime as most have it, and with all that it can play.
-TARGETS: dict[str, tuple[str, ...]] = {"plain": (), "all": ("-DDAC_SPLINE=1", "-DDAC_SHAPING=3")}
+# As `make fuzz` compiles it: the runtime as most have it, with all that it can play, and with a second sequencer for z.
+TARGETS: dict[str, tuple[str, ...]] = {
+    "plain": (),
+    "all": ("-DDAC_SPLINE=1", "-DDAC_SHAPING=3"),
+    "z": ("-DDAC_SPLINE=1", "-DDAC_COMMIT_MODES=1", "-DDAC_LINK_Z=1"),
+}
 # Codes of a buffer that are not those of steps, of what only the second target plays.
 FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
     "a run along a spline begins with a later segment": ("dac_run.h", "goes_on ? 1 : 0", "1"),
@@ -42,10 +47,12 @@ FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
         (each.file, each.old, each.new) for each in SHAPED if each.breaks == "a tick has half a code less"
     ),
 }
+# A z that is not on the ticks of x and y, or not of their scan.
+FOUND_WITH_Z = ("z is not committed", "z has no mode of its COMMIT", "a trigger is of x and y alone")
 
 
 def replay(
-    folder: Path, target: str = "plain", mutant: mutants.Mutant | None = None
+    folder: Path, target: str = "plain", mutant: mutants.Mutant | Mutant | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Compile a target, with a mutant in it or with none, and give it every file of the corpus."""
     sources: Sequence[Path] = [*c_runtime(), *c_link()]
@@ -83,3 +90,8 @@ def test_the_corpus_finds_what_is_broken(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", FOUND_WITH_ALL)
 def test_the_corpus_finds_what_is_broken_in_splines_and_shaping(name: str, tmp_path: Path) -> None:
     assert replay(tmp_path, "all", CMutant(name, *FOUND_WITH_ALL[name])).returncode != 0
+
+
+@pytest.mark.parametrize("name", FOUND_WITH_Z)
+def test_the_corpus_finds_what_is_broken_in_z(name: str, tmp_path: Path) -> None:
+    assert replay(tmp_path, "z", Mutant(name, *OF_Z[name])).returncode != 0

@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +44,8 @@ def live(scan: Path, port: str, baud: int, key_file: Path | None) -> int:
     Every change is planned and checked as a build would be, and sent only if scanner, scan and device allow it. The
     frame goes on if the firmware has DAC_COMMIT_MODES=1, and ticks and lines stay the same. With DAC_MOVE=1 a preview
     plays before the exact scan. A scan at an angle needs an operator on both axes, and seconds for each change; a
-    preview plays until then.
+    preview plays until then. The output z of a tilted sample follows its plane through all changes, on firmware with
+    DAC_LINK_Z=1.
 
     \b
     Example:
@@ -176,11 +178,17 @@ def _status(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dic
 
 
 def _where(live_scan: "Live", status: "DeviceStatus") -> dict[str, Any]:
-    """Return position and size of each axis; null where the device plays a scan that is not of this session."""
+    """Return position and size of each axis, and z; null where the device plays a scan that is not of this session."""
     if status.generation != live_scan.generation:
-        return {"x": None, "y": None}
+        return {"x": None, "y": None, "z": None}
+    z = live_scan.z
+    faults = {} if status.z is None else {"faults": status.z.faults}
     return {
-        line.axis: {"position_nm": line.drive.position_nm, "size_nm": line.drive.size_nm} for line in live_scan.place
+        **{
+            line.axis: {"position_nm": line.drive.position_nm, "size_nm": line.drive.size_nm}
+            for line in live_scan.place
+        },
+        "z": None if z is None else {**asdict(z), **faults},
     }
 
 

@@ -10,6 +10,7 @@ from tablegen.cli.shared.terminal import ARROWS
 if TYPE_CHECKING:
     from tablegen.api.live import Live, LiveAxis, LiveScan
     from tablegen.api.live_preview import LivePreview
+    from tablegen.api.live_tilt import LiveZ
     from tablegen.link.device import Device
     from tablegen.planning.line_plan import LinePlan
 
@@ -90,6 +91,7 @@ def _distances(live: "Live", right: int, up: int) -> tuple[float, float]:
 def _place(live: "Live", scan: "LiveScan") -> str:
     """Describe the scan that plays: a bar of the driver's range for each axis, rate, and how it began."""
     rows = [_bar(line, axis) for line, axis in zip(live.place, (scan.x, scan.y), strict=True)]
+    rows += [] if scan.z is None else [_bar_of_z(scan.z)]
     how = {"keep": "the frame goes on", "frame": "from a new frame", "line": "a frame begins", None: "played already"}
     angle = f", {scan.angle_deg:.4g} degrees" if scan.angle_deg else ""
     return "\n".join([*rows, f"{scan.line_rate_hz:.4g} Hz, {scan.lines} lines{angle}; {how[scan.swap]}"])
@@ -99,9 +101,24 @@ def _bar(line: "LinePlan", axis: "LiveAxis") -> str:
     drive, driver = line.drive, line.drive.driver
     half = 0.5 * axis.amplitude_v
     low, high = (driver.share(drive.v_offset + by) for by in (-half, half))
-    first = min(max(int(low * _BAR), 0), _BAR - 1)
-    last = min(max(int(high * _BAR), first), _BAR - 1)
-    bar = "." * first + "=" * (last + 1 - first) + "." * (_BAR - 1 - last)
+    bar = _drawn(low, high)
     place = f"{drive.size_nm:.5g} nm at {drive.position_nm:.5g} nm"
     drift = "" if axis.drift_nm is None else f", drifts {axis.drift_nm:.2g} nm in the first frame"
     return f"{line.axis} {driver.v_min:g} V [{bar}] {driver.v_max:g} V  {place}{drift}"
+
+
+def _bar_of_z(z: "LiveZ") -> str:
+    """Draw the heights of z in a frame in its whole range."""
+    below, above, height = z.room_below_nm, z.room_above_nm, z.highest_nm - z.lowest_nm
+    whole = below + height + above
+    bottom, top = z.lowest_nm - below, z.highest_nm + above
+    bar = _drawn(below / whole, (below + height) / whole)
+    room = f"{height:.4g} nm about {z.offset_v:.5g} V, room {below:.4g} nm below, {above:.4g} nm above"
+    return f"z {bottom:.4g} nm [{bar}] {top:.4g} nm  {room}"
+
+
+def _drawn(low: float, high: float) -> str:
+    """Return a bar with the part between two shares of it drawn."""
+    first = min(max(int(low * _BAR), 0), _BAR - 1)
+    last = min(max(int(high * _BAR), first), _BAR - 1)
+    return "." * first + "=" * (last + 1 - first) + "." * (_BAR - 1 - last)

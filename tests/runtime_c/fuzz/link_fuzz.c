@@ -12,8 +12,11 @@
  *     0x64                 the interlock changes
  *     0x65                 a reset
  *     0x66, n              100 n milliseconds
+ *     0x67, n              the COMMIT of an upload with a mode, compiled with DAC_COMMIT_MODES=1
  * Frames get their tags, so that a key keeps nobody from the states behind it. Compiled with DAC_SPLINE=1 uploads are
- * of cubic tables where the options say so; a shaped program is a change of word 11 of the page of an axis.
+ * of cubic tables where the options say so; a shaped program is a change of word 11 of the page of an axis. Compiled
+ * with DAC_LINK_Z=1 the device has a second sequencer; where the options say so its first program and uploads have z,
+ * and every second change is one of the image of z.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +25,7 @@
 
 enum { X_BITS = 4, Y_BITS = 3, X_WORDS = 1 << X_BITS, Y_WORDS = 1 << Y_BITS, HARMONICS = 3 };
 enum { LINE_TICKS = 24, LINES = 3 };
-enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64 };
+enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64, Z = 128 };
 enum { MOST_TICKS = 1500, MOST_FILL = 64, POWER_UP = 2000 };
 enum { CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000 };
 
@@ -37,6 +40,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 static dac_sequencer sequencer;
 static dac_link link_;
 static dac_word x_tables[2][DAC_TABLE_ROOM(X_BITS)], y_tables[2][DAC_TABLE_ROOM(Y_BITS)];
+#if DAC_LINK_Z
+static dac_sequencer z_sequencer;
+static dac_link z_link;
+static dac_word z_tables[2][DAC_TABLE_ROOM(X_BITS)], rest_tables[2][DAC_TABLE_ROOM(Y_BITS)];
+static int32_t z_words[1], rest_words[1];
+static bool stopped;
+#endif
 static int32_t x_words[2 * HARMONICS + 1], y_words[2 * HARMONICS + 1];
 static int32_t sine[5 * X_WORDS / 4];
 static const uint8_t key[16] = {1, 2, 3};
@@ -59,6 +69,22 @@ static uint32_t milliseconds(void)
     return clock_ms;
 }
 
+#if DAC_LINK_Z
+/* Ticks are stopped in pairs, and none comes between. */
+static void stop_ticks(bool stop)
+{
+    REQUIRE(stop != stopped);
+    stopped = stop;
+}
+
+static const dac_link_config z_config = {
+    .x = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, X_BITS,
+          DAC_TABLE_ROOM(X_BITS), {z_tables[0], z_tables[1]}, z_words},
+    .y = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, Y_BITS,
+          DAC_TABLE_ROOM(Y_BITS), {rest_tables[0], rest_tables[1]}, rest_words},
+};
+#endif
+
 static dac_link_config config = {
     .x = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, X_BITS,
           DAC_TABLE_ROOM(X_BITS), {x_tables[0], x_tables[1]}, x_words},
@@ -73,6 +99,9 @@ static dac_link_config config = {
     .identity_bytes = sizeof identity,
     .boot_persists = true,
     .milliseconds = milliseconds,
+#if DAC_LINK_Z
+    .stop_ticks = stop_ticks,
+#endif
 };
 
 /* A good program and its two images, made once. */
@@ -129,15 +158,20 @@ static void furnish(void)
 
 /* What has to hold. */
 
-static struct {
+typedef struct {
     int32_t x, y; /* the codes of the last tick */
     uint8_t markers;
     uint32_t ticks, line_ticks; /* of the line so far, and of the whole line */
     uint32_t swaps;
     /* of the program that plays, as it was taken */
     dac_word x_table[DAC_TABLE_ROOM(X_BITS)], y_table[DAC_TABLE_ROOM(Y_BITS)];
-    dac_link_reader reader;
-} watched;
+} watch;
+
+static watch watched;
+#if DAC_LINK_Z
+static watch z_watched;
+#endif
+static dac_link_reader reader;
 
 /* How many of the first words stand behind the last. */
 static uint32_t words_behind(const dac_bank_axis *axis)
@@ -157,44 +191,74 @@ static void keep_table(dac_word *copy, const dac_bank_axis *axis)
         REQUIRE(copy[axis->length + k] == copy[k]);
 }
 
-static void watch_memory(void)
+static void watch_memory(const dac_sequencer *s, watch *w)
 {
-    const dac_bank *const bank = sequencer.now;
+    const dac_bank *const bank = s->now;
 
     if (bank == NULL)
         return;
     REQUIRE(bank->x.length <= X_WORDS && bank->y.length <= Y_WORDS);
-    if (sequencer.swaps != watched.swaps) {
-        watched.swaps = sequencer.swaps;
+    if (s->swaps != w->swaps) {
+        w->swaps = s->swaps;
         REQUIRE(bank->x.code_min >= CODE_MIN && bank->x.code_max <= CODE_MAX && bank->x.max_step <= MAX_STEP);
         REQUIRE(bank->y.code_min >= CODE_MIN && bank->y.code_max <= CODE_MAX && bank->y.max_step <= MAX_STEP);
-        keep_table(watched.x_table, &bank->x);
-        keep_table(watched.y_table, &bank->y);
+        keep_table(w->x_table, &bank->x);
+        keep_table(w->y_table, &bank->y);
     }
-    REQUIRE(memcmp(watched.x_table, bank->x.table, (bank->x.length + words_behind(&bank->x)) * sizeof(dac_word)) == 0);
-    REQUIRE(memcmp(watched.y_table, bank->y.table, (bank->y.length + words_behind(&bank->y)) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(w->x_table, bank->x.table, (bank->x.length + words_behind(&bank->x)) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(w->y_table, bank->y.table, (bank->y.length + words_behind(&bank->y)) * sizeof(dac_word)) == 0);
+}
+
+static void watch_memories(void)
+{
+    watch_memory(&sequencer, &watched);
+#if DAC_LINK_Z
+    watch_memory(&z_sequencer, &z_watched);
+#endif
 }
 
 /* `requests`: that acted before it. */
-static void watch_tick(const dac_tick *tick, unsigned requests)
+static void watch_tick(const dac_sequencer *s, watch *w, const dac_tick *tick, unsigned requests)
 {
     const int32_t x = tick->x, y = tick->y;
 
     REQUIRE(x >= CODE_MIN && x <= CODE_MAX && y >= CODE_MIN && y <= CODE_MAX);
-    REQUIRE(abs(x - watched.x) <= MAX_STEP && abs(y - watched.y) <= MAX_STEP);
+    REQUIRE(abs(x - w->x) <= MAX_STEP && abs(y - w->y) <= MAX_STEP);
     REQUIRE((tick->markers & (DAC_SWAPPED | DAC_PLAYING | DAC_LINE)) != (DAC_SWAPPED | DAC_PLAYING));
     /* A line is whole, and of one program, unless the scan was stopped and started again. */
     if ((tick->markers & DAC_LINE) != 0) {
-        REQUIRE((watched.markers & DAC_PLAYING) == 0 || requests > 1 || watched.ticks == watched.line_ticks);
-        watched.ticks = 0;
-        watched.line_ticks = sequencer.now->schedule.line_ticks;
+        REQUIRE((w->markers & DAC_PLAYING) == 0 || requests > 1 || w->ticks == w->line_ticks);
+        w->ticks = 0;
+        w->line_ticks = s->now->schedule.line_ticks;
     }
-    watched.ticks++;
-    watched.markers = tick->markers;
-    watched.x = x;
-    watched.y = y;
-    watch_memory();
+    w->ticks++;
+    w->markers = tick->markers;
+    w->x = x;
+    w->y = y;
+    watch_memory(s, w);
 }
+
+/* A tick of a sequencer, which has so many requests in front of it. */
+static void step(dac_sequencer *s, watch *w, dac_tick *tick)
+{
+    const unsigned requests = (uint8_t)(s->head - s->tail);
+
+    dac_sequencer_step(s, tick);
+    watch_tick(s, w, tick, requests);
+}
+
+#if DAC_LINK_Z
+/* x, y and z are of one scan, on one tick; a z that belongs to none rests. */
+static void watch_both(const dac_tick *tick, const dac_tick *of_z)
+{
+    const uint8_t common = DAC_PLAYING | DAC_LINE | DAC_FRAME | DAC_BACKWARD;
+
+    if (link_.plays_z)
+        REQUIRE(((tick->markers ^ of_z->markers) & common) == 0);
+    else
+        REQUIRE((of_z->markers & DAC_PLAYING) == 0);
+}
+#endif
 
 static void work(unsigned most)
 {
@@ -202,33 +266,44 @@ static void work(unsigned most)
 
     for (bool more = true; more && most != 0; most--) {
         more = dac_link_work(&link_);
-        watch_memory();
+        watch_memories();
         while ((byte = dac_link_transmit(&link_)) >= 0) {
-            REQUIRE(dac_link_read_byte(&watched.reader, (uint8_t)byte) != DAC_LINK_BAD);
+            REQUIRE(dac_link_read_byte(&reader, (uint8_t)byte) != DAC_LINK_BAD);
             more = true;
         }
     }
 }
 
-/* A buffer, which is what as many steps make of it; the link works in between. */
-static unsigned fill(unsigned ticks)
+/* A buffer, which is what as many steps make of it. */
+static void fill_one(dac_sequencer *s, watch *w, dac_tick *played, unsigned ticks)
 {
     static dac_sequencer before, filled;
     dac_output codes[2 * MOST_FILL];
     uint8_t markers[MOST_FILL];
 
-    memcpy(&before, &sequencer, sizeof before);
-    dac_sequencer_fill(&sequencer, codes, codes + 1, markers, ticks);
-    memcpy(&filled, &sequencer, sizeof filled);
-    memcpy(&sequencer, &before, sizeof before);
+    memcpy(&before, s, sizeof before);
+    dac_sequencer_fill(s, codes, codes + 1, markers, ticks);
+    memcpy(&filled, s, sizeof filled);
+    memcpy(s, &before, sizeof before);
     for (unsigned i = 0; i < ticks; i++) {
-        const unsigned requests = (uint8_t)(sequencer.head - sequencer.tail);
-        dac_tick one;
-        dac_sequencer_step(&sequencer, &one);
-        watch_tick(&one, requests);
-        REQUIRE(one.x == codes[2 * i] && one.y == codes[2 * i + 1] && one.markers == markers[i]);
+        step(s, w, &played[i]);
+        REQUIRE(played[i].x == codes[2 * i] && played[i].y == codes[2 * i + 1] && played[i].markers == markers[i]);
     }
-    REQUIRE(memcmp(&filled, &sequencer, sizeof filled) == 0);
+    REQUIRE(memcmp(&filled, s, sizeof filled) == 0);
+}
+
+/* Buffers; the link works in between. */
+static unsigned fill(unsigned ticks)
+{
+    dac_tick played[MOST_FILL];
+
+    fill_one(&sequencer, &watched, played, ticks);
+#if DAC_LINK_Z
+    dac_tick of_z[MOST_FILL];
+    fill_one(&z_sequencer, &z_watched, of_z, ticks);
+    for (unsigned i = 0; i < ticks; i++)
+        watch_both(&played[i], &of_z[i]);
+#endif
     work(4 * ticks);
     return ticks;
 }
@@ -240,16 +315,34 @@ static unsigned tick(unsigned ticks)
     if (fills && ticks != 0)
         return fill(ticks);
     for (unsigned i = 0; i < ticks; i++) {
-        const unsigned requests = (uint8_t)(sequencer.head - sequencer.tail);
         dac_tick one;
-        dac_sequencer_step(&sequencer, &one);
-        watch_tick(&one, requests);
+        step(&sequencer, &watched, &one);
+#if DAC_LINK_Z
+        dac_tick of_z;
+        REQUIRE(!stopped);
+        step(&z_sequencer, &z_watched, &of_z);
+        watch_both(&one, &of_z);
+#endif
         work(4);
     }
     return ticks;
 }
 
 /* What is said. */
+
+#if DAC_LINK_Z
+static void start_z(uint8_t options)
+{
+    const bool plays = (options & Z) != 0;
+
+    REQUIRE(dac_sequencer_init(&z_sequencer, &z_config.x.converter, &z_config.y.converter));
+    REQUIRE(dac_link_init_z(&link_, &z_link, &z_config, &z_sequencer, plays) == DAC_LINK_STARTED);
+    memset(&z_watched, 0, sizeof z_watched);
+    z_watched.x = z_watched.y = POWER_UP;
+    if (plays && !(options & WITHOUT_BOOT))
+        REQUIRE(dac_sequencer_load(&z_sequencer, &boot) == DAC_LOADED && dac_sequencer_commit(&z_sequencer));
+}
+#endif
 
 static void start(uint8_t options, uint32_t count)
 {
@@ -259,7 +352,11 @@ static void start(uint8_t options, uint32_t count)
     REQUIRE(dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter));
     REQUIRE(dac_link_init(&link_, &config, &sequencer, count) == DAC_LINK_STARTED);
     memset(&watched, 0, sizeof watched);
+    memset(&reader, 0, sizeof reader);
     watched.x = watched.y = POWER_UP;
+#if DAC_LINK_Z
+    start_z(options);
+#endif
     permits = true;
     if (!(options & WITHOUT_BOOT))
         REQUIRE(dac_sequencer_load(&sequencer, &boot) == DAC_LOADED && dac_sequencer_commit(&sequencer));
@@ -318,27 +415,49 @@ static void say_tagged(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_
     say(type, seq, whole + 6, (uint8_t)(count + 16));
 }
 
-static uint8_t sent[sizeof fourier > sizeof image ? sizeof fourier : sizeof image];
+static uint8_t sent[(sizeof fourier > sizeof image ? sizeof fourier : sizeof image) + sizeof image];
 static size_t sent_bytes;
+
+/* The image of z behind that of x and y, and what BEGIN says of it; returns the bytes of this. */
+static uint8_t add_z(uint8_t options, uint8_t *info)
+{
+#if DAC_LINK_Z
+    if (options & Z) {
+        memcpy(sent + sent_bytes, image, sizeof image);
+        sent_bytes += sizeof image;
+        dac_link_put(info + 48, sizeof image);
+        memcpy(info + 52, info + 40, 8);
+        return 60;
+    }
+#endif
+    (void)options;
+    (void)info;
+    return 48;
+}
 
 static void upload(uint8_t options, const uint8_t *changes, size_t count)
 {
-    uint8_t info[48] = {0}, part[4 + 240];
+    uint8_t info[60] = {0}, part[4 + 240];
     const bool as_fourier = (options & FOURIER) != 0;
     const uint8_t cubic = options & CUBIC ? 128 : 0;
     const uint8_t shapes[] = {X_BITS + cubic, 16, 16, 0, Y_BITS + cubic, 16, 16, 0};
     uint32_t crc = DAC_LINK_CRC;
 
-    sent_bytes = as_fourier ? sizeof fourier : sizeof image;
-    memcpy(sent, as_fourier ? fourier : image, sent_bytes);
-    for (size_t i = 0; i + 1 < count; i += 2)
-        sent[changes[i] % sent_bytes] = (uint8_t)(sent[changes[i] % sent_bytes] + changes[i + 1]);
+    const size_t first = as_fourier ? sizeof fourier : sizeof image;
+    sent_bytes = first;
+    memcpy(sent, as_fourier ? fourier : image, first);
+    memcpy(info + 40, shapes, sizeof shapes);
+    const uint8_t info_bytes = add_z(options, info);
+    for (size_t i = 0; i + 1 < count; i += 2) {
+        uint8_t *const at = sent + (sent_bytes != first && (i & 2) != 0 ? first + changes[i] % sizeof image
+                                                                      : changes[i] % first);
+        *at = (uint8_t)(*at + changes[i + 1]);
+    }
     for (size_t i = 0; i < sent_bytes; i++)
         crc = dac_link_crc(crc, sent[i]);
     dac_link_put(info + 32, (uint32_t)sent_bytes);
     dac_link_put(info + 36, ~crc);
-    memcpy(info + 40, shapes, sizeof shapes);
-    say(DAC_LINK_BEGIN, 0, info, sizeof info);
+    say(DAC_LINK_BEGIN, 0, info, info_bytes);
     for (size_t at = 0; at < sent_bytes; at += 101) {
         const uint8_t some = (uint8_t)(sent_bytes - at < 101 ? sent_bytes - at : 101);
         dac_link_put(part, (uint32_t)at);
@@ -347,9 +466,10 @@ static void upload(uint8_t options, const uint8_t *changes, size_t count)
     }
 }
 
-static void commit(uint8_t seq)
+/* Bytes of a COMMIT, which may have a mode. */
+static void commit(uint8_t seq, uint8_t mode, uint8_t bytes)
 {
-    uint8_t payload[4], digest[32];
+    uint8_t payload[5], digest[32];
     uint32_t crc = DAC_LINK_CRC;
     dac_link_mac m;
 
@@ -360,7 +480,8 @@ static void commit(uint8_t seq)
     }
     dac_link_mac_end(&m, digest);
     dac_link_put(payload, ~crc);
-    say_tagged(DAC_LINK_COMMIT, seq, payload, 4, digest);
+    payload[4] = mode;
+    say_tagged(DAC_LINK_COMMIT, seq, payload, bytes, digest);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -400,7 +521,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             continue;
         }
         if (command == 0x62) {
-            commit(++seq);
+            commit(++seq, 0, 4);
             continue;
         }
         if (command == 0x64) {
@@ -424,6 +545,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             clock_ms += 100 * (uint32_t)count;
             continue;
         }
+#if DAC_COMMIT_MODES
+        if (command == 0x67) {
+            commit(++seq, (uint8_t)count, 5);
+            continue;
+        }
+#endif
         count = count < size ? count : size;
         if (command < 0x60)
             say_tagged(command & 15, command < 0x50 ? ++seq : seq, data, (uint8_t)(count < 228 ? count : 228), NULL);
