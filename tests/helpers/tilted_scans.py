@@ -24,7 +24,7 @@ SINE = (
 )  # fmt: skip
 Z = f"+ [z]\nslope_x = {SLOPE_X}\nslope_y = {SLOPE_Y}\noffset_v = {OFFSET_V}"
 OF_SCANNER = f"+ [z]\nnm_per_v = {NM_PER_V}\nv_max = 100.0"
-AUX_X, AUX_Y, AUX_NM_PER_V, AUX_OFFSET_V = -0.04, 0.015, -2.0, 45.0
+AUX_X, AUX_Y, AUX_NM_PER_V, AUX_OFFSET_V = -0.04, 0.015, -4.0, 45.0
 AUX = f"+ [aux]\nslope_x = {AUX_X}\nslope_y = {AUX_Y}\noffset_v = {AUX_OFFSET_V}"
 AUX_OF_SCANNER = f"+ [aux]\nnm_per_v = {AUX_NM_PER_V}\nv_max = 100.0\n[aux.dac]\ncoding = 'twos-complement'"
 
