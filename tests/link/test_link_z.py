@@ -260,7 +260,7 @@ def test_a_scan_at_an_angle_with_z_is_uploaded_too(tmp_path: Path) -> None:
 
 
 def test_both_outputs_are_uploaded_as_one_program(tmp_path: Path) -> None:
-    """The second output is the y of the image of z: it is read back, a word of it is named, and its converter counts."""
+    """The second output is the y of the image of z: its words are read back, and its converter counts."""
     path = with_aux(write_straight(tmp_path))
     assert run("build", path, "-o", tmp_path / "build", "-q").status == 0
     scan = PreparedScan.of_build(tmp_path / "build")
