@@ -34,20 +34,20 @@ class ShownTilt(Struct, frozen=True, eq=False):
 
 def shown_tilts(subject: Subject | TurnedSubject) -> list[ShownTilt]:
     """List the outputs beside x and y of a scan or a build; none without any."""
-    sequence, shown = subject.manifest.sequence, []
+    sequence, tilts = subject.manifest.sequence, []
     if isinstance(subject, Subject):
         steps = subject.manifest.axes.y.line.hold_ticks > 1
         for name, tilt in subject.tilts.items():
             its, program = tilt.certificate, tilt.program(sequence)
-            shown.append(ShownTilt(name, tilt, program, its.codes, its.error_lsb, its.error_nm, steps))
-        return shown
+            tilts.append(ShownTilt(name, tilt, program, its.codes, its.error_lsb, its.error_nm, steps))
+        return tilts
     certificate = subject.manifest.certificate
     for name, fields in subject.manifest.turned.tilts.items():
         codes, errors = certificate.codes.get(name), getattr(certificate, name)
         if codes is not None and errors is not None:
             program = fields.program(sequence)
-            shown.append(ShownTilt(name, fields, program, codes, errors.error_lsb, errors.error_nm))
-    return shown
+            tilts.append(ShownTilt(name, fields, program, codes, errors.error_lsb, errors.error_nm))
+    return tilts
 
 
 def tilt_section(z: ShownTilt, max_error_lsb: float | None) -> Section:
