@@ -261,10 +261,10 @@ class Build(Result):
     def charts(self) -> "PlottedCharts":
         """Return the drive of each axis, the error of the modelled piezo with and without compensation, and z."""
         from tablegen.charts.picture_file import PlottedCharts
-        from tablegen.html_report.scan_charts import charts_of_z, drive_of, modelled_error
+        from tablegen.html_report.scan_charts import charts_of_tilts, drive_of, modelled_error
 
         pairs = [(drive_of(line, self.plan.schedule), modelled_error(self.plan, line)) for line in self.plan.moving]
-        return PlottedCharts(self.name, (*(chart for pair in pairs for chart in pair), *charts_of_z(self.plan)))
+        return PlottedCharts(self.name, (*(chart for pair in pairs for chart in pair), *charts_of_tilts(self.plan)))
 
     @property
     def answers(self) -> list[ErrorAnswer]:

@@ -121,8 +121,7 @@ class TurnedBuild(Result):
     def choices(self) -> tuple[str, ...]:
         """Settings that the build chose, in sentences."""
         programs: dict[str, FrameProgram] = {axis.axis: axis.program for axis in self.plan.axes}
-        if self.plan.z is not None:
-            programs["z"] = self.plan.z.program
+        programs |= {tilt.name: tilt.program for tilt in self.plan.tilts}
         chosen: dict[str, str] = {axis.axis: f", {axis.choice}" for axis in self.plan.axes if axis.choice}
         tables = [
             f"{name}: cubic tables of {len(program.fast.words)} words for the line and "
@@ -186,8 +185,10 @@ class TurnedBuild(Result):
             charts.append(Chart(f"{axis.axis}_line", f"{axis.axis}: lines", "line period", "drive [V]", curves))
             frame = DrawnCurve(f"{axis.axis}", "other", np.arange(u.size) / _POINTS, driver.volts(u.ravel()))
             charts.append(Chart(f"{axis.axis}_frame", f"{axis.axis}: frame", "line", "drive [V]", (frame,)))
-        if (z := self.plan.z) is not None:
-            charts.append(tilt_chart(z.program, z.converter.v_zero, z.converter.v_per_code))
+        charts += [
+            tilt_chart(tilt.name, tilt.program, tilt.converter.v_zero, tilt.converter.v_per_code)
+            for tilt in self.plan.tilts
+        ]
         return PlottedCharts(self.name, tuple(charts))
 
     def write(self, folder: str | Path) -> list[str]:

@@ -65,7 +65,7 @@ def certify_planned(
     advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice
     broken = broken_limits(plan, certificates, setup.scan_file, advise, setup.hardware_problem)
     broken += [problem for line in plan.lines if (problem := too_dear(setup, line.axis, line.sample_cost))]
-    broken += _beyond_limit_of_z(setup, plan)
+    broken += _beyond_limit_of_tilts(setup, plan)
     return CertifiedScan(setup, plan, certificates, tuple(broken))
 
 
@@ -76,17 +76,19 @@ def breaks_limit(setup: Setup, periods: EmittedPeriods) -> bool:
         return True
     if limits.max_error_lsb is None and limits.max_scaling_error_percent is None:
         return steps_beyond_guard(periods)
-    return bool(broken_limits(plan, limited_figures(periods), setup.scan_file) or _beyond_limit_of_z(setup, plan))
+    return bool(broken_limits(plan, limited_figures(periods), setup.scan_file) or _beyond_limit_of_tilts(setup, plan))
 
 
-def _beyond_limit_of_z(setup: Setup, plan: Plan) -> list[Problem]:
-    """Return a problem where a code of z is off by more than the scan file allows; empty without z."""
-    limit = plan.limits.max_error_lsb
-    if plan.z is None or limit is None or plan.z.errors.error_lsb <= limit:
-        return []
+def _beyond_limit_of_tilts(setup: Setup, plan: Plan) -> list[Problem]:
+    """Return problems where codes of outputs beside x and y are off by more than the scan file allows."""
+    limit, problems = plan.limits.max_error_lsb, []
     nearer = "more harmonics of x bring" if plan.schedule.pixel_table is None else "a smaller slope brings"
-    why = f"z errs by up to {plan.z.errors.error_lsb:.4g} LSB, above {limit:g}; {nearer} it closer to the plane"
-    return [setup.scan_file.problem("limits.max_error_lsb", why)]
+    for tilt in plan.tilts:
+        error = tilt.errors.error_lsb
+        if limit is not None and error > limit:
+            why = f"{tilt.name} errs by up to {error:.4g} LSB, above {limit:g}; {nearer} it closer to the plane"
+            problems.append(setup.scan_file.problem("limits.max_error_lsb", why))
+    return problems
 
 
 def too_dear(setup: Setup, axis: str, takes: SampleCost | None) -> Problem | None:

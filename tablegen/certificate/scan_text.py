@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.error_answer import converter_percent, pixel_count, short
-from tablegen.certificate.tilt_text import tilt_rows
+from tablegen.certificate.tilt_text import tilt_blocks
 from tablegen.planning.line_plan import LinePlan, Plan
 
 
@@ -21,9 +21,7 @@ def scan_text(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
     for line in plan.lines:
         rows = _rows(plan, line, certificates[line.axis])
         lines += ["", line.axis, *(f"  {label:<20}{value}" for label, value in rows)]
-    if plan.z is not None:
-        lines += ["", "z", *(f"  {label:<20}{value}" for label, value in tilt_rows(plan.z))]
-    return lines
+    return lines + tilt_blocks(plan)
 
 
 def _rows(plan: Plan, line: LinePlan, certificate: Certificate) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from tablegen.certificate.excess import excess
 from tablegen.certificate.matching import pixel_mismatch_percent
 from tablegen.certificate.shaped_errors import ShapedErrors
 from tablegen.certificate.shaped_periods import Passage
-from tablegen.certificate.tilt_text import tilt_rows
+from tablegen.certificate.tilt_text import tilt_blocks
 from tablegen.compensation.expectation import LEVEL_PERCENT, Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
 from tablegen.fixedpoint.shaping import Shaping
@@ -286,6 +286,4 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
         exceeded = excess(certificates[line.axis].scaling)
         for i, text in enumerate([] if exceeded is None else exceeded.text(line.axis).split("; ")):
             lines.append(f"  {'' if i else 'warning':<18}{text}")
-    if plan.z is not None:
-        lines += ["", "z", *(f"  {label:<20}{value}" for label, value in tilt_rows(plan.z))]
-    return lines
+    return lines + tilt_blocks(plan)

@@ -1,13 +1,22 @@
-"""The output z in words: rows of its slopes, volts, codes and errors."""
+"""The outputs beside x and y in words: rows of their slopes, volts, codes and errors."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tablegen.planning.line_plan import Plan
     from tablegen.planning.tilt import TiltedOutput
 
 
+def tilt_blocks(plan: "Plan") -> list[str]:
+    """List a block of lines for each output beside x and y; none without any."""
+    lines = []
+    for tilt in plan.tilts:
+        lines += ["", tilt.name, *(f"  {label:<20}{value}" for label, value in tilt_rows(tilt))]
+    return lines
+
+
 def tilt_rows(z: "TiltedOutput") -> list[tuple[str, str]]:
-    """List what z does, and the errors of its integers: label and value."""
+    """List what an output beside x and y does, and the errors of its integers: label and value."""
     errors, output, volts = z.errors, z.program.output, z.converter
     codes = errors.codes
     ends = sorted(volts.v_zero + volts.v_per_code * code for code in (codes.least, codes.most))
@@ -27,7 +36,7 @@ def tilt_rows(z: "TiltedOutput") -> list[tuple[str, str]]:
 
 
 def _motion(z: "TiltedOutput") -> list[tuple[str, str]]:
-    """List what z follows where it is no straight line in x, or no ramp in y."""
+    """List what an output follows where that is no straight line in x, or no ramp in y."""
     from tablegen.planning.tilt_motion import TiltMotion  # here: most scans have no z
 
     motion = z.motion

@@ -7,8 +7,9 @@ sizes along and across the lines, the angle between them, and the scan angle; wh
 from collections.abc import Callable
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, field
 
+from tablegen.config.schema import TiltName
 from tablegen.fixedpoint.frame_program import played_extremes
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.frame_tables import compared_ticks
@@ -41,11 +42,11 @@ class TurnedErrors(Struct, frozen=True):
 
 
 class TurnedCertificate(Struct, frozen=True):
-    """The certificate of a scan at an angle: its errors, the codes of x and y, and z where the scan has it."""
+    """The certificate of a scan at an angle: its errors, the codes of x and y, and the outputs beside them by name."""
 
     errors: TurnedErrors
     codes: tuple[CodeRange, CodeRange]
-    z: TiltErrors | None = None
+    tilts: dict[TiltName, TiltErrors] = field(default_factory=dict)
 
 
 def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda _: None) -> TurnedCertificate:
@@ -63,7 +64,7 @@ def certify_turned(plan: TurnedPlan, progress: Callable[[str], object] = lambda 
     return TurnedCertificate(
         TurnedErrors(**errors, code_lsb=(distances[0], distances[1])),
         (ranges[0], ranges[1]),
-        None if plan.z is None else plan.z.errors,
+        {tilt.name: tilt.errors for tilt in plan.tilts},
     )
 
 

@@ -43,7 +43,7 @@ def turned_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str
         reach, step = f"{codes.least}..{codes.most}", f"{codes.steepest}/{axis.program.output.max_step}"
         moves = f"{axis.motion.fast_nm:+16.2f}  {axis.motion.slow_nm:+17.2f}"
         lines.append(f"{axis.axis:<4}  {moves}  {volts:9.3f}  {reach:<13}  {step:<10}  {lsb:.2f}")
-    return [*lines, *_z_summary(plan, certificate), *_costs(plan)]
+    return [*lines, *_tilt_summary(plan, certificate), *_costs(plan)]
 
 
 def _costs(plan: TurnedPlan) -> list[str]:
@@ -54,21 +54,21 @@ def _costs(plan: TurnedPlan) -> list[str]:
     return ["", *lines, *remedies] if lines else []
 
 
-def _z_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str]:
-    """Return the row of z below those of x and y, and its slopes; empty without z."""
-    z, errors = plan.z, certificate.z
-    if z is None or errors is None:
-        return []
-    codes, output = errors.codes, z.program.output
-    volts = abs(z.converter.v_per_code) * (codes.most - codes.least)
-    reach, step = f"{codes.least}..{codes.most}", f"{codes.steepest}/{output.max_step}"
-    moves = f"{z.motion.fast_nm:+16.2f}  {z.motion.slow_nm:+17.2f}"
-    return [
-        f"z     {moves}  {volts:9.3f}  {reach:<13}  {step:<10}  {errors.error_lsb:.2f}",
-        "",
-        f"z is {z.slope_x:+g} of x and {z.slope_y:+g} of y, by {z.nm_per_v:g} nm/V; within {errors.error_nm:.2g} nm "
-        "of the plane",
-    ]
+def _tilt_summary(plan: TurnedPlan, certificate: TurnedCertificate) -> list[str]:
+    """Return the rows of z and aux below those of x and y, and their slopes; empty without them."""
+    rows, slopes = [], []
+    for tilt in plan.tilts:
+        errors = certificate.tilts[tilt.name]
+        codes, output = errors.codes, tilt.program.output
+        volts = abs(tilt.converter.v_per_code) * (codes.most - codes.least)
+        reach, step = f"{codes.least}..{codes.most}", f"{codes.steepest}/{output.max_step}"
+        moves = f"{tilt.motion.fast_nm:+16.2f}  {tilt.motion.slow_nm:+17.2f}"
+        rows.append(f"{tilt.name:<4}  {moves}  {volts:9.3f}  {reach:<13}  {step:<10}  {errors.error_lsb:.2f}")
+        slopes.append(
+            f"{tilt.name} is {tilt.slope_x:+g} of x and {tilt.slope_y:+g} of y, by {tilt.nm_per_v:g} nm/V; within "
+            f"{errors.error_nm:.2g} nm of the plane"
+        )
+    return [*rows, "", *slopes] if rows else []
 
 
 def mixed_motions(plan: TurnedPlan) -> list[str]:
@@ -103,9 +103,9 @@ def turned_warnings(certificate: TurnedCertificate) -> list[tuple[float, str]]:
 def broken_limits(setup: Setup, plan: TurnedPlan, certificate: TurnedCertificate) -> list[Problem]:
     """Return the limits of the scan file that the certificate exceeds."""
     errors, limits, problems = certificate.errors, plan.limits, []
-    of_z = () if certificate.z is None else (certificate.z.error_lsb,)
+    of_tilts = [each.error_lsb for each in certificate.tilts.values()]
     figures = {
-        "max_error_lsb": (limits.max_error_lsb, max(*errors.code_lsb, *of_z), "a code is off by", "LSB"),
+        "max_error_lsb": (limits.max_error_lsb, max(*errors.code_lsb, *of_tilts), "a code is off by", "LSB"),
         "max_scaling_error_percent": (
             limits.max_scaling_error_percent,
             max(errors.scaling, abs(errors.fast_size), abs(errors.slow_size)),

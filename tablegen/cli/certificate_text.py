@@ -47,6 +47,7 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
                 f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
                 for i, text in enumerate(texts)
             ]
-    if plan.z is not None:
-        lines += [f"{'' if i else 'z':<4}  {label:<20}{value}" for i, (label, value) in enumerate(tilt_rows(plan.z))]
+    for tilt in plan.tilts:
+        rows = enumerate(tilt_rows(tilt))
+        lines += [f"{'' if i else tilt.name:<4}  {label:<20}{value}" for i, (label, value) in rows]
     return lines

@@ -1,8 +1,9 @@
 """The converter and the amplifier of each axis, combined from the keys of the scanner file and of the scan file.
 
 The hardware belongs to the instrument: in the scanner file ``[x.dac]`` goes before ``[dac]``, which serves both axes.
-``[dac]`` of the scan file serves both axes too; keys that both files have must be equal. The output z takes what it
-does not have in ``[z.dac]`` from ``[dac]`` of the scanner file, then from that of the scan file.
+``[dac]`` of the scan file serves both axes too; keys that both files have must be equal. The outputs z and
+aux take what they do not have in ``[z.dac]`` or ``[aux.dac]`` from ``[dac]`` of the scanner file, then from that of the
+scan file.
 """
 
 from collections.abc import Mapping
@@ -13,11 +14,11 @@ from msgspec import Struct
 from tablegen.base.input_errors import Document, Problems
 from tablegen.config.decode import decode, meant
 from tablegen.config.scanner import Scanner
-from tablegen.config.schema import Amplifier, Dac, WrittenScan
+from tablegen.config.schema import TILT_NAMES, Amplifier, Dac, TiltName, WrittenScan
 
 _AXES = ("x", "y")
-_NOT_OF_Z = {
-    "shaping": "the output z is not shaped; leave this out",
+_NOT_OF_TILTS = {
+    "shaping": "the output {name} is not shaped; leave this out",
     "output": "x and y are the outputs of a dual converter; leave this out",
 }
 _KINDS: Mapping[str, type[Dac] | type[Amplifier]] = {"dac": Dac, "amplifier": Amplifier}
@@ -85,7 +86,7 @@ class AxisHardware(Struct, frozen=True):
 
 
 def hardware_of(scan: WrittenScan, scanner: Scanner, axis: str) -> AxisHardware:
-    """Return the hardware of one axis ("x" or "y"), or of "z" of a scanner that has it, of validated files."""
+    """Return the hardware of one axis ("x" or "y"), or of "z" or "aux" of a scanner that has it, of validated files."""
     tables: dict[Place, Dac | Amplifier] = {}
     for part in _KINDS:
         tables[Place(False, part)] = getattr(scan, part)
@@ -111,10 +112,10 @@ def _combined(tables: _Tables, axis: str) -> AxisHardware:
 def _places(tables: _Tables, axis: str, part: str, name: str) -> list[Place]:
     """Return the tables with a key of one axis: that of the scan file, and the first one of the scanner file.
 
-    Of z it is one table: that of the scan file is of x and y, and may have other values.
+    Of z and aux it is one table: that of the scan file is of x and y, and may have other values.
     """
     scans, own, common = Place(False, part), Place(True, f"{axis}.{part}"), Place(True, part)
-    if axis == "z":
+    if axis in TILT_NAMES:
         return [place for place in (own, common, scans) if getattr(tables[place], name) is not None][:1]
     defined = [place for place in (scans, own, common) if getattr(tables[place], name) is not None]
     return defined[:2] if defined[:1] == [scans] else defined[:1]
@@ -128,11 +129,11 @@ def check_hardware(
     problems: Problems,
 ) -> None:
     """Report contradictions of the hardware in both files; faults of single keys were reported before."""
-    written, has_z = _written(scan, scanner), isinstance(scanner.get("z"), dict)
+    written, tilts = _written(scan, scanner), [name for name in TILT_NAMES if isinstance(scanner.get(name), dict)]
     if not all(isinstance(table, dict) for table in written.values()):
         return
     files = {False: scan_file, True: scanner_file}
-    missing = _missing(written) or (_missing_of_z(written) if has_z else [])
+    missing = _missing(written) or [fault for name in tilts for fault in _missing_of_tilt(written, name)]
     for place, why in missing:
         problems.add(files[place.in_scanner], place.key, why)
     tables = _decoded(written, files)
@@ -142,10 +143,13 @@ def check_hardware(
         for key, why in contradictions:
             problems.add(scan_file, key, why)
         return
-    each = {axis: _combined(tables, axis) for axis in (*_AXES, *("z" if has_z else ""))}
+    each = {axis: _combined(tables, axis) for axis in (*_AXES, *tilts)}
     faults = [(hardware, fault) for hardware in each.values() for fault in _faults(hardware)]
     faults += [(each["y"], fault) for fault in _differences(each["x"], each["y"], files)]
-    faults += [(each["z"], fault) for fault in (_faults_of_z(each["x"], each["z"], files) if has_z else ())]
+    for name in tilts:
+        faults += [(each[name], fault) for fault in _faults_of_tilt(each["x"], each[name], name, files)]
+    if {*tilts} == {*TILT_NAMES}:
+        faults += [(each["aux"], fault) for fault in _other_bits(each["z"], each["aux"], ("z", "aux"), files)]
     for hardware, (key, why) in faults:
         place = hardware.where(key)[0]
         problems.add(files[place.in_scanner], place.key, why)
@@ -157,7 +161,7 @@ def _written(scan: Mapping[str, Any], scanner: Mapping[str, Any]) -> dict[Place,
     for part in _KINDS:
         written[Place(False, part)] = scan.get(part, {})
         written[Place(True, part)] = scanner.get(part, {})
-        for axis in (*_AXES, "z"):
+        for axis in (*_AXES, *TILT_NAMES):
             its = scanner.get(axis)
             written[Place(True, f"{axis}.{part}")] = its.get(part, {}) if isinstance(its, dict) else {}
     return written
@@ -206,35 +210,37 @@ def _missing(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, st
     return faults
 
 
-def _missing_of_z(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, str]]:
-    """Return required keys that only x and y have, in tables of their own."""
+def _missing_of_tilt(written: Mapping[Place, Mapping[str, Any]], name: TiltName) -> list[tuple[Place, str]]:
+    """Return required keys of an output beside x and y that only these have, in tables of their own."""
     faults: list[tuple[Place, str]] = []
     for part, kind in _KINDS.items():
         known = [*kind.__struct_fields__]
-        tables = written[Place(True, f"z.{part}")], written[Place(True, part)], written[Place(False, part)]
+        tables = written[Place(True, f"{name}.{part}")], written[Place(True, part)], written[Place(False, part)]
         there = {key for table in tables for key in table}
         there |= {other for key in there if key not in known for other in meant(key, known)}
         faults += [
-            (Place(True, f"z.{part}.{name}"), f"missing; this key is required, here or in [{part}]")
-            for name in _REQUIRED[part]
-            if name not in there
+            (Place(True, f"{name}.{part}.{key}"), f"missing; this key is required, here or in [{part}]")
+            for key in _REQUIRED[part]
+            if key not in there
         ]
     return faults
 
 
-def _faults_of_z(x: AxisHardware, z: AxisHardware, files: Mapping[bool, Document]) -> list[tuple[str, str]]:
-    """Return the keys of z that it cannot have, or that have to equal those of x and differ."""
+def _faults_of_tilt(
+    x: AxisHardware, tilt: AxisHardware, name: TiltName, files: Mapping[bool, Document]
+) -> list[tuple[str, str]]:
+    """Return the keys of an output beside x and y that it cannot have, or that have to equal those of x and differ."""
     faults = [
-        (key, why)
-        for name, why in _NOT_OF_Z.items()
-        if (key := f"dac.{name}") in z.places and z.where(key)[0].key == f"z.{key}"
+        (key, why.format(name=name))
+        for its, why in _NOT_OF_TILTS.items()
+        if (key := f"dac.{its}") in tilt.places and tilt.where(key)[0].key == f"{name}.{key}"
     ]
-    if x.dac.update_rate_hz != z.dac.update_rate_hz:
+    if x.dac.update_rate_hz != tilt.dac.update_rate_hz:
         faults.append(
             (
                 "dac.update_rate_hz",
-                f"{z.dac.update_rate_hz:.12g} of z, and {_place_text(x, 'dac.update_rate_hz', files)} is "
-                f"{x.dac.update_rate_hz:.12g} of x; z moves on the ticks of x and y: leave this out",
+                f"{tilt.dac.update_rate_hz:.12g} of {name}, and {_place_text(x, 'dac.update_rate_hz', files)} is "
+                f"{x.dac.update_rate_hz:.12g} of x; {name} moves on the ticks of x and y: leave this out",
             )
         )
     return faults
@@ -276,17 +282,7 @@ def _faults(hardware: AxisHardware) -> list[tuple[str, str]]:
 
 def _differences(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> list[tuple[str, str]]:
     """Return the keys of y that have to equal those of x and differ."""
-    differences = []
-    if x.dac.bits != y.dac.bits:
-        few, many = sorted((x.dac.bits, y.dac.bits))
-        differences.append(
-            (
-                "dac.bits",
-                f"{y.dac.bits} of y, and {_place_text(x, 'dac.bits', files)} is {x.dac.bits} of x; the device computes "
-                f"codes of as many bits for both axes: give bits = {few} to both, and to the one of {many} bits "
-                f"word_bits = {many} with align = 'left' as well, which sends them as its upper bits",
-            )
-        )
+    differences = _other_bits(x, y, ("x", "y"), files)
     if x.dac.update_rate_hz != y.dac.update_rate_hz:
         differences.append(
             (
@@ -300,6 +296,21 @@ def _differences(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document
         outputs_text = " and ".join(f"{axis} is on {one or 'none'}" for axis, one in zip("xy", outputs, strict=True))
         differences.append(("dac.output", f"{outputs_text}; give one axis 'A' and the other 'B', or none of them"))
     return differences
+
+
+def _other_bits(
+    first: AxisHardware, second: AxisHardware, names: tuple[str, str], files: Mapping[bool, Document]
+) -> list[tuple[str, str]]:
+    """Return the bits of the y of a sequencer where its x has others."""
+    if first.dac.bits == second.dac.bits:
+        return []
+    few, many = sorted((first.dac.bits, second.dac.bits))
+    why = (
+        f"{second.dac.bits} of {names[1]}, and {_place_text(first, 'dac.bits', files)} is {first.dac.bits} of "
+        f"{names[0]}; the device computes codes of as many bits for both axes: give bits = {few} to both, and to the "
+        f"one of {many} bits word_bits = {many} with align = 'left' as well, which sends them as its upper bits"
+    )
+    return [("dac.bits", why)]
 
 
 def _place_text(hardware: AxisHardware, key: str, files: Mapping[bool, Document]) -> str:

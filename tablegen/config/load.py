@@ -19,11 +19,12 @@ from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardwa
 from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES, check_image_keys, solve_scan
 from tablegen.config.like import inherited, warn_inherited_once
 from tablegen.config.names import why_not_a_name
-from tablegen.config.scanner import Offset, Resonance, Scanner, ScannerZ
+from tablegen.config.scanner import LinearPiezo, Offset, Resonance, Scanner
 from tablegen.config.schema import (
     MAXIMUM_NAME,
     MAXIMUM_SPLINE_BITS,
     MAXIMUM_SPLINE_LENGTH,
+    TILT_NAMES,
     BandLimit,
     FastAxis,
     Refinement,
@@ -33,7 +34,7 @@ from tablegen.config.schema import (
     WrittenTiming,
 )
 
-_LEAST_NM_PER_V = 1e-6  # of z
+_LEAST_NM_PER_V = 1e-6  # of an output beside x and y
 _LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
 
 
@@ -54,12 +55,12 @@ class Setup(Struct, frozen=True, dict=True):
         return f"<tablegen setup {self.scan.name!r} on {self.scanner.name!r}, from {self.scan_file.name}>"
 
     def hardware(self, axis: str) -> AxisHardware:
-        """Return converter and amplifier of "x", "y", or "z" of a scanner with it, and where their keys stand."""
+        """Return converter and amplifier of "x", "y", or a "z" or "aux" of the scanner, and where their keys stand."""
         return self._hardware[axis]
 
     @cached_property
     def _hardware(self) -> dict[str, AxisHardware]:
-        axes = ("x", "y") if self.scanner.z is None else ("x", "y", "z")
+        axes = [axis for axis in ("x", "y", *TILT_NAMES) if getattr(self.scanner, axis) is not None]
         return {axis: hardware_of(self.scan, self.scanner, axis) for axis in axes}
 
     def hardware_problem(self, axis: str, key: str, why: str) -> Problem:
@@ -218,9 +219,13 @@ def _setup(
     assert written is not None
     assert scanner is not None
     update_rate_hz = hardware_of(written, scanner, "x").dac.update_rate_hz
-    if written.z is not None and scanner.z is None:
-        why = f"{scanner_file.name} has no [z]; give it nm_per_v and v_max of the piezo of z, and its converter"
-        problems.add(scan_file, "z", why)
+    for name in written.tilts:
+        if getattr(scanner, name) is None:
+            what = f"nm_per_v and v_max of the piezo of {name}, and its converter"
+            problems.add(scan_file, name, f"{scanner_file.name} has no [{name}]; give it {what}")
+    if written.aux is not None and written.z is None:
+        why = "is the y of the sequencer whose x is z, and there is no [z]; rename this table to [z], or give both"
+        problems.add(scan_file, "aux", why)
     solution = solve_scan(written, update_rate_hz, values, scan_file, problems)
     problems.stop_if_any()
     assert solution is not None
@@ -405,7 +410,7 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
             return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
         case Offset():
             return _offset_faults(built)
-        case ScannerZ() if abs(built.nm_per_v) < _LEAST_NM_PER_V:
+        case LinearPiezo() if abs(built.nm_per_v) < _LEAST_NM_PER_V:
             return [("nm_per_v", f"{built.nm_per_v:g} moves nothing; at least {_LEAST_NM_PER_V:g} in size is needed")]
         case Parameters():
             return built.faults()

@@ -123,31 +123,31 @@ class SlowScannerAxis(ScannerAxis, frozen=True, kw_only=True, forbid_unknown_fie
     ) = None
 
 
-class ScannerZ(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The piezo of z, taken as linear, and its driver; for scans with `[z]`."""
+class LinearPiezo(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The piezo of the output z, taken as linear, and its driver; for scans with `[z]`."""
 
     nm_per_v: Annotated[
         float,
-        Meta(ge=-1e6, le=1e6, description="nm of z for each V at the piezo; negative if a higher voltage lowers z"),
+        Meta(ge=-1e6, le=1e6, description="nm for each V at the piezo; negative if a higher voltage lowers the output"),
     ]
-    v_max: Annotated[PositiveVolts, Meta(description="maximum output of the driver of z")]
+    v_max: Annotated[PositiveVolts, Meta(description="maximum output of its driver")]
     v_min: Annotated[
-        float, Meta(ge=-1e5, le=0.0, description="minimum output of the driver of z; below 0 if it has both signs")
+        float, Meta(ge=-1e5, le=0.0, description="minimum output of its driver; below 0 if it has both signs")
     ] = 0.0
     dac: Annotated[
         Dac,
         Meta(
-            description="The converter of z; its keys take precedence over `[dac]`. It has its own `bits`, and neither "
-            "`shaping` nor `output`."
+            description="The converter of this output; its keys take precedence over `[dac]`. It has neither `shaping` "
+            "nor `output`; z has its own `bits`, aux those of z."
         ),
     ] = Dac()
     amplifier: Annotated[
-        Amplifier, Meta(description="The amplifier of z; its keys take precedence over `[amplifier]`.")
+        Amplifier, Meta(description="The amplifier of this output; its keys take precedence over `[amplifier]`.")
     ] = Amplifier()
 
     @property
     def driver(self) -> Driver:
-        """The output range of the driver of z."""
+        """The output range of its driver."""
         return Driver(self.v_max, self.v_min)
 
 
@@ -182,7 +182,16 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     x: ScannerAxis
     y: SlowScannerAxis
     coupling: Coupling = Coupling()
-    z: ScannerZ | None = None
+    z: LinearPiezo | None = None
+    aux: (
+        Annotated[
+            LinearPiezo,
+            Meta(
+                description="The actuator of the second output, and its driver; for scans with `[aux]`. Keys as `[z]`."
+            ),
+        ]
+        | None
+    ) = None
 
     @property
     def driver(self) -> Driver:

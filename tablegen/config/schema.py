@@ -513,17 +513,22 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
 
 
+TiltName = Literal["z", "aux"]
+"""An output beside x and y: the x of the second sequencer, or its y."""
+TILT_NAMES: tuple[TiltName, ...] = get_args(TiltName)
+
+
 class Tilt(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The output z beside x and y, which follows a tilted sample: z = slope_x x + slope_y y from the scan's centre."""
+    """An output beside x and y that is linear in both, from the scan's centre: z, which follows a tilted sample."""
 
     slope_x: Annotated[
-        float, Meta(ge=-1.0, le=1.0, description="nm of z for each nm along x on the sample, for example 0.02")
+        float, Meta(ge=-1.0, le=1.0, description="nm of the output for each nm along x on the sample, for example 0.02")
     ] = 0.0
-    slope_y: Annotated[float, Meta(ge=-1.0, le=1.0, description="nm of z for each nm along y on the sample")] = 0.0
-    offset_v: Annotated[Volts, Meta(description="voltage of z at the piezo in the centre of the scan")]
-    park_v: Annotated[Volts, Meta(description="voltage of z at the piezo after park; default: the offset")] | None = (
-        None
-    )
+    slope_y: Annotated[
+        float, Meta(ge=-1.0, le=1.0, description="nm of the output for each nm along y on the sample")
+    ] = 0.0
+    offset_v: Annotated[Volts, Meta(description="voltage at the piezo in the centre of the scan")]
+    park_v: Annotated[Volts, Meta(description="voltage at the piezo after park; default: the offset")] | None = None
 
 
 class ScanOfMany(Struct, frozen=True, kw_only=True):
@@ -573,6 +578,12 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     x: LineAxis
     y: SlowAxis
     z: Tilt | None = None
+    aux: (
+        Annotated[
+            Tilt, Meta(description="A second output that is linear in x and y, for example a focus. Keys as `[z]`.")
+        ]
+        | None
+    ) = None
     limits: Limits = Limits()
     cost: Cost | None = None
     emit: Emit = Emit()
@@ -580,6 +591,11 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         Annotated[list[ScanOfMany], Meta(min_length=1, description="scans of a library; `name` above is then its name")]
         | None
     ) = None
+
+    @property
+    def tilts(self) -> dict[TiltName, Tilt]:
+        """The outputs beside x and y by their names, z first; empty without any."""
+        return {name: tilt for name in TILT_NAMES if (tilt := getattr(self, name)) is not None}
 
 
 class Scan(WrittenScan, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -82,8 +82,8 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     names = [each.name for each in chosen_formats]
-    of_z = None if plan.z is None else plan.z.errors
-    files[MANIFEST] = manifest_file(record, digest, names, certificates, files, plan.clocks_per_tick, of_z)
+    tilts = {tilt.name: tilt.errors for tilt in plan.tilts}
+    files[MANIFEST] = manifest_file(record, digest, names, certificates, files, plan.clocks_per_tick, tilts)
     return files
 
 

@@ -2,6 +2,7 @@
 
 from msgspec import Struct
 
+from tablegen.device.beside import rests
 from tablegen.device.dual_program import ScanProgram
 from tablegen.emit.content import Content
 from tablegen.fixedpoint.frame_program import FrameProgram
@@ -38,13 +39,15 @@ class TurnedContent(Struct, frozen=True, eq=False):
 
 
 def content_beside(content: Content | TurnedContent) -> TurnedContent | None:
-    """Return the content of the files of a second sequencer, whose x is z, and whose y rests; None without z.
+    """Return the content of the files of a second sequencer, whose x is z, and whose y rests or is aux; None without z.
 
     They have the hash of the plan of the whole scan.
     """
     if content.z is None:
         return None
     summary = (f"The output z of {content.name}, for a sequencer of its own: x is z here, y rests at its offset.",)
+    if not rests(content.z):
+        summary = (f"The outputs z and aux of {content.name}, for a sequencer of their own: x is z here, y is aux.",)
     return TurnedContent(
         f"{content.name}_z",
         content.hash,

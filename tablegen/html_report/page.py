@@ -19,7 +19,7 @@ from tablegen.html_report.request import files, request_section, verification
 from tablegen.html_report.scan_errors import errors
 from tablegen.html_report.spectrum import quantisation, spectrum
 from tablegen.html_report.subject import Subject
-from tablegen.html_report.tilt import shown_tilt, tilt_section
+from tablegen.html_report.tilt import shown_tilts, tilt_section
 from tablegen.html_report.usable import usable
 
 Tell = Callable[[str], object]
@@ -35,7 +35,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
             request_section(subject),
             certificate(subject),
             *_of_pixels(subject),
-            *_of_z(subject),
+            *_of_tilts(subject),
             lines(subject, None),
             spectrum(subject),
             quantisation(subject),
@@ -49,7 +49,7 @@ def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:
         *([] if picture is None else [picture]),
         certificate(subject),
         *_of_pixels(subject),
-        *_of_z(subject),
+        *_of_tilts(subject),
         request_section(subject),
         lines(subject, axes),
         errors(planned, axes),
@@ -69,13 +69,10 @@ def _of_pixels(subject: Subject) -> list[Section]:
     return [] if section is None else [section]
 
 
-def _of_z(subject: Subject) -> list[Section]:
-    """Return the section of the output z; empty without z."""
-    z = shown_tilt(subject)
-    if z is None:
-        return []
+def _of_tilts(subject: Subject) -> list[Section]:
+    """Return the sections of the outputs beside x and y; empty without any."""
     limit = None if subject.planned is None else subject.planned.plan.limits.max_error_lsb
-    return [tilt_section(z, limit)]
+    return [tilt_section(tilt, limit) for tilt in shown_tilts(subject)]
 
 
 def charts_of(parts: list[Section]) -> dict[str, Chart]:

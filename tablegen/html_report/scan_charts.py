@@ -28,14 +28,15 @@ def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate
         for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
             row += [residual_chart(line.axis, one) for one in axis.corrections[-1:]]
     columns = max(map(len, rows))
-    rows.append(charts_of_z(plan))
+    rows.append(charts_of_tilts(plan))
     return PlottedCharts(f"{plan.name} on {plan.scanner}", tuple(chart for row in rows for chart in row), columns)
 
 
-def charts_of_z(plan: Plan) -> list[Chart]:
-    """Draw a frame of the output z; empty without z."""
-    z = plan.z
-    return [] if z is None else [tilt_chart(z.program, z.converter.v_zero, z.converter.v_per_code)]
+def charts_of_tilts(plan: Plan) -> list[Chart]:
+    """Draw a frame of each output beside x and y; empty without any."""
+    return [
+        tilt_chart(tilt.name, tilt.program, tilt.converter.v_zero, tilt.converter.v_per_code) for tilt in plan.tilts
+    ]
 
 
 def _bent(line: LinePlan) -> bool:

@@ -1,7 +1,7 @@
 """The subject of a report: a planned scan, or a build in its directory."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal
@@ -14,10 +14,11 @@ from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
 from tablegen.config.load import Setup
+from tablegen.config.schema import TILT_NAMES, TiltName
 from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import MANIFEST, read_json
-from tablegen.manifest.frame_fields import StraightZ
+from tablegen.manifest.frame_fields import StraightTilt
 from tablegen.manifest.read import read_build
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
@@ -67,7 +68,10 @@ class OwnImage:
 
 @dataclass(frozen=True)
 class Subject:
-    """The build as its manifest describes it; ``planned`` is None for a directory, ``z`` without that output."""
+    """The build as its manifest describes it; ``planned`` is None for a directory.
+
+    ``tilts`` are the outputs beside x and y, by their names.
+    """
 
     manifest: Manifest
     digest: str
@@ -75,7 +79,7 @@ class Subject:
     planned: PlannedScan | None = None
     verified: VerifyRecord | None = None
     image: OwnImage | None = None
-    z: StraightZ | None = None
+    tilts: dict[TiltName, StraightTilt] = field(default_factory=dict)
 
     @property
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
@@ -98,9 +102,9 @@ def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRe
     content = files[MANIFEST]
     plain = read_json(content)
     manifest = msgspec.convert(plain, Manifest)
-    z = msgspec.convert(plain["z"], StraightZ) if "z" in plain else None
+    tilts = {name: msgspec.convert(plain[name], StraightTilt) for name in TILT_NAMES if name in plain}
     states = tuple(FileState(name, sha256(data).hexdigest()) for name, data in sorted(files.items()))
-    return Subject(manifest, sha256(content).hexdigest(), states, planned, verified, z=z)
+    return Subject(manifest, sha256(content).hexdigest(), states, planned, verified, tilts=tilts)
 
 
 def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
@@ -115,7 +119,9 @@ def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
     manifest = stored.manifest
     digest = manifest_digest(folder)
     states = (FileState(MANIFEST, digest), *files_beside(folder, manifest.files))
-    return Subject(manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified, z=stored.z)
+    return Subject(
+        manifest, digest, tuple(sorted(states, key=lambda state: state.name)), None, verified, tilts=stored.tilts
+    )
 
 
 def manifest_digest(folder: Path) -> str:

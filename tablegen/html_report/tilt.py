@@ -1,9 +1,10 @@
-"""The output z on the page: what it follows, its range, its errors, and a frame of it."""
+"""The outputs beside x and y on the page: what each follows, its range, its errors, and a frame of it."""
 
 from math import atan, degrees
 
 from msgspec import Struct
 
+from tablegen.config.schema import TiltName
 from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
 from tablegen.html_report.number_text import figure
@@ -11,16 +12,19 @@ from tablegen.html_report.promises import bounded
 from tablegen.html_report.subject import Subject
 from tablegen.html_report.tilt_chart import tilt_chart
 from tablegen.html_report.turned_subject import TurnedSubject
-from tablegen.manifest.frame_fields import TurnedCodes, TurnedZ
+from tablegen.manifest.frame_fields import TiltFields, TurnedCodes
+
+_WHAT = {"z": "the height of the tilted sample", "aux": "the second output, linear in x and y, for the sample"}
 
 
 class ShownTilt(Struct, frozen=True, eq=False):
-    """The output z of a manifest, its program, and its certificate; errors are at the imaged ticks.
+    """An output beside x and y of a manifest, its program, and its certificate; errors are at the imaged ticks.
 
     With ``steps`` y moves in steps.
     """
 
-    fields: TurnedZ
+    name: TiltName
+    fields: TiltFields
     program: FrameProgram
     codes: TurnedCodes
     error_lsb: float
@@ -28,23 +32,26 @@ class ShownTilt(Struct, frozen=True, eq=False):
     steps: bool = False
 
 
-def shown_tilt(subject: Subject | TurnedSubject) -> ShownTilt | None:
-    """Return the output z of a scan or a build; None without z."""
+def shown_tilts(subject: Subject | TurnedSubject) -> list[ShownTilt]:
+    """List the outputs beside x and y of a scan or a build; none without any."""
+    sequence, tilts = subject.manifest.sequence, []
     if isinstance(subject, Subject):
-        if (z := subject.z) is None:
-            return None
-        stated = z.certificate
-        program, steps = z.program(subject.manifest.sequence), subject.manifest.axes.y.line.hold_ticks > 1
-        return ShownTilt(z, program, stated.codes, stated.error_lsb, stated.error_nm, steps)
-    of_z, certificate = subject.manifest.turned.z, subject.manifest.certificate
-    codes, errors = certificate.codes.get("z"), certificate.z
-    if of_z is None or codes is None or errors is None:
-        return None
-    return ShownTilt(of_z, of_z.program(subject.manifest.sequence), codes, errors.error_lsb, errors.error_nm)
+        steps = subject.manifest.axes.y.line.hold_ticks > 1
+        for name, tilt in subject.tilts.items():
+            its, program = tilt.certificate, tilt.program(sequence)
+            tilts.append(ShownTilt(name, tilt, program, its.codes, its.error_lsb, its.error_nm, steps))
+        return tilts
+    certificate = subject.manifest.certificate
+    for name, fields in subject.manifest.turned.tilts.items():
+        codes, errors = certificate.codes.get(name), getattr(certificate, name)
+        if codes is not None and errors is not None:
+            program = fields.program(sequence)
+            tilts.append(ShownTilt(name, fields, program, codes, errors.error_lsb, errors.error_nm))
+    return tilts
 
 
 def tilt_section(z: ShownTilt, max_error_lsb: float | None) -> Section:
-    """Return the section of z; ``max_error_lsb`` is the limit of the scan file, None without it."""
+    """Return the section of an output; ``max_error_lsb`` is the limit of the scan file, None without it."""
     fields, output, codes = z.fields, z.fields.output, z.codes
     low, high = sorted(_volts(z, code) for code in (codes.least, codes.most))
     share = 100.0 * (codes.most - codes.least + 1) / (1 << output.dac_bits)
@@ -65,11 +72,12 @@ def tilt_section(z: ShownTilt, max_error_lsb: float | None) -> Section:
         bounded("largest step", codes.steepest, output.max_step, "codes a tick"),
     ]
     lead = (
-        "What a second sequencer plays beside x and y: the height of the tilted sample under the wanted place. The "
+        f"What a second sequencer plays beside x and y: {_WHAT[z.name]} under the wanted place. The "
         "limits of the drive are those that driver and converter have in common."
     )
-    chart = Charts((tilt_chart(z.program, output.v_zero, output.v_per_code),))
-    return Section("z", "Output z", (Grid("z, of its integers", ("", "figure", "limit", ""), tuple(rows)), chart), lead)
+    chart = Charts((tilt_chart(z.name, z.program, output.v_zero, output.v_per_code),))
+    grid = Grid(f"{z.name}, of its integers", ("", "figure", "limit", ""), tuple(rows))
+    return Section(z.name, f"Output {z.name}", (grid, chart), lead)
 
 
 def _slope(slope: float) -> str:

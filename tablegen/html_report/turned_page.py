@@ -14,7 +14,7 @@ from tablegen.html_report.number_text import figure
 from tablegen.html_report.promises import bounded
 from tablegen.html_report.ranking import file_findings
 from tablegen.html_report.request import file_section, image_text, record_section
-from tablegen.html_report.tilt import shown_tilt, tilt_section
+from tablegen.html_report.tilt import shown_tilts, tilt_section
 from tablegen.html_report.turned_charts import error_maps, lattice_image, line_errors, mean_line
 from tablegen.html_report.turned_codes import axes_of, frame_charts, line_charts, path_chart, table_charts
 from tablegen.html_report.turned_subject import TurnedSubject
@@ -36,7 +36,7 @@ def turned_sections(subject: TurnedSubject, tell: Callable[[str], object] = lamb
         tell("playing the frame on the operators")
         parts.append(_image(subject))
     tell("drawing")
-    parts += [_certificate(subject), *_of_z(subject), _request(subject), _codes(subject), _tables(subject)]
+    parts += [_certificate(subject), *_of_tilts(subject), _request(subject), _codes(subject), _tables(subject)]
     manifest = subject.manifest
     origin = f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats)}"
     files = file_section(manifest.hash, origin, subject.files)
@@ -145,13 +145,10 @@ def _certificate(subject: TurnedSubject) -> Section:
     return Section("certificate", "Certificate", tuple(tables), lead)
 
 
-def _of_z(subject: TurnedSubject) -> list[Section]:
-    """Return the section of the output z; empty without z."""
-    z = shown_tilt(subject)
-    if z is None:
-        return []
+def _of_tilts(subject: TurnedSubject) -> list[Section]:
+    """Return the sections of the outputs beside x and y; empty without any."""
     limit = None if subject.planned is None else subject.planned.plan.limits.max_error_lsb
-    return [tilt_section(z, limit)]
+    return [tilt_section(tilt, limit) for tilt in shown_tilts(subject)]
 
 
 def _room(name: str, codes: int) -> tuple[TableCell, ...]:

@@ -1,10 +1,14 @@
-"""The fields of an output with a slow part in ``manifest.json``: an axis of a scan at an angle, or the output z."""
+"""The fields of an output with a slow part in ``manifest.json``: an axis of a scan at an angle, z, or aux."""
 
+from collections.abc import Iterable, Mapping
 from typing import Annotated
 
 import numpy as np
 from msgspec import Meta, Struct
 
+from tablegen.config.schema import SEQUENCER_FORMATS, TILT_NAMES, TiltName
+from tablegen.device.beside import program_beside
+from tablegen.device.dual_program import ScanProgram
 from tablegen.fixedpoint.frame_program import MOST_KNOTS, FrameProgram, Knots, SlowTable
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
@@ -65,8 +69,8 @@ class TurnedAxisFields(Struct, forbid_unknown_fields=True):
         )
 
 
-class TurnedZ(TurnedAxisFields, forbid_unknown_fields=True):
-    """The output z: its slopes, nm of z for each nm along x and y, and the nm of z for a volt at its piezo."""
+class TiltFields(TurnedAxisFields, forbid_unknown_fields=True):
+    """An output beside x and y: its slopes, nm for each nm along x and y, and its nm for a volt at its piezo."""
 
     slope_x: float
     slope_y: float
@@ -82,20 +86,41 @@ class TurnedCodes(Struct):
 
 
 class TiltFigures(Struct):
-    """The largest distance of a code of z from the wanted height at an imaged tick, in LSB and in nm."""
+    """The largest distance of a code from the wanted height at an imaged tick, in LSB and in nm."""
 
     error_lsb: Annotated[float, Meta(ge=0.0)]
     error_nm: Annotated[float, Meta(ge=0.0)]
 
 
 class TiltCertificate(TiltFigures):
-    """The certificate of z, with its codes."""
+    """The certificate of an output beside x and y, with its codes."""
 
     codes: TurnedCodes
 
 
-class StraightZ(TurnedZ, kw_only=True, forbid_unknown_fields=True):
-    """The output z of a scan at 0 degrees; ``offset_v`` are its volts at the piezo in the centre of the scan."""
+class StraightTilt(TiltFields, kw_only=True, forbid_unknown_fields=True):
+    """An output beside x and y of a scan at 0 degrees; ``offset_v`` are its volts in the centre of the scan."""
 
     offset_v: Volts
     certificate: TiltCertificate
+
+
+def beside_of(
+    tilts: Mapping[TiltName, TiltFields], formats: Iterable[str], sequence: ManifestSequence
+) -> ScanProgram | None:
+    """Return what the second sequencer of a manifest plays; None of a scan without outputs beside x and y.
+
+    Raises
+    ------
+    ValueError, OverflowError
+        If no device plays them.
+    """
+    if not tilts:
+        return None
+    if "z" not in tilts:
+        raise ValueError("aux is the y of a sequencer whose x is z, and the scan has no z")
+    if others := set(formats) - set(SEQUENCER_FORMATS):
+        raise ValueError(f"formats: {', '.join(sorted(others))} cannot hold the output z, which the scan has")
+    if len({each.output.dac_bits for each in tilts.values()}) > 1:
+        raise ValueError("z and aux differ in output.dac_bits")
+    return program_beside(sequence.schedule, *(tilts[name].program(sequence) for name in TILT_NAMES if name in tilts))

@@ -16,7 +16,13 @@ from tablegen.base.input_errors import shortened
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import other_than_file, other_than_folder, read_bytes
 from tablegen.config.names import why_not_a_name
-from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH, SEQUENCER_FORMATS
+from tablegen.config.schema import (
+    DEFAULT_FORMATS,
+    MAXIMUM_SPLINE_BITS,
+    MAXIMUM_SPLINE_LENGTH,
+    TILT_NAMES,
+    TiltName,
+)
 from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
@@ -26,7 +32,7 @@ from tablegen.manifest.fields import LEAST_V_PER_CODE, Manifest, ManifestAxis, M
 from tablegen.manifest.format import MANIFEST, RECORD, content_hash, read_json
 
 if TYPE_CHECKING:
-    from tablegen.manifest.frame_fields import StraightZ
+    from tablegen.manifest.frame_fields import StraightTilt
 
 
 class NotABuild(Exception):
@@ -52,13 +58,14 @@ class AngleManifest(ForeignManifest):
 class StoredBuild(Struct, frozen=True, eq=False, dict=True):
     """A build as its manifest has it; ``plain`` is the manifest as JSON.
 
-    ``z`` is the output z, where the scan has one, and ``program_of_z`` what a second sequencer plays of it.
+    ``z`` and ``aux`` are the outputs beside x and y, and ``program_of_z`` is what a second sequencer plays of them.
     """
 
     manifest: Manifest
     program: DualProgram
     plain: dict[str, Any]
-    z: "StraightZ | None" = None
+    z: "StraightTilt | None" = None
+    aux: "StraightTilt | None" = None
     program_of_z: ScanProgram | None = None
 
     def __repr__(self) -> str:
@@ -75,6 +82,11 @@ class StoredBuild(Struct, frozen=True, eq=False, dict=True):
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
         """Both axes with their names, the fast one first."""
         return ("x", self.manifest.axes.x), ("y", self.manifest.axes.y)
+
+    @property
+    def tilts(self) -> "dict[TiltName, StraightTilt]":
+        """The outputs beside both axes, by their names."""
+        return {name: tilt for name in TILT_NAMES if (tilt := getattr(self, name)) is not None}
 
     @property
     def formats(self) -> tuple[str, ...]:
@@ -162,31 +174,34 @@ def parse_manifest(content: bytes) -> StoredBuild:
     try:
         manifest = msgspec.convert(plain, Manifest)
         program = DualProgram(manifest.axes.x.program, manifest.axes.y.program, manifest.sequence.schedule)
-        z, program_of_z = _stored_z(plain["z"], manifest) if "z" in plain else (None, None)
+        tilts, program_of_z = _stored_tilts(plain, manifest)
     except (msgspec.ValidationError, ValueError, OverflowError, RecursionError) as error:
         raise DamagedManifest([str(error)]) from None
     if wrong := [*_wrong_names(manifest), *_wrong_schedule(manifest.sequence), *_wrong_axes(manifest)]:
         raise DamagedManifest(wrong)
-    return StoredBuild(manifest, program, plain, z, program_of_z)
+    return StoredBuild(manifest, program, plain, **tilts, program_of_z=program_of_z)
 
 
-def _stored_z(plain: Any, manifest: Manifest) -> "tuple[StraightZ, ScanProgram]":
-    """Return the output z of a manifest, and the program of its sequencer.
+def _stored_tilts(
+    plain: dict[str, Any], manifest: Manifest
+) -> "tuple[dict[TiltName, StraightTilt], ScanProgram | None]":
+    """Return the outputs beside x and y of a manifest, and the program of their sequencer.
 
     Raises
     ------
     ValueError, OverflowError
         If no device plays it.
     """
-    from tablegen.device.beside import program_beside  # here: most scans have no z
-    from tablegen.manifest.frame_fields import StraightZ
+    written = [name for name in TILT_NAMES if name in plain]
+    if not written:
+        return {}, None
+    from tablegen.manifest.frame_fields import StraightTilt, beside_of  # here: most scans have no z
 
-    z = msgspec.convert(plain, StraightZ)
-    if others := set(manifest.formats) - set(SEQUENCER_FORMATS):
-        raise ValueError(f"formats: {', '.join(sorted(others))} cannot hold the output z, which the scan has")
-    if not _finite(z):
-        raise ValueError("z holds a number that is not finite")
-    return z, program_beside(z.program(manifest.sequence), manifest.sequence.schedule)
+    tilts = {name: msgspec.convert(plain[name], StraightTilt) for name in written}
+    for name, tilt in tilts.items():
+        if not _finite(tilt):
+            raise ValueError(f"{name} holds a number that is not finite")
+    return tilts, beside_of(tilts, manifest.formats, manifest.sequence)
 
 
 def _a_program(folder: Path) -> Path | None:
@@ -209,8 +224,7 @@ def _hash(plain: dict[str, Any]) -> str:
     """Compute the hash of the plan: of everything that decides what is played."""
     record = {key: value for key, value in plain.items() if key not in _BESIDE_THE_PLAN}
     record["axes"] = {axis: _without_certificate(content) for axis, content in plain["axes"].items()}
-    if "z" in plain:
-        record["z"] = _without_certificate(plain["z"])
+    record |= {name: _without_certificate(plain[name]) for name in TILT_NAMES if name in plain}
     try:
         return content_hash(record)
     except (ValueError, RecursionError):  # infinity or a depth that no build writes

@@ -40,18 +40,18 @@ def plan_record(plan: Plan) -> dict[str, Any]:
     if any(x[key] != y[key] for key in CONVERTER_KEYS):
         y["own_hardware"] = True
     record = {"name": plan.name, "scanner": plan.scanner, "sequence": sequence_record(plan.schedule), "axes": axes}
-    return record if plan.z is None else {**record, "z": {"offset_v": _centre_v(plan.z), **tilt_record(plan.z)}}
+    return record | {tilt.name: {"offset_v": _centre_v(tilt), **tilt_record(tilt)} for tilt in plan.tilts}
 
 
-def tilt_record(z: "TiltedOutput") -> dict[str, Any]:
-    """Return the output z as JSON-ready data: slopes, motion and integers."""
-    slopes = {"slope_x": z.slope_x, "slope_y": z.slope_y, "nm_per_v": z.nm_per_v}
-    return slopes | frame_axis_record(z.motion, z.program, z.converter)
+def tilt_record(tilt: "TiltedOutput") -> dict[str, Any]:
+    """Return an output beside x and y as JSON-ready data: slopes, motion and integers."""
+    slopes = {"slope_x": tilt.slope_x, "slope_y": tilt.slope_y, "nm_per_v": tilt.nm_per_v}
+    return slopes | frame_axis_record(tilt.motion, tilt.program, tilt.converter)
 
 
-def _centre_v(z: "TiltedOutput") -> float:
-    """Return the volts of z in the centre of the scan."""
-    return z.converter.v_zero + z.converter.v_per_code * z.offset
+def _centre_v(tilt: "TiltedOutput") -> float:
+    """Return the volts in the centre of the scan."""
+    return tilt.converter.v_zero + tilt.converter.v_per_code * tilt.offset
 
 
 def frame_axis_record(motion: "FrameMotion", program: FrameProgram, converter: Converter) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def frame_axis_record(motion: "FrameMotion", program: FrameProgram, converter: C
 
 
 def tilt_certificate_record(errors: "TiltErrors") -> dict[str, Any]:
-    """Return the certificate of z as JSON-ready data; a maximum is one as printed."""
+    """Return the certificate of z or aux as JSON-ready data; a maximum is one as printed."""
     return {
         "error_lsb": _bound(errors.error_lsb),
         "error_nm": _bound(errors.error_nm),

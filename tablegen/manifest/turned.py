@@ -9,12 +9,11 @@ from msgspec import Meta, Struct
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.base.reading import read_bytes
 from tablegen.config.names import why_not_a_name
-from tablegen.config.schema import SEQUENCER_FORMATS, SequencerFormat
-from tablegen.device.beside import program_beside
+from tablegen.config.schema import SEQUENCER_FORMATS, TILT_NAMES, SequencerFormat, TiltName
 from tablegen.device.dual_program import ScanProgram
 from tablegen.manifest.fields import BuildFileName, Digest, FileName, ManifestSequence, Version
 from tablegen.manifest.format import MANIFEST, content_hash, read_json
-from tablegen.manifest.frame_fields import TiltFigures, TurnedAxisFields, TurnedCodes, TurnedZ
+from tablegen.manifest.frame_fields import TiltFields, TiltFigures, TurnedAxisFields, TurnedCodes, beside_of
 from tablegen.manifest.read import AngleManifest, DamagedManifest, NotABuild, StoredBuild, parse_manifest
 
 
@@ -33,14 +32,21 @@ class TurnedFields(Struct):
     coupling: tuple[float, float]
     drift_nm_per_s: tuple[float, float]
     axes: TurnedAxes
-    z: TurnedZ | None = None
+    z: TiltFields | None = None
+    aux: TiltFields | None = None
+
+    @property
+    def tilts(self) -> dict[TiltName, TiltFields]:
+        """The outputs beside both axes, by their names."""
+        return {name: tilt for name in TILT_NAMES if (tilt := getattr(self, name)) is not None}
 
 
 class TurnedFigures(Struct):
     """The part of the certificate that follows from the integers alone."""
 
-    codes: dict[Literal["x", "y", "z"], TurnedCodes]
+    codes: dict[Literal["x", "y", "z", "aux"], TurnedCodes]
     z: TiltFigures | None = None
+    aux: TiltFigures | None = None
 
 
 class TurnedManifest(Struct, kw_only=True):
@@ -63,7 +69,7 @@ class TurnedManifest(Struct, kw_only=True):
 class StoredTurned(Struct, frozen=True, eq=False):
     """A build of a scan at an angle as its manifest has it; ``plain`` is the manifest as JSON.
 
-    ``z`` is what a second sequencer plays, where the scan has the output z.
+    ``z`` is what a second sequencer plays, where the scan has the output z; its y is aux.
     """
 
     manifest: TurnedManifest
@@ -77,7 +83,7 @@ class StoredTurned(Struct, frozen=True, eq=False):
         keys = "name", "scanner", "sequence", "turned"
         return content_hash({key: self.plain[key] for key in keys})
 
-    def certified(self, axis: Literal["x", "y", "z"]) -> tuple[int, int, int] | None:
+    def certified(self, axis: Literal["x", "y", "z", "aux"]) -> tuple[int, int, int] | None:
         """Return the least and the greatest code, and the largest step, by the certificate; None if it has none."""
         codes = self.manifest.certificate.codes.get(axis)
         return None if codes is None else (codes.least, codes.most, codes.steepest)
@@ -140,8 +146,7 @@ def parse_turned(content: bytes) -> StoredTurned:
         program = ScanProgram(
             fields.x.program(manifest.sequence), fields.y.program(manifest.sequence), manifest.sequence.schedule
         )
-        of_z = manifest.turned.z
-        z = None if of_z is None else program_beside(of_z.program(manifest.sequence), manifest.sequence.schedule)
+        z = beside_of(manifest.turned.tilts, manifest.formats, manifest.sequence)
     except (msgspec.ValidationError, ValueError, OverflowError, RecursionError) as error:
         raise DamagedManifest([str(error)]) from None
     if (why := why_not_a_name(manifest.name)) is not None:

@@ -26,7 +26,7 @@ def turned_record(plan: TurnedPlan) -> dict[str, Any]:
             "coupling": [geometry.x_per_y, geometry.y_per_x],
             "drift_nm_per_s": list(geometry.drift_nm_per_s),
             "axes": {axis.axis: frame_axis_record(axis.motion, axis.program, axis.converter) for axis in plan.axes},
-            **({} if plan.z is None else {"z": tilt_record(plan.z)}),
+            **{tilt.name: tilt_record(tilt) for tilt in plan.tilts},
         },
     }
 
@@ -65,10 +65,12 @@ def certificate_record(certificate: TurnedCertificate) -> dict[str, Any]:
 
     errors = {key: figure(value) for key, value in structs.asdict(certificate.errors).items()}
     codes = {axis: structs.asdict(one) for axis, one in zip("xy", certificate.codes, strict=True)}
-    z = certificate.z
-    of_z = {} if z is None else {"error_lsb": figure(z.error_lsb), "error_nm": figure(z.error_nm)}
+    tilts = certificate.tilts
     return {
         "errors": errors,
-        "codes": codes if z is None else codes | {"z": structs.asdict(z.codes)},
-        **({"z": of_z} if of_z else {}),
+        "codes": codes | {name: structs.asdict(each.codes) for name, each in tilts.items()},
+        **{
+            name: {"error_lsb": figure(each.error_lsb), "error_nm": figure(each.error_nm)}
+            for name, each in tilts.items()
+        },
     }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
-from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.config.schema import DEFAULT_FORMATS, TILT_NAMES, TiltName
 from tablegen.manifest.read import DamagedManifest, parse_manifest
 from tablegen.manifest.record import certificate_record, tilt_certificate_record
 from tablegen.version import __version__
@@ -33,12 +33,12 @@ def manifest_file(
     certificates: dict[str, Certificate],
     files: Mapping[str, bytes],
     clocks_per_tick: int = 0,
-    z: "TiltErrors | None" = None,
+    tilts: "Mapping[TiltName, TiltErrors] | None" = None,
 ) -> bytes:
     """Write the plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
 
     ``formats`` stand in it unless they are those that a build has by default, ``clocks_per_tick`` unless it is 0.
-    ``z`` are the errors of the output z, where the scan has one.
+    ``tilts`` are the errors of the outputs beside x and y, by their names.
     ``require_readable`` belongs before the disk.
     """
     axes = {
@@ -48,14 +48,19 @@ def manifest_file(
     manifest = {
         "tablegen": __version__,
         "hash": digest,
-        **{key: value for key, value in record.items() if key not in ("axes", "z")},
+        **{key: value for key, value in record.items() if key not in ("axes", *TILT_NAMES)},
         **({"formats": list(formats)} if sorted(formats) != sorted(DEFAULT_FORMATS) else {}),
         **({"clocks_per_tick": clocks_per_tick} if clocks_per_tick else {}),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
         "axes": axes,
-        **({} if z is None else {"z": {**record["z"], "certificate": tilt_certificate_record(z)}}),
+        **({} if tilts is None else _tilts(record, tilts)),
     }
     return (readable(manifest) + "\n").encode("ascii")
+
+
+def _tilts(record: dict[str, Any], tilts: "Mapping[TiltName, TiltErrors]") -> dict[str, Any]:
+    """Return the records of the outputs beside x and y with their certificates."""
+    return {name: {**record[name], "certificate": tilt_certificate_record(each)} for name, each in tilts.items()}
 
 
 def require_readable(content: bytes) -> None:

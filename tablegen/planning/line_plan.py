@@ -147,7 +147,7 @@ class LinePlan(Struct, frozen=True, eq=False):
 
 
 class Plan(Struct, frozen=True, eq=False):
-    """A whole build: both axes and their common schedule; ``z`` is the output beside them, where the scan has one."""
+    """A whole build: both axes and their common schedule; ``z`` and ``aux`` are the outputs beside them."""
 
     name: str
     scanner: str
@@ -159,6 +159,7 @@ class Plan(Struct, frozen=True, eq=False):
     formats: tuple[str, ...] = DEFAULT_FORMATS
     clocks_per_tick: int = 0  # of an FPGA; 0: not known
     z: "TiltedOutput | None" = None
+    aux: "TiltedOutput | None" = None
 
     def __repr__(self) -> str:
         ticks, rate = self.schedule.ticks, float(self.schedule.line_rate)
@@ -189,11 +190,16 @@ class Plan(Struct, frozen=True, eq=False):
         return DualProgram(self.x.program, self.y.program, self.schedule)
 
     @property
+    def tilts(self) -> "tuple[TiltedOutput, ...]":
+        """The outputs beside both axes: z, then aux."""
+        return tuple(each for each in (self.z, self.aux) if each is not None)
+
+    @property
     def program_of_z(self) -> "ScanProgram | None":
-        """What a second sequencer plays, whose x is z; None without z."""
+        """What a second sequencer plays, whose x is z, and whose y aux; None without z."""
         from tablegen.device.beside import program_beside  # here: most scans have no z
 
-        return None if self.z is None else program_beside(self.z.program, self.schedule)
+        return program_beside(self.schedule, *(each.program for each in self.tilts)) if self.tilts else None
 
 
 def make_plan(setup: Setup, sines: bool = False) -> Plan:
@@ -260,12 +266,12 @@ def make_plan(setup: Setup, sines: bool = False) -> Plan:
         default_formats(scan),
         clocks,
     )
-    if scan.z is not None:
-        from tablegen.planning.straight_tilt import plan_straight_z  # here: most scans have no z
+    if scan.tilts:
+        from tablegen.planning.straight_tilt import plan_straight_tilts  # here: most scans have no z
 
         sizes_nm = x.drive.size_nm, y.drive.size_nm
         place = x.drive.shape.place if isinstance(x.drive.shape, SineLine) else None
-        plan = replace(plan, z=plan_straight_z(setup, schedule, sizes_nm, x.series.harmonics, place))
+        plan = replace(plan, **plan_straight_tilts(setup, schedule, sizes_nm, x.series.harmonics, place))
     return plan
 
 

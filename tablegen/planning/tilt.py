@@ -1,4 +1,4 @@
-"""Plan the output z of a scan on a tilted sample: a share of both motions, on a piezo that is taken as linear."""
+"""Plan an output beside x and y that is linear in both: a share of both motions, on a piezo that is taken as linear."""
 
 from dataclasses import fields
 from functools import cached_property
@@ -12,7 +12,7 @@ from tablegen.base.figures import at_most
 from tablegen.base.input_errors import Problems
 from tablegen.compensation.operator.turned_frame import FrameMotion
 from tablegen.config.load import Setup
-from tablegen.config.schema import Tilt
+from tablegen.config.schema import Tilt, TiltName
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.converter import Converter, code_limits, make_output
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
@@ -25,7 +25,7 @@ from tablegen.planning.tilt_drive import TiltDrive, tilt_drive
 from tablegen.planning.tilt_motion import TiltMotion
 from tablegen.waveform.series import FourierSeries
 
-_SAMPLES = 512  # of a line, at which the reach of z is taken
+_SAMPLES = 512  # of a line, at which the reach of the output is taken
 _LEAST_STEPS = 0.5  # of a code a tick, where a slew rate allows fewer than two
 
 
@@ -38,7 +38,7 @@ class CodeRange(Struct, frozen=True):
 
 
 class TiltErrors(Struct, frozen=True):
-    """The output z: the largest distance of a code from the wanted height at the imaged ticks, in LSB and in nm.
+    """The largest distance of a code from the wanted height at the imaged ticks, in LSB and in nm.
 
     ``codes`` are those of a frame.
     """
@@ -49,11 +49,12 @@ class TiltErrors(Struct, frozen=True):
 
 
 class TiltedOutput(Struct, frozen=True, eq=False, dict=True):
-    """The output z: its slopes on the sample, its share of both motions, and its integers.
+    """An output beside x and y: its slopes on the sample, its share of both motions, and its integers.
 
-    ``offset`` is the code in the centre of the scan, as a real number.
+    ``name`` is "z" or "aux", ``offset`` the code in the centre of the scan, as a real number.
     """
 
+    name: TiltName
     slope_x: float
     slope_y: float
     nm_per_v: float
@@ -81,31 +82,33 @@ class TiltedOutput(Struct, frozen=True, eq=False, dict=True):
 
 def plan_tilt(
     setup: Setup,
+    name: TiltName,
     schedule: Schedule,
     harmonics: int,
     shares: tuple[float, float],
     problems: Problems,
     place: FourierSeries | None = None,
 ) -> TiltedOutput | None:
-    """Plan the output z; None where ``problems`` grew.
+    """Plan an output beside x and y; None where ``problems`` grew.
 
     Parameters
     ----------
     setup
-        A scan and a scanner that both have z.
+        A scan and a scanner that both have this output.
+    name
+        Its name, which is that of its table in both files.
     harmonics
         Those of its line.
     shares
-        The nm that z moves along the line and along the frame, from x = 0 to 1 of each.
+        The nm that it moves along the line and along the frame, from x = 0 to 1 of each.
     place
         The predicted position over a line where x moves as a sine.
     """
-    tilt, piezo, hardware = setup.scan.z, setup.scanner.z, setup.hardware("z")
-    assert tilt is not None
+    tilt, piezo, hardware = setup.scan.tilts[name], getattr(setup.scanner, name), setup.hardware(name)
     assert piezo is not None
     driver, converter = piezo.driver, Converter.of(hardware.dac, hardware.amplifier)
     before = len(problems.entries)
-    _check_rest(setup, tilt, converter, driver, problems)
+    _check_rest(setup, name, converter, driver, problems)
     if len(problems.entries) > before:
         return None
     centre, offset = driver.share(tilt.offset_v), converter.code(tilt.offset_v)
@@ -115,7 +118,7 @@ def plan_tilt(
         motion = TiltMotion(**shared, schedule=schedule, place=place, steps=setup.scan.y.motion == "step")
     drive = None
     with problems.at(setup.scan_file, "y.motion"):
-        drive = tilt_drive(motion, piezo.nm_per_v * driver.span, schedule, driver.span / converter.v_per_code)
+        drive = tilt_drive(name, motion, piezo.nm_per_v * driver.span, schedule, driver.span / converter.v_per_code)
     if drive is None:
         return None
     park_v = tilt.offset_v if tilt.park_v is None else tilt.park_v
@@ -127,23 +130,23 @@ def plan_tilt(
         program = _quantised(output, converter, driver, drive, schedule)
         ends = played_extremes(program)[:2]
     if program is None or not _fits(output, ends):
-        problems.add(setup.scan_file, _key(tilt), _what_fits(tilt, converter, output, offset, ends))
+        problems.add(setup.scan_file, _key(name, tilt), _what_fits(name, tilt, converter, output, offset, ends))
         return None
-    program = _guarded(setup, tilt, converter, program, float(schedule.line_rate), problems)
-    return TiltedOutput(tilt.slope_x, tilt.slope_y, piezo.nm_per_v, converter, motion, offset, program)
+    program = _guarded(setup, name, converter, program, float(schedule.line_rate), problems)
+    return TiltedOutput(name, tilt.slope_x, tilt.slope_y, piezo.nm_per_v, converter, motion, offset, program)
 
 
-def _check_rest(setup: Setup, tilt: Tilt, converter: Converter, driver: Driver, problems: Problems) -> None:
-    """Check that offset and park voltage are in the range that the driver and the converter of z have in common."""
-    least, most = code_limits(converter, driver)
+def _check_rest(setup: Setup, name: TiltName, converter: Converter, driver: Driver, problems: Problems) -> None:
+    """Check that offset and park voltage are in the range that the driver and the converter have in common."""
+    tilt, (least, most) = setup.scan.tilts[name], code_limits(converter, driver)
     if least >= most:
-        why = f"the driver of z has {driver}, and its converter reaches none of it; correct it, or [z.amplifier]"
-        problems.add(setup.scanner_file, "z.v_max", why)
+        why = f"the driver of {name} has {driver}, and its converter reaches none of it; correct it, or "
+        problems.add(setup.scanner_file, f"{name}.v_max", f"{why}[{name}.amplifier]")
         return
     for key, volts in (("offset_v", tilt.offset_v), ("park_v", tilt.park_v)):
         if volts is not None and not least - 0.5 <= converter.code(volts) <= most + 0.5:
-            why = f"{volts:g} V is outside the {_volts(converter, least, most)} of z"
-            problems.add(setup.scan_file, f"z.{key}", why)
+            why = f"{volts:g} V is outside the {_volts(converter, least, most)} of {name}"
+            problems.add(setup.scan_file, f"{name}.{key}", why)
 
 
 def _on_grid(slow: FourierSeries, fast: FourierSeries, lines: int) -> Floats:
@@ -156,7 +159,7 @@ def _on_grid(slow: FourierSeries, fast: FourierSeries, lines: int) -> Floats:
 def _quantised(
     output: Output, converter: Converter, driver: Driver, drive: TiltDrive, schedule: Schedule
 ) -> FrameProgram:
-    """Return the integers of z, without a slew guard."""
+    """Return the integers of the output, without a slew guard."""
     parts = FrameParts(
         fast=drive.fast,
         second=drive.second,
@@ -174,21 +177,23 @@ def _fits(output: Output, ends: tuple[float, float]) -> bool:
     return output.code_min <= ends[0] and ends[1] <= output.code_max
 
 
-def _what_fits(tilt: Tilt, converter: Converter, output: Output, offset: float, ends: tuple[float, float]) -> str:
+def _what_fits(
+    name: TiltName, tilt: Tilt, converter: Converter, output: Output, offset: float, ends: tuple[float, float]
+) -> str:
     """Return the slopes that would fit the range, a code for the rounding left."""
     room = min(
         max(offset - output.code_min - 1.0, 0.0) / max(offset - ends[0], 1.0),
         max(output.code_max - offset - 1.0, 0.0) / max(ends[1] - offset, 1.0),
     )
     reach = _volts(converter, output.code_min, output.code_max)
-    return f"the tilt leaves the {reach} of z; the largest that fits here is {_slopes(tilt, room)}"
+    return f"the tilt leaves the {reach} of {name}; the largest that fits here is {_slopes(tilt, room)}"
 
 
 def _guarded(
-    setup: Setup, tilt: Tilt, converter: Converter, program: FrameProgram, line_rate_hz: float, problems: Problems
+    setup: Setup, name: TiltName, converter: Converter, program: FrameProgram, line_rate_hz: float, problems: Problems
 ) -> FrameProgram:
     """Return the program with its slew guard; steps that are too large go to ``problems``."""
-    hardware, (_, _, steepest) = setup.hardware("z"), played_extremes(program)
+    tilt, hardware, (_, _, steepest) = setup.scan.tilts[name], setup.hardware(name), played_extremes(program)
     slew, last = hardware.amplifier.max_slew_v_per_s, (1 << hardware.dac.bits) - 1
     if slew is None:
         return program.guarded(min(2 * steepest, last))
@@ -197,16 +202,16 @@ def _guarded(
         share = max(allowed - 1.0, _LEAST_STEPS) / steepest  # a code for the rounding
         problems.add(
             setup.scan_file,
-            _key(tilt),
-            f"z steps by up to {steepest} codes a tick, {slew:.6g} V/s allow {allowed}; {_slopes(tilt, share)} would "
-            f"fit, or lines at {at_most(line_rate_hz * share)} Hz",
+            _key(name, tilt),
+            f"{name} steps by up to {steepest} codes a tick, {slew:.6g} V/s allow {allowed}; {_slopes(tilt, share)} "
+            f"would fit, or lines at {at_most(line_rate_hz * share)} Hz",
         )
     return program.guarded(allowed)
 
 
-def _key(tilt: Tilt) -> str:
+def _key(name: TiltName, tilt: Tilt) -> str:
     """Return the key of the larger slope."""
-    return "z.slope_x" if abs(tilt.slope_x) >= abs(tilt.slope_y) else "z.slope_y"
+    return f"{name}.slope_x" if abs(tilt.slope_x) >= abs(tilt.slope_y) else f"{name}.slope_y"
 
 
 def _slopes(tilt: Tilt, share: float) -> str:

@@ -1,4 +1,4 @@
-"""The drive of the output z in its parts: what goes over a line, what goes over the frame, and the steps of y."""
+"""The drive of an output beside x and y in its parts: over a line, over the frame, and steps of y."""
 
 from math import ceil
 
@@ -9,6 +9,7 @@ from tablegen.base.figures import at_least
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hold import hold_inverse
 from tablegen.compensation.operator.turned_frame import FrameMotion, linear_frame, linear_slow, rounded_series
+from tablegen.config.schema import TiltName
 from tablegen.device.schedule import Schedule, Window
 from tablegen.fixedpoint.frame_program import MOST_KNOTS
 from tablegen.numerics.arrays import Floats
@@ -18,11 +19,11 @@ from tablegen.waveform.series import FourierSeries
 
 _LEAST_ROOM = 1.0 / 64.0  # of a line on either side of a step
 _HARMONICS_OF_STEP = 4.0  # over this room: what is left out is below 1e-5 of a step
-_LEFT_OUT_CODES = 0.02  # of a sine's place by harmonics that z does not play
+_LEFT_OUT_CODES = 0.02  # of a sine's place by harmonics that are not played
 
 
 class TiltDrive(Struct, frozen=True, eq=False):
-    """The parts of z's drive, of v_max; ``fast`` leads over the hold of the converter, where it moves in a line.
+    """The parts of the drive, of v_max; ``fast`` leads over the hold of the converter, where it moves in a line.
 
     ``gains`` and ``ratios`` are at knots that are ``spacing`` lines apart, as of a ``FrameDrive``.
     """
@@ -35,11 +36,13 @@ class TiltDrive(Struct, frozen=True, eq=False):
     spacing: int
 
 
-def tilt_drive(motion: FrameMotion, nm_per_drive: float, schedule: Schedule, codes: float) -> TiltDrive:
-    """Return the drive of a linear piezo that follows the motion of z.
+def tilt_drive(name: TiltName, motion: FrameMotion, nm_per_drive: float, schedule: Schedule, codes: float) -> TiltDrive:
+    """Return the drive of a linear piezo that follows a motion.
 
     Parameters
     ----------
+    name
+        The output, for messages.
     nm_per_drive
         Displacement in nm by a drive of v_max, signed.
     codes
@@ -62,10 +65,10 @@ def tilt_drive(motion: FrameMotion, nm_per_drive: float, schedule: Schedule, cod
     nothing, ones, zeros = FourierSeries(0.0, *np.zeros((2, fast.harmonics))), np.ones(2), np.zeros(2)
     if not isinstance(motion, TiltMotion) or not motion.steps or not motion.slow_nm:
         return TiltDrive(slow, fast, nothing, ones, zeros, schedule.lines)
-    level = _level(motion, motion.slow_nm / nm_per_drive / (motion.slow_turn * schedule.lines))
+    level = _level(name, motion, motion.slow_nm / nm_per_drive / (motion.slow_turn * schedule.lines))
     if not schedule.down.count:  # the slow part rises by the same step in every imaged line
         return TiltDrive(slow, fast.plus(level), nothing, ones, zeros, schedule.lines)
-    steps, spacing = _steps(schedule, motion.slow_turn)
+    steps, spacing = _steps(name, schedule, motion.slow_turn)
     if not motion.fast_nm:
         return TiltDrive(slow, level, nothing, steps, np.zeros(len(steps)), spacing)
     longest = fast.plus(FourierSeries(0.0, *np.zeros((2, level.harmonics))))  # tables of both have one length
@@ -80,7 +83,7 @@ def _shortened(series: FourierSeries, codes: float) -> FourierSeries:
     return FourierSeries(series.a0, series.a[:harmonics].copy(), series.b[:harmonics].copy())
 
 
-def _level(motion: TiltMotion, rise: float) -> FourierSeries:
+def _level(name: TiltName, motion: TiltMotion, rise: float) -> FourierSeries:
     """Return what makes a level of a slow part that rises by so much in a line: its fall, and a smooth step.
 
     It falls straight through the imaged part, ``rise (1/2 - t)``. The step is about the start of the line, where y has
@@ -89,8 +92,8 @@ def _level(motion: TiltMotion, rise: float) -> FourierSeries:
     room = motion.step_room
     if room < _LEAST_ROOM:
         raise Unphysical(
-            f"z takes {at_least(_LEAST_ROOM, 3)} of a line on either side of a step of y, and the imaged parts leave "
-            f"{room:.2g}; narrow x.band_limit.window at its lower end, or take y.motion = 'ramp'"
+            f"{name} takes {at_least(_LEAST_ROOM, 3)} of a line on either side of a step of y, and the imaged parts "
+            f"leave {room:.2g}; narrow x.band_limit.window at its lower end, or take y.motion = 'ramp'"
         )
     n = np.arange(1.0, ceil(_HARMONICS_OF_STEP / room) + 1.0)
     width = 0.5 * room  # of each of the four boxes whose convolution is the spline
@@ -99,7 +102,7 @@ def _level(motion: TiltMotion, rise: float) -> FourierSeries:
     return rounded_series(FourierSeries(0.0, np.zeros(len(n)), rise * (box * box) * (box * box) / (np.pi * n)))
 
 
-def _steps(schedule: Schedule, turn: float) -> tuple[Floats, int]:
+def _steps(name: TiltName, schedule: Schedule, turn: float) -> tuple[Floats, int]:
     """Return the step of each line as a multiple of that of a line upward, at knots, and the lines between them."""
     spacing = -(-schedule.lines // (MOST_KNOTS - 1))
     values: list[float] = []
@@ -107,7 +110,7 @@ def _steps(schedule: Schedule, turn: float) -> tuple[Floats, int]:
         up, down = (_touches(window, knot * spacing, spacing) for window in (schedule.up, schedule.down))
         if up and down:
             raise Unphysical(
-                f"z turns its steps round in {2 * spacing - 2} lines of a frame of {schedule.lines}, and y has "
+                f"{name} turns its steps round in {2 * spacing - 2} lines of a frame of {schedule.lines}, and y has "
                 f"{schedule.down.first - schedule.up.stop} between its images up and down; narrow "
                 "y.band_limit.window, or take y.band_limit.directions = 'forward'"
             )

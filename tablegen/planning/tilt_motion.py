@@ -1,4 +1,4 @@
-"""What the output z follows beside axes that play a table each: a line or a sine in x, and a ramp or steps in y."""
+"""What an output beside x and y follows where these play a table each: a line or a sine in x, a ramp or steps in y."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from tablegen.waveform.series import FourierSeries
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TiltMotion(FrameMotion):
-    """The motion of z in a frame of a ``schedule``.
+    """The motion of an output beside x and y in a frame of a ``schedule``.
 
     ``place`` is the predicted position over a line, from 0 to 1, of an x that moves as a sine; the schedule then says
     which ticks are imaged. With ``steps`` y has one level a line, that of the middle of the line.

@@ -19,7 +19,7 @@ from tablegen.compensation.operator.operator import STROKE_REACH
 from tablegen.compensation.operator.turned_frame import BeyondDriver, FrameDrive, FrameMotion, learn_frame
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Coupling, ScannerAxis
-from tablegen.config.schema import Cost, Limits, ProcessorName, Table
+from tablegen.config.schema import Cost, Limits, ProcessorName, Table, TiltName
 from tablegen.device.beside import program_beside
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.schedule import Schedule
@@ -111,14 +111,14 @@ class FrameGeometry(Struct, frozen=True):
         return {"x": (x[0], x[1]), "y": (y[0], y[1])}
 
     def on_a_plane(self, slope_x: float, slope_y: float) -> tuple[float, float]:
-        """Return the nm of the line and of the frame that z moves on a tilted sample.
+        """Return the nm of the line and of the frame that an output with these slopes moves.
 
         It follows the wanted position on the sample: coupling moves the axes alone, and drift the sample with its tilt.
 
         Parameters
         ----------
         slope_x, slope_y
-            nm of z for each nm along x and along y.
+            nm of the output for each nm along x and along y.
         """
         sine, cosine = sine_and_cosine_of(self.angle_deg / 360.0)
         fast_nm, slow_nm = self.size_nm
@@ -144,7 +144,7 @@ class FrameGeometry(Struct, frozen=True):
 class TurnedPlan(Struct, frozen=True, eq=False):
     """A scan at an angle: both axes and their schedule. ``straight`` is the same scan at 0 degrees.
 
-    ``z`` is the output beside both axes, where the scan has one.
+    ``z`` and ``aux`` are outputs beside both axes, where the scan has them.
     """
 
     name: str
@@ -156,6 +156,7 @@ class TurnedPlan(Struct, frozen=True, eq=False):
     limits: Limits
     straight: Plan
     z: TiltedOutput | None = None
+    aux: TiltedOutput | None = None
 
     @property
     def axes(self) -> tuple[TurnedAxis, TurnedAxis]:
@@ -168,9 +169,14 @@ class TurnedPlan(Struct, frozen=True, eq=False):
         return ScanProgram(self.x.program, self.y.program, self.schedule)
 
     @property
+    def tilts(self) -> tuple[TiltedOutput, ...]:
+        """The outputs beside both axes: z, then aux."""
+        return tuple(each for each in (self.z, self.aux) if each is not None)
+
+    @property
     def program_of_z(self) -> ScanProgram | None:
-        """What a second sequencer plays, whose x is z; None without z."""
-        return None if self.z is None else program_beside(self.z.program, self.schedule)
+        """What a second sequencer plays, whose x is z, and whose y aux; None without z."""
+        return program_beside(self.schedule, *(each.program for each in self.tilts)) if self.tilts else None
 
 
 def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _: None) -> TurnedPlan:
@@ -212,7 +218,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
             setup.scan_file, "drift_nm_per_s", "is followed in frames that go up alone; take timing.frame = 'flyback'"
         )
     shares = geometry.shares
-    z = plan_z(setup, straight, geometry, problems)
+    tilts = plan_tilts(setup, straight, geometry, problems)
     problems.stop_if_any()
     axes = {}
     for line in straight.lines:
@@ -228,7 +234,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
     assert y is not None
     if scan.cost is not None:
         x, y = _within_cost(setup, straight, scan.cost, x, y, problems)
-    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight, z)
+    return TurnedPlan(scan.name, setup.scanner.name, geometry, schedule, x, y, scan.limits, straight, **tilts)
 
 
 def _within_cost(
@@ -299,15 +305,17 @@ def shape_costs(
     }
 
 
-def plan_z(setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Problems) -> TiltedOutput | None:
-    """Plan the output z of a scan whose plan at 0 degrees is known; None without it, or where ``problems`` grew."""
-    tilt = setup.scan.z
-    if tilt is None:
-        return None
-    with problems.at(setup.scan_file, "z"):
-        shares = geometry.on_a_plane(tilt.slope_x, tilt.slope_y)
-        return plan_tilt(setup, straight.schedule, straight.x.series.harmonics, shares, problems)
-    return None
+def plan_tilts(
+    setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Problems
+) -> dict[TiltName, TiltedOutput]:
+    """Plan the outputs beside x and y of a scan whose plan at 0 degrees is known; fewer where ``problems`` grew."""
+    planned = {}
+    for name, tilt in setup.scan.tilts.items():
+        with problems.at(setup.scan_file, name):
+            shares = geometry.on_a_plane(tilt.slope_x, tilt.slope_y)
+            harmonics = straight.x.series.harmonics
+            planned[name] = plan_tilt(setup, name, straight.schedule, harmonics, shares, problems)
+    return {name: output for name, output in planned.items() if output is not None}
 
 
 def plan_at_0(setup: Setup) -> Plan:
@@ -322,7 +330,7 @@ def plan_at_0(setup: Setup) -> Plan:
 
 
 def _at_0_degrees(setup: Setup) -> Setup:
-    """Return the setup without angle, coupling, drift and z, and without a clock, which a slow part takes others of.
+    """Return the setup without angle, coupling, drift, z, aux, and the clock, of which a slow part takes others.
 
     Tables that a build chooses are not looked for, and nothing is counted: none of them plays.
     """
@@ -333,6 +341,7 @@ def _at_0_degrees(setup: Setup) -> Setup:
         angle_deg=0.0,
         drift_nm_per_s=(0.0, 0.0),
         z=None,
+        aux=None,
         cost=None,
         emit=replace(setup.scan.emit, clock_hz=None),
         x=replace(setup.scan.x, frame_refinement=None, table=x_table),

@@ -157,9 +157,9 @@ def verify_build(
     progress("measuring the certificate")
     certificates = check_certificates(stored, same, folder)
     checks += watch.timed(certificates.checks)
-    if stored.z is not None:
-        count, wrong = wrong_tilt(stored, stored.z)
-        checks += watch.timed([differing_check("z", "its plane, certificate", f"{count} codes", wrong)])
+    for name, tilt in stored.tilts.items():
+        count, wrong = wrong_tilt(stored, tilt)
+        checks += watch.timed([differing_check(name, "its plane, certificate", f"{count} codes", wrong)])
     outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
     checks += watch.timed(outcome.checks)
     if not same and other_version:

@@ -169,9 +169,9 @@ def _content(path: Path) -> bytes | None:
 def _code_check(stored: StoredTurned) -> Check:
     """Check that no code of a frame is clamped, and no step held back."""
     wrong = []
-    axes: list[tuple[Literal["x", "y", "z"], AxisProgram]] = [("x", stored.program.x), ("y", stored.program.y)]
+    axes: list[tuple[Literal["x", "y", "z", "aux"], AxisProgram]] = [("x", stored.program.x), ("y", stored.program.y)]
     if stored.z is not None:
-        axes.append(("z", stored.z.x))
+        axes += zip(stored.manifest.turned.tilts, (stored.z.x, stored.z.y), strict=False)  # y rests without aux
     for name, axis in axes:
         assert isinstance(axis, FrameProgram)
         least, most, steepest = played_extremes(axis)

@@ -217,7 +217,7 @@ KEYS = [
     case(
         "wholly_different = 1",
         says=(
-            "scan.toml:1: wholly_different: unknown key; known here: amplifier, angle_deg, cost, dac, "
+            "scan.toml:1: wholly_different: unknown key; known here: amplifier, angle_deg, aux, cost, dac, "
             "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y, z"
         ),
     ),
@@ -226,7 +226,7 @@ KEYS = [
         "- [limits]",
         '+ ["we.ird \\"key\\""]\na = 1',
         says=(
-            'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, angle_deg, cost, dac, '
+            'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, angle_deg, aux, cost, dac, '
             "drift_nm_per_s, emit, image_nm, image_um, limits, name, scanner, scans, timing, x, y, z"
         ),
     ),

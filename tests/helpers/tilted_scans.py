@@ -1,4 +1,4 @@
-"""Scans with the output z, and the heights that they want by a formula of their own."""
+"""Scans with the outputs z and aux, and the heights that they want by a formula of their own."""
 
 from math import cos, radians, sin
 from pathlib import Path
@@ -24,6 +24,16 @@ SINE = (
 )  # fmt: skip
 Z = f"+ [z]\nslope_x = {SLOPE_X}\nslope_y = {SLOPE_Y}\noffset_v = {OFFSET_V}"
 OF_SCANNER = f"+ [z]\nnm_per_v = {NM_PER_V}\nv_max = 100.0"
+AUX_X, AUX_Y, AUX_NM_PER_V, AUX_OFFSET_V = -0.04, 0.015, -4.0, 45.0
+AUX = f"+ [aux]\nslope_x = {AUX_X}\nslope_y = {AUX_Y}\noffset_v = {AUX_OFFSET_V}"
+AUX_OF_SCANNER = f"+ [aux]\nnm_per_v = {AUX_NM_PER_V}\nv_max = 100.0\n[aux.dac]\ncoding = 'twos-complement'"
+
+
+def with_aux(path: Path, *edits: str, scanner: tuple[str, ...] = (AUX_OF_SCANNER,)) -> Path:
+    """Give a scan with z and its scanner the second output, in place; edits may be those of keys of ``[aux]``."""
+    for file, tables in ((path, (AUX, *edits)), (path.with_name("scanner.toml"), scanner)):
+        file.write_text(edited(file.read_text("utf-8"), *tables), "utf-8")
+    return path
 
 
 def write_tilted(folder: Path, angle_deg: float, *edits: str, scanner: tuple[str, ...] = (OF_SCANNER,)) -> Path:

@@ -10,7 +10,7 @@ from client_rig import Bench, LoseOnce, Watched, client, info_for, z_info_for
 from editing import run
 from link_images import resealed
 from replacing import replace
-from tilted_scans import write_straight, write_tilted
+from tilted_scans import with_aux, write_straight, write_tilted
 
 from tablegen.link.claims import check_device
 from tablegen.link.device import Device
@@ -257,3 +257,22 @@ def test_a_scan_at_an_angle_with_z_is_uploaded_too(tmp_path: Path) -> None:
     line = VirtualLine(bench.device)
     with Device(line.open, random=Random(1), sleep=line.sleep) as host:
         assert host.upload(scan.image("table"), force=True).generation == 2
+
+
+def test_both_outputs_are_uploaded_as_one_program(tmp_path: Path) -> None:
+    """The second output is the y of the image of z: its words are read back, and its converter counts."""
+    path = with_aux(write_straight(tmp_path))
+    assert run("build", path, "-o", tmp_path / "build", "-q").status == 0
+    scan = PreparedScan.of_build(tmp_path / "build")
+    bench = Bench(device_for(scan))
+    outcome = bench.run("upload", tmp_path / "build")
+    assert outcome.status == 0, outcome.err
+    assert "all equal" in bench.run("readback", tmp_path / "build").out
+    image = scan.image("table")
+    data = bytearray(image.data)
+    data[-1] ^= 1
+    assert [difference.word[:9] for difference in differences(scan, bytes(data))] == ["z, y: rat"]
+    plain = device_for(scan, y=AxisShape(9, 16, 16, 16))
+    outcome = Bench(plain).run("upload", tmp_path / "build")
+    assert outcome.status == 9
+    assert "the axis beside z: converter words of 16 bits, twos-complement; the device sends of 16 bits" in outcome.err

@@ -25,10 +25,11 @@ from tilted_scans import (
 from tablegen.base.input_errors import Problems, Rejected
 from tablegen.certificate.certified_scan import certify_scan
 from tablegen.config.load import load
+from tablegen.config.schema import TiltName
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import make_plan
 from tablegen.planning.tilt import TiltedOutput
-from tablegen.planning.turned_plan import FrameGeometry, make_turned_plan, plan_z
+from tablegen.planning.turned_plan import FrameGeometry, make_turned_plan, plan_tilts
 
 LSB_NM = NM_PER_V * 100.0 / 65536.0
 
@@ -46,22 +47,19 @@ def heights(z: TiltedOutput, lines: Ints, ticks: Ints) -> Floats:
     return NM_PER_V * volts_of(z.program.frame()[lines, ticks])
 
 
-def planned(path: Path) -> TiltedOutput:
-    """The output z of a scan alone, without what is learnt on x and y."""
+def planned(path: Path, name: TiltName = "z") -> TiltedOutput:
+    """An output beside x and y of a scan alone, without what is learnt on x and y."""
     setup, problems = load(path), Problems()
-    without = {"angle_deg": 0.0, "z": None}
+    without = {"angle_deg": 0.0, "z": None, "aux": None}
     straight = make_plan(replace(setup, scan=replace(setup.scan, **without)))
-    z = plan_z(setup, straight, FrameGeometry.of(setup, straight), problems)
+    tilts = plan_tilts(setup, straight, FrameGeometry.of(setup, straight), problems)
     problems.stop_if_any()
-    assert z is not None
-    return z
+    return tilts[name]
 
 
-def straight(path: Path) -> TiltedOutput:
-    """The output z of a scan without an operator."""
-    z = make_plan(load(path)).z
-    assert z is not None
-    return z
+def straight(path: Path, name: TiltName = "z") -> TiltedOutput:
+    """An output beside x and y of a scan without an operator."""
+    return {tilt.name: tilt for tilt in make_plan(load(path)).tilts}[name]
 
 
 @pytest.mark.parametrize(("angle_deg", "operators"), [(0.0, True), (30.0, True), (0.0, False)])

@@ -26,7 +26,7 @@ from link_random import KEY, Dialogue
 from link_talk import Talk
 from replacing import replace
 from sets import long, one_of
-from tilted_scans import write_sine, write_stepped, write_straight, write_tilted
+from tilted_scans import with_aux, write_sine, write_stepped, write_straight, write_tilted
 
 from tablegen.base.resources import c_link, c_runtime
 from tablegen.device.commit_mode import CommitMode
@@ -48,6 +48,7 @@ SHAPES = {
 }
 CUBIC = SHAPES["cubic"]
 SCANS = {"angle": write_tilted, "straight": write_straight, "steps": write_stepped, "sine": write_sine}
+SCANS["both outputs"] = lambda folder: with_aux(write_straight(folder))
 OPTIONS = ["-DDAC_SPLINE=1", "-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1", "-DDAC_LINK_Z=1"]
 
 

@@ -340,6 +340,6 @@ def test_the_page_shows_a_limit_that_z_exceeds(straight: Path) -> None:
     stored = read_build(straight)
     assert stored.z is not None
     program, stated = stored.z.program(stored.manifest.sequence), stored.z.certificate
-    shown = ShownTilt(stored.z, program, stated.codes, stated.error_lsb, stated.error_nm)
+    shown = ShownTilt("z", stored.z, program, stated.codes, stated.error_lsb, stated.error_nm)
     for limit, says in ((1.5, "\u2713 within"), (0.5, "\u2717 exceeded")):
         assert rows_of(tilt_section(shown, limit))["largest error at imaged ticks"][1:] == [f"{limit} LSB", says]

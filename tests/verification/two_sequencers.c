@@ -1,5 +1,5 @@
 /* Plays a scan with the output z as an application does: two sequencers, a tick of each in every interrupt. Prints the
- * word of z and the markers of both, a tick a line. The argument is the number of ticks. */
+ * word of z, the markers of both, and the word of y beside z, a tick a line. The argument is the number of ticks. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -26,7 +26,8 @@ int main(int count, char **arguments)
 
         dac_sequencer_step(&sequencer, &tick);
         dac_sequencer_step(&sequencer_of_z, &tick_of_z);
-        printf("%lu %u %u\n", (unsigned long)tick_of_z.x, (unsigned)tick.markers, (unsigned)tick_of_z.markers);
+        printf("%lu %u %u %lu\n", (unsigned long)tick_of_z.x, (unsigned)tick.markers, (unsigned)tick_of_z.markers,
+               (unsigned long)tick_of_z.y);
     }
     return 0;
 }

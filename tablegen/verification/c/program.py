@@ -89,7 +89,7 @@ def _choices(stored: StoredBuild) -> dict[str, int]:
     """Return the macros with which a firmware for this build is compiled."""
     axes = [axis for _, axis in stored.axes]
     order = max(program.output.shaping.order for program in (stored.program.x, stored.program.y))
-    outputs = [axis.output.word_bits for axis in axes] + ([] if stored.z is None else [stored.z.output.word_bits])
+    outputs = [axis.output.word_bits for axis in axes] + [tilt.output.word_bits for tilt in stored.tilts.values()]
     cubic = stored.z is not None or any(axis.table.mode == "cubic" for axis in axes)
     return {
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),

@@ -1,4 +1,4 @@
-"""The output z of a build at 0 degrees, compared with the plane of its slopes at every imaged tick of a frame."""
+"""The outputs beside x and y of a build at 0 degrees, compared with the planes of their slopes at every imaged tick."""
 
 from math import isclose
 
@@ -7,7 +7,7 @@ import numpy as np
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.manifest.fields import ManifestAxis
-from tablegen.manifest.frame_fields import StraightZ
+from tablegen.manifest.frame_fields import StraightTilt
 from tablegen.manifest.read import StoredBuild
 from tablegen.numerics.arrays import Floats, Ints
 
@@ -15,8 +15,8 @@ _SAME = 1e-9
 _PRINTED = 1e-5  # of a figure with six digits
 
 
-def wrong_tilt(stored: StoredBuild, z: StraightZ) -> tuple[int, list[str]]:
-    """Compare the codes of z with its limits, its certificate, and the plane over the wanted places of x and y.
+def wrong_tilt(stored: StoredBuild, z: StraightTilt) -> tuple[int, list[str]]:
+    """Compare the codes of an output with its limits, its certificate, and the plane over the wanted places of x and y.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def wrong_tilt(stored: StoredBuild, z: StraightZ) -> tuple[int, list[str]]:
 
 
 def _distance(
-    z: StraightZ, program: FrameProgram, schedule: Schedule, x: ManifestAxis, y: ManifestAxis
+    z: StraightTilt, program: FrameProgram, schedule: Schedule, x: ManifestAxis, y: ManifestAxis
 ) -> tuple[int, float]:
     """Return how many codes are imaged, and the largest distance of one from the wanted height, in LSB."""
     t = (np.arange(schedule.ticks) + 0.5) / schedule.ticks
