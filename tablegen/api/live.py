@@ -11,7 +11,7 @@ from msgspec import structs
 
 from tablegen.api.build import Build, build_planned
 from tablegen.api.live_preview import LivePreview, PreviewWords, is_accepted, preview_words, program_digest, words_of
-from tablegen.api.live_tilt import OFFSET_KEY, Z_BEGINS, LiveZ, check_room, followed_offset_v, split_table
+from tablegen.api.live_tilt import Z_BEGINS, LiveZ, check_room, followed_offset_v, offset_key, split_table
 from tablegen.api.turned import TurnedBuild, build_turned
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.certificate.certificate import EmittedPeriods
@@ -77,7 +77,8 @@ class LiveScan:
 
     ``swap`` is the mode in which it took the place of the scan before: ``keep`` where the frame went on; None where
     the device played it already. ``generation`` counts the programs of the device. ``preview`` is what played first,
-    None without one. ``z`` is the output on a tilted sample, None without one.
+    None without one. ``z`` is the output on a tilted sample and ``aux`` the second one,
+    None without them.
     """
 
     name: str
@@ -91,6 +92,7 @@ class LiveScan:
     y: LiveAxis
     preview: LivePreview | None = None
     z: LiveZ | None = None
+    aux: LiveZ | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields, and those of the axes, as plain data."""
@@ -120,6 +122,11 @@ class _Scan:
     def z(self) -> LiveZ | None:
         """The place of the output z, None without one."""
         return None if self.plan.z is None else LiveZ.of_plan(self.plan.z, self.setup)
+
+    @cached_property
+    def aux(self) -> LiveZ | None:
+        """The place of the output aux, None without one."""
+        return None if self.plan.aux is None else LiveZ.of_plan(self.plan.aux, self.setup)
 
     @cached_property
     def prepared(self) -> PreparedScan:
@@ -167,8 +174,9 @@ class Live:
     the offset that come closest to the new plan. It plays when the plan is there and keeps all limits; the plan follows
     at once, certified.
 
-    A scan may have the output z, on a device with ``DAC_LINK_Z``: z stays on the plane of the sample through all moves,
-    so that each gives it another voltage in the centre of the scan. A move beyond the range of z is refused. Such a
+    A scan may have the output z, on a device with ``DAC_LINK_Z``: z, and the second output aux, stay on their planes
+    through all moves, so that each gives them another voltage in the centre of the scan. A move beyond their range is
+    refused. Such a
     device has no ``DAC_MOVE``.
     """
 
@@ -225,6 +233,11 @@ class Live:
     def z(self) -> LiveZ | None:
         """The output z of that plan: its voltage in the centre, its heights and the room about them; None without z."""
         return self._scan.z
+
+    @property
+    def aux(self) -> LiveZ | None:
+        """The output aux of that plan, as ``z``; None without it."""
+        return self._scan.aux
 
     @property
     def angle_deg(self) -> float:
@@ -302,14 +315,16 @@ class Live:
         """
         every = other_settings(self._scan.settings, settings)
         variant, setup = self._variant(every)
-        before, z = self._scan.setup, self._scan.plan.z
-        if z is None or setup.scan.z is None or OFFSET_KEY in settings:
-            return every, variant, setup
-        offset_v = followed_offset_v(before, setup)
-        if offset_v != setup.scan.z.offset_v:
-            every = {**every, OFFSET_KEY: offset_v}
-            variant, setup = self._variant(every)
-            check_room(z, before, setup, settings)
+        before, asked = self._scan.setup, setup
+        for tilt in self._scan.plan.tilts:
+            key = offset_key(tilt.name)
+            if tilt.name not in asked.scan.tilts or key in settings:
+                continue
+            offset_v = followed_offset_v(before, asked, tilt.name)
+            if offset_v != asked.scan.tilts[tilt.name].offset_v:
+                every = {**every, key: offset_v}
+                variant, setup = self._variant(every)
+                check_room(tilt, before, setup, settings)
         return every, variant, setup
 
     def _variant(self, settings: dict[str, Any]) -> tuple[Variant, Setup]:
@@ -434,6 +449,7 @@ class Live:
             y=y,
             preview=preview or played,
             z=scan.z,
+            aux=scan.aux,
         )
 
     def _check_z_begins(self, plan: AnyPlan) -> None:

@@ -23,7 +23,7 @@ from tablegen.planning.turned_plan import (
     TurnedPlan,
     check_reach,
     plan_at_0,
-    plan_z,
+    plan_tilts,
     within_range,
 )
 from tablegen.waveform.series import FourierSeries
@@ -49,7 +49,7 @@ class TurnedPreview(Struct, frozen=True, eq=False):
 def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     """Scale the program that plays to another scan; None where it has other lines or windows, or leaves a limit.
 
-    Nothing is learnt for z, so that of the preview is the exact one; there is no preview where z begins or ends.
+    Nothing is learnt for z and aux, so those of the preview are exact; there is no preview where one begins or ends.
 
     Raises
     ------
@@ -62,8 +62,8 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     if any(getattr(old, key) != getattr(new, key) for key in same_keys):
         return None
     geometry, problems = FrameGeometry.of(setup, straight), Problems()
-    shares, z = geometry.shares, plan_z(setup, straight, geometry, problems)
-    if problems.entries or (z is None) != (plan.z is None):
+    shares, tilts = geometry.shares, plan_tilts(setup, straight, geometry, problems)
+    if problems.entries or tilts.keys() != {tilt.name for tilt in plan.tilts}:
         return None
     programs, errors = [], []
     for axis, line in zip(plan.axes, straight.lines, strict=True):
@@ -75,7 +75,7 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
             return None
         programs.append(program)
         errors.append(error)
-    program_of_z = structs.replace(plan, z=z).program_of_z
+    program_of_z = structs.replace(plan, **tilts).program_of_z
     return TurnedPreview(ScanProgram(programs[0], programs[1], old), errors[0], errors[1], program_of_z)
 
 

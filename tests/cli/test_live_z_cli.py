@@ -15,11 +15,16 @@ from editing import edited, run
 from replacing import replace
 from test_live_cli import pressed, said
 from tilted_scans import (
+    AUX_NM_PER_V,
+    AUX_OFFSET_V,
+    AUX_X,
+    AUX_Y,
     NM_PER_V,
     OFFSET_V,
     SLOPE_X,
     SLOPE_Y,
     volts_of,
+    with_aux,
     write_sine,
     write_stepped,
     write_straight,
@@ -39,6 +44,7 @@ from tablegen.link.messages import DeviceInfo, DeviceState, Feature, More, Reaso
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import LinePlayer
 from tablegen.link.prepare import PreparedScan
+from tablegen.numerics.arrays import Ints
 from tablegen.planning.line_plan import make_plan
 
 pytestmark = pytest.mark.common
@@ -62,7 +68,8 @@ def wide(info: DeviceInfo) -> DeviceInfo:
     """The same device with modes of a COMMIT and the widest limits of steps, in z too."""
     limits = {f"{axis}_limits": replace(getattr(info, f"{axis}_limits"), max_step=1 << 16) for axis in "xy"}
     assert info.z is not None
-    z = replace(info.z, x_limits=replace(info.z.x_limits, max_step=1 << 16))
+    steps = {f"{axis}_limits": replace(getattr(info.z, f"{axis}_limits"), max_step=1 << 16) for axis in "xy"}
+    z = replace(info.z, **steps)
     more, table = info.more | More.PIXEL_TABLES, {"table_pixels": 64}
     return replace(info, features=info.features | Feature.COMMIT_MODES, more=more, z=z, **limits, **table)
 
@@ -224,6 +231,45 @@ def test_steps_of_y_and_a_sine_of_x_move_too(write: Any, tmp_path: Path) -> None
         assert scan.swap == "keep"
         assert machine.z_player is not None
         assert machine.z_player.swaps == machine.player.swaps == 2
+
+
+# The second output
+
+
+def test_aux_stays_on_its_own_plane(tmp_path: Path) -> None:
+    """Its voltage in the centre is that of its slopes, whatever z does; a move beyond its range names it."""
+    path = with_aux(write_straight(tmp_path, SMOOTH))
+    with session(wide(z_info_for(prepared(path))), path) as (machine, device, live):
+        started = live.start()
+        assert started.aux is not None
+        assert (started.aux.offset_v, started.aux.slope_x, started.aux.slope_y) == (AUX_OFFSET_V, AUX_X, AUX_Y)
+        moved = live.move(40.0, -30.5)
+        assert moved.z is not None
+        assert moved.aux is not None
+        assert moved.z.offset_v == pytest.approx(OFFSET_V + (40.0 * SLOPE_X - 30.5 * SLOPE_Y) / NM_PER_V)
+        assert moved.aux.offset_v == pytest.approx(AUX_OFFSET_V + (40.0 * AUX_X - 30.5 * AUX_Y) / AUX_NM_PER_V)
+        same = prepared(
+            path,
+            x__offset_nm=moved.x.position_nm,
+            y__offset_nm=moved.y.position_nm,
+            z__offset_v=moved.z.offset_v,
+            aux__offset_v=moved.aux.offset_v,
+        )
+        assert same.program_of_z is not None
+        frames = [_aux_frame(one) for one in (of_z(machine), same.program_of_z, prepared(path).program_of_z)]
+        assert (frames[0] == frames[1]).all()
+        assert not (frames[0] == frames[2]).all()
+        live.set({"aux": {"offset_v": 97.5}, "z.slope_x": 0.0, "z.slope_y": 0.0})
+        sent = device._session.exchange.bytes_sent
+        with pytest.raises(Rejected, match=r"aux: a move by x_nm = -?[\d.]+ and y_nm = 0 takes aux to .* fit$"):
+            live.move(120.0, 0.0)
+        assert device._session.exchange.bytes_sent == sent
+
+
+def _aux_frame(program: ScanProgram | None) -> Ints:
+    assert program is not None
+    assert isinstance(program.y, FrameProgram)
+    return program.y.frame()
 
 
 # Range

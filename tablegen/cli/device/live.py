@@ -180,7 +180,7 @@ def _status(live_scan: "Live", device: "Device", request: dict[str, Any]) -> dic
 def _where(live_scan: "Live", status: "DeviceStatus") -> dict[str, Any]:
     """Return position and size of each axis, and z; null where the device plays a scan that is not of this session."""
     if status.generation != live_scan.generation:
-        return {"x": None, "y": None, "z": None}
+        return {"x": None, "y": None, "z": None, "aux": None}
     z = live_scan.z
     faults = {} if status.z is None else {"faults": status.z.faults}
     return {
@@ -189,6 +189,7 @@ def _where(live_scan: "Live", status: "DeviceStatus") -> dict[str, Any]:
             for line in live_scan.place
         },
         "z": None if z is None else {**asdict(z), **faults},
+        "aux": None if live_scan.aux is None else asdict(live_scan.aux),
     }
 
 

@@ -91,7 +91,7 @@ def _distances(live: "Live", right: int, up: int) -> tuple[float, float]:
 def _place(live: "Live", scan: "LiveScan") -> str:
     """Describe the scan that plays: a bar of the driver's range for each axis, rate, and how it began."""
     rows = [_bar(line, axis) for line, axis in zip(live.place, (scan.x, scan.y), strict=True)]
-    rows += [] if scan.z is None else [_bar_of_z(scan.z)]
+    rows += [_bar_beside(name, one) for name, one in (("z", scan.z), ("aux", scan.aux)) if one is not None]
     how = {"keep": "the frame goes on", "frame": "from a new frame", "line": "a frame begins", None: "played already"}
     angle = f", {scan.angle_deg:.4g} degrees" if scan.angle_deg else ""
     return "\n".join([*rows, f"{scan.line_rate_hz:.4g} Hz, {scan.lines} lines{angle}; {how[scan.swap]}"])
@@ -107,14 +107,14 @@ def _bar(line: "LinePlan", axis: "LiveAxis") -> str:
     return f"{line.axis} {driver.v_min:g} V [{bar}] {driver.v_max:g} V  {place}{drift}"
 
 
-def _bar_of_z(z: "LiveZ") -> str:
-    """Draw the heights of z in a frame in its whole range."""
+def _bar_beside(name: str, z: "LiveZ") -> str:
+    """Draw the heights of z or aux in a frame in its whole range."""
     below, above, height = z.room_below_nm, z.room_above_nm, z.highest_nm - z.lowest_nm
     whole = below + height + above
     bottom, top = z.lowest_nm - below, z.highest_nm + above
     bar = _drawn(below / whole, (below + height) / whole)
     room = f"{height:.4g} nm about {z.offset_v:.5g} V, room {below:.4g} nm below, {above:.4g} nm above"
-    return f"z {bottom:.4g} nm [{bar}] {top:.4g} nm  {room}"
+    return f"{name} {bottom:.4g} nm [{bar}] {top:.4g} nm  {room}"
 
 
 def _drawn(low: float, high: float) -> str:
