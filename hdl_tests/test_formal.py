@@ -91,6 +91,7 @@ PROOFS = {
     "slow_fit": Proof("slow_fit_properties", 1, 50, covers=4, skip=44),
     "slow_fit_of_14_bits": Proof("slow_fit_properties", 1, 0, {**_14_BITS, "LINE_BITS": 16}),
     "slow_engine": Proof("slow_engine_properties", 2, 6),
+    "slow_engine_mix": Proof("slow_engine_properties", 2, 0, {"RATIO_BITS": 4, "RATIO_ZEROS": 10}),
     "slow_axis": Proof("slow_axis_properties", 1, 14, {}, ("dac_axis_serial",), 16, asserts_in_stubs=False),
     "pair_slew": Proof("pair_slew_properties", 1, 14, {"BITS": 4}),
     "pair_slew_of_16_bits": Proof("pair_slew_properties", 1, 0, {"BITS": 16}),
@@ -211,6 +212,7 @@ SLOW_PROOFS = {
     "pair_slew_of_16_bits",
     "pair_phase_of_31_bits",
     "pair_delay_of_64_clocks",
+    "slow_engine_mix",
     "slow_fit_of_14_bits",
     "slow_store_gains",
     "slow_store_ratios",
@@ -553,6 +555,9 @@ SERIAL_MUTANTS = {
 # As these do, whose counterexamples lie 500 clocks of arithmetic deep: of the proof, module, text, and instead.
 ENGINE_MUTANTS = {
     "slow_search_without_end": ("slow_engine", "if (reduces && knot != 7'd63)", "if (reduces)"),
+    "slow_mix_a_bit_short": ("slow_engine_mix", "bits_left <= 6'd7", "bits_left <= 6'd6"),
+    "slow_mix_cut_off": ("slow_engine_mix", "12'h800", "12'h000"),
+    "slow_limit_is_the_other_one": ("slow_engine_mix", "beyond ? limits ^ sign_bit", "beyond ? ~limits ^ sign_bit"),
     "slow_table_a_word_longer": ("slow_engine", "if (word_ends) begin", "if (word_ends && !enable) begin"),
 }
 

@@ -1,10 +1,10 @@
 // dac_slow_engine, from any start on, whatever words it reads and however often it stands still: its work ends after a
-// bounded number of clocks; each word of both tables is written once, and is the word of docs/sequencer.md, "Fast and
-// slow part", of its fast word, its second word and the ratio of the line; with `enable` low, and when it is done, it
-// writes nothing.
+// bounded number of clocks; each word of both tables is written once, in order; with `enable` low, and when it is
+// done, it writes nothing. With RATIO_BITS, the word is that of docs/sequencer.md, "Fast and slow part", of its fast
+// word, its second word and the ratio of the line, which is what the divisions have left.
 //
 // `watch` picks any word. Tables of 4 and 8 words of 8 and 9 bits: a step of the induction is a bit of a product, so
-// their number is no part of the argument. The ratio is what the divisions have left for the line.
+// their number is no part of the argument. Nothing is said here of the offset, the ramp and the gain that it writes.
 
 `default_nettype none
 

@@ -29,7 +29,8 @@ module slow_store_properties #(
     input wire [6:0]  watch_place
 );
     localparam PAGE = 0, FAST = 1, SECOND = 2, SLOW = 3, GAINS = 4, RATIOS = 5;
-    localparam BITS = KIND == PAGE ? 32 : KIND == FAST || KIND == SLOW ? 9 : KIND == SECOND ? 8 : KIND == GAINS ? 18 : 16;
+    localparam BITS = KIND == PAGE ? 32 : KIND == FAST || KIND == SLOW ? 9 : KIND == SECOND ? 8 :
+                      KIND == GAINS ? 18 : 16;
     localparam PLACES = KIND == PAGE ? 16 : KIND == FAST || KIND == SECOND ? 4 : KIND == SLOW ? 8 : 65;
     localparam PLACE_BITS = KIND == PAGE ? 4 : KIND == FAST || KIND == SECOND ? 2 : KIND == SLOW ? 3 : 7;
 
