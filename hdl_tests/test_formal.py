@@ -509,6 +509,12 @@ MUTANTS = {
         "slow_fit", "dac_slow_fit", "place < {7'd0, MOST_KNOTS}", "place <= {7'd0, MOST_KNOTS}"
     ),
     "slow_knots_of_more": ("slow_fit", "dac_slow_fit", "data[6:0] <= MOST_KNOTS && !data[7]", "!data[7]"),
+    "slow_withdrawn_word_is_right": (
+        "slow_fit",
+        "dac_slow_fit",
+        "(writes_spacing && y_page ? is_spacing : y_spaced)",
+        "(y_spaced || (writes_spacing && y_page))",
+    ),
     "slow_word_too_few": ("slow_fit", "dac_slow_fit", "(1 << Y_INDEX_BITS) + 8", "(1 << Y_INDEX_BITS) + 7"),
     "slow_ramp_of_the_next_line": ("slow_axis", "dac_slow_axis", "if (next) by <= next_ramp", "by <= next_ramp"),
     "slow_offset_in_the_next_line": ("slow_axis", "dac_slow_axis", "half ^ of_offset", "half"),
@@ -524,7 +530,7 @@ MUTANTS = {
 # With the first one of each module in each harness.
 FIRSTS = {(harness, module): name for name, (harness, module, _, _) in reversed(MUTANTS.items())}
 LATE = {"pair_digits_of_the_other_axis", "pair_step_of_x_for_y"}  # many clocks deep
-LATE |= {"slow_knots_of_more", "slow_word_too_few"}
+LATE |= {"slow_knots_of_more", "slow_word_too_few", "slow_withdrawn_word_is_right"}
 LATE |= {"slow_page_by_turns", "slow_gain_of_another_knot", "slow_ratio_of_another_knot"}  # large memories
 SOME = {*list(MUTANTS)[::6], *FIRSTS.values()} - LATE
 

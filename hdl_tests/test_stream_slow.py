@@ -454,6 +454,30 @@ def refused(bench: SequencerBench, *writes: tuple[int, int, list[int]], left_out
     return was_refused
 
 
+def taken_after_a_withdrawal(bench: SequencerBench, *writes: tuple[int, list[int]]) -> bool:
+    """Return True if a device takes a program that was withdrawn after the first of these writes of address, words."""
+    script = SlowScript(shape=CUBIC)
+    script.put(random_scan(np.random.default_rng(1), CUBIC, 60, 3, "smooth"))
+    for address, words in writes:
+        script.write(PROGRAM, words, address)
+        script.request("withdraw")
+    script.commit_unfit()
+    script.wait(line_clocks(CUBIC) + 10)
+    script.tick_every(slow_pace(CUBIC))
+    script.wait_ticks(2)
+    return bool(flag(bench.play(script).capture, "swapped").any())
+
+
+@pytest.mark.rest
+def test_a_withdrawal_does_not_make_a_wrong_word_right(cubic: SequencerBench) -> None:
+    """A word that does not fit stays in the idle program when it is withdrawn, until a right one is written over it."""
+    program = random_scan(np.random.default_rng(1), CUBIC, 60, 3, "smooth")
+    words = program_words(program.schedule, program.x, program.y)
+    for address, wrong in ((16 + 12, 2 | 31 << 8), (32 + 12, 0), (16 + 13, 0), (32 + 13, 1 << 17)):
+        assert not taken_after_a_withdrawal(cubic, (address, [wrong]))
+        assert taken_after_a_withdrawal(cubic, (address, [wrong]), (address, [words[address]]))
+
+
 @pytest.mark.rest
 def test_what_is_no_program_with_a_slow_part_is_refused(cubic: SequencerBench) -> None:
     x_part, x_spacing, y_part = 16 + 12, 16 + 13, 32 + 12

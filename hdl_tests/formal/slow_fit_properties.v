@@ -1,10 +1,9 @@
 // dac_slow_fit, whatever is written, discarded and taken: which addresses exist, and that a slow part fits exactly
-// where its words do: of either axis word 12 was written since the last swap, no word 12 or 13 since the last
-// withdrawal or reset was wrong, and as many words were written since the last swap as the program has.
+// where its words do. These are of either axis words 12 and 13, as they were written last since the last swap; no word
+// since the last withdrawal or reset was wrong; and as many words were written since the last swap as the program has.
 //
-// Asked of the surroundings: of regions 5 and 6, only addresses that exist are written (the sequencer sees to it). No
-// more is said of a program that was withdrawn with a wrong word 12, which was not written anew: the module forgets
-// that the word is wrong. Writes are counted, not words: it does not know of a word that was written twice.
+// Asked of the surroundings: of regions 5 and 6, only addresses that exist are written (the sequencer sees to it).
+// Counted are writes, not which words were written: this module does not know of a word that was written twice.
 
 `default_nettype none
 
@@ -56,50 +55,43 @@ module slow_fit_properties #(
     wire wrong = ((x_12 || y_12) && !word_12_fits) || ((x_13 || y_13) && !word_13_fits);
 
     // What was written: of these words the last one and whether it fits, wrong words, and how many in all.
-    reg x_12_fits, y_12_fits, is_wrong;
+    reg x_12_fits, x_13_fits, y_12_fits, y_13_fits, is_wrong;
     reg [6:0] x_knots, y_knots;
     reg [4:0] x_bits, y_bits;
     reg [19:0] words;
-    initial {x_12_fits, y_12_fits, is_wrong, words} = 0;
+    initial {x_12_fits, x_13_fits, y_12_fits, y_13_fits, is_wrong, words} = 0;
     always @(posedge clock) begin
         if (x_12) {x_12_fits, x_bits, x_knots} <= {word_12_fits, data[12:8], data[6:0]};
         if (y_12) {y_12_fits, y_bits, y_knots} <= {word_12_fits, data[12:8], data[6:0]};
+        if (x_13) x_13_fits <= word_13_fits;
+        if (y_13) y_13_fits <= word_13_fits;
         if (write && (is_word || is_slow) && words != 20'hFFFFF) words <= words + 1;
-        if (take) {x_12_fits, y_12_fits, words} <= 0;
+        if (take) {x_12_fits, x_13_fits, y_12_fits, y_13_fits, words} <= 0;
         is_wrong <= wrong || (is_wrong && !discard);
     end
     localparam [19:0] X_WORDS = 4 + (1 << X_INDEX_BITS), Y_WORDS = 4 + (1 << Y_INDEX_BITS);
     wire [19:0] x_words = X_WORDS + (20'd1 << x_bits) + 20'd2 * x_knots;
     wire [19:0] y_words = Y_WORDS + (20'd1 << y_bits) + 20'd2 * y_knots;
 
-    // Withdrawn or reset with a wrong word 12, which is still there.
-    reg x_stays, y_stays;
-    initial {x_stays, y_stays} = 0;
-    always @(posedge clock) begin
-        x_stays <= !take && (x_12 ? !word_12_fits : x_stays);
-        y_stays <= !take && (y_12 ? !word_12_fits : y_stays);
-    end
-    wire is_forgotten = !is_wrong && (x_stays || y_stays);
-
     // The properties: what is accepted fits, and what fits is accepted.
-    wire all_fit = x_12_fits && y_12_fits && !is_wrong;
+    wire all_fit = x_12_fits && x_13_fits && y_12_fits && y_13_fits && !is_wrong;
     always @* begin
-        if (fits && !is_forgotten) assert (all_fit);
-        if (fits && !is_forgotten) assert (words >= x_words + y_words);
+        if (fits) assert (all_fit);
+        if (fits) assert (words >= x_words + y_words);
         if (all_fit && words >= x_words + y_words) assert (fits);
     end
     always @* cover (wrong && is_wrong && discard);
 
 `ifndef PROPERTIES_ALONE
     // What makes them inductive.
-    wire uut__spoilt, uut__x_known, uut__y_known;
+    wire uut__spoilt, uut__x_known, uut__y_known, uut__x_spaced, uut__y_spaced;
     wire [6:0] uut__x_knots, uut__y_knots;
     wire [4:0] uut__x_bits, uut__y_bits;
     wire [17:0] uut__count;
     always @* begin
         assert (uut__spoilt == is_wrong);
-        assert (uut__x_known == (x_12_fits || x_stays) && uut__y_known == (y_12_fits || y_stays));
-        assert (!(x_12_fits && x_stays) && !(y_12_fits && y_stays));
+        assert (uut__x_known == x_12_fits && uut__y_known == y_12_fits);
+        assert (uut__x_spaced == x_13_fits && uut__y_spaced == y_13_fits);
         assert (uut__count == (words < 131072 ? words : 131072));
         if (x_12_fits) assert (uut__x_knots == x_knots && uut__x_bits == x_bits && x_knots <= 65);
         if (y_12_fits) assert (uut__y_knots == y_knots && uut__y_bits == y_bits && y_knots <= 65);

@@ -42,11 +42,12 @@ module dac_slow_fit #(
                    data[12:8] <= MOST_BITS && data[31:13] == 19'd0;
     wire is_spacing = data != 32'd0 && data >> (LINE_BITS + 1) == 0;
     wire writes_part = write && (x_page || y_page) && address[1:0] == PART;
-    wire spoils = (writes_part && !is_part) ||
-                  (write && (x_page || y_page) && address[1:0] == SPACING && !is_spacing);
+    wire writes_spacing = write && (x_page || y_page) && address[1:0] == SPACING;
+    wire spoils = (writes_part && !is_part) || (writes_spacing && !is_spacing);
 
     reg spoilt;
-    reg x_known, y_known;      // how long the parts of the idle program are
+    reg x_known, y_known;      // how long the parts of the idle program are, by a word that fits
+    reg x_spaced, y_spaced;    // a spacing that fits was written last
     reg [6:0] x_knots, y_knots;
     reg [4:0] x_bits, y_bits;  // of the index of a slow table
     reg [17:0] count;
@@ -54,6 +55,8 @@ module dac_slow_fit #(
         spoilt = 1'b0;
         x_known = 1'b0;
         y_known = 1'b0;
+        x_spaced = 1'b0;
+        y_spaced = 1'b0;
         x_knots = 7'd0;
         y_knots = 7'd0;
         x_bits = 5'd0;
@@ -65,8 +68,10 @@ module dac_slow_fit #(
             spoilt <= 1'b1;
         else if (discard)
             spoilt <= 1'b0;
-        x_known <= !take && (x_known || (writes_part && x_page));
-        y_known <= !take && (y_known || (writes_part && y_page));
+        x_known <= !take && (writes_part && x_page ? is_part : x_known);
+        y_known <= !take && (writes_part && y_page ? is_part : y_known);
+        x_spaced <= !take && (writes_spacing && x_page ? is_spacing : x_spaced);
+        y_spaced <= !take && (writes_spacing && y_page ? is_spacing : y_spaced);
         if (writes_part && x_page) {x_bits, x_knots} <= {data[12:8], data[6:0]};
         if (writes_part && y_page) {y_bits, y_knots} <= {data[12:8], data[6:0]};
         if (take)
@@ -77,7 +82,7 @@ module dac_slow_fit #(
     // Gains and ratios are as many.
     wire [7:0] knots = {1'b0, x_knots} + {1'b0, y_knots};
     wire [17:0] needed = WORDS[17:0] + {9'd0, knots, 1'b0} + (18'd1 << x_bits) + (18'd1 << y_bits);
-    assign fits = !spoilt && x_known && y_known && count >= needed;
+    assign fits = !spoilt && x_known && y_known && x_spaced && y_spaced && count >= needed;
 
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
     generate
