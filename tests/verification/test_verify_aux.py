@@ -238,11 +238,6 @@ def test_the_top_plays_both_outputs_of_the_model(small: Path, tmp_path: Path) ->
     assert any("words 0x" in (failure or "") for failure in play(out, PART, tmp_path / "of_coding"))
 
 
-@pytest.mark.long
-def test_verilator_plays_both_outputs(small: Path) -> None:
-    assert verify(small, simulator="verilator").failures == []
-
-
 @pytest.mark.common
 def test_pages_and_comparison_state_the_second_output(straight: Path, turned: Path, tmp_path: Path) -> None:
     """Beside z, with charts of their own; beside another plane rows and chart of aux alone differ."""
