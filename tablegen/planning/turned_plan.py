@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import cache
 from math import ceil, floor
 from typing import Literal
 
@@ -173,13 +174,17 @@ class TurnedPlan(Struct, frozen=True, eq=False):
         return None if self.z is None else program_beside(self.z.program, self.schedule)
 
 
-def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _: None) -> TurnedPlan:
+def make_turned_plan(
+    setup: Setup, progress: Callable[[str], object] = lambda _: None, straight: Plan | None = None
+) -> TurnedPlan:
     """Plan a scan at an angle.
 
     Parameters
     ----------
     progress
         Called with each stage, in words.
+    straight
+        Its ``plan_at_0``, where that is known.
 
     Raises
     ------
@@ -204,7 +209,7 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
             problems.entries.extend(rejected.problems)
     problems.stop_if_any()
     progress("planning the scan at 0 degrees")
-    straight = plan_at_0(setup)
+    straight = plan_at_0(setup) if straight is None else straight
     schedule = straight.schedule
     geometry = FrameGeometry.of(setup, straight)
     if any(geometry.drift_nm_per_s) and schedule.down.count:
@@ -350,11 +355,14 @@ def _axis(
     n = np.arange(1.0, motion.harmonics + 1.0)
     response, boost_db = line.drive.response, line.drive.max_boost_db
 
-    def inverse(series: FourierSeries) -> FourierSeries:
-        if response is None:
-            return series
+    @cache
+    def factors() -> tuple[Floats, Floats]:
+        assert response is not None
         real, imaginary, _ = capped_inverse(response, n * rate_hz, boost_db)
-        return series.times(real, imaginary)
+        return real, imaginary
+
+    def inverse(series: FourierSeries) -> FourierSeries:
+        return series if response is None else series.times(*factors())
 
     with problems.at(*mixing_key(setup)):
         try:

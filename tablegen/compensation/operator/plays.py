@@ -169,5 +169,59 @@ class Plays:
                     total += row
         return totals
 
+    def branch_of_loops(self, u: Floats, low: Floats, high: Floats, rising: bool) -> Floats:
+        """Return ``branch`` of several loops, with every bit of it.
+
+        Parameters
+        ----------
+        u
+            Normalised drives, a row for each loop, shape (loops, n).
+        low, high
+            Normalised drives at the ends of each loop, shape (loops,).
+        rising
+            True for the branches on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            In units of the displacement, shape of ``u``.
+        """
+        power, total, row = np.ones_like(u), np.zeros_like(u), np.empty_like(u)
+        for coefficient in self.reversible:
+            power = power * u
+            total = total + float(coefficient) * power
+        thresholds = self.stretch * self.thresholds
+        for bend, weights in zip(self.bends, self.weights.tolist(), strict=True):
+            if not any(weights):
+                continue
+            least, most = envelopes(low, bend)[1], envelopes(high, bend)[0]
+            # What a play goes on from, and where it stands still: no drive pushes it out of there.
+            at = least[:, None] + thresholds if rising else most[:, None] - thresholds
+            moving = 2.0 * thresholds < (most - least)[:, None]
+            at = np.where(moving, at, (0.5 * (least + most))[:, None])
+            edge = envelopes(u, bend)[0 if rising else 1].copy()
+            # Thresholds ascend: a play stands still where one of a smaller threshold does.
+            stops = np.sum(moving, axis=1).tolist()
+            last = max(stops)
+            standing: dict[int, list[int]] = {}
+            for loop, stop in enumerate(stops):
+                standing.setdefault(stop, []).append(loop)
+            columns = [at[:, number, None] for number in range(len(thresholds))]
+            for number, (threshold, weight) in enumerate(zip(thresholds.tolist(), weights, strict=True)):
+                if number in standing:
+                    edge[standing[number]] = -np.inf if rising else np.inf
+                if not weight:
+                    continue
+                if number >= last:
+                    total += weight * columns[number]
+                    continue
+                if rising:
+                    np.maximum(np.subtract(edge, threshold, out=row), columns[number], out=row)
+                else:
+                    np.minimum(np.add(edge, threshold, out=row), columns[number], out=row)
+                row *= weight
+                total += row
+        return total
+
 
 NO_PLAYS = Plays(np.zeros(0), np.zeros((1, 0)), np.ones(1), FIXED_BENDS[:1])
