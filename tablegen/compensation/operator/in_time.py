@@ -213,8 +213,11 @@ def late_mode(time_s: Floats, y: Floats, tau_s: complex, repeated: int) -> NDArr
         gain[step:] = gain[step:] + factor[step:] * gain[:-step]
         factor[step:] = factor[step:] * factor[:-step]
         step *= 2
-    begin = gain[repeated - 1] / (1.0 - factor[repeated - 1]) if repeated else y[0]
-    out: NDArray[np.complex128] = np.asarray(gain + factor * begin, dtype=np.complex128)
+    begin = np.complex128(y[0])
+    if repeated:  # a complex division of real numbers rounds otherwise than a real one
+        begin = np.complex128(gain[repeated - 1]) / (1.0 - np.complex128(factor[repeated - 1]))
+    first_state = begin if np.iscomplexobj(gain) else begin.real
+    out: NDArray[np.complex128] = np.asarray(gain + factor * first_state, dtype=np.complex128)
     return out
 
 
@@ -268,7 +271,7 @@ class _Way(NamedTuple):
     """A monotone way of so many samples: from ``start`` to ``end``, along the branches of its pieces."""
 
     begin: int
-    count: int
+    samples: int
     start: _Turn
     end: _Turn
     pieces: list[_Piece]
@@ -307,7 +310,7 @@ class _Memory:
             positions = _positions_of(way, shares)
             way.end.y = float(positions[-1])
             if number >= before:
-                out[way.begin : way.begin + way.count] = positions
+                out[way.begin : way.begin + way.samples] = positions
         return out
 
     def _way(self, begin: int, u: Floats) -> _Way:
@@ -365,7 +368,7 @@ class _Memory:
 
 def _positions_of(way: _Way, shares: list[Floats]) -> Floats:
     """Return the positions in nm along a way whose turns are known."""
-    out = np.full(way.count, way.start.y)
+    out = np.full(way.samples, way.start.y)
     for first, until, last, aim, stretch, reaches in way.pieces:
         out[first:until] = last.y + (aim.y - last.y) * shares[stretch]
         if reaches:

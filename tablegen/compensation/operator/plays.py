@@ -13,6 +13,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.elementary import exp
 
 _LN10 = 2.302585092994046
+_FEW = 16  # drives for which one array of all plays is faster than a play at a time
 BENDS = 4  # numbers that bend both envelopes of a play
 # l and s of two envelopes, of which the lower one pushes where the drive rises: u, u^2 and 1 - (1 - u)^2, both alike.
 FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0, 1.0, 0.0]])
@@ -143,6 +144,8 @@ class Plays:
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
+        if u.ndim == 1 and u.size <= _FEW:
+            return [self._at_few(total, u, low, high, rising) for rising in ways]
         totals = [total.copy() for _ in ways]
         # Row by row in one buffer: a table of all plays would leave the cache, and take three times as long.
         row = np.empty_like(u)
@@ -168,6 +171,21 @@ class Plays:
                     row *= weight
                     total += row
         return totals
+
+    def _at_few(self, total: Floats, u: Floats, low: float, high: float, rising: bool) -> Floats:
+        """Return ``total`` with the plays of a branch: all of them at once, added one after the other."""
+        thresholds, sums = self.stretch * self.thresholds, total[None]
+        for bend, weights in zip(self.bends, self.weights, strict=True):
+            some = np.flatnonzero(weights)
+            if not len(some):
+                continue
+            lower, upper = envelopes(u, bend)
+            least, most = _inner_ends(low, high, bend)
+            r, weight = thresholds[some, None], weights[some, None]
+            moving = np.maximum(lower - r, least + r) if rising else np.minimum(upper + r, most - r)
+            positions = np.where(2.0 * r < most - least, moving, 0.5 * (least + most))
+            sums = np.add.accumulate(np.concatenate([sums, weight * positions]), axis=0)[-1:]
+        return np.asarray(sums[0])
 
     def branch_of_loops(self, u: Floats, low: Floats, high: Floats, rising: bool) -> Floats:
         """Return ``branch`` of several loops, with every bit of it.
