@@ -174,17 +174,13 @@ class TurnedPlan(Struct, frozen=True, eq=False):
         return None if self.z is None else program_beside(self.z.program, self.schedule)
 
 
-def make_turned_plan(
-    setup: Setup, progress: Callable[[str], object] = lambda _: None, straight: Plan | None = None
-) -> TurnedPlan:
+def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _: None) -> TurnedPlan:
     """Plan a scan at an angle.
 
     Parameters
     ----------
     progress
         Called with each stage, in words.
-    straight
-        Its ``plan_at_0``, where that is known.
 
     Raises
     ------
@@ -209,7 +205,7 @@ def make_turned_plan(
             problems.entries.extend(rejected.problems)
     problems.stop_if_any()
     progress("planning the scan at 0 degrees")
-    straight = plan_at_0(setup) if straight is None else straight
+    straight = plan_at_0(setup)
     schedule = straight.schedule
     geometry = FrameGeometry.of(setup, straight)
     if any(geometry.drift_nm_per_s) and schedule.down.count:
